@@ -1,0 +1,1 @@
+//! Where evidence and model meet: similarity, search, start, filter, tracker.
