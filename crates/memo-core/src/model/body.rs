@@ -1,0 +1,402 @@
+//! The body: 14 elliptic cylinders in a hierarchy of rigid transforms (Rohr 1994, section 3.1).
+//!
+//! Lengths are fractions of body height after Drillis and Contini 1966 (as printed in Winter, *Biomechanics and Motor Control
+//! of Human Movement*). Rohr measured the thickness of the parts on a clothed person and does not print it;
+//! [`Proportions::default`] holds thicknesses of a person of average build in light clothing, chosen here.
+//!
+//! Limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of forearm and shank.
+
+use super::cylinder::EllipticCylinder;
+use super::gait::{Gait, GaitStyle, Posture, SideAngles};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use thiserror::Error;
+
+/// Number of parts.
+pub const PART_COUNT: usize = 14;
+
+/// Why a body could not be made.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum BodyError {
+    /// Body height is not plausible for a human in metres.
+    #[error("body height must lie between 0.4 and 2.6 metres, got {height_m}{}", centimetre_hint(*.height_m))]
+    Height {
+        /// Height given.
+        height_m: f64,
+    },
+}
+
+fn centimetre_hint(height_m: f64) -> &'static str {
+    if (40.0..=260.0).contains(&height_m) { " (that looks like centimetres)" } else { "" }
+}
+
+/// The 14 parts, in the order of every slice of posed cylinders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Part {
+    Head,
+    Torso,
+    RightUpperArm,
+    RightForearm,
+    RightHand,
+    LeftUpperArm,
+    LeftForearm,
+    LeftHand,
+    RightThigh,
+    RightShank,
+    RightFoot,
+    LeftThigh,
+    LeftShank,
+    LeftFoot,
+}
+
+impl Part {
+    /// All parts in order.
+    pub const ALL: [Self; PART_COUNT] = [
+        Self::Head,
+        Self::Torso,
+        Self::RightUpperArm,
+        Self::RightForearm,
+        Self::RightHand,
+        Self::LeftUpperArm,
+        Self::LeftForearm,
+        Self::LeftHand,
+        Self::RightThigh,
+        Self::RightShank,
+        Self::RightFoot,
+        Self::LeftThigh,
+        Self::LeftShank,
+        Self::LeftFoot,
+    ];
+
+    /// Whether the part belongs to an arm.
+    pub fn is_arm(self) -> bool {
+        (2..8).contains(&(self as u8))
+    }
+
+    /// Whether the part belongs to a leg.
+    pub fn is_leg(self) -> bool {
+        self as u8 >= 8
+    }
+}
+
+/// Sizes as fractions of body height. Lengths and widths: Drillis and Contini 1966.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Proportions {
+    /// Height of the chin, where the head begins.
+    pub chin_height: f64,
+    /// Height of the shoulder joints.
+    pub shoulder_height: f64,
+    /// Height of the hip joints.
+    pub hip_height: f64,
+    /// Height of the knee joints.
+    pub knee_height: f64,
+    /// Height of the ankle joints.
+    pub ankle_height: f64,
+    /// Shoulder to elbow.
+    pub upper_arm: f64,
+    /// Elbow to wrist.
+    pub forearm: f64,
+    /// Wrist to finger tips; the hand swings loosely curled, so it shows less.
+    pub hand: f64,
+    /// Heel to toe.
+    pub foot: f64,
+    /// Heel behind the ankle.
+    pub heel: f64,
+    /// Distance of a shoulder joint from the middle plane.
+    pub shoulder_half_width: f64,
+    /// Distance of a hip joint from the middle plane.
+    pub hip_half_width: f64,
+    /// Semi-axes (front to back, side to side) of head, torso, upper arm, forearm, hand, thigh, shank;
+    /// of the foot (up and down, side to side).
+    pub semi_axes: [(f64, f64); 8],
+}
+
+impl Default for Proportions {
+    fn default() -> Self {
+        Self {
+            chin_height: 0.870,
+            shoulder_height: 0.818,
+            hip_height: 0.530,
+            knee_height: 0.285,
+            ankle_height: 0.039,
+            upper_arm: 0.186,
+            forearm: 0.146,
+            hand: 0.070,
+            foot: 0.152,
+            heel: 0.035,
+            shoulder_half_width: 0.110,
+            hip_half_width: 0.050,
+            semi_axes: [
+                (0.054, 0.044),
+                (0.066, 0.095),
+                (0.027, 0.027),
+                (0.022, 0.022),
+                (0.022, 0.012),
+                (0.044, 0.044),
+                (0.030, 0.030),
+                (0.020, 0.026),
+            ],
+        }
+    }
+}
+
+/// Limb joints of one side in the world, metres.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct SideJoints {
+    pub shoulder: DVec3,
+    pub elbow: DVec3,
+    pub wrist: DVec3,
+    pub hip: DVec3,
+    pub knee: DVec3,
+    pub ankle: DVec3,
+}
+
+impl SideJoints {
+    /// Names of the joints in the order of [`SideJoints::to_array`].
+    pub const NAMES: [&'static str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
+
+    /// The joints in the order of [`SideJoints::NAMES`].
+    pub fn to_array(self) -> [DVec3; 6] {
+        [self.shoulder, self.elbow, self.wrist, self.hip, self.knee, self.ankle]
+    }
+}
+
+/// A body in a posture, placed in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PosedBody {
+    /// The 14 parts in the order of [`Part::ALL`].
+    pub cylinders: [EllipticCylinder; PART_COUNT],
+    /// Joints of the right side.
+    pub right: SideJoints,
+    /// Joints of the left side.
+    pub left: SideJoints,
+    /// Centre of the torso.
+    pub torso_centre: DVec3,
+}
+
+/// A body of given height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Body height crown to sole, metres.
+    pub height_m: f64,
+    /// Sizes as fractions of the height.
+    pub proportions: Proportions,
+}
+
+impl Body {
+    /// A body of the default proportions.
+    pub fn from_height(height_m: f64) -> Result<Self, BodyError> {
+        if !(0.4..=2.6).contains(&height_m) {
+            return Err(BodyError::Height { height_m });
+        }
+        Ok(Self { height_m, proportions: Proportions::default() })
+    }
+
+    /// Hip to shoulder, metres.
+    pub fn torso_length_m(&self) -> f64 {
+        (self.proportions.shoulder_height - self.proportions.hip_height) * self.height_m
+    }
+
+    /// Hip joint to ground with straight legs, metres.
+    pub fn leg_length_m(&self) -> f64 {
+        self.proportions.hip_height * self.height_m
+    }
+
+    /// Places the body: torso centre and heading in the world, all joint angles given.
+    ///
+    /// Every transform is `parent_from_child`; the chain is world, torso, upper limb, lower limb, hand or foot.
+    pub fn pose(&self, torso_centre: DVec3, heading_rad: f64, posture: &Posture) -> PosedBody {
+        let world_from_body =
+            DAffine3::from_mat3_translation(DMat3::from_rotation_z(heading_rad), torso_centre);
+        let world_from_torso = world_from_body * DAffine3::from_rotation_y(posture.trunk_lean);
+        let mut cylinders = [self.torso(world_from_torso); PART_COUNT];
+        cylinders[Part::Head as usize] = self.head(world_from_torso);
+        let right = self.side(world_from_torso, -1.0, &posture.right, posture.trunk_lean, &mut cylinders);
+        let left = self.side(world_from_torso, 1.0, &posture.left, posture.trunk_lean, &mut cylinders);
+        PosedBody { cylinders, right, left, torso_centre }
+    }
+
+    fn torso(&self, world_from_torso: DAffine3) -> EllipticCylinder {
+        self.cylinder(1, world_from_torso, 0.5 * self.torso_length_m())
+    }
+
+    fn head(&self, world_from_torso: DAffine3) -> EllipticCylinder {
+        let p = &self.proportions;
+        let half_length = 0.5 * (1.0 - p.chin_height) * self.height_m;
+        let centre =
+            (p.chin_height - p.shoulder_height) * self.height_m + 0.5 * self.torso_length_m() + half_length;
+        self.cylinder(0, world_from_torso * up(centre), half_length)
+    }
+
+    /// The six limb parts and joints of one side; `side` is +1 left, -1 right. Thighs are given against the vertical, so the
+    /// trunk's lean is taken out at the hip.
+    fn side(
+        &self,
+        world_from_torso: DAffine3,
+        side: f64,
+        angles: &SideAngles,
+        trunk_lean: f64,
+        cylinders: &mut [EllipticCylinder; PART_COUNT],
+    ) -> SideJoints {
+        let (p, h) = (&self.proportions, self.height_m);
+        let half_torso = 0.5 * self.torso_length_m();
+        let at = |lateral: f64, z: f64| DAffine3::from_translation(DVec3::new(0.0, side * lateral * h, z));
+        let flexed = |angle: f64| DAffine3::from_rotation_y(-angle);
+
+        let shoulder = world_from_torso * at(p.shoulder_half_width, half_torso) * flexed(angles.shoulder);
+        let elbow = shoulder * up(-p.upper_arm * h) * flexed(angles.elbow);
+        let wrist = elbow * up(-p.forearm * h);
+        let hip = world_from_torso * at(p.hip_half_width, -half_torso) * flexed(angles.hip + trunk_lean);
+        let knee = hip * up(-(p.hip_height - p.knee_height) * h) * flexed(-angles.knee);
+        let ankle = knee * up(-(p.knee_height - p.ankle_height) * h);
+
+        let first_arm = if side > 0.0 { Part::LeftUpperArm } else { Part::RightUpperArm } as usize;
+        let first_leg = if side > 0.0 { Part::LeftThigh } else { Part::RightThigh } as usize;
+        cylinders[first_arm] = self.hanging(2, shoulder, p.upper_arm * h);
+        cylinders[first_arm + 1] = self.hanging(3, elbow, p.forearm * h);
+        cylinders[first_arm + 2] = self.hanging(4, wrist, p.hand * h);
+        cylinders[first_leg] = self.hanging(5, hip, (p.hip_height - p.knee_height) * h);
+        cylinders[first_leg + 1] = self.hanging(6, knee, (p.knee_height - p.ankle_height) * h);
+        cylinders[first_leg + 2] = self.foot(ankle);
+        let [shoulder, elbow, wrist, hip, knee, ankle] =
+            [shoulder, elbow, wrist, hip, knee, ankle].map(|joint| joint.translation);
+        SideJoints { shoulder, elbow, wrist, hip, knee, ankle }
+    }
+
+    /// A limb part hanging `length` below its joint.
+    fn hanging(&self, row: usize, world_from_joint: DAffine3, length: f64) -> EllipticCylinder {
+        self.cylinder(row, world_from_joint * up(-0.5 * length), 0.5 * length)
+    }
+
+    /// The foot points forward at a right angle to the shank, its sole as far below the ankle as the table says.
+    fn foot(&self, world_from_ankle: DAffine3) -> EllipticCylinder {
+        let (p, h) = (&self.proportions, self.height_m);
+        let axis_below_ankle = p.ankle_height - p.semi_axes[7].0;
+        let centre = DVec3::new(0.5 * p.foot - p.heel, 0.0, -axis_below_ankle) * h;
+        let ankle_from_foot =
+            DAffine3::from_translation(centre) * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        self.cylinder(7, world_from_ankle * ankle_from_foot, 0.5 * p.foot * h)
+    }
+
+    fn cylinder(&self, row: usize, world_from_cylinder: DAffine3, half_length: f64) -> EllipticCylinder {
+        let (a, b) = self.proportions.semi_axes[row];
+        EllipticCylinder { world_from_cylinder, semi_axes: DVec2::new(a, b) * self.height_m, half_length }
+    }
+}
+
+fn up(z: f64) -> DAffine3 {
+    DAffine3::from_translation(DVec3::new(0.0, 0.0, z))
+}
+
+/// A body with its way of walking: what a position and a phase turn into a posed body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Walker {
+    /// Sizes.
+    pub body: Body,
+    /// Average joint curves.
+    pub gait: Gait,
+    /// The person's deviation from them.
+    pub style: GaitStyle,
+}
+
+impl Walker {
+    /// The body in its posture at `phase`. `torso_centre` is the mean (level) position; the gait's vertical
+    /// displacement is added here.
+    pub fn pose(&self, torso_centre: DVec3, heading_rad: f64, phase: f64) -> PosedBody {
+        let centre = torso_centre + DVec3::Z * self.gait.vertical_m(phase);
+        self.body.pose(centre, heading_rad, &self.gait.posture(phase, &self.style))
+    }
+
+    /// Mean height of the torso's centre over a cycle with the lower ankle always at its standing height, metres.
+    ///
+    /// The ankle carries this and not the sole, because the model's foot does not bend: its toe would dig in at push-off.
+    pub fn level_torso_height_m(&self) -> f64 {
+        let n = 40;
+        (0..n).map(|i| self.torso_height_m(f64::from(i) / f64::from(n))).sum::<f64>() / f64::from(n)
+    }
+
+    fn torso_height_m(&self, phase: f64) -> f64 {
+        let posed = self.body.pose(DVec3::ZERO, 0.0, &self.gait.posture(phase, &self.style));
+        self.body.proportions.ankle_height * self.body.height_m - posed.right.ankle.z.min(posed.left.ankle.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn walker() -> Walker {
+        Walker { body: Body::from_height(1.8).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
+    }
+
+    #[test]
+    fn standing_joints_stand_at_the_table_heights() {
+        let body = Body::from_height(1.8).unwrap();
+        let centre = DVec3::new(1.0, 2.0, 0.5 * (0.818 + 0.530) * 1.8);
+        let posed = body.pose(centre, 0.7, &Posture::default());
+        for (z, fraction) in [
+            (posed.left.shoulder.z, 0.818),
+            (posed.left.elbow.z, 0.818 - 0.186),
+            (posed.right.hip.z, 0.530),
+            (posed.right.knee.z, 0.285),
+            (posed.right.ankle.z, 0.039),
+        ] {
+            assert!((z - fraction * 1.8).abs() < 1e-12);
+        }
+        let head = posed.cylinders[Part::Head as usize];
+        assert!((head.centre().z + head.half_length - 1.8).abs() < 1e-12, "the crown is at body height");
+        assert!(
+            lowest_point_m(&posed.cylinders[Part::LeftFoot as usize]).abs() < 1e-12,
+            "the sole is on the ground"
+        );
+        let to_left = posed.left.hip - posed.right.hip;
+        assert!(to_left.dot(DVec3::new(-(0.7f64.sin()), 0.7f64.cos(), 0.0)) > 0.0);
+    }
+
+    #[test]
+    fn flexion_moves_each_limb_the_anatomical_way() {
+        let body = Body::from_height(1.8).unwrap();
+        let bent = SideAngles { hip: 0.3, knee: 0.5, shoulder: 0.3, elbow: 0.5 };
+        let posed = body.pose(DVec3::Z, 0.0, &Posture { right: bent, ..Posture::default() });
+        let r = posed.right;
+        assert!(r.knee.x > r.hip.x && r.elbow.x > r.shoulder.x, "hip and shoulder flex forward");
+        assert!(
+            r.ankle.x < r.knee.x && (r.wrist.x - r.elbow.x) > (r.elbow.x - r.shoulder.x),
+            "knee back, elbow forward"
+        );
+    }
+
+    #[test]
+    fn lean_turns_the_trunk_and_leaves_the_thighs_against_the_vertical() {
+        let body = Body::from_height(1.8).unwrap();
+        let posed = body.pose(DVec3::Z, 0.0, &Posture { trunk_lean: 0.2, ..Posture::default() });
+        assert!(posed.left.shoulder.x > posed.left.hip.x);
+        assert!((posed.left.knee.x - posed.left.hip.x).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_stance_foot_slides_little_when_the_walker_advances_at_its_own_speed() {
+        // Over mid-stance (phase 0.1 to 0.4) the ankle moves back in the body by what the body moves forward.
+        let walker = walker();
+        let ankle_x = |phase: f64| walker.pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
+        let stride = (ankle_x(0.1) - ankle_x(0.4)) / 0.3;
+        assert!((1.2..1.8).contains(&stride), "stride length implied by the stance leg: {stride} m");
+    }
+
+    #[test]
+    fn level_height_is_a_little_below_standing() {
+        let height = walker().level_torso_height_m();
+        let standing = 0.5 * (0.818 + 0.530) * 1.8;
+        assert!(height < standing && height > standing - 0.08, "{height} against {standing}");
+    }
+
+    #[test]
+    fn implausible_heights_are_refused_with_a_hint() {
+        for height in [0.0, -1.7, f64::NAN, f64::INFINITY] {
+            assert!(Body::from_height(height).is_err());
+        }
+        assert!(Body::from_height(170.0).unwrap_err().to_string().contains("centimetres"));
+    }
+}
