@@ -1,0 +1,239 @@
+//! The discrete linear Kalman filter of the walker's state (Rohr 1994, section 5.2, eqs. 12-22).
+//!
+//! The state is (X, X', Y, Y', Z, Z', pose, pose') and all matrices of eqs. (19)-(22) are block diagonal, so the filter
+//! splits exactly into four independent filters of position and velocity; [`ConstantVelocity`] is one of them.
+//! Seconds take the place of the paper's images, so that any frame rate and uneven time stamps work.
+
+/// Process and measurement noise of one coordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Variance that the velocity gains per second, (unit/s)²/s.
+    pub velocity_variance_per_s: f64,
+    /// Variance of a measurement, unit².
+    pub measurement_variance: f64,
+}
+
+/// Noise of the four coordinates; the defaults are the printed values at the paper's 25 images a second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilterOptions {
+    /// Along the walking direction, metres. Printed: sigma_Q = 0.3 * 6.4 cm/image, sigma_R = 20 cm.
+    pub along: Noise,
+    /// Height above the level of walking, metres. Printed: sigma_Q = 0, sigma_R = 10 cm.
+    pub vertical: Noise,
+    /// Gait phase, cycles. Printed: sigma_Q = 0.3 * 0.04 /image, sigma_R = 0.2.
+    pub phase: Noise,
+}
+
+/// Images per second of the paper's sequences.
+const PAPER_RATE_HZ: f64 = 25.0;
+
+impl Default for FilterOptions {
+    fn default() -> Self {
+        // A velocity step of s unit/image in every image is s * 25 unit/s each 1/25 s.
+        let per_s = |step_per_image: f64| (step_per_image * PAPER_RATE_HZ).powi(2) * PAPER_RATE_HZ;
+        Self {
+            along: Noise { velocity_variance_per_s: per_s(0.3 * 0.064), measurement_variance: 0.04 },
+            vertical: Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.01 },
+            phase: Noise { velocity_variance_per_s: per_s(0.3 * 0.04), measurement_variance: 0.04 },
+        }
+    }
+}
+
+/// Position and velocity of one coordinate with their covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConstantVelocity {
+    /// Estimated position, unit.
+    pub position: f64,
+    /// Estimated velocity, unit/s.
+    pub velocity: f64,
+    /// Covariance: variance of position, covariance, variance of velocity.
+    pub covariance: [f64; 3],
+}
+
+impl ConstantVelocity {
+    /// A state with independent uncertainties of position and velocity.
+    pub fn new(position: f64, velocity: f64, position_variance: f64, velocity_variance: f64) -> Self {
+        Self { position, velocity, covariance: [position_variance, 0.0, velocity_variance] }
+    }
+
+    /// Standard deviation of the position.
+    pub fn position_sd(&self) -> f64 {
+        self.covariance[0].max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the velocity.
+    pub fn velocity_sd(&self) -> f64 {
+        self.covariance[2].max(0.0).sqrt()
+    }
+
+    /// Eqs. (14), (15): p* = Phi p, P* = Phi P Phi^T + Q with Phi = (1 dt; 0 1) and Q on the velocity alone.
+    pub fn predict(&self, dt_s: f64, noise: &Noise) -> Self {
+        let [pp, pv, vv] = self.covariance;
+        Self {
+            position: self.position + dt_s * self.velocity,
+            velocity: self.velocity,
+            covariance: [
+                pp + 2.0 * dt_s * pv + dt_s * dt_s * vv,
+                pv + dt_s * vv,
+                vv + noise.velocity_variance_per_s * dt_s,
+            ],
+        }
+    }
+
+    /// Eqs. (16)-(18) with H = (1 0): K = P* H^T (H P* H^T + R)^-1, p = p* + K (z - H p*), P = (I - K H) P*.
+    pub fn update(&self, measured: f64, noise: &Noise) -> Self {
+        let [pp, pv, vv] = self.covariance;
+        let s = pp + noise.measurement_variance;
+        let (k0, k1) = (pp / s, pv / s);
+        let innovation = measured - self.position;
+        Self {
+            position: self.position + k0 * innovation,
+            velocity: self.velocity + k1 * innovation,
+            covariance: [(1.0 - k0) * pp, (1.0 - k0) * pv, vv - k1 * pv],
+        }
+    }
+}
+
+/// Rauch-Tung-Striebel smoothing of a filtered coordinate: what all frames, later ones included, say of each.
+///
+/// `filtered[k]` is the state after frame k, `dt_s[k]` the time from frame k to k + 1.
+pub fn smooth(filtered: &[ConstantVelocity], dt_s: &[f64], noise: &Noise) -> Vec<ConstantVelocity> {
+    let mut smoothed = filtered.to_vec();
+    for k in (0..filtered.len().saturating_sub(1)).rev() {
+        smoothed[k] = smooth_step(&filtered[k], &smoothed[k + 1], dt_s[k], noise);
+    }
+    smoothed
+}
+
+/// C = P Phi^T P*^-1, p_s = p + C (p_s' - p*), P_s = P + C (P_s' - P*) C^T.
+fn smooth_step(
+    now: &ConstantVelocity,
+    later: &ConstantVelocity,
+    dt_s: f64,
+    noise: &Noise,
+) -> ConstantVelocity {
+    let prior = now.predict(dt_s, noise);
+    let [a, b, d] = prior.covariance;
+    let determinant = a * d - b * b;
+    if determinant <= 1e-12 * a * d {
+        // A velocity known exactly: the position is all there is to correct.
+        let c = if a > 0.0 { (now.covariance[0] + dt_s * now.covariance[1]) / a } else { 0.0 };
+        let position = now.position + c * (later.position - prior.position);
+        let variance = now.covariance[0] + c * c * (later.covariance[0] - a);
+        return ConstantVelocity {
+            position,
+            velocity: later.velocity,
+            covariance: [variance, now.covariance[1], now.covariance[2]],
+        };
+    }
+    let [pp, pv, vv] = now.covariance;
+    // Rows of P Phi^T: position (pp + dt pv, pv), velocity (pv + dt vv, vv).
+    let gain = |x: f64, y: f64| ((x * d - y * b) / determinant, (y * a - x * b) / determinant);
+    let (c00, c01) = gain(pp + dt_s * pv, pv);
+    let (c10, c11) = gain(pv + dt_s * vv, vv);
+    let (dx, dv) = (later.position - prior.position, later.velocity - prior.velocity);
+    let [da, db, dd] = [later.covariance[0] - a, later.covariance[1] - b, later.covariance[2] - d];
+    ConstantVelocity {
+        position: now.position + c00 * dx + c01 * dv,
+        velocity: now.velocity + c10 * dx + c11 * dv,
+        covariance: [
+            pp + c00 * c00 * da + 2.0 * c00 * c01 * db + c01 * c01 * dd,
+            pv + c00 * c10 * da + (c00 * c11 + c01 * c10) * db + c01 * c11 * dd,
+            vv + c10 * c10 * da + 2.0 * c10 * c11 * db + c11 * c11 * dd,
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{SMatrix, SVector};
+
+    /// The paper's filter as printed: eight states, dense matrices.
+    fn dense_step(
+        p: &SVector<f64, 8>,
+        cov: &SMatrix<f64, 8, 8>,
+        z: &SVector<f64, 4>,
+        dt: f64,
+        noises: &[Noise; 4],
+    ) -> (SVector<f64, 8>, SMatrix<f64, 8, 8>) {
+        let mut phi = SMatrix::<f64, 8, 8>::identity();
+        let mut q = SMatrix::<f64, 8, 8>::zeros();
+        let mut h = SMatrix::<f64, 4, 8>::zeros();
+        let mut r = SMatrix::<f64, 4, 4>::zeros();
+        for i in 0..4 {
+            phi[(2 * i, 2 * i + 1)] = dt;
+            q[(2 * i + 1, 2 * i + 1)] = noises[i].velocity_variance_per_s * dt;
+            h[(i, 2 * i)] = 1.0;
+            r[(i, i)] = noises[i].measurement_variance;
+        }
+        let prior = phi * p;
+        let prior_cov = phi * cov * phi.transpose() + q;
+        let k = prior_cov * h.transpose() * (h * prior_cov * h.transpose() + r).try_inverse().unwrap();
+        (prior + k * (z - h * prior), (SMatrix::identity() - k * h) * prior_cov)
+    }
+
+    #[test]
+    fn four_small_filters_equal_the_printed_eight_state_filter() {
+        let o = FilterOptions::default();
+        let noises = [o.along, o.vertical, o.along, o.phase];
+        let mut states = [ConstantVelocity::new(0.0, 1.6, 0.04, 0.2); 4];
+        let mut p = SVector::<f64, 8>::zeros();
+        let mut cov = SMatrix::<f64, 8, 8>::zeros();
+        for i in 0..4 {
+            p[2 * i + 1] = 1.6;
+            cov[(2 * i, 2 * i)] = 0.04;
+            cov[(2 * i + 1, 2 * i + 1)] = 0.2;
+        }
+        for step in 0..50 {
+            let z = SVector::<f64, 4>::from_fn(|i, _| {
+                0.06 * f64::from(step) + 0.1 * f64::from((step * 7 + i as i32 * 3) % 5)
+            });
+            (p, cov) = dense_step(&p, &cov, &z, 0.04, &noises);
+            for i in 0..4 {
+                states[i] = states[i].predict(0.04, &noises[i]).update(z[i], &noises[i]);
+                assert!((states[i].position - p[2 * i]).abs() < 1e-12);
+                assert!((states[i].velocity - p[2 * i + 1]).abs() < 1e-12);
+                assert!((states[i].covariance[1] - cov[(2 * i, 2 * i + 1)]).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn printed_variances_are_reproduced_at_25_images_a_second() {
+        let o = FilterOptions::default();
+        let per_image = |n: &Noise| n.velocity_variance_per_s / 25.0 / 625.0;
+        assert!((per_image(&o.along) * 1e4 - 3.69).abs() < 0.01, "cm²/image²");
+        assert!((per_image(&o.phase) - 0.000_144).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_smoother_equals_least_squares_over_all_frames() {
+        // Without process noise the state is a straight line, and smoothing is weighted least squares with the prior.
+        let noise = Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.5 };
+        let z = [0.3, 0.9, 2.4, 2.8, 4.4, 4.9];
+        let mut state = ConstantVelocity::new(0.0, 0.0, 1e6, 1e6);
+        let mut filtered = vec![];
+        for (k, &zk) in z.iter().enumerate() {
+            state =
+                if k == 0 { state.update(zk, &noise) } else { state.predict(1.0, &noise).update(zk, &noise) };
+            filtered.push(state);
+        }
+        let smoothed = smooth(&filtered, &[1.0; 5], &noise);
+        let design = nalgebra::DMatrix::from_fn(6, 2, |r, c| if c == 0 { 1.0 } else { r as f64 });
+        let line =
+            design.clone().svd(true, true).solve(&nalgebra::DVector::from_row_slice(&z), 1e-12).unwrap();
+        for (k, s) in smoothed.iter().enumerate() {
+            assert!((s.position - (line[0] + line[1] * k as f64)).abs() < 1e-4, "frame {k}: {s:?}");
+            assert!(s.position_sd() <= filtered[k].position_sd() + 1e-9);
+        }
+    }
+
+    #[test]
+    fn missed_measurements_coast_and_grow_uncertain() {
+        let o = FilterOptions::default();
+        let start = ConstantVelocity::new(1.0, 1.5, 0.01, 0.1);
+        let coasted = start.predict(0.2, &o.along);
+        assert!((coasted.position - 1.3).abs() < 1e-12 && coasted.position_sd() > start.position_sd());
+    }
+}
