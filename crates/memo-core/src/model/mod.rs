@@ -1,7 +1,11 @@
 //! What a walker would show: camera, body, gait, contours and what hides what.
 
 pub mod camera;
+pub mod camera_file;
 pub mod cylinder;
+pub mod distortion;
 
-pub use camera::Camera;
+pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
+pub use camera_file::CameraFileError;
 pub use cylinder::EllipticCylinder;
+pub use distortion::Distortion;
