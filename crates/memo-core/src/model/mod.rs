@@ -2,11 +2,15 @@
 
 pub mod body;
 pub mod camera;
+pub mod camera_file;
 pub mod cylinder;
+pub mod distortion;
 pub mod gait;
 pub mod spline;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
-pub use camera::Camera;
+pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
+pub use camera_file::CameraFileError;
 pub use cylinder::EllipticCylinder;
+pub use distortion::Distortion;
 pub use gait::{Gait, GaitStyle, Posture, SideAngles};
