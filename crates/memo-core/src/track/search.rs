@@ -140,7 +140,10 @@ impl Grid {
     /// The paper's starting grid: the whole cycle.
     pub fn whole_cycle(along_m: f64, height_m: f64) -> Self {
         let around = Hypothesis { along_m, height_m, phase: 0.0 };
-        Self { phase: Axis { centre: 0.5 - 0.5 * PHASE_STEP, step: PHASE_STEP, count: 50 }, ..Self::printed(&around) }
+        Self {
+            phase: Axis { centre: 0.5 - 0.5 * PHASE_STEP, step: PHASE_STEP, count: 50 },
+            ..Self::printed(&around)
+        }
     }
 
     /// Number of hypotheses.
@@ -239,7 +242,8 @@ pub fn search(
     let scorer = Scorer::new(edges, options);
     let mut scores = vec![0.0; grid.len()];
     let score_column = |work: &mut Column, (index, out): (usize, &mut [f32])| {
-        let (phase, along) = (grid.phase.at(index / grid.along.count), grid.along.at(index % grid.along.count));
+        let (phase, along) =
+            (grid.phase.at(index / grid.along.count), grid.along.at(index % grid.along.count));
         match hidden_lines {
             HiddenLines::PerColumn => work.score(&scorer, scene, (along, phase), &grid.height, out),
             HiddenLines::PerHypothesis => {
@@ -314,10 +318,11 @@ const TURN_RAD: f32 = 0.03;
 /// The largest way an end of the segment moves in the image when the body is raised or lowered by `reach_m`, plus half a
 /// pixel for the rounding of f32.
 fn reach_px(segment: &VisibleSegment, reach_m: f64, camera: &Camera) -> f32 {
-    let moved = |end: DVec3, by: f64| match (camera.project_ideal(end), camera.project_ideal(end + DVec3::Z * by)) {
-        (Some(a), Some(b)) => a.distance(b),
-        _ => f64::INFINITY,
-    };
+    let moved =
+        |end: DVec3, by: f64| match (camera.project_ideal(end), camera.project_ideal(end + DVec3::Z * by)) {
+            (Some(a), Some(b)) => a.distance(b),
+            _ => f64::INFINITY,
+        };
     let ends = [segment.start, segment.end];
     let most = ends.iter().flat_map(|&end| [moved(end, reach_m), moved(end, -reach_m)]).fold(0.0, f64::max);
     most as f32 + 0.5
@@ -353,4 +358,105 @@ fn inside_image(start: DVec2, end: DVec2, camera: &Camera) -> Option<(f64, f64)>
         t1 = t1.min(a.max(b));
     }
     (t0 < t1).then_some((t0, t1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Body, Gait, GaitStyle};
+
+    fn walker() -> Walker {
+        Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
+    }
+
+    fn camera() -> Camera {
+        Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
+    }
+
+    /// The image a hypothesis would show, as edges.
+    fn edges_of(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
+        let edge = |l: ModelLine| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 };
+        scene.lines(truth).into_iter().map(edge).collect()
+    }
+
+    #[test]
+    fn the_printed_grid_has_4851_hypotheses() {
+        let grid = Grid::printed(&Hypothesis { along_m: 0.0, height_m: 1.2, phase: 0.4 });
+        assert_eq!((grid.along.count, grid.height.count, grid.phase.count), (21, 11, 21));
+        assert_eq!(grid.len(), 4851);
+        assert!((grid.along.at(0) + 0.2).abs() < 1e-12 && (grid.phase.at(20) - 0.6).abs() < 1e-12);
+        assert_eq!(Grid::whole_cycle(0.0, 1.2).phase.count, 50);
+        assert!(Grid::whole_cycle(0.0, 1.2).phase.at(0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_planted_walker_is_found_in_both_directions() {
+        let (walker, camera) = (walker(), camera());
+        let height_m = walker.level_torso_height_m();
+        for heading_rad in [0.0, std::f64::consts::PI] {
+            let path = Path { origin: DVec2::ZERO, heading_rad };
+            let scene = Scene { walker: &walker, camera: &camera, path: &path };
+            for (i, phase) in [0.13, 0.37, 0.62, 0.88].into_iter().enumerate() {
+                let truth = Hypothesis { along_m: 0.3 * i as f64 - 0.5, height_m, phase };
+                let edges = edges_of(&scene, &truth);
+                let around = Hypothesis {
+                    along_m: truth.along_m + 0.04,
+                    height_m: height_m - 0.02,
+                    phase: phase + 0.04,
+                };
+                let found = search(
+                    &edges,
+                    &scene,
+                    &Grid::printed(&around),
+                    &SimilarityOptions::default(),
+                    HiddenLines::default(),
+                );
+                let best = found.refined();
+                assert!((best.along_m - truth.along_m).abs() < 0.012, "{best:?} against {truth:?}");
+                assert!((best.height_m - height_m).abs() < 0.012, "{best:?} against {truth:?}");
+                assert!((best.phase - phase).abs() < 0.012, "{best:?} against {truth:?}");
+                assert!(found.best_score() > 0.98, "{}", found.best_score());
+            }
+        }
+    }
+
+    #[test]
+    fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing() {
+        let (walker, camera) = (walker(), camera());
+        let path = Path { origin: DVec2::new(0.2, 0.1), heading_rad: 0.3 };
+        let scene = Scene { walker: &walker, camera: &camera, path: &path };
+        let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
+        let edges = edges_of(&scene, &Hypothesis { phase: 0.45, ..truth });
+        let grid = Grid::printed(&truth);
+        let options = SimilarityOptions::default();
+        let shared = search(&edges, &scene, &grid, &options, HiddenLines::PerColumn);
+        let exact = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
+        assert_eq!(shared.best_index, exact.best_index);
+        let worst = shared.scores.iter().zip(&exact.scores).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.02, "largest change of a score: {worst}");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let again = pool.install(|| search(&edges, &scene, &grid, &options, HiddenLines::PerColumn));
+            assert!(again.scores.iter().zip(&shared.scores).all(|(a, b)| a.to_bits() == b.to_bits()));
+        }
+    }
+
+    #[test]
+    fn fast_scores_equal_the_plain_similarity() {
+        let (walker, camera) = (walker(), camera());
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+        let scene = Scene { walker: &walker, camera: &camera, path: &path };
+        let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
+        let edges = edges_of(&scene, &truth);
+        let options = SimilarityOptions::default();
+        let small = |v: f64, step: f64| Axis::around(v, 2.0 * step, step);
+        let grid =
+            Grid { along: small(0.05, 0.02), height: small(truth.height_m, 0.02), phase: small(0.25, 0.02) };
+        let found = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
+        for (index, score) in found.scores.iter().enumerate() {
+            let plain =
+                crate::track::score::similarity(&scene.lines(&grid.hypothesis(index)), &edges, &options);
+            assert!((plain.value - score).abs() < 1e-4, "{} against {score}", plain.value);
+        }
+    }
 }

