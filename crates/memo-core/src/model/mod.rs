@@ -2,6 +2,10 @@
 
 pub mod camera;
 pub mod cylinder;
+pub mod silhouette;
+pub mod visibility;
 
 pub use camera::Camera;
 pub use cylinder::EllipticCylinder;
+pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
+pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
