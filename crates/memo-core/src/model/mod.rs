@@ -7,6 +7,8 @@ pub mod cylinder;
 pub mod distortion;
 pub mod gait;
 pub mod spline;
+pub mod silhouette;
+pub mod visibility;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
 pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
@@ -14,3 +16,5 @@ pub use camera_file::CameraFileError;
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;
 pub use gait::{Gait, GaitStyle, Posture, SideAngles};
+pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
+pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
