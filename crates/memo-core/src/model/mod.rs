@@ -6,8 +6,8 @@ pub mod camera_file;
 pub mod cylinder;
 pub mod distortion;
 pub mod gait;
-pub mod spline;
 pub mod silhouette;
+pub mod spline;
 pub mod visibility;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
