@@ -1,0 +1,246 @@
+//! A slowly varying image of the empty scene, for people who stop: against it they stay visible when eq. (1) between
+//! consecutive frames sees nothing.
+//!
+//! Per pixel the temporal median, which a person in front of the pixel for less than half of the time does not disturb. From a file,
+//! [`Background::from_frames`] takes the exact median of a few frames. On a stream the median is approached by stochastic approximation (Robbins and Monro 1951):
+//! each frame moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory
+//! is one image, whatever the length of the stream. Foreground is what passes eq. (1) of [`super::change`] against this image.
+//!
+//! It takes for background whatever covers a pixel most of the time, and needs a static camera.
+
+use super::change::{ChangeOptions, pair_changes};
+use super::frame::{Frame, FrameError, Image, Mask};
+use thiserror::Error;
+
+/// How the background follows the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BackgroundOptions {
+    /// Largest lasting change of the level in grey levels a frame, 1/256 to 128. 0.05: follows daylight (a few grey levels a
+    /// minute) and takes a minute or so to absorb a person who stands still and is not masked.
+    pub rate: f64,
+    /// The step at the second frame in grey levels, falling as 1/k until it meets `rate`. 64 lets the first dozens of frames correct a
+    /// first frame with people in it.
+    pub first_step: f64,
+    /// How a frame is compared with the background.
+    pub change: ChangeOptions,
+}
+
+impl Default for BackgroundOptions {
+    fn default() -> Self {
+        Self { rate: 0.05, first_step: 64.0, change: ChangeOptions::default() }
+    }
+}
+
+/// Why no background was made.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum BackgroundError {
+    /// No frame was given.
+    #[error("a background needs at least one frame")]
+    NoFrames,
+    /// The frames differ in size.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+}
+
+/// Steps of the stored level in one grey level.
+const LEVELS: i32 = 256;
+
+/// The empty scene as known so far.
+#[derive(Debug, Clone)]
+pub struct Background {
+    options: BackgroundOptions,
+    /// Grey value times [`LEVELS`].
+    level: Image<u16>,
+    frames: usize,
+}
+
+impl Background {
+    /// Starts from one frame.
+    pub fn new(first: &Frame, options: BackgroundOptions) -> Self {
+        Self::from_image(&first.to_image(), 1, options)
+    }
+
+    /// The temporal median of frames, best spread evenly over the footage; of an even number the lower of the two
+    /// middle values. Holds no copy of the frames.
+    pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
+        let first = frames.first().ok_or(BackgroundError::NoFrames)?;
+        frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
+        let mut median = Image::filled(first.width(), first.height(), 0u8);
+        for y in 0..median.height() {
+            let rows: Vec<&[u8]> = frames.iter().map(|frame| frame.row(y)).collect();
+            median_row(&rows, median.row_mut(y));
+        }
+        Ok(Self::from_image(&median, frames.len(), options))
+    }
+
+    fn from_image(image: &Image<u8>, frames: usize, options: BackgroundOptions) -> Self {
+        let mut level = Image::filled(image.width(), image.height(), 0u16);
+        for (level, &grey) in level.pixels_mut().iter_mut().zip(image.pixels()) {
+            *level = u16::from(grey) * LEVELS as u16;
+        }
+        Self { options, level, frames }
+    }
+
+    /// The background rounded to grey values.
+    pub fn image(&self) -> Image<u8> {
+        let (width, height) = (self.level.width(), self.level.height());
+        let mut image = Image::filled(width, height, 0u8);
+        for (grey, &level) in image.pixels_mut().iter_mut().zip(self.level.pixels()) {
+            *grey = ((i32::from(level) + LEVELS / 2) / LEVELS).min(255) as u8;
+        }
+        image
+    }
+
+    /// Moves the level towards a frame, except where `foreground` is marked.
+    pub fn update(&mut self, frame: &Frame, foreground: Option<&Mask>) -> Result<(), FrameError> {
+        self.check_size(frame.width(), frame.height())?;
+        if let Some(mask) = foreground {
+            self.check_size(mask.width(), mask.height())?;
+        }
+        self.frames += 1;
+        let step = self.step();
+        for y in 0..frame.height() {
+            let (row, levels) = (frame.row(y), self.level.row_mut(y));
+            match foreground {
+                None => move_row(levels, row, step),
+                Some(mask) => move_unmasked_row(levels, row, mask.row(y), step),
+            }
+        }
+        Ok(())
+    }
+
+    /// The pixels where eq. (1) holds between a frame and the background.
+    pub fn foreground(&self, frame: &Frame) -> Result<Mask, FrameError> {
+        pair_changes(&self.image().as_frame(), frame, &self.options.change)
+    }
+
+    /// The largest change at this frame, in units of the stored level.
+    fn step(&self) -> i32 {
+        let grey_levels = (2.0 * self.options.first_step / self.frames as f64).max(self.options.rate);
+        (grey_levels * f64::from(LEVELS)).round().clamp(1.0, f64::from(128 * LEVELS)) as i32
+    }
+
+    fn check_size(&self, width: usize, height: usize) -> Result<(), FrameError> {
+        let (expected_width, expected_height) = (self.level.width(), self.level.height());
+        if (width, height) == (expected_width, expected_height) {
+            return Ok(());
+        }
+        Err(FrameError::SizeChanged { expected_width, expected_height, width, height })
+    }
+}
+
+fn moved(level: u16, grey: u8, step: i32) -> u16 {
+    let level = i32::from(level);
+    (level + (i32::from(grey) * LEVELS - level).clamp(-step, step)) as u16
+}
+
+fn move_row(levels: &mut [u16], row: &[u8], step: i32) {
+    for (level, &grey) in levels.iter_mut().zip(row) {
+        *level = moved(*level, grey, step);
+    }
+}
+
+fn move_unmasked_row(levels: &mut [u16], row: &[u8], mask: &[bool], step: i32) {
+    for ((level, &grey), &masked) in levels.iter_mut().zip(row).zip(mask) {
+        *level = if masked { *level } else { moved(*level, grey, step) };
+    }
+}
+
+/// Lower median of each column, bit by bit: the largest value that at most (n - 1) / 2 of the n values are below.
+fn median_row(rows: &[&[u8]], median: &mut [u8]) {
+    let most_below = (rows.len() - 1) / 2;
+    let mut below = vec![0u32; median.len()];
+    for bit in (0..8).rev() {
+        below.fill(0);
+        for row in rows {
+            for ((below, &grey), &known) in below.iter_mut().zip(*row).zip(&*median) {
+                *below += u32::from(grey < known | 1 << bit);
+            }
+        }
+        for (known, &below) in median.iter_mut().zip(&below) {
+            *known |= u8::from(below as usize <= most_below) << bit;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn row(pixels: Vec<u8>) -> Image<u8> {
+        Image::from_vec(pixels.len(), 1, pixels).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn the_median_is_the_middle_of_the_sorted_values(
+            frames in (1usize..40).prop_flat_map(|w| proptest::collection::vec(proptest::collection::vec(any::<u8>(), w), 1..12))
+        ) {
+            let images: Vec<_> = frames.iter().map(|pixels| row(pixels.clone())).collect();
+            let views: Vec<_> = images.iter().map(Image::as_frame).collect();
+            let background = Background::from_frames(&views, BackgroundOptions::default()).unwrap().image();
+            for x in 0..frames[0].len() {
+                let mut values: Vec<u8> = frames.iter().map(|frame| frame[x]).collect();
+                values.sort_unstable();
+                prop_assert_eq!(background.at(x, 0), values[(values.len() - 1) / 2]);
+            }
+        }
+    }
+
+    /// A textured 60x40 scene, with a bright 10x20 block at `left`.
+    fn scene(left: Option<usize>) -> Image<u8> {
+        let grey = |i: usize| {
+            let (x, y) = (i % 60, i / 60);
+            let inside = left.is_some_and(|left| (left..left + 10).contains(&x) && (10..30).contains(&y));
+            if inside { 200 } else { (60 + x + 7 * y % 13) as u8 }
+        };
+        Image::from_vec(60, 40, (0..2400).map(grey).collect()).unwrap()
+    }
+
+    #[test]
+    fn the_first_frame_s_person_fades_when_gone() {
+        let mut background = Background::new(&scene(Some(20)).as_frame(), BackgroundOptions::default());
+        for i in 0..40 {
+            background.update(&scene((i < 20).then_some(22 + i)).as_frame(), None).unwrap();
+        }
+        let worst =
+            background.image().pixels().iter().zip(scene(None).pixels()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst.unwrap() <= 3, "{worst:?}");
+    }
+
+    #[test]
+    fn a_person_who_stops_stays_foreground() {
+        let empty = scene(None);
+        let mut background =
+            Background::from_frames(&[empty.as_frame()], BackgroundOptions::default()).unwrap();
+        let standing = scene(Some(20));
+        for _ in 0..500 {
+            let foreground = background.foreground(&standing.as_frame()).unwrap();
+            assert!(foreground.at(25, 20) && !foreground.at(40, 20));
+            background.update(&standing.as_frame(), Some(&foreground)).unwrap();
+        }
+        assert_eq!(background.image(), empty);
+    }
+
+    #[test]
+    fn slow_drift_is_followed() {
+        let options = BackgroundOptions { rate: 0.1, first_step: 1.0, ..BackgroundOptions::default() };
+        let mut background = Background::new(&Image::filled(8, 8, 100u8).as_frame(), options);
+        for i in 0..400 {
+            background.update(&Image::filled(8, 8, 100 + (i / 20) as u8).as_frame(), None).unwrap();
+        }
+        assert_eq!(background.image().at(4, 4), 119);
+    }
+
+    #[test]
+    fn no_frames_and_other_sizes_are_refused() {
+        let options = BackgroundOptions::default();
+        assert_eq!(Background::from_frames(&[], options).unwrap_err(), BackgroundError::NoFrames);
+        let mut background = Background::new(&Image::filled(8, 8, 0u8).as_frame(), options);
+        assert!(background.update(&Image::filled(8, 9, 0u8).as_frame(), None).is_err());
+        let mask = Image::filled(7, 8, false);
+        assert!(background.update(&Image::filled(8, 8, 0u8).as_frame(), Some(&mask)).is_err());
+    }
+}

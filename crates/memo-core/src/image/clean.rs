@@ -1,0 +1,270 @@
+//! Binary image operations that turn a change mask into solid areas.
+//!
+//! Rohr 1994, section 4.1: detected pixels with a small number of detected neighbours in the 3x3 window are deleted, undetected ones
+//! with a large number are marked, recursively because each step changes its neighbours' numbers; remaining holes
+//! are filled by a separate algorithm. The thresholds are not printed.
+//!
+//! The recursion ends. Let m be the number of marked pixels, p the number of marked neighbour pairs, and
+//! c = (few + many) / 2. Deleting a pixel with n <= few neighbours changes E = c m - p by n - c, marking one with n >= many by c - n: with
+//! few < many both lower E by at least 1/2, and E cannot fall below -4 times the number of pixels. The
+//! result may depend on the order of steps, which is fixed: row by row, then first come first served.
+//!
+//! None of this knows what a person is: two people who touch become one area, a faint person several.
+
+use super::frame::{Image, Mask};
+use super::region::{Connectivity, connected_runs, runs};
+use std::collections::VecDeque;
+use thiserror::Error;
+
+/// Neighbour numbers at which a pixel changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CleanOptions {
+    /// A marked pixel with at most this many of 8 marked neighbours is deleted. 2 removes specks, lines and spurs one
+    /// pixel wide and keeps every corner of an area at least two pixels wide.
+    pub few: u8,
+    /// An unmarked pixel with at least this many of 8 marked neighbours is marked; 9 marks none. 5 closes slots up to three
+    /// pixels wide and leaves straight edges and outer corners alone.
+    pub many: u8,
+}
+
+impl Default for CleanOptions {
+    fn default() -> Self {
+        Self { few: 2, many: 5 }
+    }
+}
+
+/// Why a mask was not cleaned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum CleanError {
+    /// With these thresholds the recursion could run for ever.
+    #[error("pixels are deleted at up to {few} neighbours and marked from {many}: the first must be smaller")]
+    ThresholdsMeet {
+        /// The deleting threshold.
+        few: u8,
+        /// The marking threshold.
+        many: u8,
+    },
+}
+
+/// Deletes pixels with few neighbours and marks pixels with many until neither is left. Pixels outside
+/// the mask count as unmarked.
+pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, CleanError> {
+    let CleanOptions { few, many } = *options;
+    if few >= many {
+        return Err(CleanError::ThresholdsMeet { few, many });
+    }
+    let mut grid = NeighbourGrid::new(mask);
+    let mut unstable = grid.unstable(options);
+    while let Some(at) = unstable.pop_front() {
+        if grid.is_unstable(at, options) {
+            grid.flip(at);
+            unstable.extend(grid.neighbours(at).filter(|&near| grid.is_unstable(near, options)));
+        }
+    }
+    Ok(grid.into_mask())
+}
+
+/// Added to a pixel's neighbour number when it is marked itself.
+const MARKED: u8 = 16;
+/// State of the rim, which is neither marked nor ever changed.
+const RIM: u8 = 128;
+
+/// Per pixel the number of marked neighbours, plus [`MARKED`], inside a rim one pixel wide.
+struct NeighbourGrid {
+    width: usize,
+    height: usize,
+    state: Vec<u8>,
+}
+
+impl NeighbourGrid {
+    fn new(mask: &Mask) -> Self {
+        let (width, height) = (mask.width() + 2, mask.height() + 2);
+        let mut grid = Self { width, height, state: vec![RIM; width * height] };
+        let mut padded = vec![0u8; width * height];
+        for y in 0..mask.height() {
+            let row = &mut padded[(y + 1) * width + 1..][..mask.width()];
+            row.iter_mut().zip(mask.row(y)).for_each(|(pixel, &marked)| *pixel = u8::from(marked));
+        }
+        let mut columns = vec![0u8; width];
+        for y in 1..height - 1 {
+            let [above, row, below] = [y - 1, y, y + 1].map(|y| &padded[y * width..][..width]);
+            for x in 0..width {
+                columns[x] = above[x] + row[x] + below[x];
+            }
+            let states = &mut grid.state[y * width..][..width];
+            for x in 1..width - 1 {
+                states[x] = columns[x - 1] + columns[x] + columns[x + 1] + (MARKED - 1) * row[x];
+            }
+        }
+        grid
+    }
+
+    fn is_unstable(&self, at: usize, options: &CleanOptions) -> bool {
+        is_unstable(self.state[at], options)
+    }
+
+    /// The pixels to change, row by row. Rows are searched in blocks, most of which hold none.
+    fn unstable(&self, options: &CleanOptions) -> VecDeque<usize> {
+        const BLOCK: usize = 64;
+        let mut found = VecDeque::new();
+        for (i, block) in self.state.chunks(BLOCK).enumerate() {
+            if block.iter().fold(false, |any, &state| any | is_unstable(state, options)) {
+                let unstable = (0..block.len()).filter(|&j| is_unstable(block[j], options));
+                found.extend(unstable.map(|j| i * BLOCK + j));
+            }
+        }
+        found
+    }
+
+    fn neighbours(&self, at: usize) -> impl Iterator<Item = usize> + use<> {
+        let width = self.width;
+        let above = at - width;
+        let below = at + width;
+        [above - 1, above, above + 1, at - 1, at + 1, below - 1, below, below + 1].into_iter()
+    }
+
+    fn flip(&mut self, at: usize) {
+        self.state[at] ^= MARKED;
+        let marked = self.state[at] & MARKED != 0;
+        for near in self.neighbours(at) {
+            if self.state[near] & RIM == 0 {
+                self.state[near] = if marked { self.state[near] + 1 } else { self.state[near] - 1 };
+            }
+        }
+    }
+
+    fn into_mask(self) -> Mask {
+        let mut mask = Image::filled(self.width - 2, self.height - 2, false);
+        for y in 0..self.height - 2 {
+            let states = &self.state[(y + 1) * self.width + 1..][..self.width - 2];
+            for (pixel, state) in mask.row_mut(y).iter_mut().zip(states) {
+                *pixel = state & MARKED != 0;
+            }
+        }
+        mask
+    }
+}
+
+fn is_unstable(state: u8, options: &CleanOptions) -> bool {
+    let deleted = (MARKED..=MARKED + options.few).contains(&state);
+    let marked = (options.many..MARKED).contains(&state);
+    deleted | marked
+}
+
+/// Marks every unmarked area that is surrounded by marked pixels: one from which no path of horizontal and vertical
+/// steps over unmarked pixels leads to the mask's edge.
+pub fn fill_holes(mask: &Mask) -> Mask {
+    let (right, bottom) = (mask.width(), mask.height() - 1);
+    let mut filled = mask.clone();
+    for area in connected_runs(&runs(mask, false), Connectivity::Four) {
+        let at_edge =
+            |run: &super::region::Run| run.start == 0 || run.end == right || run.y == 0 || run.y == bottom;
+        if !area.iter().any(at_edge) {
+            for run in area {
+                filled.row_mut(run.y)[run.start..run.end].fill(true);
+            }
+        }
+    }
+    filled
+}
+
+/// Marks every pixel within a Euclidean distance of `radius_px` of a marked pixel; a radius below 1 changes nothing.
+pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
+    let mut dilated = mask.clone();
+    let (width, height) = (mask.width(), mask.height());
+    let radius = radius_px.clamp(0.0, (width + height) as f64);
+    for run in runs(mask, true) {
+        let reach = radius as usize;
+        for y in run.y.saturating_sub(reach)..(run.y + reach + 1).min(height) {
+            let rise = y.abs_diff(run.y) as f64;
+            let half = (radius * radius - rise * rise).sqrt() as usize;
+            let end = (run.end + half).min(width);
+            dilated.row_mut(y)[run.start.saturating_sub(half)..end].fill(true);
+        }
+    }
+    dilated
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::region::tests::{mask_of, random_mask};
+    use proptest::prelude::*;
+
+    fn neighbour_number(mask: &Mask, x: usize, y: usize) -> u8 {
+        let columns = x.saturating_sub(1)..(x + 2).min(mask.width());
+        let rows = y.saturating_sub(1)..(y + 2).min(mask.height());
+        let near = rows.flat_map(|v| columns.clone().map(move |u| (u, v)));
+        near.filter(|&(u, v)| (u, v) != (x, y) && mask.at(u, v)).count() as u8
+    }
+
+    /// Unmarked pixels that a walk from the edge reaches, one pixel at a time.
+    fn outside(mask: &Mask) -> Mask {
+        let (w, h) = (mask.width(), mask.height());
+        let mut reached = Image::filled(w, h, false);
+        let mut stack: Vec<_> = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).collect();
+        stack.retain(|&(x, y)| x == 0 || y == 0 || x == w - 1 || y == h - 1);
+        while let Some((x, y)) = stack.pop() {
+            if !mask.at(x, y) && !reached.at(x, y) {
+                reached.set(x, y, true);
+                stack.extend([(x.saturating_sub(1), y), (x, y.saturating_sub(1))]);
+                stack.extend([((x + 1).min(w - 1), y), (x, (y + 1).min(h - 1))]);
+            }
+        }
+        reached
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(128))]
+        #[test]
+        fn a_clean_mask_is_stable(mask in random_mask(), few in 0u8..4, gap in 1u8..6) {
+            let options = CleanOptions { few, many: few + gap };
+            let cleaned = clean(&mask, &options).unwrap();
+            for (i, &marked) in cleaned.pixels().iter().enumerate() {
+                let n = neighbour_number(&cleaned, i % mask.width(), i / mask.width());
+                let is_stable = if marked { n > options.few } else { n < options.many };
+                prop_assert!(is_stable);
+            }
+            prop_assert_eq!(&clean(&cleaned, &options).unwrap(), &cleaned);
+        }
+
+        #[test]
+        fn filled_is_all_that_the_edge_does_not_reach(mask in random_mask()) {
+            let (filled, outside) = (fill_holes(&mask), outside(&mask));
+            prop_assert!(filled.pixels().iter().zip(outside.pixels()).all(|(filled, outside)| filled != outside));
+        }
+
+        #[test]
+        fn dilation_marks_all_within_the_radius(mask in random_mask(), radius in 0.0f64..6.0) {
+            let dilated = dilate(&mask, radius);
+            let (w, h) = (mask.width(), mask.height());
+            for (x, y) in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
+                let near = (0..w * h).filter(|&i| mask.pixels()[i]).any(|i| {
+                    let (dx, dy) = ((i % w).abs_diff(x) as f64, (i / w).abs_diff(y) as f64);
+                    dx * dx + dy * dy <= radius * radius
+                });
+                prop_assert_eq!(dilated.at(x, y), near);
+            }
+        }
+    }
+
+    #[test]
+    fn specks_go_and_slots_close() {
+        let mask = mask_of(&["...........", ".#..###.###", "....###.###", "....#######", "....#######"]);
+        let cleaned = mask_of(&["...........", "....#######", "....#######", "....#######", "....#######"]);
+        assert_eq!(clean(&mask, &CleanOptions::default()).unwrap(), cleaned);
+    }
+
+    #[test]
+    fn rectangles_survive() {
+        let mask = mask_of(&["......", ".###..", ".###..", "......"]);
+        assert_eq!(clean(&mask, &CleanOptions::default()).unwrap(), mask);
+    }
+
+    #[test]
+    fn thresholds_that_meet_are_refused() {
+        let mask = mask_of(&["#"]);
+        let error = clean(&mask, &CleanOptions { few: 4, many: 4 }).unwrap_err();
+        assert_eq!(error, CleanError::ThresholdsMeet { few: 4, many: 4 });
+    }
+}

@@ -1,0 +1,375 @@
+//! Moving regions: connected areas of a change mask, their enclosing rectangles, and their grouping into candidates.
+//!
+//! Rohr 1994, section 4.1: the cleaned mask's area stands for the person, and its surrounding rectangle and outline
+//! are computed. On real footage a person falls apart where clothes resemble the background or where nothing moves (a
+//! foot in stance is not detected at all), so [`group_regions`] puts neighbouring areas together again.
+//!
+//! It cannot separate people who overlap in the image, nor a person from shadow and reflection.
+
+use super::frame::{Image, Mask};
+use super::outline::{Outline, outlines};
+
+/// Marked pixels side by side in one row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Run {
+    /// Row.
+    pub y: usize,
+    /// First column.
+    pub start: usize,
+    /// Column after the last.
+    pub end: usize,
+}
+
+/// An upright rectangle of whole pixels; all four sides belong to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rectangle {
+    /// First column.
+    pub left: usize,
+    /// First row.
+    pub top: usize,
+    /// Last column.
+    pub right: usize,
+    /// Last row.
+    pub bottom: usize,
+}
+
+impl Rectangle {
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.right - self.left + 1
+    }
+
+    /// Number of rows.
+    pub fn height(&self) -> usize {
+        self.bottom - self.top + 1
+    }
+
+    /// The smallest rectangle that holds both.
+    pub fn union(&self, other: &Self) -> Self {
+        Self {
+            left: self.left.min(other.left),
+            top: self.top.min(other.top),
+            right: self.right.max(other.right),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+
+    /// Free columns and rows between two rectangles; 0 where they overlap or touch.
+    pub fn gap(&self, other: &Self) -> [usize; 2] {
+        let free = |end: usize, start: usize| start.saturating_sub(end + 1);
+        [
+            free(self.right, other.left).max(free(other.right, self.left)),
+            free(self.bottom, other.top).max(free(other.bottom, self.top)),
+        ]
+    }
+}
+
+/// A set of pixels that stands for one moving thing: a connected area, or several areas grouped.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Region {
+    /// Its pixels, row by row and left to right.
+    pub runs: Vec<Run>,
+    /// The smallest rectangle that holds them.
+    pub rectangle: Rectangle,
+    /// Number of pixels.
+    pub area: usize,
+}
+
+impl Region {
+    /// From at least one run, in any order, no two overlapping.
+    fn from_runs(mut runs: Vec<Run>) -> Self {
+        runs.sort_unstable();
+        let rectangle = Rectangle {
+            left: runs.iter().map(|run| run.start).min().unwrap_or(0),
+            top: runs.first().map_or(0, |run| run.y),
+            right: runs.iter().map(|run| run.end - 1).max().unwrap_or(0),
+            bottom: runs.last().map_or(0, |run| run.y),
+        };
+        let area = runs.iter().map(|run| run.end - run.start).sum();
+        Self { runs, rectangle, area }
+    }
+
+    /// Whether a pixel belongs to the region.
+    pub fn contains(&self, x: usize, y: usize) -> bool {
+        let after = self.runs.partition_point(|run| (run.y, run.start) <= (y, x));
+        after.checked_sub(1).is_some_and(|i| self.runs[i].y == y && x < self.runs[i].end)
+    }
+
+    /// The region as a mask of a frame's size; pixels outside it are dropped.
+    pub fn mask(&self, width: usize, height: usize) -> Mask {
+        let mut mask = Image::filled(width, height, false);
+        for run in self.runs.iter().filter(|run| run.y < height && run.start < width) {
+            mask.row_mut(run.y)[run.start..run.end.min(width)].fill(true);
+        }
+        mask
+    }
+
+    /// The borders of the region in frame coordinates, see [`outlines`].
+    pub fn outlines(&self) -> Vec<Outline> {
+        let Rectangle { left, top, .. } = self.rectangle;
+        let shifted =
+            self.runs.iter().map(|r| Run { y: r.y - top, start: r.start - left, end: r.end - left });
+        let local = Self::from_runs(shifted.collect()).mask(self.rectangle.width(), self.rectangle.height());
+        let mut outlines = outlines(&local);
+        for [x, y] in outlines.iter_mut().flat_map(|outline| &mut outline.pixels) {
+            *x += left;
+            *y += top;
+        }
+        outlines
+    }
+}
+
+/// The connected areas (8 neighbours) with at least `min_area` pixels, largest first, equal ones from top to bottom.
+pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
+    let areas = connected_runs(&runs(mask, true), Connectivity::Eight);
+    let mut regions: Vec<Region> = areas.into_iter().map(Region::from_runs).collect();
+    regions.retain(|region| region.area >= min_area);
+    regions.sort_by(|a, b| b.area.cmp(&a.area));
+    regions
+}
+
+/// When two areas belong to one candidate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroupOptions {
+    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16 is the
+    /// size of what one changed pixel leaves in the mask.
+    pub min_part_area: usize,
+    /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can be seen.
+    pub min_area: usize,
+    /// Largest free height between two rectangles over the taller one's height. 0.3: the shank of a faint
+    /// trouser leg may be missing.
+    pub gap_y: f64,
+    /// Largest free width between two rectangles over the taller one's height. 0.05: wide enough for a forearm, narrower than the space
+    /// between two people side by side.
+    pub gap_x: f64,
+}
+
+impl Default for GroupOptions {
+    fn default() -> Self {
+        Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05 }
+    }
+}
+
+/// Joins regions whose rectangles overlap or nearly touch, until no more do; largest first.
+///
+/// A joined group has a larger rectangle, which may reach further areas.
+pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
+    let mut groups: Vec<Region> =
+        regions.iter().filter(|region| region.area >= options.min_part_area).cloned().collect();
+    while let Some((i, j)) = first_joinable(&groups, options) {
+        let mut runs = groups.swap_remove(j).runs;
+        runs.append(&mut groups[i].runs);
+        groups[i] = Region::from_runs(runs);
+    }
+    groups.retain(|group| group.area >= options.min_area);
+    groups.sort_by(|a, b| b.area.cmp(&a.area).then(a.runs[0].cmp(&b.runs[0])));
+    groups
+}
+
+/// Indices i < j of the first two groups that are near enough.
+fn first_joinable(groups: &[Region], options: &GroupOptions) -> Option<(usize, usize)> {
+    let near = |a: &Rectangle, b: &Rectangle| {
+        let height = a.height().max(b.height()) as f64;
+        let [gap_x, gap_y] = a.gap(b);
+        gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height
+    };
+    let mut pairs = (0..groups.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    pairs.find(|&(i, j)| near(&groups[i].rectangle, &groups[j].rectangle))
+}
+
+/// Which pixels count as neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Connectivity {
+    /// Those that share an edge.
+    Four,
+    /// Those that share an edge or a corner.
+    Eight,
+}
+
+/// The runs of pixels equal to `value`, row by row and left to right.
+pub(super) fn runs(mask: &Mask, value: bool) -> Vec<Run> {
+    let mut runs = Vec::new();
+    for y in 0..mask.height() {
+        let row = mask.row(y);
+        let mut x = 0;
+        while x < row.len() {
+            let start = x + distance_to(&row[x..], value);
+            x = start + distance_to(&row[start..], !value);
+            if start < row.len() {
+                runs.push(Run { y, start, end: x });
+            }
+        }
+    }
+    runs
+}
+
+/// Number of pixels before the first one equal to `value`. Whole blocks without it are skipped.
+fn distance_to(row: &[bool], value: bool) -> usize {
+    const BLOCK: usize = 64;
+    let skipped =
+        row.chunks_exact(BLOCK).take_while(|block| !block.iter().fold(false, |any, &p| any | (p == value)));
+    let skipped = skipped.count() * BLOCK;
+    row[skipped..].iter().position(|&pixel| pixel == value).map_or(row.len(), |i| skipped + i)
+}
+
+/// Groups runs (as [`runs`] orders them) into connected areas, in the order of their first runs.
+pub(super) fn connected_runs(runs: &[Run], connectivity: Connectivity) -> Vec<Vec<Run>> {
+    let reach = usize::from(connectivity == Connectivity::Eight);
+    let mut parents: Vec<usize> = (0..runs.len()).collect();
+    let mut above = 0;
+    for (i, run) in runs.iter().enumerate() {
+        while runs[above].y + 1 < run.y
+            || (runs[above].y + 1 == run.y && runs[above].end + reach <= run.start)
+        {
+            above += 1;
+        }
+        let touching = runs[above..i].iter().take_while(|up| up.y < run.y && up.start < run.end + reach);
+        for j in above..above + touching.count() {
+            join(&mut parents, i, j);
+        }
+    }
+    areas_by_root(runs, &mut parents)
+}
+
+fn areas_by_root(runs: &[Run], parents: &mut [usize]) -> Vec<Vec<Run>> {
+    let mut areas: Vec<Vec<Run>> = Vec::new();
+    let mut area_of_root = vec![usize::MAX; runs.len()];
+    for (i, &run) in runs.iter().enumerate() {
+        let root = root(parents, i);
+        if area_of_root[root] == usize::MAX {
+            area_of_root[root] = areas.len();
+            areas.push(Vec::new());
+        }
+        areas[area_of_root[root]].push(run);
+    }
+    areas
+}
+
+fn root(parents: &mut [usize], mut i: usize) -> usize {
+    while parents[i] != i {
+        parents[i] = parents[parents[i]];
+        i = parents[i];
+    }
+    i
+}
+
+fn join(parents: &mut [usize], i: usize, j: usize) {
+    let (a, b) = (root(parents, i), root(parents, j));
+    parents[a.max(b)] = a.min(b);
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::VecDeque;
+
+    /// A mask drawn with `#` for marked pixels.
+    pub fn mask_of(rows: &[&str]) -> Mask {
+        let pixels = rows.iter().flat_map(|row| row.bytes().map(|c| c == b'#')).collect();
+        Image::from_vec(rows[0].len(), rows.len(), pixels).unwrap()
+    }
+
+    /// Masks from nearly empty to nearly full, wide enough for whole blocks.
+    pub fn random_mask() -> impl Strategy<Value = Mask> {
+        (1usize..90, 1usize..24, 0.02f64..0.98).prop_flat_map(|(w, h, density)| {
+            proptest::collection::vec(proptest::bool::weighted(density), w * h)
+                .prop_map(move |pixels| Image::from_vec(w, h, pixels).unwrap())
+        })
+    }
+
+    /// Connected areas as sorted pixel lists, by breadth-first search.
+    fn areas_by_search(mask: &Mask) -> Vec<Vec<(usize, usize)>> {
+        let mut left = mask.clone();
+        let mut areas = Vec::new();
+        for (x, y) in (0..mask.height()).flat_map(|y| (0..mask.width()).map(move |x| (x, y))) {
+            let (mut queue, mut area) = (VecDeque::from([(x, y)]), Vec::new());
+            while let Some((x, y)) = queue.pop_front() {
+                if x < mask.width() && y < mask.height() && left.at(x, y) {
+                    left.set(x, y, false);
+                    area.push((y, x));
+                    let near = (0..9).map(|i| ((x + i % 3).wrapping_sub(1), (y + i / 3).wrapping_sub(1)));
+                    queue.extend(near);
+                }
+            }
+            if !area.is_empty() {
+                area.sort_unstable();
+                areas.push(area);
+            }
+        }
+        areas
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(128))]
+        #[test]
+        fn regions_are_the_areas_a_search_finds(mask in random_mask(), min_area in 1usize..6) {
+            let mut expected = areas_by_search(&mask);
+            expected.retain(|area| area.len() >= min_area);
+            expected.sort_by_key(|area| std::cmp::Reverse(area.len()));
+            let found = regions(&mask, min_area);
+            prop_assert_eq!(found.len(), expected.len());
+            for (region, pixels) in found.iter().zip(&expected) {
+                let own = region.runs.iter().flat_map(|run| (run.start..run.end).map(|x| (run.y, x)));
+                prop_assert_eq!(&own.collect::<Vec<_>>(), pixels);
+                prop_assert_eq!(region.area, pixels.len());
+                let columns = || pixels.iter().map(|&(_, x)| x);
+                let rectangle = Rectangle {
+                    left: columns().min().unwrap(),
+                    top: pixels[0].0,
+                    right: columns().max().unwrap(),
+                    bottom: pixels[pixels.len() - 1].0,
+                };
+                prop_assert_eq!(region.rectangle, rectangle);
+            }
+        }
+
+        #[test]
+        fn masks_and_membership_agree(mask in random_mask()) {
+            let mut all = Image::filled(mask.width(), mask.height(), false);
+            for region in regions(&mask, 1) {
+                let own = region.mask(mask.width(), mask.height());
+                for (i, pixel) in all.pixels_mut().iter_mut().enumerate() {
+                    let (x, y) = (i % mask.width(), i / mask.width());
+                    prop_assert_eq!(region.contains(x, y), own.at(x, y));
+                    *pixel |= own.at(x, y);
+                }
+            }
+            prop_assert_eq!(all, mask);
+        }
+    }
+
+    fn block(left: usize, top: usize, width: usize, height: usize) -> Region {
+        Region::from_runs((top..top + height).map(|y| Run { y, start: left, end: left + width }).collect())
+    }
+
+    #[test]
+    fn a_person_in_pieces_is_one_candidate_and_two_people_are_two() {
+        let trunk = block(100, 50, 30, 60);
+        let (shoe, neighbour, speck) = (block(95, 125, 12, 8), block(140, 50, 30, 80), block(131, 60, 3, 3));
+        let groups =
+            group_regions(&[trunk.clone(), shoe.clone(), neighbour.clone(), speck], &GroupOptions::default());
+        assert_eq!(groups.len(), 2);
+        assert_eq!(groups[0], neighbour);
+        assert_eq!(groups[1].rectangle, trunk.rectangle.union(&shoe.rectangle));
+        assert_eq!(groups[1].area, trunk.area + shoe.area);
+    }
+
+    #[test]
+    fn grouping_does_not_depend_on_the_order() {
+        let parts =
+            [block(100, 50, 30, 60), block(95, 125, 12, 20), block(120, 160, 12, 20), block(300, 0, 20, 40)];
+        let groups = group_regions(&parts, &GroupOptions::default());
+        let mut reversed = parts;
+        reversed.reverse();
+        assert_eq!(groups, group_regions(&reversed, &GroupOptions::default()));
+        assert_eq!(groups.iter().map(|group| group.rectangle.height()).collect::<Vec<_>>(), [130, 40]);
+    }
+
+    #[test]
+    fn outlines_are_in_frame_coordinates() {
+        let outlines = block(7, 5, 2, 2).outlines();
+        assert_eq!(outlines.len(), 1);
+        assert_eq!(outlines[0].pixels, [[7, 5], [7, 6], [8, 6], [8, 5]]);
+    }
+}
