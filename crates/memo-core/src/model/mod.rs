@@ -4,8 +4,13 @@ pub mod camera;
 pub mod camera_file;
 pub mod cylinder;
 pub mod distortion;
+pub mod position;
 
 pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
 pub use camera_file::CameraFileError;
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;
+pub use position::{
+    FootPosition, Midpoints, PositionError, PositionOptions, height_on_ground, position_from_feet,
+    position_from_head, position_from_rectangle, position_on_ground,
+};
