@@ -305,6 +305,25 @@ fisheye = false
     }
 
     #[test]
+    fn a_rotation_vector_is_read_as_opencv_does() {
+        let camera =
+            Camera::from_toml_str(&ONE.replace("[1.623156204, 0.0, 0.0]", "[1.2, -0.7, 0.4]"), None).unwrap();
+        // cv2.Rodrigues, rows.
+        let expected = DMat3::from_cols_array(&[
+            0.72780455,
+            -0.62628336,
+            -0.27940954,
+            -0.07723718,
+            0.32998044,
+            -0.94082269,
+            0.68142127,
+            0.70631584,
+            0.1917889,
+        ]);
+        assert!(camera.rotation.abs_diff_eq(expected.transpose(), 1e-8));
+    }
+
+    #[test]
     fn a_rotation_may_be_a_rounded_matrix() {
         let matrix = "rotation = [[0.8, -0.6, 0.0], [0.6001, 0.8, 0.0], [0, 0, 1]]";
         let camera =

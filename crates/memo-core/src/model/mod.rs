@@ -9,6 +9,7 @@ pub mod gait;
 pub mod silhouette;
 pub mod spline;
 pub mod visibility;
+pub mod position;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
 pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
@@ -18,3 +19,7 @@ pub use distortion::Distortion;
 pub use gait::{Gait, GaitStyle, Posture, SideAngles};
 pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
 pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
+pub use position::{
+    FootPosition, Midpoints, PositionError, PositionOptions, height_on_ground, position_from_feet,
+    position_from_head, position_from_rectangle, position_on_ground,
+};
