@@ -6,10 +6,10 @@ pub mod camera_file;
 pub mod cylinder;
 pub mod distortion;
 pub mod gait;
+pub mod position;
 pub mod silhouette;
 pub mod spline;
 pub mod visibility;
-pub mod position;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
 pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
@@ -17,9 +17,9 @@ pub use camera_file::CameraFileError;
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;
 pub use gait::{Gait, GaitStyle, Posture, SideAngles};
-pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
-pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
 pub use position::{
     FootPosition, Midpoints, PositionError, PositionOptions, height_on_ground, position_from_feet,
     position_from_head, position_from_rectangle, position_on_ground,
 };
+pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
+pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
