@@ -207,7 +207,9 @@ mod tests {
         assert!(lens.undistort(DVec2::new(fold * 0.999, 0.0)).is_some());
         assert_eq!(lens.undistort(DVec2::new(fold * 1.001, 0.0)), None);
         assert!(lens.distort(DVec2::new(fold * 2.0 / 3.0 * 0.999_999, 0.0)).is_some());
-        assert_eq!(lens.distort(DVec2::new(fold * 2.0 / 3.0 * 1.000_001, 0.0)), None);
+        for beyond in [1.000_001, 1.1, 2.0, 5.0] {
+            assert_eq!(lens.distort(DVec2::new(fold * 2.0 / 3.0 * beyond, 0.0)), None);
+        }
     }
 
     #[test]
@@ -235,6 +237,21 @@ mod tests {
             prop_assume!(is_clear);
             let back = lens.undistort(lens.distort(ideal).unwrap());
             prop_assert!(back.is_some_and(|b| (b - ideal).length() < 1e-12), "{:?}", back);
+        }
+
+        #[test]
+        fn the_fold_is_where_sampling_finds_it(
+            k1 in -1.0..1.0_f64, k2 in -1.0..1.0_f64, k3 in -1.0..1.0_f64, reach in 0.3..2.0_f64,
+        ) {
+            let lens = Distortion::from_opencv([k1, k2, 0.0, 0.0, k3]);
+            let radius = |r: f64| lens.brown(DVec2::new(r, 0.0)).x;
+            let slope = |i: u32| {
+                let r = reach * f64::from(i) / 1000.0;
+                (radius(r + 1e-5) - radius(r - 1e-5)) / 2e-5
+            };
+            let least = (0..=1000).map(slope).fold(f64::INFINITY, f64::min);
+            prop_assume!(least.abs() > 1e-3);
+            prop_assert_eq!(lens.is_unfolded(DVec2::new(reach, 0.0)), least > 0.0);
         }
 
         #[test]

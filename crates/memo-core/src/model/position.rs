@@ -585,6 +585,38 @@ mod tests {
     }
 
     #[test]
+    fn the_fit_is_the_likeliest_place_and_height() {
+        let camera = turned(0.3, 0.3, 0.2);
+        let options = PositionOptions {
+            column_sd_px: 1.5,
+            bottom_sd_px: 5.0,
+            top_sd_px: 0.7,
+            height_sd_m: 0.02,
+            ..options()
+        };
+        let mut midpoints = seen(&camera, DVec3::new(0.6, 1.5, 0.0), 1.7).unwrap();
+        midpoints.bottom_px += DVec2::new(1.0, 4.0);
+        midpoints.top_px += DVec2::new(1.0, -1.0);
+        // Minus twice the logarithm of the likelihood, least over the height.
+        let cost = |place: DVec2| {
+            let at_height = |height: f64| {
+                let model = seen(&camera, place.extend(0.0), height).unwrap();
+                let (b, t) = (midpoints.bottom_px - model.bottom_px, midpoints.top_px - model.top_px);
+                (b.x * b.x + t.x * t.x) / (2.0 * 1.5 * 1.5)
+                    + (b.y / 5.0).powi(2)
+                    + (t.y / 0.7).powi(2)
+                    + ((height - 1.7) / 0.02).powi(2)
+            };
+            (0..400).map(|i| at_height(1.6 + f64::from(i) * 5e-4)).fold(f64::INFINITY, f64::min)
+        };
+        let found = position_on_ground(&camera, &midpoints, 1.7, &options).unwrap().point_in_world.truncate();
+        for turn in 0..8 {
+            let aside = DVec2::from_angle(f64::from(turn) * std::f64::consts::FRAC_PI_4) * 0.005;
+            assert!(cost(found) < cost(found + aside), "{aside}");
+        }
+    }
+
+    #[test]
     fn no_person_fits_these() {
         let camera = level();
         let good = Midpoints { bottom_px: DVec2::new(500.0, 400.0), top_px: DVec2::new(500.0, 200.0) };
