@@ -1,6 +1,8 @@
 //! Where evidence and model meet: similarity, search, start, filter, tracker.
 
+pub mod evidence;
 pub mod kalman;
+pub mod locate;
 pub mod score;
 pub mod search;
 pub mod start;

@@ -1,0 +1,153 @@
+//! What each frame contributes to tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and 4.3).
+//!
+//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two frames are
+//! kept, however long the stream.
+
+use super::score::EdgeLine;
+use crate::image::edge::{EdgeDomain, EdgeOptions, Window};
+use crate::image::line::{LineError, LineOptions, edge_segments};
+use crate::image::{
+    ChangeDetector, ChangeOptions, CleanError, CleanOptions, Frame, FrameError, GroupOptions, Image, Mask,
+    Rectangle, Region, clean, dilate, fill_holes, group_regions, regions,
+};
+use crate::model::Camera;
+use thiserror::Error;
+
+/// Why a frame gave no evidence.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum EvidenceError {
+    /// The frame does not fit the ones before.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The options of the binary operations make no sense.
+    #[error(transparent)]
+    Clean(#[from] CleanError),
+    /// The options of edge or line finding make no sense.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// Frames must come in order.
+    #[error("frame times must increase: {time_s} s came after {previous_s} s")]
+    TimeOrder {
+        /// Time of the frame before.
+        previous_s: f64,
+        /// Time of this frame.
+        time_s: f64,
+    },
+}
+
+/// Options of the stages from pixels to regions and edges.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EvidenceOptions {
+    /// Change detection, eq. (1).
+    pub change: ChangeOptions,
+    /// Recursive binary operations.
+    pub clean: CleanOptions,
+    /// Grouping of regions into candidates.
+    pub group: GroupOptions,
+    /// Edge points.
+    pub edge: EdgeOptions,
+    /// Straight edges.
+    pub line: LineOptions,
+}
+
+/// Edges are taken this far outside the moving region, pixels: the change mask covers the outline, this covers the
+/// parts of a limb that stood still between two frames.
+const EDGE_MARGIN_PX: f64 = 5.0;
+
+/// One frame with its change mask.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// Number of the frame, from 0.
+    pub frame: usize,
+    /// Time of the frame, seconds.
+    pub time_s: f64,
+    /// The frame.
+    pub grey: Image<u8>,
+    /// Changed pixels after the binary operations.
+    pub mask: Mask,
+}
+
+impl Evidence {
+    /// Candidate regions, largest first.
+    pub fn candidates(&self, options: &EvidenceOptions) -> Vec<Region> {
+        group_regions(&regions(&self.mask, options.group.min_part_area), &options.group)
+    }
+
+    /// Straight edges in and near the changed pixels of a rectangle, in ideal pixels of the camera; in the whole rectangle
+    /// where nothing changed in it.
+    pub fn edges(
+        &self,
+        window: &Rectangle,
+        camera: Option<&Camera>,
+        options: &EvidenceOptions,
+    ) -> Result<Vec<EdgeLine>, EvidenceError> {
+        let window = Window { x: window.left, y: window.top, width: window.width(), height: window.height() };
+        let moving = self.mask_near(&window);
+        let domain = EdgeDomain { mask: moving.as_ref(), window: Some(window) };
+        let segments = edge_segments(&self.grey.as_frame(), &domain, &options.edge, &options.line)?;
+        let ideal =
+            |p: glam::DVec2| camera.and_then(|c| c.undistort(p).ok()).unwrap_or(p).as_vec2().to_array();
+        Ok(segments
+            .iter()
+            .map(|s| EdgeLine {
+                start: ideal(s.start_px),
+                end: ideal(s.end_px),
+                gradient: s.mean_gradient as f32,
+                velocity: 0.0,
+            })
+            .collect())
+    }
+
+    /// The dilated change mask, `None` where nothing changed in the window.
+    fn mask_near(&self, window: &Window) -> Option<Mask> {
+        let rows = window.y..window.y + window.height;
+        let moved = rows.clone().any(|y| self.mask.row(y)[window.x..window.x + window.width].contains(&true));
+        moved.then(|| dilate(&self.mask, EDGE_MARGIN_PX))
+    }
+}
+
+/// Frames in, evidence out, one frame later.
+#[derive(Debug)]
+pub struct EvidenceStream {
+    options: EvidenceOptions,
+    detector: ChangeDetector,
+    waiting: Option<(usize, f64, Image<u8>)>,
+    frames: usize,
+}
+
+impl EvidenceStream {
+    /// A stream that has seen no frame.
+    pub fn new(options: EvidenceOptions) -> Self {
+        Self { options, detector: ChangeDetector::new(options.change), waiting: None, frames: 0 }
+    }
+
+    /// Takes a frame and gives the evidence of the one before.
+    pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
+        if let Some((_, previous_s, _)) = self.waiting
+            && (time_s.is_nan() || time_s <= previous_s)
+        {
+            return Err(EvidenceError::TimeOrder { previous_s, time_s });
+        }
+        let mask = self.detector.push(frame)?;
+        let before = self.waiting.replace((self.frames, time_s, frame.to_image()));
+        self.frames += 1;
+        self.evidence(before, mask)
+    }
+
+    /// The evidence of the last frame.
+    pub fn finish(mut self) -> Result<Option<Evidence>, EvidenceError> {
+        let last = self.waiting.take();
+        let detector = std::mem::replace(&mut self.detector, ChangeDetector::new(self.options.change));
+        self.evidence(last, detector.finish())
+    }
+
+    fn evidence(
+        &self,
+        frame: Option<(usize, f64, Image<u8>)>,
+        mask: Option<Mask>,
+    ) -> Result<Option<Evidence>, EvidenceError> {
+        let (Some((frame, time_s, grey)), Some(mask)) = (frame, mask) else { return Ok(None) };
+        let mask = fill_holes(&clean(&mask, &self.options.clean)?);
+        Ok(Some(Evidence { frame, time_s, grey, mask }))
+    }
+}

@@ -1,0 +1,204 @@
+//! From rectangles to the path walked: depth, direction and speed (Rohr 1994, sections 4.2 and 6).
+//!
+//! The paper's assumption holds here too: the person walks parallel to the image plane on level ground. A single
+//! rectangle is a poor gauge (arms and feet swing its centre by 7-10 cm, reflections stretch it by half a metre of depth), so rows are
+//! pooled over the frames before they become a depth.
+
+use super::search::Path;
+use super::start::line_through;
+use crate::image::Rectangle;
+use crate::model::position::{Midpoints, PositionError, PositionOptions, position_on_ground};
+use crate::model::{Camera, CameraError};
+use glam::{DVec2, DVec3};
+use thiserror::Error;
+
+/// Why no path was found.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LocateError {
+    /// The rectangles do not fit a person standing on the ground before this camera.
+    #[error(transparent)]
+    Position(#[from] PositionError),
+    /// No camera could be made from the person.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The person does not fit between ground and camera.
+    #[error(
+        "a person {height_m} m tall would stand {distance_m:.1} m away, where the image should show {expected_px:.0} px, not {got_px:.0} px; check height and camera"
+    )]
+    Size {
+        /// Body height, metres.
+        height_m: f64,
+        /// Distance found, metres.
+        distance_m: f64,
+        /// Pixels that such a person spans there.
+        expected_px: f64,
+        /// Pixels seen.
+        got_px: f64,
+    },
+}
+
+/// A person's enclosing rectangle in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// Time of the frame, seconds.
+    pub time_s: f64,
+    /// The rectangle of the moving region.
+    pub rectangle: Rectangle,
+}
+
+/// The 5x5 windows of eq. (1) mark pixels up to this far outside the person.
+const MASK_MARGIN_PX: f64 = 2.0;
+/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for the soles.
+const SOLE_QUANTILE: f64 = 0.2;
+/// The crown bobs evenly about its median row.
+const CROWN_QUANTILE: f64 = 0.5;
+/// Standard deviation of a body height that was measured, metres: shoes and hair.
+const HEIGHT_SD_M: f64 = 0.02;
+
+/// Row of the soles and of the crown over all sightings, pixels.
+pub fn person_rows(sightings: &[Sighting]) -> (f64, f64) {
+    let rows =
+        |row: fn(&Rectangle) -> usize| sightings.iter().map(|s| row(&s.rectangle) as f64).collect::<Vec<_>>();
+    let sole = quantile(rows(|r| r.bottom), SOLE_QUANTILE) - MASK_MARGIN_PX;
+    let crown = quantile(rows(|r| r.top), CROWN_QUANTILE) + MASK_MARGIN_PX;
+    (sole, crown)
+}
+
+fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = q * (values.len() as f64 - 1.0);
+    let (low, high) = (values[at.floor() as usize], values[at.ceil() as usize]);
+    low + at.fract() * (high - low)
+}
+
+/// The camera guessed from the sightings of one person of known height; see [`Camera::from_person`].
+pub fn camera_from_sightings(
+    sightings: &[Sighting],
+    size: [u32; 2],
+    field_of_view_rad: f64,
+    height_m: f64,
+) -> Result<Camera, LocateError> {
+    let (sole, crown) = person_rows(sightings);
+    Ok(Camera::from_person(size, field_of_view_rad, height_m, sole, crown)?)
+}
+
+/// Where and how fast somebody moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    /// The line walked, facing the way the person moves; `along` is 0 where the camera's axis crosses.
+    pub path: Path,
+    /// Place along the path at each sighting, metres.
+    pub along_m: Vec<f64>,
+    /// Mean speed along the path, metres a second, never negative.
+    pub speed_mps: f64,
+    /// Standard deviation of the path's distance from the camera, metres.
+    pub depth_sd_m: f64,
+}
+
+/// Finds the line parallel to the image plane on which the sighted person moves.
+pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<Course, LocateError> {
+    // 1. Depth of the line from the pooled rows at the sightings' mean column.
+    let (sole, crown) = person_rows(sightings);
+    let column = |s: &Sighting| 0.5 * (s.rectangle.left + s.rectangle.right) as f64;
+    let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
+    let midpoints = Midpoints::undistorted(camera, DVec2::new(middle, sole), DVec2::new(middle, crown))?;
+    let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
+    let foot = position_on_ground(camera, &midpoints, height_m, &options)?;
+    check_size(camera, &foot.point_in_world, height_m, sole - crown)?;
+    // 2. The line runs along the image's x axis, laid on the ground.
+    let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
+    let origin = camera.position().truncate();
+    let depth = (foot.point_in_world.truncate() - origin).dot(right.perp());
+    let mut path = Path { origin: origin + right.perp() * depth, heading_rad: right.to_angle() };
+    // 3. Where the columns meet the vertical plane above the line, and which way they go.
+    let places: Vec<(f64, f64)> =
+        sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), 0.5 * (sole + crown)))).collect();
+    let (speed, _) = line_through(&places);
+    if speed < 0.0 {
+        path.heading_rad += std::f64::consts::PI;
+    }
+    let along_m = places.iter().map(|(_, along)| along * speed.signum()).collect();
+    Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
+}
+
+/// Where the ray of a pixel meets the vertical plane above the path, metres along it.
+fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -> f64 {
+    let pixel = DVec2::new(column_px, row_px);
+    let ray = camera.ray_in_world(camera.undistort(pixel).unwrap_or(pixel)).truncate();
+    let across = path.direction().perp();
+    let eye = camera.position().truncate();
+    let t = (path.origin - eye).dot(across) / ray.dot(across);
+    path.along(eye + t * ray)
+}
+
+/// The rows must agree with the height to within a third: a person cut off or a wrong unit does not.
+fn check_size(camera: &Camera, foot: &DVec3, height_m: f64, got_px: f64) -> Result<(), LocateError> {
+    let expected_px = camera.pixel_height_at(*foot, height_m).unwrap_or(0.0);
+    if (0.67..1.5).contains(&(got_px / expected_px)) {
+        return Ok(());
+    }
+    let distance_m = (*foot - camera.position()).length();
+    Err(LocateError::Size { height_m, distance_m, expected_px, got_px })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sightings(camera: &Camera, depth: f64, speed: f64, height_m: f64) -> Vec<Sighting> {
+        (0..13)
+            .map(|k| {
+                let time_s = f64::from(k) * 0.04;
+                let foot = DVec3::new(0.3 + speed * time_s, depth, 0.0);
+                let at = |z: f64| camera.project(foot + DVec3::Z * z).unwrap();
+                let (sole, crown) = (at(0.0), at(height_m));
+                let rectangle = Rectangle {
+                    left: (sole.x - 40.0) as usize,
+                    right: (sole.x + 40.0) as usize,
+                    top: (crown.y - MASK_MARGIN_PX).round() as usize,
+                    bottom: (sole.y + MASK_MARGIN_PX).round() as usize,
+                };
+                Sighting { time_s, rectangle }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_planted_course_is_recovered_in_both_directions() {
+        let camera = Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap();
+        for speed in [1.4, -1.2] {
+            let course = locate(&sightings(&camera, 0.5, speed, 1.8), &camera, 1.8).unwrap();
+            assert!((course.path.origin.y - 0.5).abs() < 0.05, "{course:?}");
+            assert!((course.speed_mps - speed.abs()).abs() < 0.05, "{course:?}");
+            let start = course.path.point(course.along_m[0], 0.0);
+            assert!((start.x - 0.3).abs() < 0.03, "{start}");
+            assert!((course.path.direction().x - speed.signum()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn reflections_below_the_feet_move_the_depth_little() {
+        let camera = Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap();
+        let mut seen = sightings(&camera, 0.0, 1.4, 1.8);
+        for s in seen.iter_mut().step_by(2) {
+            s.rectangle.bottom += 60;
+        }
+        let course = locate(&seen, &camera, 1.8).unwrap();
+        assert!(course.path.origin.y.abs() < 0.15, "{course:?}");
+    }
+
+    #[test]
+    fn a_camera_made_from_the_person_puts_the_walk_on_its_origin() {
+        let truth = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
+        let seen = sightings(&truth, 0.0, 1.4, 1.7);
+        let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7).unwrap();
+        let course = locate(&seen, &camera, 1.7).unwrap();
+        assert!(course.path.origin.length() < 0.05 && (course.speed_mps - 1.4).abs() < 0.05, "{course:?}");
+    }
+
+    #[test]
+    fn a_height_that_cannot_be_is_refused() {
+        let camera = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
+        assert!(locate(&sightings(&camera, 0.0, 1.4, 1.7), &camera, 0.5).is_err());
+    }
+}
