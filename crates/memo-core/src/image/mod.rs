@@ -17,3 +17,10 @@ pub use frame::{Frame, FrameError, Image, Mask};
 pub use gain::{Gain, estimate_gain};
 pub use outline::{Outline, outlines};
 pub use region::{GroupOptions, Rectangle, Region, Run, group_regions, regions};
+pub mod edge;
+pub mod frame;
+pub mod line;
+
+pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
+pub use frame::{Frame, FrameError, Image, Mask};
+pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};

@@ -1,0 +1,505 @@
+//! Straight edges: chains of edge points cut where they bend and replaced by eigenvector lines.
+//!
+//! Sources: Rohr 1994, section 4.3; Duda & Hart, "Pattern Classification and Scene Analysis", 1973, p. 332
+//! (eigenvector line fitting) and p. 338 (splitting at the point farthest from the chord).
+//!
+//! A segment never reaches over the end of a chain: collinear pieces of an interrupted edge stay separate.
+//! Curves become polygons within the tolerance; where exactly they are cut means nothing.
+
+use super::edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, edge_chains};
+use super::frame::Frame;
+use glam::DVec2;
+use std::ops::Range;
+use thiserror::Error;
+
+/// Why no straight edges were computed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LineError {
+    /// The tolerance is not a positive number.
+    #[error("line tolerance of {max_deviation_px} px: must be positive")]
+    BadTolerance {
+        /// The tolerance asked for.
+        max_deviation_px: f64,
+    },
+    /// The shortest length is not a number or negative.
+    #[error("minimum length of {min_length_px} px: must not be negative")]
+    BadLength {
+        /// The length asked for.
+        min_length_px: f64,
+    },
+    /// The edge points were refused.
+    #[error(transparent)]
+    Edge(#[from] EdgeError),
+}
+
+/// How chains become straight edges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineOptions {
+    /// Largest distance of an edge point from its line. 1 px: five times the scatter of edge points in
+    /// compressed video, while the outline of a limb 100 px long that bows by 2 px is cut once.
+    pub max_deviation_px: f64,
+    /// Shorter segments are dropped. 8 px: below that noise makes segments too, and their direction scatters by degrees.
+    pub min_length_px: f64,
+}
+
+impl Default for LineOptions {
+    fn default() -> Self {
+        Self { max_deviation_px: 1.0, min_length_px: 8.0 }
+    }
+}
+
+impl LineOptions {
+    fn check(&self) -> Result<(), LineError> {
+        let Self { max_deviation_px, min_length_px } = *self;
+        if max_deviation_px.is_nan() || max_deviation_px <= 0.0 {
+            return Err(LineError::BadTolerance { max_deviation_px });
+        }
+        if min_length_px.is_nan() || min_length_px < 0.0 {
+            return Err(LineError::BadLength { min_length_px });
+        }
+        Ok(())
+    }
+}
+
+/// A straight edge. Seen in the image, the brighter side is on the right of the way from start to end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeSegment {
+    /// First end, pixels.
+    pub start_px: DVec2,
+    /// Second end, pixels.
+    pub end_px: DVec2,
+    /// Mean magnitude of the gradient of its edge points, grey levels per pixel.
+    pub mean_gradient: f64,
+    /// Root mean square distance of the edge points from the line, rounded ends excepted.
+    pub residual_rms_px: f64,
+    /// Number of edge points along the segment.
+    pub edgel_count: usize,
+}
+
+impl EdgeSegment {
+    /// Distance of the two ends.
+    pub fn length_px(&self) -> f64 {
+        self.start_px.distance(self.end_px)
+    }
+
+    /// Unit vector from start to end; zero if they coincide.
+    pub fn direction(&self) -> DVec2 {
+        (self.end_px - self.start_px).normalize_or_zero()
+    }
+
+    /// Unit vector across the edge to the brighter side; zero if the ends coincide.
+    pub fn normal(&self) -> DVec2 {
+        self.direction().perp()
+    }
+
+    /// The point halfway.
+    pub fn midpoint_px(&self) -> DVec2 {
+        self.start_px.midpoint(self.end_px)
+    }
+}
+
+/// Finds the straight edges of a frame.
+///
+/// 1. Edge points, linked into chains ([`edge_chains`]).
+/// 2. Chains cut and fitted ([`segments_from_chains`]).
+pub fn edge_segments(
+    frame: &Frame<'_>,
+    domain: &EdgeDomain<'_>,
+    edge_options: &EdgeOptions,
+    line_options: &LineOptions,
+) -> Result<Vec<EdgeSegment>, LineError> {
+    let chains = edge_chains(frame, domain, edge_options)?;
+    segments_from_chains(&chains, line_options)
+}
+
+/// Approximates each chain by straight segments, in the order of the chains.
+///
+/// 1. Cut a piece at its farthest point from the chord until every piece is near its own line.
+/// 2. Join neighbouring pieces that one line fits as well.
+/// 3. Keep the pieces that are long enough.
+pub fn segments_from_chains(
+    chains: &EdgeChains,
+    options: &LineOptions,
+) -> Result<Vec<EdgeSegment>, LineError> {
+    options.check()?;
+    let mut segments = Vec::new();
+    for edgels in chains.iter().filter(|edgels| edgels.len() >= 2) {
+        let chain = Chain::new(edgels);
+        let pieces = chain.join(chain.split(options.max_deviation_px), options.max_deviation_px);
+        segments.extend(pieces.into_iter().filter_map(|piece| chain.segment(piece, options)));
+    }
+    Ok(segments)
+}
+
+/// A line as a point on it and a unit direction.
+struct Line {
+    point: DVec2,
+    direction: DVec2,
+    /// Sum of the squared distances of the points it was fitted to, and their number.
+    residual_sq: f64,
+    count: f64,
+}
+
+impl Line {
+    fn residual_rms(&self) -> f64 {
+        (self.residual_sq / self.count).sqrt()
+    }
+
+    fn distance(&self, point: DVec2) -> f64 {
+        self.direction.perp_dot(point - self.point).abs()
+    }
+}
+
+/// Sums over the points from the start of a chain, relative to its first point.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    count: f64,
+    sum: DVec2,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl Moments {
+    fn plus(self, p: DVec2) -> Self {
+        Self {
+            count: self.count + 1.0,
+            sum: self.sum + p,
+            xx: self.xx + p.x * p.x,
+            xy: self.xy + p.x * p.y,
+            yy: self.yy + p.y * p.y,
+        }
+    }
+
+    fn minus(self, other: Self) -> Self {
+        Self {
+            count: self.count - other.count,
+            sum: self.sum - other.sum,
+            xx: self.xx - other.xx,
+            xy: self.xy - other.xy,
+            yy: self.yy - other.yy,
+        }
+    }
+
+    /// The line through the mean along the eigenvector of the larger eigenvalue of the scatter matrix
+    /// S = sum (p - m)(p - m)^T, with tan 2 theta = 2 `S_xy` / (`S_xx` - `S_yy`); the smaller eigenvalue is the
+    /// sum of squared distances.
+    fn line(self) -> Line {
+        let mean = self.sum / self.count;
+        let xx = self.xx - self.sum.x * mean.x;
+        let xy = self.xy - self.sum.x * mean.y;
+        let yy = self.yy - self.sum.y * mean.y;
+        let theta = 0.5 * (2.0 * xy).atan2(xx - yy);
+        let residual_sq = 0.5 * (xx + yy - (xx - yy).hypot(2.0 * xy));
+        Line {
+            point: mean,
+            direction: DVec2::from_angle(theta),
+            residual_sq: residual_sq.max(0.0),
+            count: self.count,
+        }
+    }
+}
+
+/// A chain of edge points with what makes the line through any stretch of it cheap.
+struct Chain<'a> {
+    edgels: &'a [Edgel],
+    origin: DVec2,
+    /// Positions relative to the origin.
+    points: Vec<DVec2>,
+    /// Entry i sums the first i points.
+    moments: Vec<Moments>,
+}
+
+impl<'a> Chain<'a> {
+    fn new(edgels: &'a [Edgel]) -> Self {
+        let origin = edgels[0].position_px.as_dvec2();
+        let points: Vec<DVec2> = edgels.iter().map(|e| e.position_px.as_dvec2() - origin).collect();
+        let mut moments = vec![Moments::default()];
+        moments.extend(points.iter().scan(Moments::default(), |sum, &p| {
+            *sum = sum.plus(p);
+            Some(*sum)
+        }));
+        Self { edgels, origin, points, moments }
+    }
+
+    fn whole(&self) -> Range<usize> {
+        0..self.points.len()
+    }
+
+    fn line(&self, piece: &Range<usize>) -> Line {
+        self.moments[piece.end].minus(self.moments[piece.start]).line()
+    }
+
+    fn is_straight(&self, piece: &Range<usize>, max_deviation_px: f64) -> bool {
+        let line = self.line(piece);
+        self.points[piece.clone()].iter().all(|&p| line.distance(p) <= max_deviation_px)
+    }
+
+    /// Pieces in order, each within the tolerance of its own line.
+    fn split(&self, max_deviation_px: f64) -> Vec<Range<usize>> {
+        let mut pieces = Vec::new();
+        let mut open = vec![self.whole()];
+        while let Some(piece) = open.pop() {
+            if piece.len() <= 2 || self.is_straight(&piece, max_deviation_px) {
+                pieces.push(piece);
+                continue;
+            }
+            let cut = self.farthest_from_chord(&piece);
+            open.push(cut..piece.end);
+            open.push(piece.start..cut);
+        }
+        pieces
+    }
+
+    /// The inner point farthest from the chord. The fitted line would not do: a corner's line runs through both
+    /// its sides, and the ends may be as far from it as the corner.
+    fn farthest_from_chord(&self, piece: &Range<usize>) -> usize {
+        let (a, b) = (self.points[piece.start], self.points[piece.end - 1]);
+        let chord = b - a;
+        let distance = |i: &usize| {
+            let p = self.points[*i] - a;
+            if chord == DVec2::ZERO { p.length_squared() } else { chord.perp_dot(p).abs() }
+        };
+        let inner = piece.start + 1..piece.end - 1;
+        inner.max_by(|i, j| distance(i).total_cmp(&distance(j))).unwrap_or(piece.start + 1)
+    }
+
+    /// Joins neighbours from the left as long as the common line keeps the tolerance.
+    fn join(&self, pieces: Vec<Range<usize>>, max_deviation_px: f64) -> Vec<Range<usize>> {
+        let mut joined: Vec<Range<usize>> = Vec::with_capacity(pieces.len());
+        for mut piece in pieces {
+            while let Some(before) = joined.last() {
+                let both = before.start..piece.end;
+                if !self.is_straight(&both, max_deviation_px) {
+                    break;
+                }
+                joined.pop();
+                piece = both;
+            }
+            joined.push(piece);
+        }
+        joined
+    }
+
+    /// The line fitted again without the points more than twice the RMS distance away: the Gaussian rounds
+    /// corners, and the rounded ends would turn and shift the line. They still have to keep the tolerance.
+    fn line_without_rounded_ends(&self, piece: &Range<usize>, max_deviation_px: f64) -> Line {
+        let points = &self.points[piece.clone()];
+        let line = self.line(piece);
+        let limit = 2.0 * line.residual_rms();
+        let near = points.iter().filter(|&&p| line.distance(p) <= limit);
+        let refitted = near.fold(Moments::default(), |sum, &p| sum.plus(p)).line();
+        let is_near = || points.iter().all(|&p| refitted.distance(p) <= max_deviation_px);
+        if 2.0 * refitted.count >= line.count && is_near() { refitted } else { line }
+    }
+
+    /// The segment fitted to a piece, `None` if it is too short.
+    fn segment(&self, piece: Range<usize>, options: &LineOptions) -> Option<EdgeSegment> {
+        if piece.len() < 2 {
+            return None;
+        }
+        let line = self.line_without_rounded_ends(&piece, options.max_deviation_px);
+        let edgels = &self.edgels[piece.clone()];
+        let count = piece.len() as f64;
+        let gradient = edgels.iter().map(|e| e.gradient.as_dvec2()).sum::<DVec2>();
+        let direction =
+            if line.direction.perp_dot(gradient) < 0.0 { -line.direction } else { line.direction };
+        let along = self.points[piece].iter().map(|&p| direction.dot(p - line.point));
+        let (from, to) = along.fold((f64::MAX, f64::MIN), |(from, to), t| (from.min(t), to.max(t)));
+        let foot = self.origin + line.point;
+        (to - from >= options.min_length_px).then(|| EdgeSegment {
+            start_px: foot + from * direction,
+            end_px: foot + to * direction,
+            mean_gradient: edgels.iter().map(|e| f64::from(e.gradient.length())).sum::<f64>() / count,
+            residual_rms_px: line.residual_rms(),
+            edgel_count: edgels.len(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use glam::Vec2;
+    use proptest::prelude::*;
+
+    /// Draws a shape given by its signed distance (positive = dark), anti-aliased over one pixel, with noise.
+    fn draw(size: usize, distance: impl Fn(DVec2) -> f64, contrast: f64, noise_sd: f64) -> Image<u8> {
+        let mut state = 0x2545_f491_4f6c_dd1du64;
+        let mut uniform = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let data = (0..size * size).map(|p| {
+            let at = DVec2::new((p % size) as f64, (p / size) as f64);
+            let noise = noise_sd * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+            (50.0 + contrast * (0.5 - distance(at)).clamp(0.0, 1.0) + noise).round().clamp(0.0, 255.0) as u8
+        });
+        Image::from_vec(size, size, data.collect()).unwrap()
+    }
+
+    fn polygon(corners: Vec<DVec2>) -> impl Fn(DVec2) -> f64 {
+        move |p| {
+            let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+            sides.map(|(&a, &b)| -(b - a).normalize().perp_dot(p - a)).fold(f64::MIN, f64::max)
+        }
+    }
+
+    fn segments(image: &Image<u8>) -> Vec<EdgeSegment> {
+        let (edge_options, line_options) = (EdgeOptions::default(), LineOptions::default());
+        edge_segments(&image.as_frame(), &EdgeDomain::default(), &edge_options, &line_options).unwrap()
+    }
+
+    /// Edge points with gradients across the way they run.
+    fn segments_through(points: &[DVec2], options: &LineOptions) -> Vec<EdgeSegment> {
+        let edgel = |i: usize| {
+            let way = points[(i + 1).min(points.len() - 1)] - points[i.saturating_sub(1)];
+            Edgel {
+                position_px: points[i].as_vec2(),
+                gradient: 10.0 * way.perp().normalize_or_zero().as_vec2(),
+            }
+        };
+        let edgels: Vec<Edgel> = (0..points.len()).map(edgel).collect();
+        let chain = Chain::new(&edgels);
+        let pieces = chain.join(chain.split(options.max_deviation_px), options.max_deviation_px);
+        pieces.into_iter().filter_map(|p| chain.segment(p, options)).collect()
+    }
+
+    #[test]
+    fn the_line_through_points_minimises_the_distances_across_it() {
+        let points = [(0.0, 0.1), (1.0, -0.2), (2.0, 0.3), (3.0, 0.2), (4.0, -0.1)].map(DVec2::from);
+        let line = points.iter().fold(Moments::default(), |m, &p| m.plus(p)).line();
+        let sum_sq = |l: &Line| points.iter().map(|&p| l.distance(p).powi(2)).sum::<f64>();
+        assert!((line.residual_sq - sum_sq(&line)).abs() < 1e-12);
+        for turn in [-1e-3, 1e-3] {
+            let turned = Line { direction: DVec2::from_angle(turn).rotate(line.direction), ..line };
+            let moved = Line { point: line.point + turn * DVec2::Y, ..line };
+            assert!(sum_sq(&turned) > line.residual_sq && sum_sq(&moved) > line.residual_sq);
+        }
+    }
+
+    #[test]
+    fn planted_noisy_edges_are_recovered() {
+        let (mut turn_sq, mut shift_sq, count) = (0.0, 0.0, 60);
+        for i in 0..count {
+            let normal = DVec2::from_angle(f64::from(i) * 0.1047);
+            let offset = (f64::from(i) * 0.618).fract() - 0.5;
+            let image = draw(64, |p| offset - normal.dot(p - 32.0), 60.0, 4.0);
+            let longest = segments(&image).into_iter().max_by(|a, b| a.length_px().total_cmp(&b.length_px()));
+            let found = longest.expect("an edge is there");
+            assert!(found.length_px() > 55.0, "{found:?}");
+            assert!(found.normal().dot(normal) > 0.99, "polarity of {found:?}");
+            turn_sq += found.direction().dot(normal).powi(2);
+            shift_sq += (normal.dot(found.midpoint_px() - 32.0) - offset).powi(2);
+        }
+        let (turn_sd, shift_sd) = ((turn_sq / f64::from(count)).sqrt(), (shift_sq / f64::from(count)).sqrt());
+        println!("direction sd {:.3} deg, offset sd {shift_sd:.4} px", turn_sd.to_degrees());
+        assert!(turn_sd.to_degrees() < 0.1, "direction sd {} deg", turn_sd.to_degrees());
+        assert!(shift_sd < 0.03, "offset sd {shift_sd} px");
+    }
+
+    #[test]
+    fn a_polygon_has_one_segment_a_side() {
+        let corners: Vec<DVec2> = (0..5)
+            .map(|i| 50.0 + 35.0 * DVec2::from_angle(0.3 + 0.4 * f64::from(i) * std::f64::consts::PI))
+            .collect();
+        let found = segments(&draw(100, polygon(corners.clone()), 100.0, 0.0));
+        assert_eq!(found.len(), 5);
+        for (i, &a) in corners.iter().enumerate() {
+            let b = corners[(i + 1) % 5];
+            let normal = (b - a).normalize().perp();
+            let side =
+                found.iter().find(|s| s.normal().dot(normal) > 0.999).expect("a segment along the side");
+            assert!(normal.dot(side.midpoint_px() - a).abs() < 0.1, "{side:?}");
+            assert!(side.start_px.distance(a) < 4.0 && side.end_px.distance(b) < 4.0, "{side:?}");
+        }
+    }
+
+    #[test]
+    fn a_disc_becomes_a_polygon_within_the_tolerance() {
+        let found = segments(&draw(120, |p| p.distance(DVec2::splat(60.0)) - 45.0, 100.0, 0.0));
+        assert!((10..=18).contains(&found.len()), "{} segments", found.len());
+        let length: f64 = found.iter().map(EdgeSegment::length_px).sum();
+        assert!(length > 0.9 * 2.0 * std::f64::consts::PI * 45.0, "{length} px of outline");
+        for s in &found {
+            for p in [s.start_px, s.midpoint_px(), s.end_px] {
+                assert!((p.distance(DVec2::splat(60.0)) - 45.0).abs() < 1.1, "{s:?}");
+            }
+            assert!(s.normal().dot(s.midpoint_px() - 60.0) < 0.0, "the disc is the bright side");
+        }
+    }
+
+    #[test]
+    fn a_thin_bright_bar_has_two_sides_of_opposite_polarity() {
+        let image = draw(80, |p| (p.x * 0.6 - p.y * 0.8 + 8.0).abs() - 3.0, 100.0, 0.0);
+        let long: Vec<_> = segments(&image).into_iter().filter(|s| s.length_px() > 50.0).collect();
+        assert_eq!(long.len(), 2);
+        assert!(long[0].direction().dot(long[1].direction()) < -0.999);
+        let gap = long[0].normal().dot(long[1].midpoint_px() - long[0].midpoint_px());
+        assert!((gap - 6.0).abs() < 0.1, "the bar is {gap} px wide");
+    }
+
+    #[test]
+    fn few_points_and_degenerate_chains_do_no_harm() {
+        let all = LineOptions { min_length_px: 0.0, ..Default::default() };
+        assert!(segments_through(&[DVec2::ONE], &all).is_empty());
+        for way in [DVec2::X, DVec2::Y, DVec2::new(1.0, -1.0)] {
+            for count in 2..5 {
+                let points: Vec<DVec2> = (0..count).map(|i| 7.0 + f64::from(i) * way).collect();
+                let found = segments_through(&points, &all);
+                assert_eq!(found.len(), 1);
+                assert_eq!(found[0].edgel_count, points.len());
+                assert!(found[0].start_px.distance(points[0]) < 1e-5 && found[0].residual_rms_px < 1e-5);
+            }
+        }
+        let coincident = segments_through(&[DVec2::ONE; 4], &all);
+        assert!(coincident.iter().all(|s| s.length_px() == 0.0 && s.direction() == DVec2::ZERO));
+        let there_and_back: Vec<DVec2> = [0.0, 5.0, 10.0, 5.0, 0.0].map(|x| DVec2::new(x, x * x)).to_vec();
+        assert!(segments_through(&there_and_back, &all).iter().all(|s| s.length_px().is_finite()));
+    }
+
+    #[test]
+    fn zero_gradients_leave_finite_segments() {
+        let edgels: Vec<Edgel> =
+            (0..9).map(|i| Edgel { position_px: Vec2::new(i as f32, 2.0), gradient: Vec2::ZERO }).collect();
+        let segment = Chain::new(&edgels).segment(0..9, &LineOptions::default()).unwrap();
+        assert_eq!((segment.mean_gradient, segment.length_px()), (0.0, 8.0));
+    }
+
+    #[test]
+    fn bad_options_are_refused_with_their_values() {
+        let refuse = |options| segments_from_chains(&EdgeChains::default(), &options).unwrap_err();
+        let error = refuse(LineOptions { max_deviation_px: 0.0, ..Default::default() });
+        assert_eq!(error, LineError::BadTolerance { max_deviation_px: 0.0 });
+        let error = refuse(LineOptions { min_length_px: -1.0, ..Default::default() });
+        assert_eq!(error, LineError::BadLength { min_length_px: -1.0 });
+    }
+
+    proptest! {
+        #[test]
+        fn every_point_is_near_its_segment_and_none_is_lost(
+            turns in prop::collection::vec(-0.6f64..0.6, 2..60), tolerance in 0.2f64..3.0,
+        ) {
+            let mut heading = 0.0;
+            let points: Vec<DVec2> = turns.iter().scan(DVec2::ZERO, |at, turn| {
+                heading += turn;
+                *at += DVec2::from_angle(heading);
+                Some(*at)
+            }).collect();
+            let options = LineOptions { max_deviation_px: tolerance, min_length_px: 0.0 };
+            let found = segments_through(&points, &options);
+            let lone = points.len() - found.iter().map(|s| s.edgel_count).sum::<usize>();
+            prop_assert!(lone <= found.len() + 1, "{lone} points in no segment");
+            let mut first = 0;
+            for s in found.iter().filter(|_| lone == 0) {
+                for p in &points[first..first + s.edgel_count] {
+                    prop_assert!(s.direction().perp_dot(*p - s.start_px).abs() <= tolerance + 1e-5);
+                }
+                first += s.edgel_count;
+            }
+        }
+    }
+}
