@@ -79,16 +79,8 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     a.check_same_size(b)?;
     let mut norms = Image::filled(a.width(), a.height(), 0f32);
     let scale = 1.0 / NORM_SCALE as f32;
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            for_each_norm_row(a, b, |y, row| {
-                for (norm, &scaled_sq) in inner(norms.row_mut(y)).iter_mut().zip(row) {
-                    *norm = (scaled_sq as f32 * scale).sqrt();
-                }
-            });
-        },
-    );
+    let value = |norm_sq: i32| (norm_sq as f32 * scale).sqrt();
+    pulp::Arch::new().dispatch(NormRows { a: *a, b: *b, out: &mut norms, value });
     extend_to_border(&mut norms);
     Ok(norms)
 }
@@ -170,25 +162,9 @@ fn changes_over(a: &Frame, b: &Frame, threshold: f64) -> Mask {
     let mut mask = Image::filled(a.width(), a.height(), false);
     // An integer exceeds a real number when it exceeds its floor.
     let limit = (NORM_SCALE * threshold.clamp(0.0, 255.0).powi(2)).floor() as i32;
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            for_each_norm_row(a, b, |y, row| {
-                for (changed, &norm) in inner(mask.row_mut(y)).iter_mut().zip(row) {
-                    *changed = norm > limit;
-                }
-            });
-        },
-    );
+    pulp::Arch::new().dispatch(NormRows { a: *a, b: *b, out: &mut mask, value: |norm_sq| norm_sq > limit });
     extend_to_border(&mut mask);
     mask
-}
-
-/// The pixels of a row that are centres of windows.
-#[inline(always)]
-fn inner<T>(row: &mut [T]) -> &mut [T] {
-    let end = row.len() - BORDER;
-    &mut row[BORDER..end]
 }
 
 /// Gives every pixel without a window the value of the nearest window.
@@ -211,25 +187,36 @@ fn extend_to_border<T: Copy>(image: &mut Image<T>) {
     }
 }
 
-/// Calls `emit(y, row)` for every row of window centres with 17500 N^2 of its windows, left to right.
+/// Writes `value(17500 N^2)` of every window to its centre in `out`.
 ///
-/// One pass: five rows of differences are kept, and of them the three tap sums along y.
-#[inline(always)]
-fn for_each_norm_row(a: &Frame, b: &Frame, mut emit: impl FnMut(usize, &[i32])) {
-    let (width, height) = (a.width(), a.height());
-    if width < WINDOW || height < WINDOW {
-        return;
-    }
-    let mut differences: [Vec<i16>; WINDOW] = std::array::from_fn(|_| vec![0; width]);
-    let mut columns: [Vec<i16>; 3] = std::array::from_fn(|_| vec![0; width]);
-    let mut norms = vec![0i32; width - 2 * BORDER];
-    for y in 0..height {
-        difference_row(a.row(y), b.row(y), &mut differences[y % WINDOW]);
-        if y + 1 >= WINDOW {
-            let window = std::array::from_fn(|j| differences[(y + 1 + j) % WINDOW].as_slice());
-            column_sums(window, &mut columns);
-            norm_row(&columns, &mut norms);
-            emit(y - BORDER, &norms);
+/// One pass: five rows of differences are kept, and of them the three tap sums along y. The loops are compiled for
+/// several instruction sets, of which the best is taken at run time.
+struct NormRows<'a, T, F> {
+    a: Frame<'a>,
+    b: Frame<'a>,
+    out: &'a mut Image<T>,
+    value: F,
+}
+
+impl<T: Copy, F: Fn(i32) -> T> pulp::NullaryFnOnce for NormRows<'_, T, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (width, height) = (self.a.width(), self.a.height());
+        if width < WINDOW || height < WINDOW {
+            return;
+        }
+        let mut differences: [Vec<i16>; WINDOW] = std::array::from_fn(|_| vec![0; width]);
+        let mut columns: [Vec<i16>; 3] = std::array::from_fn(|_| vec![0; width]);
+        for y in 0..height {
+            difference_row(self.a.row(y), self.b.row(y), &mut differences[y % WINDOW]);
+            if y + 1 >= WINDOW {
+                let window = std::array::from_fn(|j| differences[(y + 1 + j) % WINDOW].as_slice());
+                column_sums(window, &mut columns);
+                let centres = &mut self.out.row_mut(y - BORDER)[BORDER..width - BORDER];
+                norm_row(&columns, centres, &self.value);
+            }
         }
     }
 }
@@ -252,15 +239,15 @@ fn column_sums(rows: [&[i16]; WINDOW], columns: &mut [Vec<i16>; 3]) {
     }
 }
 
-/// 17500 N^2 of the windows in a row from their tap sums along y.
+/// Writes `value(17500 N^2)` of the windows in a row from their tap sums along y.
 #[inline(always)]
-fn norm_row(columns: &[Vec<i16>; 3], norms: &mut [i32]) {
-    let count = norms.len();
+fn norm_row<T>(columns: &[Vec<i16>; 3], out: &mut [T], value: impl Fn(i32) -> T) {
+    let count = out.len();
     let shifted = columns.each_ref().map(|sums| std::array::from_fn(|i| &sums[i..i + count]));
     let [constant, slope, curvature]: [[&[i16]; WINDOW]; 3] = shifted;
     for x in 0..count {
         let at = |sums: [&[i16]; WINDOW]| sums.map(|sum| sum[x]);
-        norms[x] = scaled_norm_sq([at(constant), at(slope), at(curvature)]);
+        out[x] = value(scaled_norm_sq([at(constant), at(slope), at(curvature)]));
     }
 }
 

@@ -102,8 +102,8 @@ mod tests {
                     prop_assert!(mask.at(a[0], a[1]));
                 }
                 let area = doubled_area(pixels);
-                let is_turned_right = if outline.is_hole { area >= 0 } else { area <= 0 };
-                prop_assert!(is_turned_right);
+                let turns_as_stated = if outline.is_hole { area >= 0 } else { area <= 0 };
+                prop_assert!(turns_as_stated);
             }
             let followed: BTreeSet<_> = found.iter().flat_map(|outline| outline.pixels.clone()).collect();
             let expected: BTreeSet<_> = border_pixels(&mask).into_iter().collect();

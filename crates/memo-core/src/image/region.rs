@@ -8,6 +8,7 @@
 
 use super::frame::{Image, Mask};
 use super::outline::{Outline, outlines};
+use std::cmp::Reverse;
 
 /// Marked pixels side by side in one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -124,7 +125,7 @@ pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
     let areas = connected_runs(&runs(mask, true), Connectivity::Eight);
     let mut regions: Vec<Region> = areas.into_iter().map(Region::from_runs).collect();
     regions.retain(|region| region.area >= min_area);
-    regions.sort_by(|a, b| b.area.cmp(&a.area));
+    regions.sort_by_key(|region| Reverse(region.area));
     regions
 }
 
@@ -162,7 +163,7 @@ pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> 
         groups[i] = Region::from_runs(runs);
     }
     groups.retain(|group| group.area >= options.min_area);
-    groups.sort_by(|a, b| b.area.cmp(&a.area).then(a.runs[0].cmp(&b.runs[0])));
+    groups.sort_by_key(|group| (Reverse(group.area), group.runs[0]));
     groups
 }
 
@@ -306,7 +307,7 @@ pub(super) mod tests {
         fn regions_are_the_areas_a_search_finds(mask in random_mask(), min_area in 1usize..6) {
             let mut expected = areas_by_search(&mask);
             expected.retain(|area| area.len() >= min_area);
-            expected.sort_by_key(|area| std::cmp::Reverse(area.len()));
+            expected.sort_by_key(|area| Reverse(area.len()));
             let found = regions(&mask, min_area);
             prop_assert_eq!(found.len(), expected.len());
             for (region, pixels) in found.iter().zip(&expected) {
