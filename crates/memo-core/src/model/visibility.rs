@@ -24,21 +24,21 @@
 //!
 //! # What is decided where geometry leaves it open
 //!
-//! * Contact does not hide: an occluder is shrunk by 1e-9 of its size. Side lines of equal cylinders in
+//! * Contact does not hide: an occluder is shrunk by 1e-11 of its size. Side lines of equal cylinders in
 //!   one row coincide with each other's surface; they would otherwise hide each other by a rounding error. With a camera
-//!   up to 10⁴ radii away rounding stays near 1e-12 radii, three orders below.
+//!   some hundred radii away rounding stays below 1e-13 radii.
 //! * A part does not hide its own contours; points of other parts inside it are hidden.
 //! * From a camera inside a part, or within 1e-7 of its size of it, everything is hidden, the definition of S taken literally.
 //! * A part with a semi-axis or a half length that is not positive shows nothing and hides nothing.
 //! * No image plane enters: contours behind the camera are treated like those before it. Clipping is the projection's affair.
-//! * Visible pieces shorter than 1e-9 of their contour, rounding between two occluders that meet, are dropped.
+//! * Visible pieces shorter than 1e-11 of their contour, rounding between two occluders that meet, are dropped.
 
 use super::silhouette::{ContourKind, RimAspect, RimChord, camera_in_unit_frame, rims, side_lines};
 use super::{Contour, EllipticCylinder};
 use glam::DVec3;
 
 /// The relative size of what is taken for rounding: occluders shrink by it, shorter visible pieces are dropped.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING: f64 = 1e-11;
 
 /// A camera nearer than this fraction of a part's size counts as inside: the tangent points then lose 1e-16/1e-7 in precision.
 const CONTACT: f64 = 1e-7;
@@ -370,9 +370,10 @@ impl SideRays<'_> {
         let half_width = (self.shadow.mu * alpha * beta).max(0.0).sqrt();
         let enter = camera_z + dz * (1.0 / (alpha + beta + half_width)).min(1.0);
         let leave = camera_z + dz * (1.0 / (alpha + beta - half_width)).min(1.0);
-        if enter.min(leave) > 1.0 {
+        let end = 1.0 + 1e-15 * (1.0 + camera_z.abs() + dz.abs());
+        if enter.min(leave) > end {
             Passage::Beyond(1.0)
-        } else if enter.max(leave) < -1.0 {
+        } else if enter.max(leave) < -end {
             Passage::Beyond(-1.0)
         } else {
             Passage::Through
@@ -420,7 +421,8 @@ impl EndShadow {
 /// negative inside the double cone over it. Its limits are the segment's ends, the cone, or where the segment pierces the face.
 fn meets_end_face(cone: &Conic, dz: &Linear, k: f64) -> Option<Interval> {
     let is_inside = |t: f64| cone.at(t) <= 0.0;
-    let reaches = |t: f64| dz.at(t) * k > 0.0 && dz.at(t).abs() >= k.abs() * (1.0 - 1e-3 * ROUNDING);
+    let slack = 1e-15 * (dz.at0.abs() + dz.at1.abs());
+    let reaches = |t: f64| dz.at(t) * k.signum() >= k.abs() - slack;
     let pierces = (k - dz.at0) / (dz.at1 - dz.at0);
     let [enter, leave] = cone.roots().unwrap_or([f64::NAN; 2]);
     let candidates = [
