@@ -76,7 +76,7 @@ def test_tracking_leaves_everything(memo_command, video, tmp_path):
     np.testing.assert_allclose(columns["time_s"], np.arange(20) / 25, atol=1e-4)
 
 
-def test_results_go_beside_where_one_stands(memo_command, video, tmp_path, monkeypatch):
+def test_results_go_to_memo_out_by_default(memo_command, video, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert memo_command("track", video, "--no-overlay", "--no-plots")[0] == 0
     assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == {"track.csv", "events.csv"}

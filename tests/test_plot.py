@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from memo.overlay import CONTOUR, draw_segments, draw_text, write_overlay
+from memo.overlay import CONTOUR, draw_row, draw_segments, draw_text, write_overlay
 from memo.plot import plot_angles, plot_motion, plot_similarity, plot_start, write_plots
 from memo.video import Frame, VideoReader
 
@@ -77,28 +77,32 @@ def track(core):
     return tracker.finish()
 
 
-def test_overlay_keeps_times_and_draws_only_where_the_track_is(tmp_path, track):
-    grey = np.full((121, 161), 100, np.uint8)
-    frames = [Frame(index, time_s, grey) for index, time_s in enumerate([0.0, 0.04, 0.3, 0.31])]
+def test_overlay_keeps_times_and_draws_only_where_the_track_is(tmp_path, core):
+    size = (481, 361)  # H.264 needs even sizes
+    track = core.Track(np.arange(30) / 25, core.Camera(size), "tracked")
     track.columns["frame"] = np.arange(1, 31)  # frame 0 is before the track
+    grey = np.full(size[::-1], 100, np.uint8)
+    times_s = [0.0, 0.04, 0.3, 0.31]
     path = tmp_path / "overlay.mp4"
-    assert write_overlay(path, frames, track) == 4
+    assert write_overlay(path, [Frame(i, t, grey) for i, t in enumerate(times_s)], track) == 4
     with VideoReader(path) as reader:
-        assert reader.size == (162, 122)  # H.264 needs even sizes
-        np.testing.assert_allclose([frame.time_s for frame in reader], [0, 0.04, 0.3, 0.31], atol=1e-3)
+        assert reader.size == (482, 362)
+        np.testing.assert_allclose([frame.time_s for frame in reader], times_s, atol=1e-3)
     with av.open(str(path)) as container:
-        before, after = (
-            frame.to_ndarray(format="rgb24").astype(int)
-            for frame in container.decode(video=0)
-            if frame.pts * frame.time_base < 0.05
-        )
-    u, v = (int(track.columns[f"left_hip_{axis}_px"][0]) for axis in "uv")
-    yellowness = [
-        picture[v - 18 : v, u - 7 : u + 8, 0].max() - picture[v - 18 : v, u - 7 : u + 8, 2].min()
-        for picture in (before, after)
-    ]
-    assert yellowness[0] < 20 < yellowness[1] and CONTOUR[0] > CONTOUR[2]
+        pictures = [frame.to_ndarray(format="rgb24").astype(int) for frame in container.decode(video=0)]
+    (u, v), _ = track.contours(0)[0]
+    before, tracked = (picture[round(v) + 10, round(u)] for picture in pictures[:2])
+    assert np.ptp(before) < 10 and tracked[0] - tracked[2] > 30  # grey, then yellow
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_small_frames_are_enlarged_about_pixel_centres(core):
+    track = core.Track([0.0], core.Camera((180, 144)), "tracked")
+    track.contours = lambda row: [np.array([[100.0, 50.0], [100.0, 70.0]])]
+    rgb = draw_row(np.zeros((144, 180), np.uint8), track, 0)
+    assert rgb.shape == (432, 540, 3)
+    yellow = np.flatnonzero((rgb[180] == CONTOUR).all(axis=1))
+    assert yellow.mean() == 301  # the middle of the nine pixels that pixel 100 became
 
 
 def test_overlay_of_nothing_leaves_no_file(tmp_path, track):
@@ -149,3 +153,5 @@ def test_all_plots_are_saved(tmp_path, track):
     for path in paths:
         with VideoReader(path) as reader:
             assert min(reader.size) > 300
+    track.start = {}
+    assert {path.name for path in write_plots(track, tmp_path)} == {"motion.png", "angles.png"}

@@ -72,7 +72,10 @@ def main() -> None:
     if absent:
         _complain(f'the command line needs {", ".join(absent)}: pip install "memo-motion[app]"')
         raise SystemExit(Exit.NO_EXTRA)
-    _app()()
+    try:
+        _app()()
+    except KeyboardInterrupt:  # while the extra is still being imported
+        raise SystemExit(Exit.INTERRUPTED) from None
 
 
 def _app() -> "typer.Typer":

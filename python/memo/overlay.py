@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from memo.files import complete_file
-from memo.video import Frame
+from memo.video import Frame, Luma
 
 __all__ = ["draw_row", "draw_segments", "draw_text", "write_overlay"]
 
@@ -35,6 +35,7 @@ LEFT: Colour = (86, 180, 233)
 WHITE: Colour = (255, 255, 255)
 
 _CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+_LEGIBLE_HEIGHT_PX = 480
 _TRAIL_S = 1.0  # about one stride
 _TIME_BASE = Fraction(1, 90000)  # finer than any video clock, so variable frame rates survive
 
@@ -50,11 +51,11 @@ def write_overlay(
     written = 0
     with complete_file(path) as temporary, _h264(str(temporary), rate_hz) as encode:
         for frame in frames:
-            rgb = np.repeat(frame.luma[:, :, None], 3, axis=2)
             if frame.index in rows:
-                draw_row(rgb, track, rows[frame.index])
+                rgb = draw_row(frame.luma, track, rows[frame.index])
             else:
-                draw_text(rgb, f"frame {frame.index}  {frame.time_s:.2f} s")
+                rgb = _enlarged(frame.luma, _scale(frame.luma))
+                draw_text(rgb, f"frame {frame.index} at {frame.time_s:.2f} s")
             encode(rgb, frame.time_s)
             written += 1
         if not written:
@@ -62,20 +63,33 @@ def write_overlay(
     return written
 
 
-def draw_row(rgb: Rgb, track: Any, row: int) -> None:
-    """Draws one row of the track onto its frame: model contours, limbs, ankle trails and legend."""
+def draw_row(luma: Luma, track: Any, row: int) -> Rgb:
+    """The frame of one row of the track with model contours, limbs, ankle trails and legend on it.
+
+    A small frame comes out enlarged by a whole number, so that lines and letters stay fine.
+    """
+    scale = _scale(luma)
+    rgb = _enlarged(luma, scale)
     width_px = max(1.0, rgb.shape[0] / 360)
+
+    def draw(segments: Segments, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
+        enlarged = (segments + 0.5) * scale - 0.5  # the centre of a pixel is its whole number
+        draw_segments(rgb, enlarged, colour, width_px, opacity=opacity)
+
     contours = track.contours(row)
     if len(contours):
-        draw_segments(rgb, np.stack(contours), CONTOUR, width_px)
+        draw(np.stack(contours), CONTOUR, width_px)
     for side, colour in (("left", LEFT), ("right", RIGHT)):
-        draw_segments(rgb, _trail(track.columns, side, row), colour, width_px, opacity=0.5)
-        draw_segments(rgb, _limbs(track.columns, side, row), colour, 1.5 * width_px)
-    cell = {name: values[row] for name, values in track.columns.items()}
-    status = f"frame {cell['frame']}  {cell['time_s']:.2f} s  phase {cell['phase']:.2f}"
-    draw_text(rgb, f"{status}  P(left and right swapped) {cell['p_swapped']:.0%}")
-    draw_text(rgb, "right", RIGHT, line=1)
-    draw_text(rgb, "left", LEFT, line=2)
+        draw(_trail(track.columns, side, row), colour, width_px, opacity=0.5)
+        draw(_limbs(track.columns, side, row), colour, 1.5 * width_px)
+    frame, time_s, phase, p_swapped = (
+        track.columns[name][row] for name in ("frame", "time_s", "phase", "p_swapped")
+    )
+    draw_text(rgb, f"frame {frame} at {time_s:.2f} s, phase {phase:.2f}")
+    draw_text(rgb, f"P(left and right swapped) {p_swapped:.0%}", line=1)
+    draw_text(rgb, "right", RIGHT, line=2)
+    draw_text(rgb, "left", LEFT, line=3)
+    return rgb
 
 
 def draw_segments(
@@ -102,11 +116,21 @@ def draw_segments(
 
 def draw_text(rgb: Rgb, text: str, colour: Colour = WHITE, *, line: int = 0) -> None:
     """Writes a line of text into the upper left corner, on a darkened ground; cut off at the image's edge."""
-    ink = _ink(text, max(11, rgb.shape[0] // 40))
+    height_px = max(11, rgb.shape[0] // 40)
+    ink = np.concatenate([_ink(word, height_px) for word in text.split()], axis=1)
     top = 4 + line * ink.shape[0]
     ground = rgb[top : top + ink.shape[0], 4 : 4 + ink.shape[1]]
     ground[:] = ground // 3
     _blend(ground, ink[: ground.shape[0], : ground.shape[1]], colour)
+
+
+def _scale(luma: Luma) -> int:
+    return max(1, round(_LEGIBLE_HEIGHT_PX / luma.shape[0]))
+
+
+def _enlarged(luma: Luma, scale: int) -> Rgb:
+    """Grey values as RGB, each pixel repeated `scale` times in both directions."""
+    return np.repeat(np.repeat(np.repeat(luma, scale, axis=0), scale, axis=1)[:, :, None], 3, axis=2)
 
 
 def _distance_to_segment(
@@ -125,15 +149,16 @@ def _blend(rgb: Rgb, coverage: npt.NDArray[np.float32], colour: Colour) -> None:
     rgb[:] = rgb + coverage[:, :, None] * (np.array(colour, np.float32) - rgb) + 0.5
 
 
-@lru_cache(maxsize=64)
-def _ink(text: str, height_px: int) -> npt.NDArray[np.float32]:
-    """Coverage of a line of text, one line high; matplotlib brings the font."""
+@lru_cache(maxsize=1024)
+def _ink(word: str, height_px: int) -> npt.NDArray[np.float32]:
+    """Coverage of a word and half a space on either side, one line high; matplotlib brings the font."""
     dpi = 72.0
-    figure = Figure(figsize=(len(text) * height_px / dpi, 1.4 * height_px / dpi), dpi=dpi)
+    figure = Figure(figsize=((len(word) + 1) * height_px / dpi, 1.4 * height_px / dpi), dpi=dpi)
     canvas = FigureCanvasAgg(figure)
-    label = figure.text(0, 0.5, f" {text} ", size=height_px, va="center", color="black")
+    margin = 0.2 * height_px
+    label = figure.text(margin / figure.bbox.width, 0.5, word, size=height_px, va="center", color="black")
     canvas.draw()
-    width = int(np.ceil(label.get_window_extent().width))
+    width = int(np.ceil(label.get_window_extent().width + 2 * margin))
     shade = np.asarray(canvas.buffer_rgba())[:, :width, 0]
     return (1 - shade / 255).astype(np.float32)
 

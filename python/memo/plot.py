@@ -100,14 +100,16 @@ def plot_angles(axes: Sequence[Axes], track: Any) -> Sequence[Axes]:
 
 
 def write_plots(track: Any, out_dir: str | PathLike[str]) -> list[Path]:
-    """Writes similarity.png, start.png, motion.png and angles.png into a folder that exists."""
-    middle = len(track.start["frame"]) // 2
+    """Writes motion.png and angles.png, and similarity.png and start.png where the track has a start."""
     plots: dict[str, tuple[tuple[int, int], tuple[float, float], Callable[[Any], object]]] = {
-        "similarity": ((1, 1), (5, 3), lambda axes: plot_similarity(axes[0, 0], track, middle)),
-        "start": ((1, 1), (5, 3), lambda axes: plot_start(axes[0, 0], track)),
         "motion": ((3, 2), (8, 6), lambda axes: plot_motion(axes, track)),
         "angles": ((2, 1), (6, 5), lambda axes: plot_angles(axes[:, 0], track)),
     }
+    start_frames = len(track.start.get("frame", ()))
+    if start_frames:
+        middle = start_frames // 2
+        plots["similarity"] = ((1, 1), (5, 3), lambda axes: plot_similarity(axes[0, 0], track, middle))
+        plots["start"] = ((1, 1), (5, 3), lambda axes: plot_start(axes[0, 0], track))
     return [_save(Path(out_dir) / f"{name}.png", *how) for name, how in plots.items()]
 
 
