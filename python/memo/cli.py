@@ -1,0 +1,436 @@
+"""The command line: `memo track VIDEO`, `memo demo`.
+
+This file alone knows how a tracked walk is delivered: what is checked before work starts, what is written,
+what is said and which exit code says it. The base install has numpy alone, so everything from the `app`
+extra is imported inside functions, after `main` has looked for it. (Typer reads annotations where they
+stand, hence no `from __future__ import annotations` here.)
+"""
+
+import contextlib
+import json
+import math
+import os
+import signal
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.files import JOINTS, write_events_csv, write_track_csv
+
+if TYPE_CHECKING:
+    import typer
+
+    from memo.video import Frame
+
+EXTRA = ("av", "matplotlib", "rich", "typer")
+
+EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage;
+3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
+(what was tracked until then is written)."""
+
+_LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at before they are used
+
+
+class Exit(IntEnum):
+    """What the exit codes mean."""
+
+    TRACKED = 0
+    BAD_INPUT = 1
+    NOBODY = 3
+    NO_EXTRA = 4
+    INTERRUPTED = 130
+
+
+class InputError(ValueError):
+    """A mistake in what the user gave; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Where results go, which of them, and how much is said."""
+
+    out: Path
+    overlay: bool = True
+    plots: bool = True
+    as_json: bool = False
+    quiet: bool = False
+
+
+def main() -> None:
+    """Entry point of the `memo` command."""
+    absent = [name for name in EXTRA if find_spec(name) is None]
+    if absent:
+        _complain(f'the command line needs {", ".join(absent)}: pip install "memo-motion[app]"')
+        raise SystemExit(Exit.NO_EXTRA)
+    try:
+        _app()()
+    except KeyboardInterrupt:  # while the extra is still being imported
+        raise SystemExit(Exit.INTERRUPTED) from None
+
+
+def _app() -> "typer.Typer":
+    import typer
+
+    app = typer.Typer(
+        name="memo",
+        help="3D motion of a walker from one fixed camera.",
+        epilog=EXIT_CODES,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+
+    def version(wanted: bool) -> None:
+        if wanted:
+            print(f"memo {memo.__version__}")
+            raise typer.Exit
+
+    @app.callback()
+    def options(
+        version: Annotated[bool, typer.Option("--version", callback=version, is_eager=True)] = False,
+    ) -> None: ...
+
+    _add_track(app)
+    _add_demo(app)
+    return app
+
+
+def _add_track(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def track(
+        video: Annotated[Path, typer.Argument(help="A video file, or a folder of images (then --fps too).")],
+        camera: Annotated[Path | None, typer.Option(help="Calibration: TOML, or Tsai XML.")] = None,
+        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
+        fov_deg: Annotated[
+            float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
+        ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
+        frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
+        fps: Annotated[
+            float | None, typer.Option(help="True frame rate, in place of the time stamps (slow motion).")
+        ] = None,
+        overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
+        plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Tracks one person who walks through VIDEO."""
+        delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
+
+        def work() -> Exit:
+            tracker_options = _tracker_options(height, camera, camera_name, fov_deg)
+            return _track_video(video, _frame_range(frames), fps, tracker_options, delivery)
+
+        raise typer.Exit(_guarded(work))
+
+
+def _add_demo(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def demo(
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
+        seed: Annotated[int, typer.Option(help="Which scene is drawn.", min=0)] = 0,
+    ) -> None:
+        """Draws a walker whose motion is known, tracks it and compares."""
+        raise typer.Exit(_guarded(lambda: _demo(out, seed)))
+
+
+def _track_video(
+    video: Path,
+    frame_range: tuple[int, int | None],
+    fps: float | None,
+    tracker_options: dict[str, Any],
+    delivery: Delivery,
+) -> Exit:
+    from memo.video import VideoReader
+
+    _check_writable(delivery.out)
+
+    def opened() -> VideoReader:
+        return VideoReader(video, start=frame_range[0], stop=frame_range[1], rate_hz=fps)
+
+    with opened() as reader:
+        _check_camera_fits(tracker_options, reader)
+        if reader.pixel_aspect != 1:
+            _complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
+        tracker = _new_tracker(tracker_options)
+        track, interrupted = _follow(reader, tracker, reader.frame_count, frame_range[0], delivery)
+        if reader.damage:
+            _complain(f"{video}: {reader.damage}")
+    if interrupted:
+        written = _write_tables(track, delivery)
+        _report(track, written, delivery)
+        _complain("interrupted: the tables hold what was tracked until then; no overlay, no plots")
+        return Exit.INTERRUPTED
+    with opened() as reader:
+        written = _write_all(track, reader, reader.frame_count, reader.rate_hz, delivery)
+    _report(track, written, delivery)
+    return _exit_code(track)
+
+
+def _demo(out: Path, seed: int) -> Exit:
+    from memo.video import Frame
+
+    delivery = Delivery(out)
+    _check_writable(out)
+    scene = memo.demo_scene(seed=seed)
+    timed = zip(scene.times_s, scene.frames, strict=True)
+    frames = [Frame(index, float(time_s), luma) for index, (time_s, luma) in enumerate(timed)]
+    tracker = _new_tracker({"height_m": scene.height_m, "camera": scene.camera})
+    track, interrupted = _follow(frames, tracker, len(frames), 0, delivery)
+    if interrupted:
+        return Exit.INTERRUPTED
+    rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
+    written = _write_all(track, frames, len(frames), rate_hz, delivery)
+    _report(track, written, delivery)
+    for line in _against_truth(track.columns, scene.truth):
+        print(line)
+    print("Next, your own video of one person walking across the picture, camera on a tripod:")
+    print("  memo track VIDEO --height 1.75")
+    return _exit_code(track)
+
+
+# The core is called here and nowhere else in this file.
+
+
+def _new_tracker(options: dict[str, Any]) -> Any:
+    return memo.Tracker(**options)
+
+
+def _load_camera(path: Path, name: str | None) -> Any:
+    if not path.is_file():
+        raise InputError(f"{path}: no such camera file")
+    if path.suffix.lower() == ".xml":
+        return memo.Camera.from_tsai(str(path))
+    return memo.Camera.from_toml(str(path), name=name)
+
+
+def _follow(
+    frames: "Iterable[Frame]", tracker: Any, count: int | None, first_frame: int, delivery: Delivery
+) -> tuple[Any, bool]:
+    """Gives all frames to the tracker; an interrupt ends it after the current frame."""
+    with warnings.catch_warnings(), _Interrupt() as interrupt:
+        warnings.simplefilter("ignore", UserWarning)  # damage is told at the end, in one line
+        for frame in _with_progress(frames, "tracking", count, delivery):
+            tracker.update(frame.luma, frame.time_s)
+            if interrupt.requested:
+                break
+    return _snapshot(tracker.finish(), first_frame), interrupt.requested
+
+
+def _snapshot(track: Any, first_frame: int) -> Any:
+    """The track's tables, read once, with frames numbered as in the video (the tracker counts from 0)."""
+
+    def renumbered(table: dict[str, Any]) -> dict[str, Any]:
+        return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else table
+
+    return SimpleNamespace(
+        columns=renumbered(dict(track.columns)),
+        events=[{**event, "frame": event["frame"] + first_frame} for event in track.events],
+        start=renumbered(dict(track.start)),
+        measured=renumbered(dict(track.measured)),
+        contours=track.contours,
+        summary=dict(track.summary),
+    )
+
+
+# What the user gave, checked before any work.
+
+
+def _tracker_options(
+    height_m: float, camera: Path | None, camera_name: str | None, fov_deg: float | None
+) -> dict[str, Any]:
+    options: dict[str, Any] = {"height_m": _checked_height(height_m)}
+    if camera is not None and fov_deg is not None:
+        raise InputError("--camera already holds the field of view: leave --fov-deg out")
+    if camera is None and camera_name is not None:
+        raise InputError("--camera-name needs --camera")
+    if camera is not None:
+        options["camera"] = _load_camera(camera, camera_name)
+    if fov_deg is not None:
+        if not 5 <= fov_deg <= 170:
+            raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
+        options["fov_deg"] = fov_deg
+    return options
+
+
+def _checked_height(height_m: float) -> float:
+    if 50 <= height_m <= 250:
+        raise InputError(f"--height {height_m:g} looks like centimetres: give --height {height_m / 100:g}")
+    if not (math.isfinite(height_m) and 0.5 <= height_m <= 2.5):
+        raise InputError(f"--height {height_m:g} is not the height of a person in metres (0.5 to 2.5)")
+    return height_m
+
+
+def _frame_range(text: str) -> tuple[int, int | None]:
+    start, colon, stop = text.partition(":")
+    try:
+        first, end = int(start or 0), int(stop) if stop else None
+    except ValueError:
+        first, end, colon = 0, None, ""
+    if not colon or first < 0 or (end is not None and end <= first):
+        raise InputError(f"--frames {text} is not A:B with 0 <= A < B")
+    return first, end
+
+
+def _check_writable(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written to: {error.strerror}") from None
+
+
+def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
+    camera = tracker_options.get("camera")
+    if camera is None or tuple(camera.size) == reader.size:
+        return
+    (width, height), (video_width, video_height) = camera.size, reader.size
+    raise InputError(f"the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}")
+
+
+# What is written and said.
+
+
+def _write_tables(track: Any, delivery: Delivery) -> list[Path]:
+    table, events = delivery.out / "track.csv", delivery.out / "events.csv"
+    write_track_csv(table, track.columns)
+    write_events_csv(events, track.events)
+    return [table, events]
+
+
+def _write_all(
+    track: Any, frames: "Iterable[Frame]", count: int | None, rate_hz: float, delivery: Delivery
+) -> list[Path]:
+    written = _write_tables(track, delivery)
+    if not len(track.columns["frame"]):
+        return written
+    if delivery.overlay:
+        from memo.overlay import write_overlay
+
+        path = delivery.out / "overlay.mp4"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # damage was told after tracking
+            write_overlay(path, _with_progress(frames, "drawing", count, delivery), track, rate_hz=rate_hz)
+        written.append(path)
+    if delivery.plots:
+        from memo.plot import write_plots
+
+        written += write_plots(track, delivery.out)
+    return written
+
+
+def _report(track: Any, written: list[Path], delivery: Delivery) -> None:
+    if delivery.as_json:
+        files = [str(path) for path in written]
+        print(json.dumps(_plain({**track.summary, "rows": len(track.columns["frame"]), "files": files})))
+        return
+    if delivery.quiet:
+        return
+    print(track.summary["message"])
+    p_swapped = track.summary.get("p_swapped")
+    if p_swapped is not None and p_swapped > _LIKELY_SWAPPED:
+        print(f"Left and right may be swapped (probability {p_swapped:.0%}): look before you use them.")
+    print(f"Written to {delivery.out}: {', '.join(path.name for path in written)}.")
+
+
+def _exit_code(track: Any) -> Exit:
+    return Exit.TRACKED if track.summary["status"] == "tracked" else Exit.NOBODY
+
+
+def _against_truth(columns: dict[str, Any], truth: dict[str, Any]) -> list[str]:
+    """Root mean square differences from the scene's truth, in sentences; none without a tracked frame."""
+    rows = np.searchsorted(truth["frame"], columns["frame"])
+    if not len(rows):
+        return []
+
+    def rms(names: Iterable[str]) -> float:
+        return math.sqrt(np.nanmean([(columns[name] - np.asarray(truth[name])[rows]) ** 2 for name in names]))
+
+    phase = (columns["phase"] - np.asarray(truth["phase"])[rows] + 0.5) % 1 - 0.5
+    joints = math.sqrt(3) * rms(f"{joint}_{axis}_m" for joint in JOINTS for axis in "xyz")
+    angles = rms(f"{side}_{joint}_deg" for side in ("right", "left") for joint in ("hip", "knee"))
+    return [
+        f"Against the drawn truth, root mean square over {len(rows)} frames:",
+        "  torso " + ", ".join(f"{axis} {100 * rms([f'{axis}_m']):.1f} cm" for axis in "xyz"),
+        f"  phase {math.sqrt(np.mean(phase**2)):.3f} of a cycle, hips and knees {angles:.1f} degrees",
+        f"  joints {100 * joints:.1f} cm in space",
+    ]
+
+
+def _plain(value: Any) -> Any:
+    """The value as JSON knows it: no numpy types, and null for what is not finite."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _with_progress(
+    frames: "Iterable[Frame]", what: str, count: int | None, delivery: Delivery
+) -> "Iterator[Frame]":
+    """The same frames; on a terminal, a bar with the time left."""
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    silent = delivery.quiet or not console.is_terminal
+    yield from track(frames, what, total=count, console=console, transient=True, disable=silent)
+
+
+def _guarded(work: Callable[[], Exit]) -> Exit:
+    """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept."""
+    try:
+        return work()
+    except (ValueError, TypeError, OSError) as error:
+        if os.environ.get("MEMO_DEBUG"):
+            raise
+        _complain(" ".join(str(error).split()))
+        return Exit.BAD_INPUT
+    except KeyboardInterrupt:
+        _complain("interrupted")
+        return Exit.INTERRUPTED
+
+
+def _complain(message: str) -> None:
+    print(f"memo: {message}", file=sys.stderr)
+
+
+class _Interrupt(contextlib.AbstractContextManager["_Interrupt"]):
+    """Turns the first Ctrl-C into a request, so that no frame is left half way; the second is raised."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def __enter__(self) -> "_Interrupt":
+        self._before = signal.signal(signal.SIGINT, self._request)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _request(self, *_: object) -> None:
+        self.requested = True
+        signal.signal(signal.SIGINT, self._before)
+
+
+if __name__ == "__main__":
+    main()

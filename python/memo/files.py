@@ -1,0 +1,123 @@
+"""The tables a tracked walk is written to: `track.csv` and `events.csv`.
+
+Comma separated, one header row, metres, radians where the name says `_rad`, degrees where it says `_deg`,
+an empty cell for a value that is not known. A file appears under its name only when it is complete.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "EVENT_COLUMNS",
+    "JOINTS",
+    "TRACK_COLUMNS",
+    "complete_file",
+    "read_events_csv",
+    "read_track_csv",
+    "write_events_csv",
+    "write_track_csv",
+]
+
+SIDES = ("right", "left")
+ANGLES = ("hip", "knee", "shoulder", "elbow")
+JOINTS = tuple(
+    f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+)
+
+TRACK_COLUMNS = (
+    *("frame", "time_s", "x_m", "y_m", "z_m", "heading_rad", "phase", "p_swapped", "speed_mps"),
+    *("sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"),
+    *(f"{side}_{angle}_deg" for side in SIDES for angle in ANGLES),
+    *(f"{joint}_{axis}" for joint in JOINTS for axis in ("x_m", "y_m", "z_m", "u_px", "v_px")),
+)
+"""Columns of `track.csv`, in order."""
+
+EVENT_COLUMNS = ("time_s", "frame", "event", "side")
+"""Columns of `events.csv`, in order."""
+
+# Digits after the point: well below what a single camera resolves, so that rounding never shows.
+_DIGITS = {"_m": 4, "_mps": 4, "_px": 2, "_deg": 2, "_rad": 5, "_s": 6, "phase": 5, "p_swapped": 6}
+
+Column = npt.NDArray[Any]
+
+
+def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
+    """Writes the columns of a track, which must be exactly `TRACK_COLUMNS` in any order."""
+    absent, unknown = set(TRACK_COLUMNS) - set(columns), set(columns) - set(TRACK_COLUMNS)
+    if absent or unknown:
+        raise ValueError(f"track columns: missing {sorted(absent)}, unknown {sorted(unknown)}")
+    texts = [_texts(name, np.asarray(columns[name])) for name in TRACK_COLUMNS]
+    lengths = {name: len(text) for name, text in zip(TRACK_COLUMNS, texts, strict=True)}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"track columns of different lengths: {lengths}")
+    _write_rows(path, TRACK_COLUMNS, zip(*texts, strict=True))
+
+
+def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
+    """Reads what `write_track_csv` wrote: `frame` as int64, the others as float64, empty cells as NaN."""
+    rows = _read_rows(path, TRACK_COLUMNS)
+    columns: dict[str, Column] = {}
+    for name in TRACK_COLUMNS:
+        kind = np.int64 if name == "frame" else np.float64
+        columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
+    return columns
+
+
+def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:
+    """Writes gait events: dicts with the keys of `EVENT_COLUMNS`."""
+    rows = ([_texts(name, np.asarray([event[name]]))[0] for name in EVENT_COLUMNS] for event in events)
+    _write_rows(path, EVENT_COLUMNS, rows)
+
+
+def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
+    """Reads what `write_events_csv` wrote."""
+    return [
+        {**row, "time_s": float(row["time_s"]), "frame": int(row["frame"])}
+        for row in _read_rows(path, EVENT_COLUMNS)
+    ]
+
+
+@contextmanager
+def complete_file(path: str | PathLike[str]) -> Iterator[Path]:
+    """Gives a temporary name beside `path`; on success the file written there takes the name `path`."""
+    path = Path(path)
+    temporary = path.with_name(f".{os.getpid()}-{path.name}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _texts(name: str, values: Column) -> list[str]:
+    if values.dtype.kind in "iuUO":
+        return [str(value) for value in values]
+    digits = next(digits for suffix, digits in _DIGITS.items() if name.endswith(suffix))
+    return [f"{value:.{digits}f}" if np.isfinite(value) else "" for value in values]
+
+
+def _write_rows(path: str | PathLike[str], header: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)
+
+
+def _read_rows(path: str | PathLike[str], header: tuple[str, ...]) -> list[dict[str, str]]:
+    with open(path, newline="", encoding="utf-8") as file:
+        table = csv.DictReader(file)
+        absent = set(header) - set(table.fieldnames or ())
+        if absent:
+            raise ValueError(f"{path}: columns missing: {sorted(absent)}")
+        return list(table)

@@ -1,0 +1,207 @@
+"""The tracked model drawn over the video it was found in.
+
+Lines are rasterised with numpy: a pixel is covered by clamp(w / 2 + 1/2 - distance to the segment, 0, 1),
+which is anti-aliased to one pixel and exact along straight stretches. No image library is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from functools import lru_cache
+from os import PathLike
+from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from memo.files import complete_file
+from memo.video import Frame, Luma
+
+__all__ = ["draw_row", "draw_segments", "draw_text", "write_overlay"]
+
+Rgb = npt.NDArray[np.uint8]
+Segments = npt.NDArray[np.float64]
+Colour = tuple[int, int, int]
+
+# From the palette of Okabe and Ito, told apart with any colour vision and on any grey.
+CONTOUR: Colour = (240, 228, 66)
+RIGHT: Colour = (230, 110, 0)
+LEFT: Colour = (86, 180, 233)
+WHITE: Colour = (255, 255, 255)
+
+_CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+_LEGIBLE_HEIGHT_PX = 480
+_TRAIL_S = 1.0  # about one stride
+_TIME_BASE = Fraction(1, 90000)  # finer than any video clock, so variable frame rates survive
+
+
+def write_overlay(
+    path: str | PathLike[str], frames: Iterable[Frame], track: Any, *, rate_hz: float = 25.0
+) -> int:
+    """Writes an H.264 MP4 of `frames`, the track drawn on those it covers; returns how many frames it has.
+
+    The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate.
+    """
+    rows = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
+    written = 0
+    with complete_file(path) as temporary, _h264(str(temporary), rate_hz) as encode:
+        for frame in frames:
+            if frame.index in rows:
+                rgb = draw_row(frame.luma, track, rows[frame.index])
+            else:
+                rgb = _enlarged(frame.luma, _scale(frame.luma))
+                draw_text(rgb, f"frame {frame.index} at {frame.time_s:.2f} s")
+            encode(rgb, frame.time_s)
+            written += 1
+        if not written:
+            raise ValueError(f"{path}: no frames to draw on")
+    return written
+
+
+def draw_row(luma: Luma, track: Any, row: int) -> Rgb:
+    """The frame of one row of the track with model contours, limbs, ankle trails and legend on it.
+
+    A small frame comes out enlarged by a whole number, so that lines and letters stay fine.
+    """
+    scale = _scale(luma)
+    rgb = _enlarged(luma, scale)
+    width_px = max(1.0, rgb.shape[0] / 360)
+
+    def draw(segments: Segments, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
+        enlarged = (segments + 0.5) * scale - 0.5  # the centre of a pixel is its whole number
+        draw_segments(rgb, enlarged, colour, width_px, opacity=opacity)
+
+    contours = track.contours(row)
+    if len(contours):
+        draw(np.stack(contours), CONTOUR, width_px)
+    for side, colour in (("left", LEFT), ("right", RIGHT)):
+        draw(_trail(track.columns, side, row), colour, width_px, opacity=0.5)
+        draw(_limbs(track.columns, side, row), colour, 1.5 * width_px)
+    frame, time_s, phase, p_swapped = (
+        track.columns[name][row] for name in ("frame", "time_s", "phase", "p_swapped")
+    )
+    draw_text(rgb, f"frame {frame} at {time_s:.2f} s, phase {phase:.2f}")
+    draw_text(rgb, f"P(left and right swapped) {p_swapped:.0%}", line=1)
+    draw_text(rgb, "right", RIGHT, line=2)
+    draw_text(rgb, "left", LEFT, line=3)
+    return rgb
+
+
+def draw_segments(
+    rgb: Rgb, segments: Segments, colour: Colour, width_px: float, *, opacity: float = 1.0
+) -> None:
+    """Draws (N, 2, 2) segments in pixels; those with a NaN and parts outside the image are left out."""
+    segments = segments[np.isfinite(segments).all(axis=(1, 2))]
+    if not len(segments):
+        return
+    reach = width_px / 2 + 1
+    size = np.array(rgb.shape[1::-1])
+    boxes_from = np.clip(np.floor(segments.min(axis=1) - reach), 0, size).astype(int)
+    boxes_to = np.clip(np.ceil(segments.max(axis=1) + reach) + 1, 0, size).astype(int)
+    left, top = boxes_from.min(axis=0)
+    right, bottom = boxes_to.max(axis=0)
+    coverage = np.zeros((bottom - top, right - left), np.float32)
+    for (start, end), (u0, v0), (u1, v1) in zip(segments, boxes_from, boxes_to, strict=True):
+        distance = _distance_to_segment(start, end, np.arange(u0, u1), np.arange(v0, v1))
+        covered = np.clip(width_px / 2 + 0.5 - distance, 0, opacity)
+        part = coverage[v0 - top : v1 - top, u0 - left : u1 - left]
+        np.maximum(part, covered, out=part)
+    _blend(rgb[top:bottom, left:right], coverage, colour)
+
+
+def draw_text(rgb: Rgb, text: str, colour: Colour = WHITE, *, line: int = 0) -> None:
+    """Writes a line of text into the upper left corner, on a darkened ground; cut off at the image's edge."""
+    height_px = max(11, rgb.shape[0] // 40)
+    ink = np.concatenate([_ink(word, height_px) for word in text.split()], axis=1)
+    top = 4 + line * ink.shape[0]
+    ground = rgb[top : top + ink.shape[0], 4 : 4 + ink.shape[1]]
+    ground[:] = ground // 3
+    _blend(ground, ink[: ground.shape[0], : ground.shape[1]], colour)
+
+
+def _scale(luma: Luma) -> int:
+    return max(1, round(_LEGIBLE_HEIGHT_PX / luma.shape[0]))
+
+
+def _enlarged(luma: Luma, scale: int) -> Rgb:
+    """Grey values as RGB, each pixel repeated `scale` times in both directions."""
+    return np.repeat(np.repeat(np.repeat(luma, scale, axis=0), scale, axis=1)[:, :, None], 3, axis=2)
+
+
+def _distance_to_segment(
+    start: Segments, end: Segments, u: npt.NDArray[np.int_], v: npt.NDArray[np.int_]
+) -> npt.NDArray[np.float64]:
+    """Distances of the pixels (v, u) to the segment from `start` to `end`."""
+    along_u, along_v = end - start
+    from_u, from_v = (u - start[0])[None, :], (v - start[1])[:, None]
+    length_sq = max(along_u**2 + along_v**2, 1e-12)
+    t = np.clip((from_u * along_u + from_v * along_v) / length_sq, 0, 1)
+    distance: npt.NDArray[np.float64] = np.hypot(from_u - t * along_u, from_v - t * along_v)
+    return distance
+
+
+def _blend(rgb: Rgb, coverage: npt.NDArray[np.float32], colour: Colour) -> None:
+    rgb[:] = rgb + coverage[:, :, None] * (np.array(colour, np.float32) - rgb) + 0.5
+
+
+@lru_cache(maxsize=1024)
+def _ink(word: str, height_px: int) -> npt.NDArray[np.float32]:
+    """Coverage of a word and half a space on either side, one line high; matplotlib brings the font."""
+    dpi = 72.0
+    figure = Figure(figsize=((len(word) + 1) * height_px / dpi, 1.4 * height_px / dpi), dpi=dpi)
+    canvas = FigureCanvasAgg(figure)
+    margin = 0.2 * height_px
+    label = figure.text(margin / figure.bbox.width, 0.5, word, size=height_px, va="center", color="black")
+    canvas.draw()
+    width = int(np.ceil(label.get_window_extent().width + 2 * margin))
+    shade = np.asarray(canvas.buffer_rgba())[:, :width, 0]
+    return (1 - shade / 255).astype(np.float32)
+
+
+def _limbs(columns: dict[str, Any], side: str, row: int) -> Segments:
+    """Shoulder-elbow-wrist and hip-knee-ankle of one side."""
+    return np.concatenate([_segments([_joint(columns, side, j)[row] for j in chain]) for chain in _CHAINS])
+
+
+def _trail(columns: dict[str, Any], side: str, row: int) -> Segments:
+    """Where the ankle of one side was in the last second."""
+    time_s = columns["time_s"]
+    first = int(np.searchsorted(time_s, time_s[row] - _TRAIL_S))
+    return _segments(_joint(columns, side, "ankle")[first : row + 1])
+
+
+def _joint(columns: dict[str, Any], side: str, joint: str) -> npt.NDArray[np.float64]:
+    return np.column_stack([columns[f"{side}_{joint}_{axis}"] for axis in ("u_px", "v_px")])
+
+
+def _segments(points: npt.ArrayLike) -> Segments:
+    """The stretches between consecutive points."""
+    points = np.asarray(points, np.float64)
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+@contextmanager
+def _h264(path: str, rate_hz: float) -> Iterator[Any]:
+    """Gives a function (rgb, time_s) that appends a frame; the video is complete when the block ends."""
+    with av.open(path, "w", format="mp4") as container:
+        rate = Fraction(rate_hz).limit_denominator(1001)
+        stream = container.add_stream("libx264", rate=rate, options={"preset": "veryfast", "crf": "20"})
+        stream.pix_fmt = "yuv420p"
+        stream.codec_context.time_base = _TIME_BASE
+
+        def encode(rgb: Rgb, time_s: float) -> None:
+            odd_height, odd_width = rgb.shape[0] % 2, rgb.shape[1] % 2
+            even = np.pad(rgb, ((0, odd_height), (0, odd_width), (0, 0)), mode="edge")
+            if not stream.codec_context.is_open:
+                stream.height, stream.width = even.shape[:2]
+            picture = av.VideoFrame.from_ndarray(even, format="rgb24")
+            picture.pts, picture.time_base = round(time_s / _TIME_BASE), _TIME_BASE
+            container.mux(stream.encode(picture))
+
+        yield encode
+        container.mux(stream.encode(None))

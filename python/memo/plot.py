@@ -1,0 +1,146 @@
+"""Plots of a tracked walk, after the figures of Rohr (1994).
+
+Every function draws into the Axes it is given and returns them; nothing is shown. `write_plots` saves
+all of them as PNG files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from memo.files import complete_file
+
+__all__ = ["plot_angles", "plot_motion", "plot_similarity", "plot_start", "write_plots"]
+
+RIGHT = "#d55e00"
+LEFT = "#0072b2"
+NEUTRAL = "#444444"
+MEASURED: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 4, "color": NEUTRAL}
+
+
+def plot_similarity(ax: Axes, track: Any, start_row: int = 0) -> Axes:
+    """Similarity of model and image edges over the gait phase, in one frame of the start (Fig. 19)."""
+    start = track.start
+    curve = np.asarray(start["similarity"])[start_row]
+    ax.plot(np.arange(len(curve)) / len(curve), curve, color=NEUTRAL, linewidth=1.2)
+    best = start["phase"][start_row]
+    ax.axvline(best, color=RIGHT, linewidth=1, label=f"best, {best:.2f}")
+    ax.axvline((best + 0.5) % 1, color=LEFT, linewidth=1, linestyle="--", label="half a cycle away")
+    ax.set(xlim=(0, 1), xlabel="gait phase", ylabel="similarity")
+    ax.set_title(f"frame {start['frame'][start_row]}", loc="left")
+    _legend_above(ax)
+    return ax
+
+
+def plot_start(ax: Axes, track: Any) -> Axes:
+    """Best phase of each frame of the start, with the tracked line and that half a cycle away (Fig. 23)."""
+    frames, phases = np.asarray(track.start["frame"]), np.asarray(track.start["phase"])
+    ax.plot(frames, phases, **{**MEASURED, "markersize": 7, "label": "best in the frame"})
+    line = _phase_line(track.columns)
+    if line is not None:
+        ends = np.linspace(frames[0], frames[-1], 200)
+        for offset, style, label in ((0.0, "-", "tracked"), (0.5, ":", "half a cycle away")):
+            ax.plot(*_cut_at_wraps(line(ends) + offset, ends)[::-1], color=RIGHT, ls=style, label=label)
+    ax.set(ylim=(0, 1), xlabel="frame", ylabel="gait phase")
+    _legend_above(ax)
+    return ax
+
+
+def plot_motion(axes: Sequence[Sequence[Axes]], track: Any) -> Sequence[Sequence[Axes]]:
+    """Position and phase over the frames: measured left, filtered with one sigma right (Fig. 26).
+
+    `axes` is a grid of three rows (x, z, phase) and two columns.
+    """
+    columns, measured = track.columns, track.measured
+    frames = columns["frame"]
+    measured_frames = np.asarray(measured.get("frame", frames))
+    for (left, right), key in zip(axes, ("x", "z", "phase"), strict=True):
+        name = key if key == "phase" else f"{key}_m"
+        left.plot(measured_frames, measured[key], **MEASURED)
+        curve = (columns[name], frames, columns[f"sd_{name}"])
+        value, at, sd = _cut_at_wraps(*curve) if key == "phase" else curve
+        right.plot(at, value, color=NEUTRAL, linewidth=1.2)
+        right.fill_between(at, value - sd, value + sd, color=NEUTRAL, alpha=0.25, linewidth=0)
+        left.set(ylabel=name.replace("_m", ", m"))
+        right.sharey(left)
+    axes[0][0].set(title="measured")
+    axes[0][1].set(title="filtered, ± one standard deviation")
+    for ax in axes[-1]:
+        ax.set(xlabel="frame")
+    return axes
+
+
+def plot_angles(axes: Sequence[Axes], track: Any) -> Sequence[Axes]:
+    """Hip and knee flexion over time, right and left, with the heel strikes (Figs. 32 and 33).
+
+    `axes` are two: hip and knee.
+    """
+    columns = track.columns
+    for ax, joint in zip(axes, ("hip", "knee"), strict=True):
+        for side, colour in (("right", RIGHT), ("left", LEFT)):
+            flexion = columns[f"{side}_{joint}_deg"]
+            ax.plot(columns["time_s"], flexion, color=colour, linewidth=1.2, label=side)
+        for event in track.events:
+            if event["event"] == "heel_strike":
+                colour = RIGHT if event["side"] == "right" else LEFT
+                ax.axvline(event["time_s"], color=colour, linewidth=0.6, linestyle=":")
+        ax.set(ylabel=f"{joint} flexion, degrees")
+    _legend_above(axes[0])
+    axes[-1].set(xlabel="time, s (dotted: heel strikes)")
+    return axes
+
+
+def write_plots(track: Any, out_dir: str | PathLike[str]) -> list[Path]:
+    """Writes motion.png and angles.png, and similarity.png and start.png where the track has a start."""
+    plots: dict[str, tuple[tuple[int, int], tuple[float, float], Callable[[Any], object]]] = {
+        "motion": ((3, 2), (8, 6), lambda axes: plot_motion(axes, track)),
+        "angles": ((2, 1), (6, 5), lambda axes: plot_angles(axes[:, 0], track)),
+    }
+    start_frames = len(track.start.get("frame", ()))
+    if start_frames:
+        middle = start_frames // 2
+        plots["similarity"] = ((1, 1), (5, 3), lambda axes: plot_similarity(axes[0, 0], track, middle))
+        plots["start"] = ((1, 1), (5, 3), lambda axes: plot_start(axes[0, 0], track))
+    return [_save(Path(out_dir) / f"{name}.png", *how) for name, how in plots.items()]
+
+
+def _save(
+    path: Path, grid: tuple[int, int], size_in: tuple[float, float], draw: Callable[[Any], object]
+) -> Path:
+    figure = Figure(figsize=size_in, dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(*grid, squeeze=False, sharex="col")
+    for ax in axes.flat:
+        ax.spines[["top", "right"]].set_visible(False)
+    draw(axes)
+    with complete_file(path) as temporary:
+        figure.savefig(temporary, format="png")
+    return path
+
+
+def _phase_line(columns: dict[str, Any]) -> Callable[[npt.NDArray[np.float64]], Any] | None:
+    """The straight line through the tracked phases, which the start is drawn against."""
+    frames, phases = columns["frame"], columns["phase"]
+    if len(frames) < 2:
+        return None
+    return np.polynomial.Polynomial.fit(frames, np.unwrap(phases, period=1.0), 1)
+
+
+def _cut_at_wraps(phases: npt.ArrayLike, *others: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
+    """Phases in [0, 1), and the others, with a NaN between where they start anew: no line is drawn across."""
+    wrapped = np.mod(phases, 1.0)
+    anew = 1 + np.flatnonzero(np.diff(wrapped) < -0.5)
+    return [np.insert(np.asarray(values, np.float64), anew, np.nan) for values in (wrapped, *others)]
+
+
+def _legend_above(ax: Axes) -> None:
+    ax.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0)

@@ -1,0 +1,299 @@
+"""Frames out of a video file or a folder of images: luma, time stamps, upright.
+
+What it delivers is the luma plane as the camera stored it (no colour conversion: a conversion to
+`gray` differs from it by several grey levels), turned upright by the display matrix, with the video's
+own time stamps. Frames come one at a time, so memory does not grow with the length of the video.
+
+What it cannot do: no seeking (a start frame is reached by decoding), no deinterlacing, no variable size.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import chain
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
+
+Luma = npt.NDArray[np.uint8]
+
+_IMAGE_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff"}
+# Fewer missing frames than this are edit lists and rounding, not a recording that was cut off.
+_MISSING_FRAMES_TOLERATED = 2
+
+
+class VideoError(ValueError):
+    """A video that cannot be read; the message says which and why, in one line."""
+
+
+class VideoDamageWarning(UserWarning):
+    """A video was read to its end, but not every frame of it could be decoded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame of a video."""
+
+    index: int
+    """Position in the video, 0 for the first frame."""
+    time_s: float
+    """Seconds since the first frame."""
+    luma: Luma
+    """(H, W) grey values, upright; may be a strided view of the decoder's memory."""
+
+
+class VideoReader:
+    """Iterates over the frames of a video file or of a folder of images; use it in a `with` statement.
+
+    `start` and `stop` choose frames like a slice. `rate_hz` replaces the time stamps: needed for a
+    folder of images, and for slow-motion video that was stored at another rate than it was recorded.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        *,
+        start: int = 0,
+        stop: int | None = None,
+        rate_hz: float | None = None,
+    ) -> None:
+        if start < 0 or (stop is not None and stop <= start):
+            raise VideoError(f"frames {start}:{'' if stop is None else stop} is not a range of frames")
+        if rate_hz is not None and not 0 < rate_hz < float("inf"):
+            raise VideoError(f"the frame rate must be positive, got {rate_hz}")
+        self.path = Path(path)
+        self.damage: str | None = None
+        """After iteration: what could not be read, `None` if everything was."""
+        self._start, self._stop, self._rate_hz = start, stop, rate_hz
+        self._source = _open_source(self.path, rate_hz)
+        self._decoded = self._source.decoded()
+        try:
+            self._first = next(self._decoded, None)
+            if self._first is None:
+                raise VideoError(f"{self.path}: no frame of it can be decoded")
+            height, width = _upright(_luma(self._first), self._first).shape
+        except BaseException:
+            self.close()
+            raise
+        self.size: tuple[int, int] = (width, height)
+        """Width and height of the upright frames, pixels."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Average frame rate, frames per second."""
+        return self._rate_hz or self._source.rate_hz
+
+    @property
+    def pixel_aspect(self) -> float:
+        """Width over height of a stored pixel: 1 unless the video is anamorphic."""
+        return self._source.pixel_aspect
+
+    @property
+    def frame_count(self) -> int | None:
+        """How many frames iteration will give, as the container announces it; `None` if it does not."""
+        announced = self._source.announced
+        if announced is None:
+            return None if self._stop is None else self._stop - self._start
+        return max(0, min(announced, self._stop or announced) - self._start)
+
+    def __enter__(self) -> VideoReader:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._source.close()
+
+    def __iter__(self) -> Iterator[Frame]:
+        index = -1
+        for index, (time_s, decoded) in enumerate(self._timed()):
+            if self._stop is not None and index >= self._stop:
+                return
+            if index >= self._start:
+                yield Frame(index, time_s, self._checked(index, decoded))
+        if index < self._start:
+            raise VideoError(f"{self.path}: frame {self._start} was asked for, it has {index + 1} frames")
+        self._report_damage(index + 1)
+
+    def _timed(self) -> Iterator[tuple[float, av.VideoFrame]]:
+        """Decoded frames with their time; where a stamp is missing or does not increase, the rate decides."""
+        first, self._first = self._first, None
+        if first is None:
+            raise VideoError(f"{self.path}: its frames can be read once; open it again")
+        step_s = 1.0 / self.rate_hz
+        time_s = -step_s
+        for index, decoded in enumerate(chain([first], self._decoded)):
+            if self._rate_hz is not None:
+                stamp_s = index * step_s
+            elif decoded.time is None or first.time is None:
+                stamp_s = -1.0
+            else:
+                stamp_s = decoded.time - first.time
+            time_s = stamp_s if stamp_s > time_s else time_s + step_s
+            yield time_s, decoded
+
+    def _checked(self, index: int, decoded: av.VideoFrame) -> Luma:
+        luma = _upright(_luma(decoded), decoded)
+        if luma.shape != self.size[::-1]:
+            (width, height), (now_height, now_width) = self.size, luma.shape
+            raise VideoError(
+                f"{self.path}: frame {index} is {now_width}x{now_height}, those before it {width}x{height}"
+            )
+        return luma
+
+    def _report_damage(self, read: int) -> None:
+        announced, undecodable = self._source.announced, self._source.undecodable
+        missing = 0 if announced is None else announced - read
+        if undecodable:
+            self.damage = f"{undecodable} pieces could not be decoded; {read} frames could"
+        elif self._source.counted and missing > _MISSING_FRAMES_TOLERATED:
+            self.damage = f"cut off: it announces {announced} frames, {read} could be read"
+        if self.damage:
+            warnings.warn(f"{self.path}: {self.damage}", VideoDamageWarning, stacklevel=3)
+
+
+class _File:
+    """The first video stream of a container."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._container = av.open(str(path))
+        except av.error.InvalidDataError:
+            raise VideoError(f"{path}: not a video, or its index is missing (recording cut off)") from None
+        except (av.error.FFmpegError, OSError) as error:
+            raise VideoError(f"{path}: cannot be opened: {error.strerror or error}") from None
+        if not self._container.streams.video:
+            self._container.close()
+            raise VideoError(f"{path}: holds no video stream")
+        self._stream = self._container.streams.video[0]
+        self._stream.thread_type = "AUTO"
+        self.undecodable = 0
+        self.counted = self._stream.frames > 0
+        self.rate_hz = float(self._stream.average_rate or self._stream.guessed_rate or 25)
+        self.announced = self._stream.frames or self._frames_from_duration()
+        self.pixel_aspect = float(self._stream.sample_aspect_ratio or 1)
+
+    def _frames_from_duration(self) -> int | None:
+        duration = self._container.duration
+        return round(duration / av.time_base * self.rate_hz) if duration else None
+
+    def decoded(self) -> Iterator[av.VideoFrame]:
+        """All frames; pieces that cannot be decoded are counted and left out."""
+        for packet in self._packets():
+            try:
+                frames = packet.decode()
+            except av.error.FFmpegError:
+                self.undecodable += 1
+            else:
+                yield from frames
+        with suppress(av.error.EOFError):  # raised where the last packet has flushed the decoder already
+            yield from self._stream.codec_context.decode(None)
+
+    def _packets(self) -> Iterator[av.Packet]:
+        try:
+            yield from self._container.demux(self._stream)
+        except av.error.FFmpegError:
+            self.undecodable += 1
+
+    def close(self) -> None:
+        self._container.close()
+
+
+class _Folder:
+    """Images of a folder, in the order of the numbers in their names."""
+
+    counted = False
+    pixel_aspect = 1.0
+
+    def __init__(self, path: Path, rate_hz: float | None) -> None:
+        names = [file for file in path.iterdir() if file.suffix.lower() in _IMAGE_SUFFIXES]
+        if not names:
+            raise VideoError(f"{path}: a folder without images")
+        if rate_hz is None:
+            raise VideoError(f"{path}: a folder of images has no time stamps; give its frame rate")
+        self._images = iter(sorted(names, key=_natural_order))
+        self.announced = len(names)
+        self.rate_hz = rate_hz
+        self.undecodable = 0
+
+    def decoded(self) -> Iterator[av.VideoFrame]:
+        for image in self._images:
+            file = _File(image)
+            try:
+                yield from file.decoded()
+            finally:
+                self.undecodable += file.undecodable
+                file.close()
+
+    def close(self) -> None:
+        self._images = iter(())
+
+
+def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
+    if path.is_dir():
+        return _Folder(path, rate_hz)
+    if not path.exists():
+        raise VideoError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise VideoError(f"{path}: the file is empty")
+    return _File(path)
+
+
+def _natural_order(path: Path) -> list[tuple[int, str]]:
+    """Sorts frame9 before frame10."""
+    return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
+
+
+def _luma(decoded: av.VideoFrame) -> Luma:
+    """The luma plane itself where there is one of 8 bits; else the nearest thing to it."""
+    kind = decoded.format
+    if kind.is_rgb or kind.has_palette:
+        return _bt601(np.asarray(decoded.to_ndarray(format="rgb24"), np.uint8))
+    first = kind.components[0]
+    own_plane = all(component.plane != first.plane for component in kind.components[1:])
+    if first.bits != 8 or not own_plane or decoded.planes[0].line_size < 0:
+        decoded = decoded.reformat(format="yuv420p" if len(kind.components) > 1 else "gray")
+    plane = decoded.planes[0]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
+    luma: Luma = rows[: decoded.height, : decoded.width]
+    return luma
+
+
+def _bt601(rgb: Luma) -> Luma:
+    """Y = 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601), rounded, in 16 bits of fixed point."""
+    red, green, blue = np.moveaxis(rgb.astype(np.uint16), 2, 0)
+    luma: Luma = ((77 * red + 150 * green + 29 * blue + 128) >> 8).astype(np.uint8)
+    return luma
+
+
+def _upright(luma: Luma, decoded: av.VideoFrame) -> Luma:
+    """Applies the display matrix (x' = a x + c y, y' = b x + d y): quarter turns and mirrorings, as views."""
+    matrix = _display_matrix(decoded)
+    if matrix is None:
+        return luma
+    a, b, c, d = matrix
+    if max(abs(b), abs(c)) < 0.01 * min(abs(a), abs(d)):
+        return luma[:: 1 if d > 0 else -1, :: 1 if a > 0 else -1]
+    if max(abs(a), abs(d)) < 0.01 * min(abs(b), abs(c)):
+        return luma.T[:: 1 if b > 0 else -1, :: 1 if c > 0 else -1]
+    raise VideoError(f"the video is turned by {decoded.rotation} degrees; only quarter turns can be read")
+
+
+def _display_matrix(decoded: av.VideoFrame) -> tuple[int, int, int, int] | None:
+    side_data: Any = decoded.side_data.get("DISPLAYMATRIX")
+    if side_data is None:
+        return None
+    a, b, _, c, d = np.frombuffer(memoryview(side_data), np.int32)[:5].tolist()
+    return a, b, c, d

@@ -1,0 +1,60 @@
+"""Fixtures: the stand-in core and small videos written for one test."""
+
+from fractions import Fraction
+
+import av
+import fake_core
+import memo
+import numpy as np
+import pytest
+
+needs_core = pytest.mark.skipif(not hasattr(memo, "Tracker"), reason="needs the compiled tracker")
+
+
+@pytest.fixture
+def core(monkeypatch):
+    """Puts the stand-in core in place of the compiled one."""
+    for name, part in fake_core.PARTS.items():
+        monkeypatch.setattr(memo, name, part, raising=False)
+    return fake_core
+
+
+@pytest.fixture
+def luma_frames():
+    """Makes (count, height, width) grey values that differ in every frame and have no symmetry."""
+
+    def make(count=8, size=(50, 36), seed=0):
+        width, height = size
+        v, u = np.mgrid[:height, :width]
+        ramp = 20 + 3 * u + v + (5 * np.arange(count) % 30)[:, None, None]
+        noise = np.random.default_rng(seed).integers(0, 8, (count, height, width))
+        return (ramp + noise).clip(16, 235).astype(np.uint8)
+
+    return make
+
+
+@pytest.fixture
+def write_video(tmp_path):
+    """Writes grey values, unchanged (lossless), as the luma plane of a video; returns its path."""
+
+    def write(name, luma, *, times_s=None, rate=25, codec="libx264", options=None, **open_options):
+        path = tmp_path / name
+        options = {"qp": "0", "g": "5"} | (options or {}) if codec == "libx264" else {}
+        with av.open(str(path), "w", **open_options) as container:
+            stream = container.add_stream(codec, rate=rate, options=options)
+            stream.height, stream.width = luma.shape[1:]
+            stream.pix_fmt = "yuv420p"
+            if times_s is not None:
+                stream.codec_context.time_base = Fraction(1, 90000)
+            for index, plane in enumerate(luma):
+                chroma = np.full((plane.shape[0] // 2, plane.shape[1]), 100, np.uint8)
+                frame = av.VideoFrame.from_ndarray(np.vstack([plane, chroma]), format="yuv420p")
+                if times_s is None:
+                    frame.pts, frame.time_base = index, Fraction(1, rate)
+                else:
+                    frame.pts, frame.time_base = round(times_s[index] * 90000), Fraction(1, 90000)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        return path
+
+    return write

@@ -1,0 +1,298 @@
+"""The command line as a user meets it: exit codes, what is said, what is left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import av
+import memo
+import numpy as np
+import pytest
+from conftest import needs_core
+from memo import cli
+from memo.files import (
+    TRACK_COLUMNS,
+    complete_file,
+    read_events_csv,
+    read_track_csv,
+    write_events_csv,
+    write_track_csv,
+)
+
+TESTS = Path(__file__).parent
+ROOT = TESTS.parent
+WITH_FAKE_CORE = f"""
+import sys
+sys.path.insert(0, {str(TESTS)!r})
+import fake_core, memo, memo.cli
+for name, part in fake_core.PARTS.items():
+    setattr(memo, name, part)
+memo.cli.main()
+"""
+CAMERA = "[side]\nname = 'side'\nsize = [50, 36]\n[front]\nname = 'front'\nsize = [640, 480]\n"
+
+
+@pytest.fixture
+def memo_command(core, monkeypatch, capsys):
+    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out, said.err
+
+    return run
+
+
+@pytest.fixture
+def video(write_video, luma_frames):
+    return write_video("walk.mp4", luma_frames(count=20))
+
+
+def test_version_and_help(memo_command):
+    assert memo_command("--version") == (0, f"memo {memo.__version__}\n", "")
+    code, said, _ = memo_command("track", "--help")
+    assert code == 0 and "Exit codes" in said and "--no-overlay" in said
+    assert memo_command("track")[0] == 2
+
+
+def test_tracking_leaves_everything(memo_command, video, tmp_path):
+    out = tmp_path / "out"
+    code, said, complaint = memo_command("track", video, "--out", out)
+    assert (code, complaint) == (0, "")
+    assert {path.name for path in out.iterdir()} == {
+        *("track.csv", "events.csv", "overlay.mp4"),
+        *("similarity.png", "start.png", "motion.png", "angles.png"),
+    }
+    assert said.startswith("20 frames, tracked.\nLeft and right may be swapped (probability 40%)")
+    columns = read_track_csv(out / "track.csv")
+    np.testing.assert_array_equal(columns["frame"], np.arange(20))
+    np.testing.assert_allclose(columns["time_s"], np.arange(20) / 25, atol=1e-4)
+
+
+def test_results_go_to_memo_out_by_default(memo_command, video, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert memo_command("track", video, "--no-overlay", "--no-plots")[0] == 0
+    assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == {"track.csv", "events.csv"}
+
+
+def test_chosen_frames_keep_their_numbers(memo_command, video, tmp_path):
+    assert memo_command("track", video, "--frames", "5:12", "--out", tmp_path / "out")[0] == 0
+    columns = read_track_csv(tmp_path / "out" / "track.csv")
+    np.testing.assert_array_equal(columns["frame"], np.arange(5, 12))
+    np.testing.assert_allclose(columns["time_s"], np.arange(5, 12) / 25, atol=1e-4)
+    assert [event["frame"] for event in read_events_csv(tmp_path / "out" / "events.csv")] == [5, 6]
+    with av.open(str(tmp_path / "out" / "overlay.mp4")) as overlay:
+        assert overlay.streams.video[0].frames == 7
+
+
+def test_summary_as_json(memo_command, video, tmp_path):
+    _, said, _ = memo_command("track", video, "--json", "--no-plots", "--out", tmp_path / "out")
+    summary = json.loads(said)
+    assert summary["status"] == "tracked" and summary["speed_mps"] == 1.3 and summary["rows"] == 20
+    assert summary["unknown"] is None
+    assert all(Path(file).is_file() for file in summary["files"])
+
+
+def test_quiet_says_nothing(memo_command, video, tmp_path):
+    assert memo_command("track", video, "--quiet", "--no-plots", "--out", tmp_path) == (0, "", "")
+
+
+def test_nobody_there(memo_command, write_video, tmp_path):
+    empty = write_video("empty.mp4", np.full((8, 36, 50), 16, np.uint8))
+    code, said, _ = memo_command("track", empty, "--out", tmp_path / "out")
+    assert code == 3 and said.startswith("0 frames, nobody.")
+    assert read_track_csv(tmp_path / "out" / "track.csv")["x_m"].shape == (0,)
+    assert not (tmp_path / "out" / "overlay.mp4").exists()
+
+
+def test_camera_is_chosen_by_name(memo_command, video, tmp_path):
+    camera = tmp_path / "cameras.toml"
+    camera.write_text(CAMERA)
+    arguments = ("track", video, "--no-plots", "--no-overlay", "--out", tmp_path, "--camera", camera)
+    assert memo_command(*arguments, "--camera-name", "side")[0] == 0
+    code, _, complaint = memo_command(*arguments, "--camera-name", "front")
+    assert code == 1 and "640x480 pixels, the video has 50x36" in complaint
+    code, _, complaint = memo_command(*arguments, "--camera-name", "top")
+    assert code == 1 and "no camera named 'top'" in complaint
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--height", "170"], "looks like centimetres: give --height 1.7"),
+        (["--height", "0"], "height of a person in metres"),
+        (["--height", "-1.7"], "height of a person in metres"),
+        (["--height", "nan"], "height of a person in metres"),
+        (["--height", "17"], "height of a person in metres"),
+        (["--fov-deg", "0"], "field of view"),
+        (["--fov-deg", "nan"], "field of view"),
+        (["--camera", "absent.toml"], "absent.toml: no such camera file"),
+        (["--camera", __file__, "--fov-deg", "60"], "leave --fov-deg out"),
+        (["--camera", __file__], ""),
+        (["--camera-name", "side"], "needs --camera"),
+        (["--frames", "5"], "--frames 5 is not A:B"),
+        (["--frames", "9:3"], "--frames 9:3 is not A:B"),
+        (["--frames", "a:b"], "--frames a:b is not A:B"),
+        (["--frames", "100:"], "frame 100 was asked for, it has 20 frames"),
+        (["--fps", "0"], "frame rate must be positive"),
+        (["--out", __file__], "cannot be written to"),
+    ],
+    ids=lambda value: "_".join(value) if isinstance(value, list) else "",
+)
+def test_mistakes_are_told_in_one_line(memo_command, video, tmp_path, monkeypatch, arguments, reason):
+    monkeypatch.chdir(tmp_path)
+    code, said, complaint = memo_command("track", video, *arguments)
+    assert (code, said) == (1, "")
+    assert complaint.startswith("memo: ") and complaint.count("\n") == 1 and reason in complaint
+
+
+def test_bad_videos_are_told_in_one_line(memo_command, tmp_path):
+    for name in ("absent.mp4", "text.mp4"):
+        (tmp_path / "text.mp4").write_text("no video " * 99)
+        code, _, complaint = memo_command("track", tmp_path / name, "--out", tmp_path / "out")
+        assert code == 1 and complaint.startswith("memo: ") and complaint.count("\n") == 1
+
+
+def test_a_damaged_video_is_tracked_and_told(memo_command, write_video, luma_frames, tmp_path):
+    path = write_video("cut.mp4", luma_frames(count=60), container_options={"movflags": "faststart"})
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.6)])
+    code, _, complaint = memo_command("track", path, "--no-plots", "--out", tmp_path / "out")
+    assert code == 0 and complaint.count("\n") == 1 and "could" in complaint
+    assert 10 < len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 60
+
+
+def test_demo_compares_with_the_truth(memo_command, tmp_path):
+    code, said, _ = memo_command("demo", "--out", tmp_path, "--seed", "3")
+    assert code == 0 and "torso x 0.0 cm" in said and "memo track VIDEO" in said
+    assert (tmp_path / "overlay.mp4").exists() and (tmp_path / "track.csv").exists()
+
+
+def test_truth_is_compared_by_frame_number(core):
+    camera = core.Camera((160, 120))
+    truth = core.walk(np.arange(30) / 25, camera)
+    columns = {name: values[10:].copy() for name, values in truth.items()}
+    columns["x_m"] += 0.03
+    columns["phase"] = (columns["phase"] + 0.99) % 1
+    lines = " ".join(cli._against_truth(columns, truth))
+    assert "over 20 frames" in lines and "torso x 3.0 cm, y 0.0 cm" in lines and "phase 0.010" in lines
+
+
+def interrupted(process, started, after_s=0.3):
+    """Sends Ctrl-C a little after work has begun; gives the exit code and what was complained."""
+    deadline = time.monotonic() + 30
+    while not started() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(after_s)
+    process.send_signal(signal.SIGINT)
+    _, complaint = process.communicate(timeout=60)
+    return process.returncode, complaint
+
+
+def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path):
+    video, started = write_video("long.mp4", luma_frames(count=400)), tmp_path / "started"
+    process = subprocess.Popen(
+        [sys.executable, "-c", WITH_FAKE_CORE, "track", str(video), "--out", str(tmp_path / "out")],
+        env=os.environ | {"FAKE_CORE_FRAME_S": "0.02", "FAKE_CORE_STARTED": str(started)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    code, complaint = interrupted(process, started.exists)
+    assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
+    assert 1 <= len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 400
+
+
+@pytest.mark.parametrize("absent", ["typer", "av", "matplotlib", "rich"])
+def test_without_the_extra_it_says_what_to_install(absent):
+    code = f"import sys; sys.modules[{absent!r}] = None; import memo.cli; memo.cli.main()"
+    done = subprocess.run([sys.executable, "-c", code, "demo"], capture_output=True, text=True)
+    assert done.returncode == 4 and done.stderr.count("\n") == 1
+    assert absent in done.stderr and 'pip install "memo-motion[app]"' in done.stderr
+
+
+def test_base_import_needs_numpy_alone():
+    code = "import sys, memo, memo.files, memo.cli; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert not {"av", "matplotlib", "rich", "typer"} & set(loaded.split())
+
+
+def test_tables_survive_writing(tmp_path, core):
+    columns = core.walk(np.arange(9) / 25, core.Camera((160, 120)))
+    columns["left_knee_deg"][4] = np.nan
+    write_track_csv(tmp_path / "track.csv", columns)
+    header = (tmp_path / "track.csv").read_text().splitlines()[0]
+    assert header == ",".join(TRACK_COLUMNS)
+    back = read_track_csv(tmp_path / "track.csv")
+    assert back["frame"].dtype == np.int64
+    for name in TRACK_COLUMNS:
+        np.testing.assert_allclose(back[name], columns[name], atol=0.005)
+    events = [{"time_s": 0.25, "frame": 6, "event": "toe_off", "side": "left"}]
+    write_events_csv(tmp_path / "events.csv", events)
+    assert read_events_csv(tmp_path / "events.csv") == events
+
+
+def test_tables_refuse_other_columns(tmp_path, core):
+    columns = core.walk(np.arange(3) / 25, core.Camera((160, 120)))
+    for broken in (
+        {name: columns[name] for name in TRACK_COLUMNS[1:]},
+        columns | {"other": columns["x_m"]},
+        columns | {"x_m": np.zeros(2)},
+    ):
+        with pytest.raises(ValueError, match="track columns"):
+            write_track_csv(tmp_path / "track.csv", broken)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_fails_half_way_leaves_the_old_one(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), complete_file(path) as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_ci_runs_the_commands_of_the_readme():
+    block = (ROOT / "README.md").read_text().split("```sh\n")[1:3]
+    commands = [part.split("```")[0].strip() for part in block]
+    run = (ROOT / ".ci" / "run").read_text()
+    assert all(command in run for command in commands)
+
+
+def test_the_python_example_of_the_readme(core, video, monkeypatch, capsys):
+    example = (ROOT / "README.md").read_text().split("```python\n")[1].split("```")[0]
+    monkeypatch.chdir(video.parent)
+    exec(example, {})
+    assert "20 frames, tracked." in capsys.readouterr().out and Path("track.csv").exists()
+
+
+@needs_core
+def test_demo_of_the_compiled_core(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "memo.cli", "demo", "--out", str(tmp_path)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    columns = read_track_csv(tmp_path / "track.csv")
+    assert len(columns["frame"]) > 20 and "Against the drawn truth" in done.stdout
+
+
+@needs_core
+def test_interrupt_of_the_compiled_core(tmp_path, write_video):
+    scene = memo.demo_scene(seed=0)
+    frames = np.concatenate([scene.frames] * 5)
+    video = write_video("scene.mp4", frames[:, : frames.shape[1] // 2 * 2, : frames.shape[2] // 2 * 2])
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "memo.cli", "track", str(video), "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    code, complaint = interrupted(process, out.exists, after_s=0.5)
+    assert code == 130, complaint
+    assert "Traceback" not in complaint and (out / "track.csv").exists()

@@ -1,0 +1,237 @@
+"""Videos in every state they come in: each is written here, then read back."""
+
+import struct
+import wave
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from memo.video import VideoDamageWarning, VideoError, VideoReader, _bt601
+
+
+def read(path, **options):
+    with VideoReader(path, **options) as reader:
+        return list(reader), reader
+
+
+def set_display_matrix(path, a, b, c, d):
+    """Writes the display matrix of the first track header of an MP4."""
+    data = bytearray(path.read_bytes())
+    header = data.index(b"tkhd") + 4
+    matrix = header + (40 if data[header] == 0 else 52)
+    one = 1 << 16
+    data[matrix : matrix + 36] = struct.pack(
+        ">9i", int(a * one), int(b * one), 0, int(c * one), int(d * one), 0, 0, 0, 1 << 30
+    )
+    path.write_bytes(data)
+
+
+def write_pictures(path, pictures, pix_fmt, codec):
+    """A lossless video of pictures (N, H, W, 3) in RGB or of the planes that `pix_fmt` has."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=25)
+        first = pictures[0]
+        stream.width, stream.height, stream.pix_fmt = first.width, first.height, pix_fmt
+        for index, picture in enumerate(pictures):
+            picture.pts, picture.time_base = index, Fraction(1, 25)
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+
+
+def test_luma_is_the_stored_plane(write_video, luma_frames):
+    luma = luma_frames(count=12)
+    frames, reader = read(write_video("plain.mp4", luma))
+    assert reader.size == (50, 36) and reader.frame_count == 12 and reader.rate_hz == 25
+    assert [frame.index for frame in frames] == list(range(12))
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(12) / 25, atol=1e-4)
+    np.testing.assert_array_equal([frame.luma for frame in frames], luma)
+    assert reader.damage is None
+
+
+def test_colour_video_becomes_bt601_luma(tmp_path):
+    rgb = np.random.default_rng(1).integers(0, 256, (24, 40, 3), dtype=np.uint8)
+    picture = av.VideoFrame.from_ndarray(rgb, format="rgb24").reformat(format="bgr24")
+    write_pictures(tmp_path / "raw.avi", [picture, picture], "bgr24", "rawvideo")
+    frames, _ = read(tmp_path / "raw.avi")
+    expected = rgb @ np.array([0.299, 0.587, 0.114])
+    assert np.abs(frames[1].luma - expected).max() <= 1.0
+
+
+def test_bt601_keeps_greys():
+    greys = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
+    np.testing.assert_array_equal(_bt601(greys)[0], np.arange(256))
+
+
+@pytest.mark.parametrize("pix_fmt", ["yuv420p10le", "yuyv422", "uyvy422", "nv12", "gray", "yuv444p"])
+def test_luma_of_other_layouts(tmp_path, luma_frames, pix_fmt):
+    luma = luma_frames(count=1)[0]
+    grey = av.VideoFrame.from_ndarray(np.vstack([luma, np.full((18, 50), 128, np.uint8)]), format="yuv420p")
+    codec = "ffv1" if pix_fmt == "yuv420p10le" else "rawvideo"
+    path = tmp_path / "layout.nut"
+    if pix_fmt == "gray":
+        grey = av.VideoFrame.from_ndarray(luma, format="gray")
+    write_pictures(path, [grey.reformat(format=pix_fmt)], pix_fmt, codec)
+    frames, _ = read(path)
+    assert np.abs(frames[0].luma.astype(int) - luma).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("matrix", "upright"),
+    [
+        ((1, 0, 0, 1), lambda y: y),
+        ((0, 1, -1, 0), lambda y: np.rot90(y, -1)),
+        ((-1, 0, 0, -1), lambda y: np.rot90(y, 2)),
+        ((0, -1, 1, 0), lambda y: np.rot90(y, 1)),
+        ((-1, 0, 0, 1), np.fliplr),
+        ((0, 1, 1, 0), np.transpose),
+    ],
+    ids=["none", "clockwise", "half", "anticlockwise", "mirrored", "transposed"],
+)
+def test_display_matrix_is_honoured(write_video, luma_frames, matrix, upright):
+    luma = luma_frames(count=3)
+    path = write_video("phone.mp4", luma)
+    set_display_matrix(path, *matrix)
+    frames, reader = read(path)
+    np.testing.assert_array_equal(frames[2].luma, upright(luma[2]))
+    assert reader.size == upright(luma[0]).shape[::-1]
+
+
+def test_display_matrix_agrees_with_the_library(write_video, luma_frames):
+    path = write_video("phone.mp4", luma_frames(count=1))
+    set_display_matrix(path, 0, 1, -1, 0)
+    with av.open(str(path)) as container:
+        assert next(container.decode(video=0)).rotation == -90  # clockwise
+
+
+def test_other_rotations_are_refused(write_video, luma_frames):
+    path = write_video("tilted.mp4", luma_frames(count=1))
+    set_display_matrix(path, 0.866, 0.5, -0.5, 0.866)
+    with pytest.raises(VideoError, match="quarter turns"):
+        VideoReader(path)
+
+
+def test_variable_rate_keeps_time_stamps(write_video, luma_frames):
+    times_s = [0.0, 0.04, 0.12, 0.13, 0.5, 0.9]
+    frames, _ = read(write_video("variable.mp4", luma_frames(count=6), times_s=times_s))
+    np.testing.assert_allclose([frame.time_s for frame in frames], times_s, atol=1e-4)
+
+
+def test_time_starts_with_the_first_frame(write_video, luma_frames):
+    frames, _ = read(write_video("late.mkv", luma_frames(count=3), times_s=[2.0, 2.5, 3.0]))
+    np.testing.assert_allclose([frame.time_s for frame in frames], [0, 0.5, 1.0], atol=2e-3)
+
+
+def test_missing_time_stamps_follow_the_rate(write_video, luma_frames):
+    frames, reader = read(write_video("bare.h264", luma_frames(count=6), options={"bf": "0"}))
+    np.testing.assert_allclose([f.time_s for f in frames], np.arange(6) / reader.rate_hz, atol=1e-6)
+
+
+def test_a_given_rate_replaces_time_stamps(write_video, luma_frames):
+    frames, reader = read(write_video("slow.mp4", luma_frames(count=5)), rate_hz=240)
+    np.testing.assert_allclose([f.time_s for f in frames], np.arange(5) / 240)
+    assert reader.rate_hz == 240
+
+
+def test_frames_are_chosen_like_a_slice(write_video, luma_frames):
+    luma = luma_frames(count=10)
+    path = write_video("ten.mp4", luma)
+    frames, reader = read(path, start=3, stop=6)
+    assert [frame.index for frame in frames] == [3, 4, 5] and reader.frame_count == 3
+    np.testing.assert_allclose([frame.time_s for frame in frames], [0.12, 0.16, 0.2], atol=1e-4)
+    np.testing.assert_array_equal([frame.luma for frame in frames], luma[3:6])
+    with pytest.raises(VideoError, match="frame 10 was asked for, it has 10 frames"):
+        read(path, start=10)
+
+
+@pytest.mark.parametrize("choice", [{"start": -1}, {"start": 4, "stop": 4}, {"rate_hz": 0.0}])
+def test_bad_choices_are_refused(write_video, luma_frames, choice):
+    with pytest.raises(VideoError):
+        VideoReader(write_video("ten.mp4", luma_frames(count=2)), **choice)
+
+
+def test_frames_are_read_once(write_video, luma_frames):
+    with VideoReader(write_video("once.mp4", luma_frames(count=2))) as reader:
+        assert len(list(reader)) == 2
+        with pytest.raises(VideoError, match="read once"):
+            next(iter(reader))
+
+
+def test_cut_off_before_its_index_is_not_a_video(write_video, luma_frames):
+    path = write_video("cut.mp4", luma_frames(count=30))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(VideoError, match="recording cut off"):
+        VideoReader(path)
+
+
+@pytest.mark.parametrize("name", ["cut.mp4", "cut.mkv"])
+def test_cut_off_in_the_middle_gives_what_is_there(write_video, luma_frames, name):
+    luma = luma_frames(count=60)
+    options = {"options": {"bf": "0"}}
+    path = write_video(name, luma, container_options={"movflags": "faststart"}, **options)
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.6)])
+    with VideoReader(path) as reader:
+        if name.endswith("mp4"):
+            with pytest.warns(VideoDamageWarning):
+                frames = list(reader)
+            assert reader.damage
+        else:  # a Matroska file announces nothing, so its end is its end
+            frames = list(reader)
+    assert 20 < len(frames) < 50
+    np.testing.assert_array_equal([frame.luma for frame in frames[:20]], luma[:20])
+
+
+def test_damage_in_the_middle_is_counted(write_video, luma_frames):
+    path = write_video("hurt.mp4", luma_frames(count=60), options={"bf": "0"})
+    data = bytearray(path.read_bytes())
+    middle = data.index(b"mdat") + len(data) // 2
+    data[middle : middle + 3000] = bytes(3000)
+    path.write_bytes(data)
+    with VideoReader(path) as reader, pytest.warns(VideoDamageWarning, match="could not be decoded"):
+        frames = list(reader)
+    assert 30 < len(frames) < 60
+    assert np.all(np.diff([frame.time_s for frame in frames]) > 0)
+
+
+def test_what_is_not_a_video_is_named(tmp_path):
+    empty, text, sound = tmp_path / "empty.mp4", tmp_path / "notes.mp4", tmp_path / "sound.wav"
+    empty.touch()
+    text.write_text("not a video " * 100)
+    with wave.open(str(sound), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(8000)
+        file.writeframes(bytes(16000))
+    for path, reason in [
+        (tmp_path / "absent.mp4", "no such file"),
+        (empty, "is empty"),
+        (text, "not a video"),
+        (sound, "no video stream"),
+        (tmp_path, "a folder without images"),
+    ]:
+        with pytest.raises(VideoError, match=reason) as caught:
+            VideoReader(path)
+        assert "\n" not in str(caught.value)
+
+
+def write_image(path, luma):
+    write_pictures(path, [av.VideoFrame.from_ndarray(luma, format="gray")], "gray", "png")
+
+
+def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames):
+    luma = luma_frames(count=11)
+    for index in range(11):
+        write_image(tmp_path / f"frame{index}.png", luma[index])
+    with pytest.raises(VideoError, match="frame rate"):
+        VideoReader(tmp_path)
+    frames, reader = read(tmp_path, rate_hz=10)
+    np.testing.assert_array_equal([frame.luma for frame in frames], luma)
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(11) / 10)
+    assert reader.frame_count == 11
+
+
+def test_frames_that_change_size_are_refused(tmp_path, luma_frames):
+    write_image(tmp_path / "a1.png", luma_frames(count=1)[0])
+    write_image(tmp_path / "a2.png", luma_frames(count=1, size=(40, 30))[0])
+    with pytest.raises(VideoError, match="frame 1 is 40x30, those before it 50x36"):
+        read(tmp_path, rate_hz=10)
