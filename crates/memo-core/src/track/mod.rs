@@ -6,3 +6,5 @@ pub mod locate;
 pub mod score;
 pub mod search;
 pub mod start;
+pub mod style;
+pub mod walk;
