@@ -3,8 +3,10 @@
 pub mod background;
 pub mod change;
 pub mod clean;
+pub mod edge;
 pub mod frame;
 pub mod gain;
+pub mod line;
 pub mod outline;
 pub mod region;
 
@@ -13,14 +15,9 @@ pub use change::{
     ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold, threshold_for_noise,
 };
 pub use clean::{CleanError, CleanOptions, clean, dilate, fill_holes};
-pub use frame::{Frame, FrameError, Image, Mask};
-pub use gain::{Gain, estimate_gain};
-pub use outline::{Outline, outlines};
-pub use region::{GroupOptions, Rectangle, Region, Run, group_regions, regions};
-pub mod edge;
-pub mod frame;
-pub mod line;
-
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
 pub use frame::{Frame, FrameError, Image, Mask};
+pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
+pub use outline::{Outline, outlines};
+pub use region::{GroupOptions, Rectangle, Region, Run, group_regions, regions};
