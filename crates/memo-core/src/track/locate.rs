@@ -122,7 +122,7 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
 }
 
 /// Where the ray of a pixel meets the vertical plane above the path, metres along it.
-fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -> f64 {
+pub(crate) fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -> f64 {
     let pixel = DVec2::new(column_px, row_px);
     let ray = camera.ray_in_world(camera.undistort(pixel).unwrap_or(pixel)).truncate();
     let across = path.direction().perp();

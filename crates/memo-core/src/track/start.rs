@@ -6,6 +6,10 @@
 //! whole similarity curves along every line. Both twins are returned; [`swap_probability`] says how far the
 //! evidence separates them.
 
+use super::locate::Course;
+use super::search::{Grid, Hypothesis, Path, Scene, search};
+use super::walk::{Beginning, FrameEdges, WalkOptions};
+use crate::model::{Camera, Walker};
 use std::f64::consts::TAU;
 
 /// Similarity of one frame over the whole cycle, at equally spaced phases from 0.
@@ -197,6 +201,134 @@ pub(crate) fn line_through(points: &[(f64, f64)]) -> (f64, f64) {
         .fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.0 - mx), b + (p.0 - mx) * (p.1 - my)));
     let slope = if sxx > 1e-12 { sxy / sxx } else { 0.0 };
     (slope, my - slope * mx)
+}
+
+/// Which way a body moves relative to where it faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Ordinary walking.
+    Forward,
+    /// Walking backwards: the gait cycle run in reverse.
+    Backward,
+}
+
+/// What the starting phase found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartReport {
+    /// The line walked and the direction faced.
+    pub path: Path,
+    /// State at the first start frame on the best line.
+    pub beginning: Beginning,
+    /// Forward or backward, whichever explains the frames better.
+    pub direction: Direction,
+    /// Probability that the other direction is the true one.
+    pub p_other_direction: f64,
+    /// Best line and half-cycle twin of the chosen direction.
+    pub lines: TwinLines,
+    /// Best line of the other direction.
+    pub other_direction: PhaseLine,
+    /// The paper's choice on the same frames, for comparison.
+    pub two_line_rule: TwoLineChoice,
+    /// Similarity over the whole cycle, frame by frame, in the chosen direction.
+    pub curves: Vec<PhaseCurve>,
+    /// Frame numbers of the curves.
+    pub frames: Vec<usize>,
+}
+
+/// Whole-cycle search in every frame, for one direction of facing.
+struct Faced {
+    path: Path,
+    curves: Vec<PhaseCurve>,
+    hypotheses: Vec<Vec<Hypothesis>>,
+}
+
+/// Starts a walk on a handful of frames: whole-cycle search, phase lines for forward and backward walking, regression.
+pub fn start(
+    frames: &[&FrameEdges],
+    course: &Course,
+    walker: &Walker,
+    camera: &Camera,
+    rates: &CadenceRange,
+    options: &WalkOptions,
+) -> Option<StartReport> {
+    // 1. Similarity over the whole cycle, facing either way.
+    let ahead = face(frames, course, false, walker, camera, options);
+    let back = face(frames, course, true, walker, camera, options);
+    // 2. The best line of phase over time for each direction.
+    let reversed = CadenceRange { low_hz: -rates.high_hz, high_hz: -rates.low_hz };
+    let forward = phase_lines(&ahead.curves, rates)?;
+    let backward = phase_lines(&back.curves, &reversed)?;
+    let is_forward = forward.best.similarity >= backward.best.similarity;
+    let (direction, faced, lines, other) = if is_forward {
+        (Direction::Forward, ahead, forward, backward)
+    } else {
+        (Direction::Backward, back, backward, forward)
+    };
+    let duration_s = frames.last()?.time_s - frames.first()?.time_s;
+    let p_other_direction =
+        swap_probability(lines.best.similarity, other.best.similarity, duration_s, &options.swap);
+    // 3. Place and speed by regression over the hypotheses on the line.
+    let beginning = beginning(frames, &faced, &lines.best)?;
+    let used = if is_forward { *rates } else { reversed };
+    let two_line_rule = two_line_rule(&estimates(&faced.curves), &used)?;
+    Some(StartReport {
+        path: faced.path,
+        beginning,
+        direction,
+        p_other_direction,
+        lines,
+        other_direction: other.best,
+        two_line_rule,
+        curves: faced.curves,
+        frames: frames.iter().map(|f| f.frame).collect(),
+    })
+}
+
+fn face(
+    frames: &[&FrameEdges],
+    course: &Course,
+    turned: bool,
+    walker: &Walker,
+    camera: &Camera,
+    options: &WalkOptions,
+) -> Faced {
+    let sign = if turned { -1.0 } else { 1.0 };
+    let turn = if turned { std::f64::consts::PI } else { 0.0 };
+    let path = Path { heading_rad: course.path.heading_rad + turn, ..course.path };
+    let scene = Scene { walker, camera, path: &path };
+    let height_m = walker.level_torso_height_m();
+    let mut faced = Faced { path, curves: Vec::new(), hypotheses: Vec::new() };
+    for (frame, along) in frames.iter().zip(&course.along_m) {
+        let grid = Grid::whole_cycle(sign * along, height_m);
+        let curve = search(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines).curve();
+        let scores = curve.iter().map(|(_, score)| *score).collect();
+        faced.curves.push(PhaseCurve { time_s: frame.time_s, scores });
+        faced.hypotheses.push(curve.into_iter().map(|(hypothesis, _)| hypothesis).collect());
+    }
+    faced
+}
+
+/// Regression of place over time and the mean height, over each frame's best hypothesis at the line's phase.
+fn beginning(frames: &[&FrameEdges], faced: &Faced, line: &PhaseLine) -> Option<Beginning> {
+    let first = frames.first()?.time_s;
+    let on_line = |(frame, hypotheses): (&&FrameEdges, &Vec<Hypothesis>)| {
+        let elapsed = frame.time_s - first;
+        let index = (line.at(elapsed) * hypotheses.len() as f64).round() as usize % hypotheses.len();
+        (elapsed, hypotheses[index])
+    };
+    let found: Vec<(f64, Hypothesis)> = frames.iter().zip(&faced.hypotheses).map(on_line).collect();
+    let (speed_mps, along_m) = line_through(&found.iter().map(|(t, h)| (*t, h.along_m)).collect::<Vec<_>>());
+    let height_m = found.iter().map(|(_, h)| h.height_m).sum::<f64>() / found.len() as f64;
+    let hypothesis = Hypothesis { along_m, height_m, phase: line.phase_at_start };
+    Some(Beginning { time_s: first, hypothesis, speed_mps, rate_hz: line.rate_hz })
+}
+
+fn estimates(curves: &[PhaseCurve]) -> Vec<PhaseEstimate> {
+    let estimate = |c: &PhaseCurve| {
+        let phase = c.best_phase();
+        PhaseEstimate { time_s: c.time_s, phase, similarity: c.at(phase) }
+    };
+    curves.iter().map(estimate).collect()
 }
 
 /// How the margin between the twins behaves; measured on real and motion-captured walks.

@@ -203,6 +203,13 @@ impl Walk {
         )
     }
 
+    /// Forgets all steps from the `keep`-th on; the similarity sums keep what they have seen.
+    pub(crate) fn truncate(&mut self, keep: usize) {
+        for twin in &mut self.twins {
+            twin.steps.truncate(keep);
+        }
+    }
+
     /// The last step of the best twin.
     pub fn last(&self) -> Option<&Step> {
         self.twins[self.best()].steps.last()

@@ -1,0 +1,91 @@
+//! Tracks a walker through a folder of PNG frames and prints `track.csv` rows.
+//!
+//! `cargo run --release -p memo-core --example track_frames -- FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]`
+
+use memo_core::image::Image;
+use memo_core::model::{Camera, SideJoints};
+use memo_core::track::result::{Row, TrackedWalk};
+use memo_core::track::tracker::{Tracker, TrackerOptions};
+use std::error::Error;
+use std::path::PathBuf;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [frames, rate_hz, height_m, rest @ ..] = arguments.as_slice() else {
+        return Err("usage: track_frames FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]".into());
+    };
+    let rate_hz: f64 = rate_hz.parse()?;
+    let mut options = TrackerOptions::for_height(height_m.parse()?);
+    if let Some(file) = rest.first() {
+        options.camera = Some(Camera::from_toml_str(&std::fs::read_to_string(file)?, None)?);
+    }
+
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(frames)?.map(|entry| entry.map(|e| e.path())).collect::<Result<_, _>>()?;
+    files.sort();
+    let mut tracker = Tracker::new(options)?;
+    for (index, file) in files.iter().enumerate() {
+        let grey = image::open(file)?.to_luma8();
+        let (width, height) = (grey.width() as usize, grey.height() as usize);
+        let frame = Image::from_vec(width, height, grey.into_raw())?;
+        tracker.update(&frame.as_frame(), index as f64 / rate_hz)?;
+    }
+    tracker.finish()?;
+
+    let walks = tracker.take_finished();
+    println!("{}", header());
+    for walk in &walks {
+        report(walk);
+        walk.rows().iter().for_each(|row| println!("{}", csv_row(row, walk)));
+    }
+    if walks.is_empty() {
+        eprintln!("nobody followed: {:?}", tracker.seek_report());
+    }
+    Ok(())
+}
+
+fn report(walk: &TrackedWalk) {
+    let start = &walk.start;
+    eprintln!(
+        "frames {:?}..{:?}, {:?} (other direction: p = {:.3}), p_swapped {:.3}, style fit {:?}",
+        walk.steps().first().map(|s| s.frame),
+        walk.steps().last().map(|s| s.frame),
+        walk.direction(),
+        start.p_other_direction,
+        walk.p_swapped(),
+        walk.style_fit
+    );
+}
+
+fn header() -> String {
+    let mut names: Vec<String> =
+        ["frame", "time_s", "x_m", "y_m", "z_m", "heading_rad", "phase", "p_swapped", "speed_mps"]
+            .map(String::from)
+            .into();
+    names.extend(["sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"].map(String::from));
+    for side in ["right", "left"] {
+        names.extend(["hip", "knee", "shoulder", "elbow"].map(|angle| format!("{side}_{angle}_deg")));
+    }
+    for side in ["right", "left"] {
+        for joint in SideJoints::NAMES {
+            names.extend(["x_m", "y_m", "z_m", "u_px", "v_px"].map(|what| format!("{side}_{joint}_{what}")));
+        }
+    }
+    names.join(",")
+}
+
+fn csv_row(row: &Row, walk: &TrackedWalk) -> String {
+    let p = row.torso_centre;
+    let mut values =
+        vec![row.time_s, p.x, p.y, p.z, row.heading_rad, row.phase, row.p_swapped, row.speed_mps];
+    values.extend(row.sd);
+    for side in [row.posture.right, row.posture.left] {
+        values.extend([side.hip, side.knee, side.shoulder, side.elbow].map(f64::to_degrees));
+    }
+    for joint in [row.right, row.left].into_iter().flat_map(SideJoints::to_array) {
+        let pixel = walk.camera.project(joint).unwrap_or(glam::DVec2::NAN);
+        values.extend([joint.x, joint.y, joint.z, pixel.x, pixel.y]);
+    }
+    let values: Vec<String> = values.iter().map(|v| format!("{v:.6}")).collect();
+    format!("{},{}", row.frame, values.join(","))
+}

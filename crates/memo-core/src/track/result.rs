@@ -1,0 +1,220 @@
+//! The result: one row of position, phase, angles and joints per frame, and gait events.
+//!
+//! Rows come from the smoothed states of the better twin: what all frames, later ones included, say of each frame. The printed noise of
+//! the filter is generous, so standard deviations are scaled by how far measurements really fell from predictions.
+
+use super::kalman::{ConstantVelocity, Noise, smooth};
+use super::search::{Hypothesis, Scene};
+use super::start::{Direction, StartReport};
+use super::style::StyleFit;
+use super::walk::{Step, Walk, WalkOptions};
+use crate::model::{Camera, Posture, SideJoints};
+use glam::DVec3;
+
+/// A walk that has ended, with everything it was made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedWalk {
+    /// Both twins with all their steps.
+    pub walk: Walk,
+    /// The camera given or guessed.
+    pub camera: Camera,
+    /// What the starting phase found.
+    pub start: StartReport,
+    /// The style fit, where one was made.
+    pub style_fit: Option<StyleFit>,
+    /// Options it was followed with.
+    pub options: WalkOptions,
+}
+
+/// One frame of the result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Number of the frame, from 0.
+    pub frame: usize,
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Centre of the torso, metres, world Z up.
+    pub torso_centre: DVec3,
+    /// Direction faced, radians about world Z.
+    pub heading_rad: f64,
+    /// Gait phase in [0, 1), 0 = right heel strike.
+    pub phase: f64,
+    /// Probability that left and right are swapped.
+    pub p_swapped: f64,
+    /// Speed along the path, metres a second; negative when walking backwards.
+    pub speed_mps: f64,
+    /// Standard deviations of x, y, z (metres) and phase.
+    pub sd: [f64; 4],
+    /// Joint angles, radians.
+    pub posture: Posture,
+    /// Joints of the right side, metres.
+    pub right: SideJoints,
+    /// Joints of the left side, metres.
+    pub left: SideJoints,
+    /// Similarity of the frame's best hypothesis, 0 where the filter coasted.
+    pub similarity: f64,
+    /// The hypothesis behind the row: draws the contours again.
+    pub hypothesis: Hypothesis,
+}
+
+/// A side of the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Side {
+    Right,
+    Left,
+}
+
+/// What happens at a gait event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum EventKind {
+    HeelStrike,
+    ToeOff,
+}
+
+/// A gait event between two frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Frame number, with a fraction.
+    pub frame: f64,
+    /// Heel strike or toe-off.
+    pub kind: EventKind,
+    /// Which foot.
+    pub side: Side,
+}
+
+/// Phase of toe-off on the side whose heel strikes at 0: adults at free speed stand for 61 % of the cycle.
+const TOE_OFF_PHASE: f64 = 0.61;
+
+impl TrackedWalk {
+    /// Probability that left and right are swapped throughout.
+    pub fn p_swapped(&self) -> f64 {
+        self.walk.swap_probability(&self.options.swap)
+    }
+
+    /// Forward or backward.
+    pub fn direction(&self) -> Direction {
+        self.start.direction
+    }
+
+    /// The scene of the walk.
+    pub fn scene(&self) -> Scene<'_> {
+        Scene { walker: &self.walk.walker, camera: &self.camera, path: &self.walk.path }
+    }
+
+    /// Steps of the better twin, as measured and filtered.
+    pub fn steps(&self) -> &[Step] {
+        &self.walk.twins[self.walk.best()].steps
+    }
+
+    /// One row per frame.
+    pub fn rows(&self) -> Vec<Row> {
+        let steps = self.steps();
+        let dt_s: Vec<f64> = steps.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
+        let filter = &self.options.filter;
+        let along = Coordinate::new(steps, &dt_s, &filter.along, |s| s.state.along, |h, _| h.along_m);
+        let height = Coordinate::new(steps, &dt_s, &filter.vertical, |s| s.state.height, |h, _| h.height_m);
+        let phase = Coordinate::new(
+            steps,
+            &dt_s,
+            &filter.phase,
+            |s| s.state.phase,
+            |h, p| h.phase - (h.phase - p).round(),
+        );
+        let p_swapped = self.p_swapped();
+        (0..steps.len())
+            .map(|k| {
+                self.row(&steps[k], p_swapped, [&along, &height, &phase].map(|c| (c.smoothed[k], c.sd_scale)))
+            })
+            .collect()
+    }
+
+    fn row(&self, step: &Step, p_swapped: f64, [along, height, phase]: [(ConstantVelocity, f64); 3]) -> Row {
+        let hypothesis = Hypothesis {
+            along_m: along.0.position,
+            height_m: height.0.position,
+            phase: phase.0.position.rem_euclid(1.0),
+        };
+        let posed = self.scene().pose(&hypothesis);
+        let sd = |(state, scale): (ConstantVelocity, f64)| state.position_sd() * scale;
+        let direction = self.walk.path.direction().abs() * sd(along);
+        Row {
+            frame: step.frame,
+            time_s: step.time_s,
+            torso_centre: posed.torso_centre,
+            heading_rad: self.walk.path.heading_rad,
+            phase: hypothesis.phase,
+            p_swapped,
+            speed_mps: along.0.velocity,
+            sd: [direction.x, direction.y, sd(height), sd(phase)],
+            posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),
+            right: posed.right,
+            left: posed.left,
+            similarity: f64::from(step.similarity),
+            hypothesis,
+        }
+    }
+
+    /// Heel strikes and toe-offs where the phase passes them.
+    pub fn events(&self) -> Vec<Event> {
+        let rows = self.rows();
+        let marks = [
+            (0.0, EventKind::HeelStrike, Side::Right),
+            (0.5, EventKind::HeelStrike, Side::Left),
+            (TOE_OFF_PHASE, EventKind::ToeOff, Side::Right),
+            (TOE_OFF_PHASE - 0.5, EventKind::ToeOff, Side::Left),
+        ];
+        let mut events = Vec::new();
+        for pair in rows.windows(2) {
+            for (phase, kind, side) in marks {
+                events.extend(crossing(&pair[0], &pair[1], phase).map(|t| Event {
+                    time_s: pair[0].time_s + t * (pair[1].time_s - pair[0].time_s),
+                    frame: pair[0].frame as f64 + t * (pair[1].frame - pair[0].frame) as f64,
+                    kind,
+                    side,
+                }));
+            }
+        }
+        events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        events
+    }
+}
+
+/// Where between two rows (0 to 1) the phase passes a mark, forwards or backwards.
+fn crossing(a: &Row, b: &Row, mark: f64) -> Option<f64> {
+    let wrapped = |x: f64| x - x.round();
+    let advance = wrapped(b.phase - a.phase);
+    let to_mark = wrapped(mark - a.phase);
+    let t = to_mark / advance;
+    (advance != 0.0 && (0.0..1.0).contains(&t)).then_some(t)
+}
+
+/// One smoothed coordinate and the factor that makes its standard deviations honest.
+struct Coordinate {
+    smoothed: Vec<ConstantVelocity>,
+    sd_scale: f64,
+}
+
+impl Coordinate {
+    fn new(
+        steps: &[Step],
+        dt_s: &[f64],
+        noise: &Noise,
+        state: impl Fn(&Step) -> ConstantVelocity,
+        measured: impl Fn(&Hypothesis, f64) -> f64,
+    ) -> Self {
+        let filtered: Vec<ConstantVelocity> = steps.iter().map(&state).collect();
+        let smoothed = smooth(&filtered, dt_s, noise);
+        let ratio = |k: usize| {
+            let prior = filtered[k - 1].predict(dt_s[k - 1], noise);
+            let z = measured(steps[k].measured.as_ref()?, prior.position);
+            Some((z - prior.position).powi(2) / (prior.covariance[0] + noise.measurement_variance))
+        };
+        let ratios: Vec<f64> = (1..steps.len()).filter_map(ratio).collect();
+        let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
+        Self { smoothed, sd_scale: mean.sqrt() }
+    }
+}

@@ -1,0 +1,479 @@
+//! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
+//!
+//! It seeks a moving region that could be a person, starts on 13 frames of it, follows both half-cycle twins with filters, fits
+//! the person's style once enough of the walk is seen, and ends the walk when the person leaves or stops walking. Then it
+//! seeks again. One person at a time: the largest moving region that is fully visible.
+//!
+//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::style_frames`] frames, and
+//! the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
+
+use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
+use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
+use super::result::TrackedWalk;
+use super::search::{Hypothesis, Scene};
+use super::start::{CadenceRange, StartReport, start};
+use super::style::{StyleOptions, fit_style};
+use super::walk::{Beginning, FrameEdges, Walk, WalkOptions};
+use crate::image::{Frame, Rectangle};
+use crate::model::body::BodyError;
+use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
+use glam::DVec2;
+use thiserror::Error;
+
+/// Why tracking stopped with an error.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TrackError {
+    /// The body height makes no sense.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A frame or an option was refused.
+    #[error(transparent)]
+    Evidence(#[from] EvidenceError),
+    /// The camera belongs to images of another size.
+    #[error(
+        "the camera is calibrated for {camera_width}x{camera_height} images, the frames are {width}x{height}"
+    )]
+    CameraSize {
+        /// Width the camera file states.
+        camera_width: u32,
+        /// Height the camera file states.
+        camera_height: u32,
+        /// Width of the frames.
+        width: usize,
+        /// Height of the frames.
+        height: usize,
+    },
+}
+
+/// Which average gait the model walks with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum GaitChoice {
+    /// Fifty samples a curve.
+    #[default]
+    Dense,
+    /// Ten samples a curve, the paper's form.
+    Sampled10,
+}
+
+impl GaitChoice {
+    fn gait(self) -> Gait {
+        match self {
+            Self::Dense => Gait::dense(),
+            Self::Sampled10 => Gait::sampled_10(),
+        }
+    }
+}
+
+/// What the tracker knows beforehand and how it works.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackerOptions {
+    /// Body height of the person, metres.
+    pub height_m: f64,
+    /// The camera; without one it is guessed from field of view and height.
+    pub camera: Option<Camera>,
+    /// Horizontal field of view of a guessed camera, radians.
+    pub field_of_view_rad: f64,
+    /// Average gait.
+    pub gait: GaitChoice,
+    /// Frames of the starting phase. Printed: images 2 to 14.
+    pub start_frames: usize,
+    /// Fit of the person's style; `None` stays on the average gait.
+    pub style: Option<StyleOptions>,
+    /// Frames that must be followed before the style is fitted. 40: a stride and a half at 25 images a second.
+    pub style_frames: usize,
+    /// Cadences that are considered.
+    pub cadence: CadenceRange,
+    /// From pixels to regions and edges.
+    pub evidence: EvidenceOptions,
+    /// Search and filter.
+    pub walk: WalkOptions,
+}
+
+impl TrackerOptions {
+    /// Defaults for a person of the given height.
+    pub fn for_height(height_m: f64) -> Self {
+        Self {
+            height_m,
+            camera: None,
+            field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
+            gait: GaitChoice::default(),
+            start_frames: 13,
+            style: Some(StyleOptions::default()),
+            style_frames: 40,
+            cadence: CadenceRange::default(),
+            evidence: EvidenceOptions::default(),
+            walk: WalkOptions::default(),
+        }
+    }
+}
+
+/// A walk is handed out after this many frames and goes on as a new one.
+pub const LONGEST_WALK: usize = 20_000;
+/// A candidate is dropped after this many frames in a row without it.
+const MISSED_FRAMES: usize = 3;
+/// Slower than this nobody walks, metres a second.
+const SLOWEST_MPS: f64 = 0.3;
+/// A walk ends when this share of the body's height or width lies outside the image.
+const OUTSIDE_SHARE: f64 = 0.4;
+/// A walk ends when the similarity of the last frames falls below this share of the walk's mean.
+const LOST_SHARE: f64 = 0.45;
+/// Number of last frames looked at for that.
+const LOST_FRAMES: usize = 10;
+/// Edges are looked for this far around the predicted body, pixels.
+const WINDOW_MARGIN_PX: f64 = 16.0;
+
+/// Why nobody has been followed so far; counts frames of the whole stream.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SeekReport {
+    /// Frames seen.
+    pub frames: usize,
+    /// Frames with a moving region large enough for a person.
+    pub frames_with_candidate: usize,
+    /// Of these, frames in which the region was cut by the image border.
+    pub frames_cut_off: usize,
+    /// Starts refused because the region moved too slowly or did not fit the height.
+    pub refused_starts: usize,
+}
+
+/// A streaming tracker.
+#[derive(Debug)]
+pub struct Tracker {
+    options: TrackerOptions,
+    stream: EvidenceStream,
+    seen: Vec<(Sighting, FrameEdges)>,
+    missed: usize,
+    walking: Option<Active>,
+    finished: Vec<TrackedWalk>,
+    report: SeekReport,
+}
+
+/// The walk under way.
+#[derive(Debug)]
+struct Active {
+    camera: Camera,
+    start: StartReport,
+    walk: Walk,
+    /// Evidence kept until the style is fitted.
+    kept: Vec<(Option<Sighting>, FrameEdges)>,
+    style_fit: Option<super::style::StyleFit>,
+    fitted: bool,
+}
+
+impl Tracker {
+    /// A tracker that has seen no frame.
+    pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
+        Body::from_height(options.height_m)?;
+        let stream = EvidenceStream::new(options.evidence);
+        Ok(Self {
+            options,
+            stream,
+            seen: Vec::new(),
+            missed: 0,
+            walking: None,
+            finished: Vec::new(),
+            report: SeekReport::default(),
+        })
+    }
+
+    /// Takes the next frame. What it shows is known one frame later.
+    pub fn update(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<(), TrackError> {
+        self.check_camera(frame)?;
+        self.report.frames += 1;
+        if let Some(evidence) = self.stream.push(frame, time_s)? {
+            self.advance(&evidence)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the stream: the last frame is worked on and the walk under way ends.
+    pub fn finish(&mut self) -> Result<(), TrackError> {
+        let stream = std::mem::replace(&mut self.stream, EvidenceStream::new(self.options.evidence));
+        if let Some(evidence) = stream.finish()? {
+            self.advance(&evidence)?;
+        }
+        self.end_walk();
+        Ok(())
+    }
+
+    /// The walks that have ended since this was last asked.
+    pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
+        std::mem::take(&mut self.finished)
+    }
+
+    /// The walk under way with its camera.
+    pub fn current(&self) -> Option<(&Walk, &Camera)> {
+        self.walking.as_ref().map(|active| (&active.walk, &active.camera))
+    }
+
+    /// What happened while nobody was followed.
+    pub fn seek_report(&self) -> SeekReport {
+        self.report
+    }
+
+    fn check_camera(&self, frame: &Frame<'_>) -> Result<(), TrackError> {
+        let Some(camera) = &self.options.camera else { return Ok(()) };
+        let (width, height) = (frame.width(), frame.height());
+        let [camera_width, camera_height] = camera.size;
+        if (width, height) == (camera_width as usize, camera_height as usize) {
+            return Ok(());
+        }
+        Err(TrackError::CameraSize { camera_width, camera_height, width, height })
+    }
+
+    fn advance(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
+        if self.walking.is_some() { self.follow(evidence) } else { self.seek(evidence) }
+    }
+
+    /// Collects sightings of one candidate and tries to start on them.
+    fn seek(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
+        match self.sighting(evidence, None) {
+            Some(sighting) => {
+                let edges = self.edges(evidence, &grown(&sighting.rectangle, evidence, WINDOW_MARGIN_PX))?;
+                if self
+                    .seen
+                    .last()
+                    .is_some_and(|(last, _)| !same_person(&last.rectangle, &sighting.rectangle))
+                {
+                    self.seen.clear();
+                }
+                self.seen.push((sighting, edges));
+                self.missed = 0;
+            }
+            None => {
+                self.missed += 1;
+                if self.missed > MISSED_FRAMES {
+                    self.seen.clear();
+                }
+            }
+        }
+        if self.seen.len() >= self.options.start_frames {
+            self.try_start(evidence);
+        }
+        Ok(())
+    }
+
+    /// The fully visible candidate: the largest, or the one that overlaps `expected` most.
+    fn sighting(&mut self, evidence: &Evidence, expected: Option<&Rectangle>) -> Option<Sighting> {
+        let candidates = evidence.candidates(&self.options.evidence);
+        let region = candidates.iter().find(|r| expected.is_none_or(|e| overlaps(&r.rectangle, e)))?;
+        let rectangle = region.rectangle;
+        self.report.frames_with_candidate += 1;
+        if touches_border(&rectangle, evidence.grey.width(), evidence.grey.height()) {
+            self.report.frames_cut_off += 1;
+            return None;
+        }
+        Some(Sighting { time_s: evidence.time_s, rectangle })
+    }
+
+    fn edges(&self, evidence: &Evidence, window: &Rectangle) -> Result<FrameEdges, TrackError> {
+        let camera = self.walking.as_ref().map(|active| &active.camera).or(self.options.camera.as_ref());
+        let edges = evidence.edges(window, camera, &self.options.evidence)?;
+        Ok(FrameEdges { frame: evidence.frame, time_s: evidence.time_s, edges })
+    }
+
+    /// Starts a walk on the collected sightings, or drops the oldest ones.
+    fn try_start(&mut self, evidence: &Evidence) {
+        let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
+        match self.begin(size) {
+            Some(active) => {
+                self.seen.clear();
+                self.walking = Some(active);
+            }
+            None => {
+                self.report.refused_starts += 1;
+                self.seen.drain(..self.options.start_frames / 3);
+            }
+        }
+    }
+
+    /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through the start frames.
+    fn begin(&self, size: [u32; 2]) -> Option<Active> {
+        let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
+        let (camera, course) = self.course(&sightings, size).ok()?;
+        if course.speed_mps < SLOWEST_MPS {
+            return None;
+        }
+        let walker = self.walker(GaitStyle::default())?;
+        let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
+        let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
+        let mut walk = Walk::new(walker, start.path, start.beginning);
+        let kept: Vec<_> = self.seen.iter().map(|(s, e)| (Some(*s), e.clone())).collect();
+        for (_, edges) in &kept {
+            walk.follow(edges, &camera, &self.options.walk);
+        }
+        Some(Active { camera, start, walk, kept, style_fit: None, fitted: false })
+    }
+
+    fn course(&self, sightings: &[Sighting], size: [u32; 2]) -> Result<(Camera, Course), LocateError> {
+        let camera = match &self.options.camera {
+            Some(camera) => camera.clone(),
+            None => {
+                camera_from_sightings(sightings, size, self.options.field_of_view_rad, self.options.height_m)?
+            }
+        };
+        let course = locate(sightings, &camera, self.options.height_m)?;
+        Ok((camera, course))
+    }
+
+    fn walker(&self, style: GaitStyle) -> Option<Walker> {
+        let body = Body::from_height(self.options.height_m).ok()?;
+        Some(Walker { body, gait: self.options.gait.gait(), style })
+    }
+
+    /// Follows the person into a frame, or ends the walk.
+    fn follow(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
+        let Some(window) = self.predicted_window(evidence) else {
+            self.end_walk();
+            return self.seek(evidence);
+        };
+        let sighting = self.sighting(evidence, Some(&window));
+        let edges = self.edges(evidence, &window)?;
+        let Some(active) = &mut self.walking else { return Ok(()) };
+        active.walk.follow(&edges, &active.camera, &self.options.walk);
+        if !active.fitted {
+            active.kept.push((sighting, edges));
+            if active.kept.len() >= self.options.style_frames {
+                active.refit(&self.options);
+            }
+        }
+        if active.is_over() || active.walk.twins[0].steps.len() >= LONGEST_WALK {
+            self.end_walk();
+        }
+        Ok(())
+    }
+
+    /// The image rectangle in which the body is expected; `None` when too much of it lies outside.
+    fn predicted_window(&self, evidence: &Evidence) -> Option<Rectangle> {
+        let active = self.walking.as_ref()?;
+        let predicted = active.walk.predict(active.walk.best(), evidence.time_s, &self.options.walk.filter);
+        let scene = Scene { walker: &active.walk.walker, camera: &active.camera, path: &active.walk.path };
+        let (low, high) = body_box(&scene, &predicted.hypothesis())?;
+        let size = DVec2::new(evidence.grey.width() as f64, evidence.grey.height() as f64);
+        let (low_in, high_in) = (low.max(DVec2::ZERO), high.min(size - 1.0));
+        let shown = (high_in - low_in) / (high - low);
+        if shown.min_element() < 1.0 - OUTSIDE_SHARE {
+            return None;
+        }
+        let reach =
+            DVec2::new(predicted.along.position_sd().min(0.2), predicted.height.position_sd().min(0.1));
+        let scale = (high.y - low.y) / self.options.height_m;
+        let margin = reach * scale + WINDOW_MARGIN_PX;
+        let (low, high) = ((low - margin).max(DVec2::ZERO), (high + margin).min(size - 1.0));
+        Some(Rectangle {
+            left: low.x as usize,
+            top: low.y as usize,
+            right: high.x as usize,
+            bottom: high.y as usize,
+        })
+    }
+
+    fn end_walk(&mut self) {
+        if let Some(mut active) = self.walking.take() {
+            active.refit(&self.options);
+            active.trim();
+            self.finished.push(TrackedWalk {
+                walk: active.walk,
+                camera: active.camera,
+                start: active.start,
+                style_fit: active.style_fit,
+                options: self.options.walk,
+            });
+        }
+    }
+}
+
+impl Active {
+    /// Whether the person has stopped walking or the model has lost it.
+    fn is_over(&self) -> bool {
+        let Some(last) = self.walk.last() else { return false };
+        let twin = &self.walk.twins[self.walk.best()];
+        let stopped =
+            last.state.along.velocity.abs() < 0.5 * SLOWEST_MPS || last.state.phase.velocity.abs() < 0.3;
+        let recent = twin.steps.iter().rev().take(LOST_FRAMES).map(|s| f64::from(s.similarity)).sum::<f64>();
+        let mean = twin.similarity_sum / twin.steps.len() as f64;
+        let lost = twin.steps.len() > 2 * LOST_FRAMES && recent / (LOST_FRAMES as f64) < LOST_SHARE * mean;
+        stopped || lost
+    }
+
+    /// Takes the frames off the end in which the walk was already over.
+    fn trim(&mut self) {
+        if self.is_over() {
+            let keep = self.walk.twins[0].steps.len().saturating_sub(LOST_FRAMES / 2);
+            self.walk.truncate(keep);
+        }
+    }
+
+    /// Fits depth and style to the kept frames and follows them again; once.
+    fn refit(&mut self, options: &TrackerOptions) {
+        if std::mem::replace(&mut self.fitted, true) {
+            return;
+        }
+        let kept = std::mem::take(&mut self.kept);
+        if let Some(style_options) = &options.style {
+            let twin = &self.walk.twins[self.walk.best()];
+            let frames: Vec<(&FrameEdges, Hypothesis)> =
+                kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect();
+            let similarity = &options.walk.similarity;
+            let fit = fit_style(
+                &frames,
+                &self.walk.walker,
+                &self.camera,
+                &self.walk.path,
+                similarity,
+                style_options,
+            );
+            self.style_fit = Some(fit);
+            let walker = Walker { style: fit.style, ..self.walk.walker.clone() };
+            self.walk = Walk::new(walker, self.walk.path, self.beginning_again());
+            for (_, edges) in &kept {
+                self.walk.follow(edges, &self.camera, &options.walk);
+            }
+        }
+    }
+
+    /// The beginning as the best twin's track now sees it.
+    fn beginning_again(&self) -> Beginning {
+        self.walk.beginning
+    }
+}
+
+/// Bounding box of the body in the image, pixels.
+fn body_box(scene: &Scene<'_>, hypothesis: &Hypothesis) -> Option<(DVec2, DVec2)> {
+    let posed = scene.pose(hypothesis);
+    let mut bounds = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for cylinder in &posed.cylinders {
+        let end = cylinder.world_from_cylinder.matrix3.z_axis * cylinder.half_length;
+        for point in [cylinder.centre() + end, cylinder.centre() - end] {
+            let pixel = scene.camera.project(point)?;
+            bounds = (bounds.0.min(pixel), bounds.1.max(pixel));
+        }
+    }
+    Some(bounds)
+}
+
+fn touches_border(r: &Rectangle, width: usize, height: usize) -> bool {
+    // Reflections may reach the lower border; the person is cut off only where a side or the top is.
+    let _ = height;
+    r.left <= 1 || r.top <= 1 || r.right + 2 >= width
+}
+
+fn overlaps(a: &Rectangle, b: &Rectangle) -> bool {
+    a.gap(b) == [0, 0]
+}
+
+/// Whether two rectangles of neighbouring frames can enclose one person.
+fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
+    let ratio = a.height() as f64 / b.height() as f64;
+    overlaps(a, b) && (0.6..1.6).contains(&ratio)
+}
+
+/// A rectangle grown by a margin, inside the image.
+fn grown(r: &Rectangle, evidence: &Evidence, margin_px: f64) -> Rectangle {
+    let m = margin_px as usize;
+    Rectangle {
+        left: r.left.saturating_sub(m),
+        top: r.top.saturating_sub(m),
+        right: (r.right + m).min(evidence.grey.width() - 1),
+        bottom: (r.bottom + m).min(evidence.grey.height() - 1),
+    }
+}
