@@ -29,6 +29,7 @@ def test_an_edge_on_the_line_scores_its_whole_length():
 
 def test_distance_alone():
     found = match(LINE, beside(4.0), P)
+    assert match(LINE, beside(-4.0), P) == found
     assert (found.l_px, found.d_px, found.dphi_rad) == (40.0, 4.0, 0.0)
     assert found.score == pytest.approx(40.0 * np.exp(-0.5 * (4.0 / 5.0) ** 2))  # c_d r = 0.5 * 10 px
 

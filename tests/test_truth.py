@@ -59,8 +59,8 @@ class Walker:
 
 
 def pixels(points: np.ndarray) -> np.ndarray:
-    """Some projection: 100 px a metre."""
-    return 100.0 * points[:, [0, 2]]
+    """Some projection: 100 px a metre, seen askew so that no two joints fall together."""
+    return 100.0 * points @ np.array([[1.0, 0.0], [0.3, 0.1], [0.0, -1.0]])
 
 
 def write_csv(path: Path, columns: dict[str, np.ndarray | list]) -> Path:
@@ -209,6 +209,14 @@ def test_half_cycle_twin_is_not_right(tmp_path, p_swapped, surely_wrong, undecid
     assert result.strikes.matched == 0 and result.strikes.extra >= 6
 
 
+def test_a_third_of_a_cycle_is_near_neither_twin(tmp_path):
+    track = perfect_track(Walker())
+    track["phase"][FRAMES >= 60.0] += 0.33
+    phase = mocap(tmp_path, Walker(), track).phase
+    assert (phase.near_truth, phase.near_half) == (pytest.approx(40 / 91), 0.0)
+    assert (phase.median_abs, phase.p95_abs) == pytest.approx((0.33, 0.33))
+
+
 def test_right_phase_with_sides_given_up_is_not_right(tmp_path):
     track = perfect_track(Walker())
     track["p_swapped"][:] = 0.6
@@ -249,6 +257,12 @@ def test_strikes_are_matched_by_side_and_once(tmp_path):
     strikes = mocap(tmp_path, walker, perfect_track(walker), tracked_events_csv=file).strikes
     np.testing.assert_allclose(strikes.errors_frames, [1.5, 1.5, 1.5, 1.5, np.nan, -1.0, np.nan])
     assert (strikes.matched, strikes.extra, strikes.within(1.0)) == (5, 2, 1)
+
+
+def test_one_tracked_strike_answers_one_true_one():
+    true = gt.StrikeList(np.array([10.0, 18.0, 40.0]), np.array(["right", "right", "left"]))
+    strikes = gt.match_strikes([(13.0, "right"), (40.0, "left")], true)
+    np.testing.assert_allclose(strikes.errors_frames, [3.0, np.nan, 0.0])
 
 
 def test_phase_truth_spans_a_missed_strike():
