@@ -16,7 +16,10 @@ use memo_core::model::visibility::{VisibilityOptions, VisibleSegment, visible_co
 
 const POSTURES: u64 = 1000;
 const SAMPLES: usize = 400;
+/// Of the summed length.
 const MAX_DISAGREEMENT: f64 = 1e-4;
+/// On any one line: the sum alone would forgive a few lines that are wholly wrong.
+const MAX_ON_ONE_LINE_M: f64 = 1e-3;
 
 // The oracle
 
@@ -403,7 +406,7 @@ fn visible_lengths_agree_with_rays_on_random_bodies() {
     }
     println!("{POSTURES} views: {}", tally.report());
     assert!((0.2..0.9).contains(&(tally.visible_m / tally.length_m)), "scenes that test nothing: {tally:?}");
-    assert!(tally.fraction() < MAX_DISAGREEMENT, "{tally:?}");
+    assert!(tally.fraction() < MAX_DISAGREEMENT && tally.worst_line_m < MAX_ON_ONE_LINE_M, "{tally:?}");
     assert!((tally.disagreeing_samples as f64) < MAX_DISAGREEMENT * tally.samples as f64, "{tally:?}");
 }
 
