@@ -47,13 +47,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn report(walk: &TrackedWalk) {
     let start = &walk.start;
     eprintln!(
-        "frames {:?}..{:?}, {:?} (other direction: p = {:.3}), p_swapped {:.3}, style fit {:?}",
+        "frames {:?}..{:?}, {:?} (other direction: p = {:.3}), p_swapped {:.3}, {:?}",
         walk.steps().first().map(|s| s.frame),
         walk.steps().last().map(|s| s.frame),
         walk.direction(),
         start.p_other_direction,
         walk.p_swapped(),
-        walk.style_fit
+        walk.person_fit
     );
 }
 

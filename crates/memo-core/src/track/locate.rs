@@ -7,7 +7,10 @@
 use super::search::Path;
 use super::start::line_through;
 use crate::image::Rectangle;
-use crate::model::position::{Midpoints, PositionError, PositionOptions, position_on_ground};
+use crate::model::position::{
+    FootPosition, Midpoints, PositionError, PositionOptions, position_from_feet, position_from_head,
+    position_on_ground,
+};
 use crate::model::{Camera, CameraError};
 use glam::{DVec2, DVec3};
 use thiserror::Error;
@@ -54,6 +57,9 @@ const SOLE_QUANTILE: f64 = 0.2;
 const CROWN_QUANTILE: f64 = 0.5;
 /// Standard deviation of a body height that was measured, metres: shoes and hair.
 const HEIGHT_SD_M: f64 = 0.02;
+
+/// The bottom row is disbelieved when it says nearer than the crown by this many standard deviations.
+const REFLECTION_SD: f64 = 2.0;
 
 /// Row of the soles and of the crown over all sightings, pixels.
 pub fn person_rows(sightings: &[Sighting]) -> (f64, f64) {
@@ -103,7 +109,7 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
     let midpoints = Midpoints::undistorted(camera, DVec2::new(middle, sole), DVec2::new(middle, crown))?;
     let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
-    let foot = position_on_ground(camera, &midpoints, height_m, &options)?;
+    let foot = stand(camera, &midpoints, height_m, &options)?;
     check_size(camera, &foot.point_in_world, height_m, sole - crown)?;
     // 2. The line runs along the image's x axis, laid on the ground.
     let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
@@ -119,6 +125,26 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     }
     let along_m = places.iter().map(|(_, along)| along * speed.signum()).collect();
     Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
+}
+
+/// Both rows weighted, unless the soles seem nearer than the crown allows: then the bottom row is a reflection's or
+/// a shadow's, which only ever lie below the feet, and the crown decides alone.
+fn stand(
+    camera: &Camera,
+    midpoints: &Midpoints,
+    height_m: f64,
+    options: &PositionOptions,
+) -> Result<FootPosition, PositionError> {
+    let (feet, head) = (
+        position_from_feet(camera, midpoints, height_m, options),
+        position_from_head(camera, midpoints, height_m, options),
+    );
+    if let (Ok(feet), Ok(head)) = (feet, head)
+        && head.depth_m - feet.depth_m > REFLECTION_SD * feet.depth_sd_m.hypot(head.depth_sd_m)
+    {
+        return Ok(head);
+    }
+    position_on_ground(camera, midpoints, height_m, options)
 }
 
 /// Where the ray of a pixel meets the vertical plane above the path, metres along it.
@@ -180,11 +206,11 @@ mod tests {
     fn reflections_below_the_feet_move_the_depth_little() {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap();
         let mut seen = sightings(&camera, 0.0, 1.4, 1.8);
-        for s in seen.iter_mut().step_by(2) {
-            s.rectangle.bottom += 60;
+        for reflected in [2, 1] {
+            seen.iter_mut().step_by(reflected).for_each(|s| s.rectangle.bottom += 60);
+            let course = locate(&seen, &camera, 1.8).unwrap();
+            assert!(course.path.origin.y.abs() < 0.15, "{course:?}");
         }
-        let course = locate(&seen, &camera, 1.8).unwrap();
-        assert!(course.path.origin.y.abs() < 0.15, "{course:?}");
     }
 
     #[test]

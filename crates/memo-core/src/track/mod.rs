@@ -3,10 +3,10 @@
 pub mod evidence;
 pub mod kalman;
 pub mod locate;
+pub mod person;
 pub mod result;
 pub mod score;
 pub mod search;
 pub mod start;
-pub mod style;
 pub mod tracker;
 pub mod walk;

@@ -4,9 +4,9 @@
 //! the filter is generous, so standard deviations are scaled by how far measurements really fell from predictions.
 
 use super::kalman::{ConstantVelocity, Noise, smooth};
+use super::person::PersonFit;
 use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
-use super::style::StyleFit;
 use super::walk::{Step, Walk, WalkOptions};
 use crate::model::{Camera, Posture, SideJoints};
 use glam::DVec3;
@@ -20,8 +20,8 @@ pub struct TrackedWalk {
     pub camera: Camera,
     /// What the starting phase found.
     pub start: StartReport,
-    /// The style fit, where one was made.
-    pub style_fit: Option<StyleFit>,
+    /// The fit of the person, where one was made.
+    pub person_fit: Option<PersonFit>,
     /// Options it was followed with.
     pub options: WalkOptions,
 }

@@ -1,19 +1,19 @@
 //! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
 //!
 //! It seeks a moving region that could be a person, starts on 13 frames of it, follows both half-cycle twins with filters, fits
-//! the person's style once enough of the walk is seen, and ends the walk when the person leaves or stops walking. Then it
+//! the person's deviation once enough of the walk is seen, and ends the walk when the person leaves or stops walking. Then it
 //! seeks again. One person at a time: the largest moving region that is fully visible.
 //!
-//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::style_frames`] frames, and
+//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`] frames, and
 //! the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
+use super::person::{PersonFit, PersonOptions, fit_person};
 use super::result::TrackedWalk;
 use super::search::{Hypothesis, Scene};
 use super::start::{CadenceRange, StartReport, start};
-use super::style::{StyleOptions, fit_style};
-use super::walk::{Beginning, FrameEdges, Walk, WalkOptions};
+use super::walk::{FrameEdges, Walk, WalkOptions};
 use crate::image::{Frame, Rectangle};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
@@ -77,10 +77,10 @@ pub struct TrackerOptions {
     pub gait: GaitChoice,
     /// Frames of the starting phase. Printed: images 2 to 14.
     pub start_frames: usize,
-    /// Fit of the person's style; `None` stays on the average gait.
-    pub style: Option<StyleOptions>,
-    /// Frames that must be followed before the style is fitted. 40: a stride and a half at 25 images a second.
-    pub style_frames: usize,
+    /// Fit of the person's deviation from the average; `None` stays on the average.
+    pub person: Option<PersonOptions>,
+    /// Frames that must be followed before the person is fitted. 40: a stride and a half at 25 images a second.
+    pub person_frames: usize,
     /// Cadences that are considered.
     pub cadence: CadenceRange,
     /// From pixels to regions and edges.
@@ -98,8 +98,8 @@ impl TrackerOptions {
             field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
             gait: GaitChoice::default(),
             start_frames: 13,
-            style: Some(StyleOptions::default()),
-            style_frames: 40,
+            person: Some(PersonOptions::default()),
+            person_frames: 40,
             cadence: CadenceRange::default(),
             evidence: EvidenceOptions::default(),
             walk: WalkOptions::default(),
@@ -112,13 +112,13 @@ pub const LONGEST_WALK: usize = 20_000;
 /// A candidate is dropped after this many frames in a row without it.
 const MISSED_FRAMES: usize = 3;
 /// Slower than this nobody walks, metres a second.
-const SLOWEST_MPS: f64 = 0.3;
+const SLOWEST_MPS: f64 = 0.25;
 /// A walk ends when this share of the body's height or width lies outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
-/// A walk ends when the similarity of the last frames falls below this share of the walk's mean.
+/// Number of last frames that tell whether a walk goes on.
+const RECENT_FRAMES: usize = 12;
+/// A walk ends when their similarity falls below this share of the walk's mean.
 const LOST_SHARE: f64 = 0.45;
-/// Number of last frames looked at for that.
-const LOST_FRAMES: usize = 10;
 /// Edges are looked for this far around the predicted body, pixels.
 const WINDOW_MARGIN_PX: f64 = 16.0;
 
@@ -153,9 +153,9 @@ struct Active {
     camera: Camera,
     start: StartReport,
     walk: Walk,
-    /// Evidence kept until the style is fitted.
+    /// Evidence kept until the person is fitted.
     kept: Vec<(Option<Sighting>, FrameEdges)>,
-    style_fit: Option<super::style::StyleFit>,
+    person_fit: Option<PersonFit>,
     fitted: bool,
 }
 
@@ -301,7 +301,7 @@ impl Tracker {
         for (_, edges) in &kept {
             walk.follow(edges, &camera, &self.options.walk);
         }
-        Some(Active { camera, start, walk, kept, style_fit: None, fitted: false })
+        Some(Active { camera, start, walk, kept, person_fit: None, fitted: false })
     }
 
     fn course(&self, sightings: &[Sighting], size: [u32; 2]) -> Result<(Camera, Course), LocateError> {
@@ -332,7 +332,7 @@ impl Tracker {
         active.walk.follow(&edges, &active.camera, &self.options.walk);
         if !active.fitted {
             active.kept.push((sighting, edges));
-            if active.kept.len() >= self.options.style_frames {
+            if active.kept.len() >= self.options.person_frames {
                 active.refit(&self.options);
             }
         }
@@ -375,7 +375,7 @@ impl Tracker {
                 walk: active.walk,
                 camera: active.camera,
                 start: active.start,
-                style_fit: active.style_fit,
+                person_fit: active.person_fit,
                 options: self.options.walk,
             });
         }
@@ -383,57 +383,49 @@ impl Tracker {
 }
 
 impl Active {
-    /// Whether the person has stopped walking or the model has lost it.
+    /// Whether over the last frames the person stood still or the model found little.
     fn is_over(&self) -> bool {
-        let Some(last) = self.walk.last() else { return false };
         let twin = &self.walk.twins[self.walk.best()];
-        let stopped =
-            last.state.along.velocity.abs() < 0.5 * SLOWEST_MPS || last.state.phase.velocity.abs() < 0.3;
-        let recent = twin.steps.iter().rev().take(LOST_FRAMES).map(|s| f64::from(s.similarity)).sum::<f64>();
-        let mean = twin.similarity_sum / twin.steps.len() as f64;
-        let lost = twin.steps.len() > 2 * LOST_FRAMES && recent / (LOST_FRAMES as f64) < LOST_SHARE * mean;
+        let count = twin.steps.len();
+        if count < 2 * RECENT_FRAMES {
+            return false;
+        }
+        let recent = &twin.steps[count - RECENT_FRAMES..];
+        let (first, last) = (&recent[0], &recent[RECENT_FRAMES - 1]);
+        let covered_m = (last.state.along.position - first.state.along.position).abs();
+        let stopped = covered_m < SLOWEST_MPS * (last.time_s - first.time_s);
+        let similarity = recent.iter().map(|s| f64::from(s.similarity)).sum::<f64>() / RECENT_FRAMES as f64;
+        let lost = similarity < LOST_SHARE * twin.similarity_sum / count as f64;
         stopped || lost
     }
 
     /// Takes the frames off the end in which the walk was already over.
     fn trim(&mut self) {
         if self.is_over() {
-            let keep = self.walk.twins[0].steps.len().saturating_sub(LOST_FRAMES / 2);
+            let keep = self.walk.twins[0].steps.len().saturating_sub(RECENT_FRAMES / 2);
             self.walk.truncate(keep);
         }
     }
 
-    /// Fits depth and style to the kept frames and follows them again; once.
+    /// Fits the person to the kept frames and follows them again if that is believed; once.
     fn refit(&mut self, options: &TrackerOptions) {
         if std::mem::replace(&mut self.fitted, true) {
             return;
         }
         let kept = std::mem::take(&mut self.kept);
-        if let Some(style_options) = &options.style {
-            let twin = &self.walk.twins[self.walk.best()];
-            let frames: Vec<(&FrameEdges, Hypothesis)> =
-                kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect();
-            let similarity = &options.walk.similarity;
-            let fit = fit_style(
-                &frames,
-                &self.walk.walker,
-                &self.camera,
-                &self.walk.path,
-                similarity,
-                style_options,
-            );
-            self.style_fit = Some(fit);
-            let walker = Walker { style: fit.style, ..self.walk.walker.clone() };
-            self.walk = Walk::new(walker, self.walk.path, self.beginning_again());
+        let Some(person) = &options.person else { return };
+        let twin = &self.walk.twins[self.walk.best()];
+        let frames: Vec<(&FrameEdges, Hypothesis)> =
+            kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect();
+        let Walk { walker, path, beginning, .. } = &self.walk;
+        let fit = fit_person(&frames, walker, &self.camera, path, &options.walk.similarity, person);
+        self.person_fit = Some(fit);
+        if fit.is_believed {
+            self.walk = Walk::new(fit.deviation.apply(walker), *path, *beginning);
             for (_, edges) in &kept {
                 self.walk.follow(edges, &self.camera, &options.walk);
             }
         }
-    }
-
-    /// The beginning as the best twin's track now sees it.
-    fn beginning_again(&self) -> Beginning {
-        self.walk.beginning
     }
 }
 
