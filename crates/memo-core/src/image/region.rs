@@ -137,45 +137,52 @@ pub struct GroupOptions {
     pub min_part_area: usize,
     /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can be seen.
     pub min_area: usize,
-    /// Largest free height between two rectangles over the taller one's height. 0.3: the shank of a faint
-    /// trouser leg may be missing.
+    /// Largest free height between a group and a further area, over the group's height. 0.3: the shank of a trouser leg that
+    /// resembles the floor may be missing.
     pub gap_y: f64,
-    /// Largest free width between two rectangles over the taller one's height. 0.05: wide enough for a forearm, narrower than the space
-    /// between two people side by side.
+    /// Largest free width between a group and a further area, over the group's height. 0.05: wide enough for a forearm,
+    /// narrower than the space between two people side by side.
     pub gap_x: f64,
+    /// No area is added that makes the group wider than this times its height. 0.75: a long step with what
+    /// the neighbour frames add; two people side by side, or a row of small things, are wider.
+    pub max_aspect: f64,
 }
 
 impl Default for GroupOptions {
     fn default() -> Self {
-        Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05 }
+        Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05, max_aspect: 0.75 }
     }
 }
 
-/// Joins regions whose rectangles overlap or nearly touch, until no more do; largest first.
+/// Joins regions whose rectangles overlap or nearly touch into upright candidates, largest first.
 ///
-/// A joined group has a larger rectangle, which may reach further areas.
+/// The largest region takes in what is near enough, largest first, until nothing more is; then the largest one left, and so on.
 pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
-    let mut groups: Vec<Region> =
-        regions.iter().filter(|region| region.area >= options.min_part_area).cloned().collect();
-    while let Some((i, j)) = first_joinable(&groups, options) {
-        let mut runs = groups.swap_remove(j).runs;
-        runs.append(&mut groups[i].runs);
-        groups[i] = Region::from_runs(runs);
+    let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
+    parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
+    let mut groups = Vec::new();
+    while !parts.is_empty() {
+        let mut members = vec![parts.remove(0)];
+        let mut whole = members[0].rectangle;
+        while let Some(i) = parts.iter().position(|part| belongs(&whole, &part.rectangle, options)) {
+            whole = whole.union(&parts[i].rectangle);
+            members.push(parts.remove(i));
+        }
+        groups.push(Region::from_runs(members.iter().flat_map(|part| part.runs.iter().copied()).collect()));
     }
     groups.retain(|group| group.area >= options.min_area);
     groups.sort_by_key(|group| (Reverse(group.area), group.runs[0]));
     groups
 }
 
-/// Indices i < j of the first two groups that are near enough.
-fn first_joinable(groups: &[Region], options: &GroupOptions) -> Option<(usize, usize)> {
-    let near = |a: &Rectangle, b: &Rectangle| {
-        let height = a.height().max(b.height()) as f64;
-        let [gap_x, gap_y] = a.gap(b);
-        gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height
-    };
-    let mut pairs = (0..groups.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    pairs.find(|&(i, j)| near(&groups[i].rectangle, &groups[j].rectangle))
+/// Whether an area is near enough to a group and leaves it upright.
+fn belongs(group: &Rectangle, part: &Rectangle, options: &GroupOptions) -> bool {
+    let height = group.height() as f64;
+    let [gap_x, gap_y] = group.gap(part);
+    let whole = group.union(part);
+    let is_upright =
+        whole.width() <= group.width() || whole.width() as f64 <= options.max_aspect * whole.height() as f64;
+    gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height && is_upright
 }
 
 /// Which pixels count as neighbours.
@@ -338,6 +345,12 @@ pub(super) mod tests {
             }
             prop_assert_eq!(all, mask);
         }
+    }
+
+    #[test]
+    fn a_row_of_things_is_no_person() {
+        let row: Vec<Region> = (0..8).map(|i| block(40 + 32 * i, 90, 30, 14)).collect();
+        assert_eq!(group_regions(&row, &GroupOptions::default()), row);
     }
 
     fn block(left: usize, top: usize, width: usize, height: usize) -> Region {
