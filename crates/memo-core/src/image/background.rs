@@ -22,13 +22,15 @@ pub struct BackgroundOptions {
     /// The step at the second frame in grey levels, falling as 1/k until it meets `rate`. 64 lets the first dozens of frames correct a
     /// first frame with people in it.
     pub first_step: f64,
-    /// How a frame is compared with the background.
+    /// How a frame is compared with the background. T is at least 8, twice that of consecutive frames: here soft shadows
+    /// and slow changes of light appear at full strength.
     pub change: ChangeOptions,
 }
 
 impl Default for BackgroundOptions {
     fn default() -> Self {
-        Self { rate: 0.05, first_step: 64.0, change: ChangeOptions::default() }
+        let change = ChangeOptions { min_threshold: 8.0, ..ChangeOptions::default() };
+        Self { rate: 0.05, first_step: 64.0, change }
     }
 }
 

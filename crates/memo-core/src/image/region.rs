@@ -6,6 +6,8 @@
 //!
 //! It cannot separate people who overlap in the image, nor a person from shadow and reflection.
 
+#[cfg(doc)]
+use super::change::CHANGE_REACH_PX;
 use super::frame::{Image, Mask};
 use super::outline::{Outline, outlines};
 use std::cmp::Reverse;
@@ -22,6 +24,9 @@ pub struct Run {
 }
 
 /// An upright rectangle of whole pixels; all four sides belong to it.
+///
+/// Around a region of changes it is larger than the moving thing: by about [`CHANGE_REACH_PX`] on every side, and by
+/// what the thing covers in the neighbour frames along its motion. [`Rectangle::sides`] takes the first back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rectangle {
     /// First column.
@@ -45,6 +50,19 @@ impl Rectangle {
         self.bottom - self.top + 1
     }
 
+    /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette, [`CHANGE_REACH_PX`] for a region of
+    /// changes, where 0.7 px either way remains for contrasts of 20 to 100 grey levels. A rectangle narrower than
+    /// twice the reach shrinks to its middle.
+    pub fn sides(&self, reach_px: f64) -> Sides {
+        let shrunk = |first: usize, last: usize| {
+            let (low, high) = (first as f64 - 0.5, last as f64 + 0.5);
+            let reach = reach_px.min((high - low) / 2.0);
+            (low + reach, high - reach)
+        };
+        let ((left, right), (top, bottom)) = (shrunk(self.left, self.right), shrunk(self.top, self.bottom));
+        Sides { left, top, right, bottom }
+    }
+
     /// The smallest rectangle that holds both.
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -63,6 +81,19 @@ impl Rectangle {
             free(self.bottom, other.top).max(free(other.bottom, self.top)),
         ]
     }
+}
+
+/// The sides of an upright rectangle in pixel coordinates, where the centre of a pixel is its integer coordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sides {
+    /// Column of the left side.
+    pub left: f64,
+    /// Row of the upper side.
+    pub top: f64,
+    /// Column of the right side.
+    pub right: f64,
+    /// Row of the lower side.
+    pub bottom: f64,
 }
 
 /// A set of pixels that stands for one moving thing: a connected area, or several areas grouped.
@@ -269,6 +300,7 @@ fn join(parents: &mut [usize], i: usize, j: usize) {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::image::change::{CHANGE_REACH_PX, ChangeOptions, pair_changes};
     use proptest::prelude::*;
     use std::collections::VecDeque;
 
@@ -351,6 +383,40 @@ pub(super) mod tests {
     fn a_row_of_things_is_no_person() {
         let row: Vec<Region> = (0..8).map(|i| block(40 + 32 * i, 90, 30, 14)).collect();
         assert_eq!(group_regions(&row, &GroupOptions::default()), row);
+    }
+
+    /// A frame of 110 grey levels with a disc of radius 20 around (x, y), its rim pixels weighted by 8x8 samples.
+    fn disc(x: f64, y: f64, contrast: f64) -> Image<u8> {
+        let covered = |column: usize, row: usize| {
+            let inside = |i: usize| {
+                let sample = |pixel: usize, i: usize| pixel as f64 + (i as f64 + 0.5) / 8.0 - 0.5;
+                (sample(column, i % 8) - x).powi(2) + (sample(row, i / 8) - y).powi(2) < 400.0
+            };
+            (0..64).filter(|&i| inside(i)).count() as f64 / 64.0
+        };
+        let pixels = (0..80 * 80).map(|i| (110.0 + contrast * covered(i % 80, i / 80)).round() as u8);
+        Image::from_vec(80, 80, pixels.collect()).unwrap()
+    }
+
+    #[test]
+    fn corrected_sides_lie_at_the_edges_of_a_moving_disc() {
+        let options = ChangeOptions { threshold: Some(4.0), ..ChangeOptions::default() };
+        for (contrast, tolerance) in [(20.0, 1.1), (50.0, 0.7), (100.0, 0.7)] {
+            for i in 0..8 {
+                let y = 40.0 + i as f64 / 8.0;
+                let (a, b) = (disc(36.0, y, contrast), disc(42.0, y, contrast));
+                let mask = pair_changes(&a.as_frame(), &b.as_frame(), &options).unwrap();
+                let found = group_regions(
+                    &regions(&mask, 1),
+                    &GroupOptions { max_aspect: 2.0, gap_x: 1.0, ..GroupOptions::default() },
+                );
+                let sides = found[0].rectangle.sides(CHANGE_REACH_PX);
+                assert!((sides.top - (y - 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.bottom - (y + 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.left - 16.0).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.right - 62.0).abs() < tolerance, "{contrast} {y} {sides:?}");
+            }
+        }
     }
 
     fn block(left: usize, top: usize, width: usize, height: usize) -> Region {
