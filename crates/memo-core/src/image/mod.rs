@@ -12,7 +12,8 @@ pub mod region;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
 pub use change::{
-    ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold, threshold_for_noise,
+    CHANGE_REACH_PX, ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold,
+    threshold_for_noise,
 };
 pub use clean::{CleanError, CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
@@ -20,4 +21,4 @@ pub use frame::{Frame, FrameError, Image, Mask};
 pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
-pub use region::{GroupOptions, Rectangle, Region, Run, group_regions, regions};
+pub use region::{GroupOptions, Rectangle, Region, Run, Sides, group_regions, regions};

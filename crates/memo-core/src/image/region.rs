@@ -6,6 +6,8 @@
 //!
 //! It cannot separate people who overlap in the image, nor a person from shadow and reflection.
 
+#[cfg(doc)]
+use super::change::CHANGE_REACH_PX;
 use super::frame::{Image, Mask};
 use super::outline::{Outline, outlines};
 use std::cmp::Reverse;
@@ -22,6 +24,9 @@ pub struct Run {
 }
 
 /// An upright rectangle of whole pixels; all four sides belong to it.
+///
+/// Around a region of changes it is larger than the moving thing: by about [`CHANGE_REACH_PX`] on every side, and by
+/// what the thing covers in the neighbour frames along its motion. [`Rectangle::sides`] takes the first back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rectangle {
     /// First column.
@@ -45,6 +50,19 @@ impl Rectangle {
         self.bottom - self.top + 1
     }
 
+    /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette, [`CHANGE_REACH_PX`] for a region of
+    /// changes, where 0.7 px either way remains for contrasts of 20 to 100 grey levels. A rectangle narrower than
+    /// twice the reach shrinks to its middle.
+    pub fn sides(&self, reach_px: f64) -> Sides {
+        let shrunk = |first: usize, last: usize| {
+            let (low, high) = (first as f64 - 0.5, last as f64 + 0.5);
+            let reach = reach_px.min((high - low) / 2.0);
+            (low + reach, high - reach)
+        };
+        let ((left, right), (top, bottom)) = (shrunk(self.left, self.right), shrunk(self.top, self.bottom));
+        Sides { left, top, right, bottom }
+    }
+
     /// The smallest rectangle that holds both.
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -63,6 +81,19 @@ impl Rectangle {
             free(self.bottom, other.top).max(free(other.bottom, self.top)),
         ]
     }
+}
+
+/// The sides of an upright rectangle in pixel coordinates, where the centre of a pixel is its integer coordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sides {
+    /// Column of the left side.
+    pub left: f64,
+    /// Row of the upper side.
+    pub top: f64,
+    /// Column of the right side.
+    pub right: f64,
+    /// Row of the lower side.
+    pub bottom: f64,
 }
 
 /// A set of pixels that stands for one moving thing: a connected area, or several areas grouped.
@@ -137,45 +168,52 @@ pub struct GroupOptions {
     pub min_part_area: usize,
     /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can be seen.
     pub min_area: usize,
-    /// Largest free height between two rectangles over the taller one's height. 0.3: the shank of a faint
-    /// trouser leg may be missing.
+    /// Largest free height between a group and a further area, over the group's height. 0.3: the shank of a trouser leg that
+    /// resembles the floor may be missing.
     pub gap_y: f64,
-    /// Largest free width between two rectangles over the taller one's height. 0.05: wide enough for a forearm, narrower than the space
-    /// between two people side by side.
+    /// Largest free width between a group and a further area, over the group's height. 0.05: wide enough for a forearm,
+    /// narrower than the space between two people side by side.
     pub gap_x: f64,
+    /// No area is added that makes the group wider than this times its height. 0.75: a long step with what
+    /// the neighbour frames add; two people side by side, or a row of small things, are wider.
+    pub max_aspect: f64,
 }
 
 impl Default for GroupOptions {
     fn default() -> Self {
-        Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05 }
+        Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05, max_aspect: 0.75 }
     }
 }
 
-/// Joins regions whose rectangles overlap or nearly touch, until no more do; largest first.
+/// Joins regions whose rectangles overlap or nearly touch into upright candidates, largest first.
 ///
-/// A joined group has a larger rectangle, which may reach further areas.
+/// The largest region takes in what is near enough, largest first, until nothing more is; then the largest one left, and so on.
 pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
-    let mut groups: Vec<Region> =
-        regions.iter().filter(|region| region.area >= options.min_part_area).cloned().collect();
-    while let Some((i, j)) = first_joinable(&groups, options) {
-        let mut runs = groups.swap_remove(j).runs;
-        runs.append(&mut groups[i].runs);
-        groups[i] = Region::from_runs(runs);
+    let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
+    parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
+    let mut groups = Vec::new();
+    while !parts.is_empty() {
+        let mut members = vec![parts.remove(0)];
+        let mut whole = members[0].rectangle;
+        while let Some(i) = parts.iter().position(|part| belongs(&whole, &part.rectangle, options)) {
+            whole = whole.union(&parts[i].rectangle);
+            members.push(parts.remove(i));
+        }
+        groups.push(Region::from_runs(members.iter().flat_map(|part| part.runs.iter().copied()).collect()));
     }
     groups.retain(|group| group.area >= options.min_area);
     groups.sort_by_key(|group| (Reverse(group.area), group.runs[0]));
     groups
 }
 
-/// Indices i < j of the first two groups that are near enough.
-fn first_joinable(groups: &[Region], options: &GroupOptions) -> Option<(usize, usize)> {
-    let near = |a: &Rectangle, b: &Rectangle| {
-        let height = a.height().max(b.height()) as f64;
-        let [gap_x, gap_y] = a.gap(b);
-        gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height
-    };
-    let mut pairs = (0..groups.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    pairs.find(|&(i, j)| near(&groups[i].rectangle, &groups[j].rectangle))
+/// Whether an area is near enough to a group and leaves it upright.
+fn belongs(group: &Rectangle, part: &Rectangle, options: &GroupOptions) -> bool {
+    let height = group.height() as f64;
+    let [gap_x, gap_y] = group.gap(part);
+    let whole = group.union(part);
+    let is_upright =
+        whole.width() <= group.width() || whole.width() as f64 <= options.max_aspect * whole.height() as f64;
+    gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height && is_upright
 }
 
 /// Which pixels count as neighbours.
@@ -262,6 +300,7 @@ fn join(parents: &mut [usize], i: usize, j: usize) {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::image::change::{CHANGE_REACH_PX, ChangeOptions, pair_changes};
     use proptest::prelude::*;
     use std::collections::VecDeque;
 
@@ -337,6 +376,46 @@ pub(super) mod tests {
                 }
             }
             prop_assert_eq!(all, mask);
+        }
+    }
+
+    #[test]
+    fn a_row_of_things_is_no_person() {
+        let row: Vec<Region> = (0..8).map(|i| block(40 + 32 * i, 90, 30, 14)).collect();
+        assert_eq!(group_regions(&row, &GroupOptions::default()), row);
+    }
+
+    /// A frame of 110 grey levels with a disc of radius 20 around (x, y), its rim pixels weighted by 8x8 samples.
+    fn disc(x: f64, y: f64, contrast: f64) -> Image<u8> {
+        let covered = |column: usize, row: usize| {
+            let inside = |i: usize| {
+                let sample = |pixel: usize, i: usize| pixel as f64 + (i as f64 + 0.5) / 8.0 - 0.5;
+                (sample(column, i % 8) - x).powi(2) + (sample(row, i / 8) - y).powi(2) < 400.0
+            };
+            (0..64).filter(|&i| inside(i)).count() as f64 / 64.0
+        };
+        let pixels = (0..80 * 80).map(|i| (110.0 + contrast * covered(i % 80, i / 80)).round() as u8);
+        Image::from_vec(80, 80, pixels.collect()).unwrap()
+    }
+
+    #[test]
+    fn corrected_sides_lie_at_the_edges_of_a_moving_disc() {
+        let options = ChangeOptions { threshold: Some(4.0), ..ChangeOptions::default() };
+        for (contrast, tolerance) in [(20.0, 1.1), (50.0, 0.7), (100.0, 0.7)] {
+            for i in 0..8 {
+                let y = 40.0 + i as f64 / 8.0;
+                let (a, b) = (disc(36.0, y, contrast), disc(42.0, y, contrast));
+                let mask = pair_changes(&a.as_frame(), &b.as_frame(), &options).unwrap();
+                let found = group_regions(
+                    &regions(&mask, 1),
+                    &GroupOptions { max_aspect: 2.0, gap_x: 1.0, ..GroupOptions::default() },
+                );
+                let sides = found[0].rectangle.sides(CHANGE_REACH_PX);
+                assert!((sides.top - (y - 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.bottom - (y + 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.left - 16.0).abs() < tolerance, "{contrast} {y} {sides:?}");
+                assert!((sides.right - 62.0).abs() < tolerance, "{contrast} {y} {sides:?}");
+            }
         }
     }
 
