@@ -71,7 +71,7 @@ impl Default for FlowOptions {
             smoothness: 10.0,
             levels: 5,
             warps: 3,
-            tolerance: 1e-3,
+            tolerance: 1e-4,
             max_iterations: 200,
             min_gradient: 0.5,
         }
@@ -174,8 +174,9 @@ pub fn velocity_field(
             motion = motion.refined(&pyramid[k + 1].domain, &level.domain);
         }
         motion.iterations = 0;
+        let mut solver = Multigrid::new(&level.domain, options.smoothness * options.smoothness);
         for _ in 0..options.warps {
-            improve(&mut motion, level, options);
+            improve(&mut motion, level, &mut solver, options);
         }
     }
     Ok(field_of_motion(motion, &pyramid[0].domain, window, components))
@@ -319,15 +320,6 @@ struct Sample {
     gradient: Vec2,
 }
 
-impl Sample {
-    fn mix(self, other: Self, weight: f32) -> Self {
-        Self {
-            grey: self.grey + weight * (other.grey - self.grey),
-            gradient: self.gradient.lerp(other.gradient, weight),
-        }
-    }
-}
-
 /// Smoothed grey values with gradients.
 struct Raster {
     width: usize,
@@ -375,17 +367,24 @@ impl Raster {
         self.samples[y * self.width + x]
     }
 
-    /// Bilinear between pixels; `None` outside the frame.
+    /// Between pixels the gradient is bilinear, and the grey value is the weighted mean of the four straight
+    /// continuations I + g.d / 2: the half cancels the error bilinear interpolation makes where the image is
+    /// curved. `None` outside the frame.
     fn sample(&self, at: Vec2) -> Option<Sample> {
         if !(at.cmpge(self.low).all() && at.cmple(self.high).all()) {
             return None;
         }
         let (x, y) = (at.x as usize, at.y as usize);
-        let (right, below) = ((x + 1).min(self.width - 1), (y + 1).min(self.height - 1));
         let part = at - Vec2::new(x as f32, y as f32);
-        let upper = self.at(x, y).mix(self.at(right, y), part.x);
-        let lower = self.at(x, below).mix(self.at(right, below), part.x);
-        Some(upper.mix(lower, part.y))
+        let mut mean = Sample::default();
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let corner = self.at((x + i).min(self.width - 1), (y + j).min(self.height - 1));
+            let step = part - Vec2::new(i as f32, j as f32);
+            let weight = (1.0 - step.x.abs()) * (1.0 - step.y.abs());
+            mean.grey += weight * (corner.grey + 0.5 * corner.gradient.dot(step));
+            mean.gradient += weight * corner.gradient;
+        }
+        Some(mean)
     }
 
     /// Half the size: pixel i lies between pixels 2 i and 2 i + 1 and weighs four of them (1, 3, 3, 1) / 8.
@@ -464,26 +463,23 @@ impl Vectors {
         Self { u: vec![0.0; cells], v: vec![0.0; cells] }
     }
 
+    #[inline(always)]
     fn dot(&self, other: &Self) -> f64 {
-        pulp::Arch::new().dispatch(|| dot(&self.u, &other.u) + dot(&self.v, &other.v))
+        dot(&self.u, &other.u) + dot(&self.v, &other.v)
     }
 
-    /// `self += factor * other`
-    fn add(&mut self, factor: f64, other: &Self) {
-        let add = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
-        pulp::Arch::new().dispatch(|| {
-            add(&mut self.u, &other.u);
-            add(&mut self.v, &other.v);
-        });
+    /// `self = scale * self + factor * other`
+    #[inline(always)]
+    fn combine(&mut self, scale: f64, factor: f64, other: &Self) {
+        combine(&mut self.u, scale, factor, &other.u);
+        combine(&mut self.v, scale, factor, &other.v);
     }
+}
 
-    /// `self = other + factor * self`
-    fn scale_and_add(&mut self, factor: f64, other: &Self) {
-        let add = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a = b + factor * *a);
-        pulp::Arch::new().dispatch(|| {
-            add(&mut self.u, &other.u);
-            add(&mut self.v, &other.v);
-        });
+#[inline(always)]
+fn combine(a: &mut [f64], scale: f64, factor: f64, b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = scale * *a + factor * b;
     }
 }
 
@@ -527,19 +523,19 @@ impl Motion {
 }
 
 /// Linearises the grey value constraint about the motion so far, and minimises.
-fn improve(motion: &mut Motion, level: &Level, options: &FlowOptions) {
-    let lambda_sq = options.smoothness * options.smoothness;
-    let mut system = System::smoothness(&level.domain, lambda_sq);
-    let mut right_side = Vectors::zero(level.domain.is_inside.len());
+fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: &FlowOptions) {
+    let cells = level.domain.is_inside.len();
+    let (mut data, mut right_side) = (Blocks::zero(cells), Vectors::zero(cells));
     for (x, y, cell) in level.domain.pixels() {
         let velocity = DVec2::new(motion.velocity.u[cell], motion.velocity.v[cell]);
         if let Some((gradient, offset)) = constraint(level, x, y, velocity) {
-            system.add_constraint(cell, gradient);
+            data.set_square(cell, gradient);
             right_side.u[cell] = -gradient.x * offset;
             right_side.v[cell] = -gradient.y * offset;
         }
     }
-    let solved = Multigrid::new(system).solve(&right_side, &mut motion.velocity, options);
+    solver.set_data(data);
+    let solved = solver.solve(&right_side, &mut motion.velocity, options);
     motion.iterations += solved.iterations;
     motion.relative_residual = solved.relative_residual;
 }
@@ -567,6 +563,17 @@ impl Blocks {
         Self { uu: vec![0.0; cells], uv: vec![0.0; cells], vv: vec![0.0; cells] }
     }
 
+    /// Sets a block to g g^T.
+    fn set_square(&mut self, cell: usize, g: DVec2) {
+        (self.uu[cell], self.uv[cell], self.vv[cell]) = (g.x * g.x, g.x * g.y, g.y * g.y);
+    }
+
+    /// `self + weights * identity`, cell by cell.
+    fn plus_diagonal(&self, weights: &[f64]) -> Self {
+        let sum = |a: &[f64]| a.iter().zip(weights).map(|(a, w)| a + w).collect();
+        Self { uu: sum(&self.uu), uv: self.uv.clone(), vv: sum(&self.vv) }
+    }
+
     /// The inverses; zero for blocks that have none, which leaves the cell to the other smoothing steps.
     fn inverse(&self) -> Self {
         let mut inverse = Self::zero(self.uu.len());
@@ -583,11 +590,10 @@ impl Blocks {
     }
 
     /// `out += factor * self * r`, cell by cell.
+    #[inline(always)]
     fn multiply_add(&self, factor: f64, r: &Vectors, out: &mut Vectors) {
-        pulp::Arch::new().dispatch(|| {
-            add_products(factor, [&self.uu, &self.uv], [&r.u, &r.v], &mut out.u);
-            add_products(factor, [&self.uv, &self.vv], [&r.u, &r.v], &mut out.v);
-        });
+        add_products(factor, [&self.uu, &self.uv], [&r.u, &r.v], &mut out.u);
+        add_products(factor, [&self.uv, &self.vv], [&r.u, &r.v], &mut out.v);
     }
 }
 
@@ -600,94 +606,35 @@ fn add_products(factor: f64, [a, b]: [&[f64]; 2], [x, y]: [&[f64]; 2], out: &mut
     }
 }
 
-/// The linear equations of the minimum: at each pixel p, with the sum over its neighbours q inside,
-///
-/// ```text
-/// g g^T (u, v)_p + sum of w_pq ((u, v)_p - (u, v)_q) = -g c
-/// ```
-struct System {
-    domain: Domain,
-    /// g g^T.
-    data: Blocks,
-    /// Weight w of the difference to the neighbour on the right; 0 unless both are inside.
-    right: Vec<f64>,
-    /// Weight w of the difference to the neighbour below.
-    below: Vec<f64>,
-}
-
-impl System {
-    /// The smoothness term alone: w = lambda^2.
-    fn smoothness(domain: &Domain, lambda_sq: f64) -> Self {
-        let mut system = Self::zero(domain.clone());
-        for (_, _, cell) in domain.pixels() {
-            let weight = |neighbour: usize| if domain.is_inside[neighbour] { lambda_sq } else { 0.0 };
-            system.right[cell] = weight(cell + 1);
-            system.below[cell] = weight(cell + domain.stride());
-        }
-        system
-    }
-
-    fn zero(domain: Domain) -> Self {
-        let cells = domain.is_inside.len();
-        Self { domain, data: Blocks::zero(cells), right: vec![0.0; cells], below: vec![0.0; cells] }
-    }
-
-    fn add_constraint(&mut self, cell: usize, gradient: DVec2) {
-        self.data.uu[cell] += gradient.x * gradient.x;
-        self.data.uv[cell] += gradient.x * gradient.y;
-        self.data.vv[cell] += gradient.y * gradient.y;
-    }
-
-    /// The blocks on the diagonal: g g^T plus the weights of all neighbours.
-    fn diagonal(&self) -> Blocks {
-        let mut diagonal = Blocks::zero(self.right.len());
-        let stride = self.domain.stride();
-        for (_, _, i) in self.domain.pixels() {
-            let weights = self.right[i] + self.right[i - 1] + self.below[i] + self.below[i - stride];
-            diagonal.uu[i] = self.data.uu[i] + weights;
-            diagonal.uv[i] = self.data.uv[i];
-            diagonal.vv[i] = self.data.vv[i] + weights;
-        }
-        diagonal
-    }
-
-    /// The equations for vectors constant on blocks of 2x2 pixels: their data terms add up, and so do the
-    /// differences across their borders. Those are halved, for they stand for a slope over two pixels rather
-    /// than a jump over one.
-    fn halved(&self) -> Self {
-        let mut half = Self::zero(self.domain.halved());
-        for (x, y, cell) in self.domain.pixels() {
-            let parent = half.domain.cell(x / 2, y / 2);
-            half.data.uu[parent] += self.data.uu[cell];
-            half.data.uv[parent] += self.data.uv[cell];
-            half.data.vv[parent] += self.data.vv[cell];
-            if x % 2 == 1 {
-                half.right[parent] += 0.5 * self.right[cell];
-            }
-            if y % 2 == 1 {
-                half.below[parent] += 0.5 * self.below[cell];
-            }
-        }
-        half
-    }
-}
-
 /// Outcome of a solution.
 struct Solved {
     iterations: usize,
     relative_residual: f64,
 }
 
-/// Damping of the block Jacobi steps: 0.8 halves at least every wave shorter than four pixels.
+/// Damping of the block Jacobi steps: 0.8 at least halves every wave shorter than four pixels.
 const DAMPING: f64 = 0.8;
 
 /// Block Jacobi steps on the coarsest grid, which has at most 2x2 cells.
 const COARSEST_STEPS: usize = 12;
 
-/// The equations on one grid, with what solving them needs.
+/// The linear equations A x = b of the minimum on one grid, with what solving them needs. At each pixel p, with
+/// the sum over its neighbours q inside,
+///
+/// ```text
+/// g g^T (u, v)_p + sum of w_pq ((u, v)_p - (u, v)_q) = -g c
+/// ```
 struct GridLevel {
-    system: System,
+    domain: Domain,
+    /// Weight w of the difference to the neighbour on the right; 0 unless both are inside.
+    right: Vec<f64>,
+    /// Weight w of the difference to the neighbour below.
+    below: Vec<f64>,
+    /// Sum of the weights of a pixel's neighbours.
+    weights: Vec<f64>,
+    /// The blocks on the diagonal of A: g g^T plus the weights of all neighbours.
     diagonal: Blocks,
+    /// Their inverses.
     inverse: Blocks,
     right_side: Vectors,
     solution: Vectors,
@@ -695,86 +642,169 @@ struct GridLevel {
 }
 
 impl GridLevel {
-    fn new(system: System) -> Self {
-        let diagonal = system.diagonal();
-        let zero = Vectors::zero(system.domain.is_inside.len());
+    fn new(domain: Domain, right: Vec<f64>, below: Vec<f64>) -> Self {
+        let (cells, stride) = (right.len(), domain.stride());
+        let mut weights = vec![0.0; cells];
+        for (_, _, i) in domain.pixels() {
+            weights[i] = right[i] + right[i - 1] + below[i] + below[i - stride];
+        }
+        let (diagonal, inverse) = (Blocks::zero(cells), Blocks::zero(cells));
+        let zero = Vectors::zero(cells);
         let (right_side, solution, residual) = (zero.clone(), zero.clone(), zero);
-        Self { inverse: diagonal.inverse(), diagonal, system, right_side, solution, residual }
+        Self { domain, right, below, weights, diagonal, inverse, right_side, solution, residual }
+    }
+
+    /// The pixel grid: w = lambda^2.
+    fn finest(domain: &Domain, lambda_sq: f64) -> Self {
+        let (mut right, mut below) = (vec![0.0; domain.is_inside.len()], vec![0.0; domain.is_inside.len()]);
+        for (_, _, cell) in domain.pixels() {
+            let weight = |neighbour: usize| if domain.is_inside[neighbour] { lambda_sq } else { 0.0 };
+            right[cell] = weight(cell + 1);
+            below[cell] = weight(cell + domain.stride());
+        }
+        Self::new(domain.clone(), right, below)
+    }
+
+    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the blocks' borders add up,
+    /// and are halved, for they stand for a slope over two pixels rather than a jump over one.
+    fn halved(&self) -> Self {
+        let half = self.domain.halved();
+        let (mut right, mut below) = (vec![0.0; half.is_inside.len()], vec![0.0; half.is_inside.len()]);
+        for (x, y, cell) in self.domain.pixels() {
+            let parent = half.cell(x / 2, y / 2);
+            if x % 2 == 1 {
+                right[parent] += 0.5 * self.right[cell];
+            }
+            if y % 2 == 1 {
+                below[parent] += 0.5 * self.below[cell];
+            }
+        }
+        Self::new(half, right, below)
+    }
+
+    fn set_data(&mut self, data: &Blocks) {
+        self.diagonal = data.plus_diagonal(&self.weights);
+        self.inverse = self.diagonal.inverse();
     }
 
     /// `out = A x`
+    #[inline(always)]
     fn multiply(&self, x: &Vectors, out: &mut Vectors) {
-        let (d, stride) = (&self.diagonal, self.system.domain.stride());
-        let weights = [&self.system.right[..], &self.system.below[..]];
-        pulp::Arch::new().dispatch(|| {
-            multiply_component([&d.uu, &d.uv], [&x.u, &x.v], weights, stride, &mut out.u);
-            multiply_component([&d.vv, &d.uv], [&x.v, &x.u], weights, stride, &mut out.v);
-        });
+        self.u_row(x).products(&mut out.u);
+        self.v_row(x).products(&mut out.v);
     }
 
+    /// residual = b - A x
+    #[inline(always)]
     fn update_residual(&mut self) {
         let mut residual = std::mem::replace(&mut self.residual, Vectors::zero(0));
         self.multiply(&self.solution, &mut residual);
-        residual.scale_and_add(-1.0, &self.right_side);
+        residual.combine(-1.0, 1.0, &self.right_side);
         self.residual = residual;
     }
 
+    #[inline(always)]
+    fn u_row<'a>(&'a self, x: &'a Vectors) -> Stencil<'a> {
+        self.stencil(&self.diagonal.uu, [&x.u, &x.v])
+    }
+
+    #[inline(always)]
+    fn v_row<'a>(&'a self, x: &'a Vectors) -> Stencil<'a> {
+        self.stencil(&self.diagonal.vv, [&x.v, &x.u])
+    }
+
+    #[inline(always)]
+    fn stencil<'a>(&'a self, own: &'a [f64], [a, b]: [&'a [f64]; 2]) -> Stencil<'a> {
+        let (right, below, stride) = (&self.right, &self.below, self.domain.stride());
+        Stencil { own, coupling: &self.diagonal.uv, a, b, right, below, stride }
+    }
+
     /// One damped block Jacobi step.
+    #[inline(always)]
     fn smooth(&mut self) {
         self.update_residual();
         self.inverse.multiply_add(DAMPING, &self.residual, &mut self.solution);
     }
 
     /// The same step from zero.
+    #[inline(always)]
     fn smooth_from_zero(&mut self) {
         self.solution.u.fill(0.0);
         self.solution.v.fill(0.0);
         self.inverse.multiply_add(DAMPING, &self.right_side, &mut self.solution);
     }
 
-    /// Sums the residual over blocks of 2x2 pixels.
+    /// Hands the residual down as the right side of the coarser grid.
+    #[inline(always)]
     fn restrict_residual(&mut self, coarse: &mut GridLevel) {
         self.update_residual();
-        coarse.right_side.u.fill(0.0);
-        coarse.right_side.v.fill(0.0);
-        for (x, y, cell) in self.system.domain.pixels() {
-            let parent = coarse.system.domain.cell(x / 2, y / 2);
-            coarse.right_side.u[parent] += self.residual.u[cell];
-            coarse.right_side.v[parent] += self.residual.v[cell];
-        }
+        sum_blocks(&self.domain, &self.residual.u, &coarse.domain, &mut coarse.right_side.u);
+        sum_blocks(&self.domain, &self.residual.v, &coarse.domain, &mut coarse.right_side.v);
     }
 
     /// Adds the correction found on the coarser grid.
+    #[inline(always)]
     fn correct(&mut self, coarse: &GridLevel) {
-        for (x, y, cell) in self.system.domain.pixels() {
-            let parent = coarse.system.domain.cell(x / 2, y / 2);
-            self.solution.u[cell] += coarse.solution.u[parent];
-            self.solution.v[cell] += coarse.solution.v[parent];
+        add_parents(&coarse.domain, &coarse.solution.u, &self.domain, &mut self.solution.u);
+        add_parents(&coarse.domain, &coarse.solution.v, &self.domain, &mut self.solution.v);
+    }
+}
+
+/// Sums over blocks of 2x2 pixels. The free cells on the right and below hold zero and complete odd sizes.
+#[inline(always)]
+fn sum_blocks(fine: &Domain, values: &[f64], coarse: &Domain, sums: &mut [f64]) {
+    for y in 0..coarse.height {
+        let row = |y: usize| values[fine.cell(0, y)..][..2 * coarse.width].chunks_exact(2);
+        let sums = &mut sums[coarse.cell(0, y)..][..coarse.width];
+        for ((sum, upper), lower) in sums.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1)) {
+            *sum = upper[0] + upper[1] + lower[0] + lower[1];
         }
     }
 }
 
-/// One component a of A (a, b): its own diagonal comes first, the coupling to the other component b second.
+/// Adds to each pixel inside the value of the block it lies in.
 #[inline(always)]
-fn multiply_component(
-    [own, coupling]: [&[f64]; 2],
-    [a, b]: [&[f64]; 2],
-    [right, below]: [&[f64]; 2],
+fn add_parents(coarse: &Domain, parents: &[f64], fine: &Domain, values: &mut [f64]) {
+    for y in 0..fine.height {
+        let row = fine.cell(0, y)..fine.cell(0, y) + 2 * coarse.width;
+        let pairs = values[row.clone()].chunks_exact_mut(2).zip(fine.is_inside[row].chunks_exact(2));
+        for ((pair, is_inside), parent) in pairs.zip(&parents[coarse.cell(0, y / 2)..]) {
+            pair[0] += if is_inside[0] { *parent } else { 0.0 };
+            pair[1] += if is_inside[1] { *parent } else { 0.0 };
+        }
+    }
+}
+
+/// What one component of A (u, v) reads: the component itself is a, the other b.
+struct Stencil<'a> {
+    own: &'a [f64],
+    coupling: &'a [f64],
+    a: &'a [f64],
+    b: &'a [f64],
+    right: &'a [f64],
+    below: &'a [f64],
     stride: usize,
-    out: &mut [f64],
-) {
-    let count = out.len() - 2 * stride;
-    let shifted = |start: usize| start..start + count;
-    let here = || shifted(stride);
-    let (own, coupling, b) = (&own[here()], &coupling[here()], &b[here()]);
-    let (a_left, a_here, a_right) = (&a[shifted(stride - 1)], &a[here()], &a[shifted(stride + 1)]);
-    let (a_above, a_below) = (&a[shifted(0)], &a[shifted(2 * stride)]);
-    let (to_left, to_right) = (&right[shifted(stride - 1)], &right[here()]);
-    let (to_above, to_below) = (&below[shifted(0)], &below[here()]);
-    for (i, out) in out[here()].iter_mut().enumerate() {
-        let across = to_left[i] * a_left[i] + to_right[i] * a_right[i];
-        let along = to_above[i] * a_above[i] + to_below[i] * a_below[i];
-        *out = own[i] * a_here[i] + coupling[i] * b[i] - across - along;
+}
+
+impl Stencil<'_> {
+    /// The component of A (u, v) at all pixels.
+    #[inline(always)]
+    fn products(&self, out: &mut [f64]) {
+        let (stride, count) = (self.stride, out.len() - 2 * self.stride);
+        let here = stride..stride + count;
+        let (own, coupling, b) =
+            (&self.own[here.clone()], &self.coupling[here.clone()], &self.b[here.clone()]);
+        let (a, a_left, a_right) =
+            (&self.a[here.clone()], &self.a[stride - 1..][..count], &self.a[stride + 1..][..count]);
+        let (a_above, a_below) = (&self.a[..count], &self.a[2 * stride..][..count]);
+        let (to_left, to_right) = (&self.right[stride - 1..][..count], &self.right[here.clone()]);
+        let (to_above, to_below) = (&self.below[..count], &self.below[here.clone()]);
+        let out = &mut out[here];
+        for i in 0..count {
+            let across = to_left[i] * a_left[i] + to_right[i] * a_right[i];
+            let along = to_above[i] * a_above[i] + to_below[i] * a_below[i];
+            out[i] = own[i] * a[i] + coupling[i] * b[i] - across - along;
+        }
     }
 }
 
@@ -784,48 +814,67 @@ struct Multigrid {
 }
 
 impl Multigrid {
-    fn new(system: System) -> Self {
-        let mut levels = vec![GridLevel::new(system)];
+    /// Grids for a domain, down to at most 2x2 cells.
+    fn new(domain: &Domain, lambda_sq: f64) -> Self {
+        let mut levels = vec![GridLevel::finest(domain, lambda_sq)];
         loop {
-            let finest = &levels[levels.len() - 1].system;
-            if finest.domain.width <= 2 && finest.domain.height <= 2 {
+            let coarsest = &levels[levels.len() - 1];
+            if coarsest.domain.width <= 2 && coarsest.domain.height <= 2 {
                 return Self { levels };
             }
-            let coarser = GridLevel::new(finest.halved());
+            let coarser = coarsest.halved();
             levels.push(coarser);
+        }
+    }
+
+    /// Sets the data terms g g^T; those of coarser grids are sums.
+    fn set_data(&mut self, mut data: Blocks) {
+        for k in 0..self.levels.len() {
+            self.levels[k].set_data(&data);
+            if let Some(coarse) = self.levels.get(k + 1) {
+                let mut sums = Blocks::zero(coarse.right.len());
+                let pairs = [(&data.uu, &mut sums.uu), (&data.uv, &mut sums.uv), (&data.vv, &mut sums.vv)];
+                for (values, sums) in pairs {
+                    sum_blocks(&self.levels[k].domain, values, &coarse.domain, sums);
+                }
+                data = sums;
+            }
         }
     }
 
     /// Solves A x = b from the given x on, until |b - A x| <= tolerance |b|.
     fn solve(&mut self, b: &Vectors, x: &mut Vectors, options: &FlowOptions) -> Solved {
+        pulp::Arch::new().dispatch(Solve { grids: self, b, x, options })
+    }
+
+    #[inline(always)]
+    fn conjugate_gradients(&mut self, b: &Vectors, x: &mut Vectors, options: &FlowOptions) -> Solved {
         let norm = b.dot(b).sqrt();
         let mut product = Vectors::zero(b.u.len());
         self.levels[0].multiply(x, &mut product);
         let mut residual = b.clone();
-        residual.add(-1.0, &product);
-        let mut direction = self.precondition(&residual).clone();
-        let mut slope = residual.dot(&direction);
-        let mut iterations = 0;
-        while residual.dot(&residual).sqrt() > options.tolerance * norm
-            && iterations < options.max_iterations
-            && slope > 0.0
-        {
-            self.levels[0].multiply(&direction, &mut product);
-            let step = slope / direction.dot(&product);
-            x.add(step, &direction);
-            residual.add(-step, &product);
+        residual.combine(1.0, -1.0, &product);
+        let mut residual_norm = residual.dot(&residual).sqrt();
+        let mut direction = Vectors::zero(b.u.len());
+        let (mut slope, mut iterations) = (f64::INFINITY, 0);
+        while residual_norm > options.tolerance * norm && iterations < options.max_iterations {
             let preconditioned = self.precondition(&residual);
             let next_slope = residual.dot(preconditioned);
-            direction.scale_and_add(next_slope / slope, preconditioned);
+            direction.combine(next_slope / slope, 1.0, preconditioned);
             slope = next_slope;
+            self.levels[0].multiply(&direction, &mut product);
+            let step = slope / direction.dot(&product);
+            x.combine(1.0, step, &direction);
+            residual.combine(1.0, -step, &product);
+            residual_norm = residual.dot(&residual).sqrt();
             iterations += 1;
         }
-        let relative_residual = if norm > 0.0 { residual.dot(&residual).sqrt() / norm } else { 0.0 };
-        Solved { iterations, relative_residual }
+        Solved { iterations, relative_residual: if norm > 0.0 { residual_norm / norm } else { 0.0 } }
     }
 
     /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: a symmetric
     /// approximation of the inverse of A.
+    #[inline(always)]
     fn precondition(&mut self, residual: &Vectors) -> &Vectors {
         self.levels[0].right_side.clone_from(residual);
         let coarsest = self.levels.len() - 1;
@@ -844,6 +893,23 @@ impl Multigrid {
             fine[k].smooth();
         }
         &self.levels[0].solution
+    }
+}
+
+/// A solution, compiled for each width of vectors.
+struct Solve<'a> {
+    grids: &'a mut Multigrid,
+    b: &'a Vectors,
+    x: &'a mut Vectors,
+    options: &'a FlowOptions,
+}
+
+impl pulp::WithSimd for Solve<'_> {
+    type Output = Solved;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Solved {
+        self.grids.conjugate_gradients(self.b, self.x, self.options)
     }
 }
 
@@ -917,15 +983,17 @@ mod tests {
         c: &[f64],
         options: &FlowOptions,
     ) -> (Vectors, Solved) {
-        let mut system = System::smoothness(domain, options.smoothness * options.smoothness);
+        let mut data = Blocks::zero(g.len());
         let mut b = Vectors::zero(g.len());
         for (_, _, cell) in domain.pixels() {
-            system.add_constraint(cell, g[cell]);
+            data.set_square(cell, g[cell]);
             b.u[cell] = -g[cell].x * c[cell];
             b.v[cell] = -g[cell].y * c[cell];
         }
         let mut x = Vectors::zero(g.len());
-        let solved = Multigrid::new(system).solve(&b, &mut x, options);
+        let mut solver = Multigrid::new(domain, options.smoothness * options.smoothness);
+        solver.set_data(data);
+        let solved = solver.solve(&b, &mut x, options);
         (x, solved)
     }
 
