@@ -24,6 +24,7 @@
 use super::edge::Window;
 use super::frame::{Frame, FrameError, Image, Mask};
 use glam::{DVec2, Vec2};
+use std::ops::Range;
 use thiserror::Error;
 
 /// Why no velocity field was computed.
@@ -592,17 +593,14 @@ impl Blocks {
     /// `out += factor * self * r`, cell by cell.
     #[inline(always)]
     fn multiply_add(&self, factor: f64, r: &Vectors, out: &mut Vectors) {
-        add_products(factor, [&self.uu, &self.uv], [&r.u, &r.v], &mut out.u);
-        add_products(factor, [&self.uv, &self.vv], [&r.u, &r.v], &mut out.v);
-    }
-}
-
-#[inline(always)]
-fn add_products(factor: f64, [a, b]: [&[f64]; 2], [x, y]: [&[f64]; 2], out: &mut [f64]) {
-    let n = out.len();
-    let (a, b, x, y) = (&a[..n], &b[..n], &x[..n], &y[..n]);
-    for i in 0..n {
-        out[i] += factor * (a[i] * x[i] + b[i] * y[i]);
+        let n = self.uu.len();
+        let (uu, uv, vv) = (&self.uu[..n], &self.uv[..n], &self.vv[..n]);
+        let (ru, rv) = (&r.u[..n], &r.v[..n]);
+        let (out_u, out_v) = (&mut out.u[..n], &mut out.v[..n]);
+        for i in 0..n {
+            out_u[i] += factor * (uu[i] * ru[i] + uv[i] * rv[i]);
+            out_v[i] += factor * (uv[i] * ru[i] + vv[i] * rv[i]);
+        }
     }
 }
 
@@ -690,33 +688,44 @@ impl GridLevel {
     /// `out = A x`
     #[inline(always)]
     fn multiply(&self, x: &Vectors, out: &mut Vectors) {
-        self.u_row(x).products(&mut out.u);
-        self.v_row(x).products(&mut out.v);
+        self.combine_products(x, out, |_, product| product);
     }
 
     /// residual = b - A x
     #[inline(always)]
     fn update_residual(&mut self) {
         let mut residual = std::mem::replace(&mut self.residual, Vectors::zero(0));
-        self.multiply(&self.solution, &mut residual);
-        residual.combine(-1.0, 1.0, &self.right_side);
+        let inner = self.inner_cells();
+        let (bu, bv) = (&self.right_side.u[inner.clone()], &self.right_side.v[inner]);
+        self.combine_products(&self.solution, &mut residual, |i, [u, v]| [bu[i] - u, bv[i] - v]);
         self.residual = residual;
     }
 
-    #[inline(always)]
-    fn u_row<'a>(&'a self, x: &'a Vectors) -> Stencil<'a> {
-        self.stencil(&self.diagonal.uu, [&x.u, &x.v])
+    /// The cells without the free first and last row.
+    fn inner_cells(&self) -> Range<usize> {
+        self.domain.stride()..self.right.len() - self.domain.stride()
     }
 
+    /// `out_i = f(i, (A x)_i)` at the i-th of the inner cells.
     #[inline(always)]
-    fn v_row<'a>(&'a self, x: &'a Vectors) -> Stencil<'a> {
-        self.stencil(&self.diagonal.vv, [&x.v, &x.u])
-    }
-
-    #[inline(always)]
-    fn stencil<'a>(&'a self, own: &'a [f64], [a, b]: [&'a [f64]; 2]) -> Stencil<'a> {
-        let (right, below, stride) = (&self.right, &self.below, self.domain.stride());
-        Stencil { own, coupling: &self.diagonal.uv, a, b, right, below, stride }
+    fn combine_products(&self, x: &Vectors, out: &mut Vectors, f: impl Fn(usize, [f64; 2]) -> [f64; 2]) {
+        let (inner, stride) = (self.inner_cells(), self.domain.stride());
+        let [uu, uv, vv] =
+            [&self.diagonal.uu, &self.diagonal.uv, &self.diagonal.vv].map(|d| &d[inner.clone()]);
+        let weights = [
+            &self.right[inner.start - 1..inner.end - 1],
+            &self.right[inner.clone()],
+            &self.below[..inner.len()],
+            &self.below[inner.clone()],
+        ];
+        let (u, v) = (Plus::new(&x.u, stride), Plus::new(&x.v, stride));
+        let (out_u, out_v) = (&mut out.u[inner.clone()], &mut out.v[inner.clone()]);
+        for i in 0..inner.len() {
+            let w = weights.map(|w| w[i]);
+            let product_u = uu[i] * u.centre[i] + uv[i] * v.centre[i] - u.weighted(i, w);
+            let product_v = uv[i] * u.centre[i] + vv[i] * v.centre[i] - v.weighted(i, w);
+            [out_u[i], out_v[i]] = f(i, [product_u, product_v]);
+        }
     }
 
     /// One damped block Jacobi step.
@@ -775,36 +784,33 @@ fn add_parents(coarse: &Domain, parents: &[f64], fine: &Domain, values: &mut [f6
     }
 }
 
-/// What one component of A (u, v) reads: the component itself is a, the other b.
-struct Stencil<'a> {
-    own: &'a [f64],
-    coupling: &'a [f64],
-    a: &'a [f64],
-    b: &'a [f64],
+/// The inner cells of a grid and their four neighbours, each at the index of the cell it belongs to.
+struct Plus<'a> {
+    centre: &'a [f64],
+    left: &'a [f64],
     right: &'a [f64],
+    above: &'a [f64],
     below: &'a [f64],
-    stride: usize,
 }
 
-impl Stencil<'_> {
-    /// The component of A (u, v) at all pixels.
+impl<'a> Plus<'a> {
     #[inline(always)]
-    fn products(&self, out: &mut [f64]) {
-        let (stride, count) = (self.stride, out.len() - 2 * self.stride);
-        let here = stride..stride + count;
-        let (own, coupling, b) =
-            (&self.own[here.clone()], &self.coupling[here.clone()], &self.b[here.clone()]);
-        let (a, a_left, a_right) =
-            (&self.a[here.clone()], &self.a[stride - 1..][..count], &self.a[stride + 1..][..count]);
-        let (a_above, a_below) = (&self.a[..count], &self.a[2 * stride..][..count]);
-        let (to_left, to_right) = (&self.right[stride - 1..][..count], &self.right[here.clone()]);
-        let (to_above, to_below) = (&self.below[..count], &self.below[here.clone()]);
-        let out = &mut out[here];
-        for i in 0..count {
-            let across = to_left[i] * a_left[i] + to_right[i] * a_right[i];
-            let along = to_above[i] * a_above[i] + to_below[i] * a_below[i];
-            out[i] = own[i] * a[i] + coupling[i] * b[i] - across - along;
+    fn new(values: &'a [f64], stride: usize) -> Self {
+        let count = values.len() - 2 * stride;
+        Self {
+            centre: &values[stride..][..count],
+            left: &values[stride - 1..][..count],
+            right: &values[stride + 1..][..count],
+            above: &values[..count],
+            below: &values[2 * stride..][..count],
         }
+    }
+
+    /// Sum over the neighbours on the left, right, above and below, weighted.
+    #[inline(always)]
+    fn weighted(&self, i: usize, [left, right, above, below]: [f64; 4]) -> f64 {
+        let across = left * self.left[i] + right * self.right[i];
+        across + (above * self.above[i] + below * self.below[i])
     }
 }
 
