@@ -469,6 +469,11 @@ impl Vectors {
         dot(&self.u, &other.u) + dot(&self.v, &other.v)
     }
 
+    #[inline(always)]
+    fn norm(&self) -> f64 {
+        self.dot(self).sqrt()
+    }
+
     /// `self = scale * self + factor * other`
     #[inline(always)]
     fn combine(&mut self, scale: f64, factor: f64, other: &Self) {
@@ -525,18 +530,12 @@ impl Motion {
 
 /// Linearises the grey value constraint about the motion so far, and minimises.
 fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: &FlowOptions) {
-    let cells = level.domain.is_inside.len();
-    let (mut data, mut right_side) = (Blocks::zero(cells), Vectors::zero(cells));
     for (x, y, cell) in level.domain.pixels() {
         let velocity = DVec2::new(motion.velocity.u[cell], motion.velocity.v[cell]);
-        if let Some((gradient, offset)) = constraint(level, x, y, velocity) {
-            data.set_square(cell, gradient);
-            right_side.u[cell] = -gradient.x * offset;
-            right_side.v[cell] = -gradient.y * offset;
-        }
+        let (gradient, offset) = constraint(level, x, y, velocity).unwrap_or_default();
+        solver.set_constraint(cell, gradient, offset);
     }
-    solver.set_data(data);
-    let solved = solver.solve(&right_side, &mut motion.velocity, options);
+    let solved = solver.solve(&mut motion.velocity, options);
     motion.iterations += solved.iterations;
     motion.relative_residual = solved.relative_residual;
 }
@@ -562,32 +561,6 @@ struct Blocks {
 impl Blocks {
     fn zero(cells: usize) -> Self {
         Self { uu: vec![0.0; cells], uv: vec![0.0; cells], vv: vec![0.0; cells] }
-    }
-
-    /// Sets a block to g g^T.
-    fn set_square(&mut self, cell: usize, g: DVec2) {
-        (self.uu[cell], self.uv[cell], self.vv[cell]) = (g.x * g.x, g.x * g.y, g.y * g.y);
-    }
-
-    /// `self + weights * identity`, cell by cell.
-    fn plus_diagonal(&self, weights: &[f64]) -> Self {
-        let sum = |a: &[f64]| a.iter().zip(weights).map(|(a, w)| a + w).collect();
-        Self { uu: sum(&self.uu), uv: self.uv.clone(), vv: sum(&self.vv) }
-    }
-
-    /// The inverses; zero for blocks that have none, which leaves the cell to the other smoothing steps.
-    fn inverse(&self) -> Self {
-        let mut inverse = Self::zero(self.uu.len());
-        for i in 0..self.uu.len() {
-            let (uu, uv, vv) = (self.uu[i], self.uv[i], self.vv[i]);
-            let determinant = uu * vv - uv * uv;
-            if determinant > 1e-12 * (uu + vv) * (uu + vv) {
-                inverse.uu[i] = vv / determinant;
-                inverse.uv[i] = -uv / determinant;
-                inverse.vv[i] = uu / determinant;
-            }
-        }
-        inverse
     }
 
     /// `out += factor * self * r`, cell by cell.
@@ -630,9 +603,11 @@ struct GridLevel {
     below: Vec<f64>,
     /// Sum of the weights of a pixel's neighbours.
     weights: Vec<f64>,
+    /// g g^T.
+    data: Blocks,
     /// The blocks on the diagonal of A: g g^T plus the weights of all neighbours.
     diagonal: Blocks,
-    /// Their inverses.
+    /// Their inverses; zero for blocks that have none, which leaves the cell to the other smoothing steps.
     inverse: Blocks,
     right_side: Vectors,
     solution: Vectors,
@@ -646,10 +621,10 @@ impl GridLevel {
         for (_, _, i) in domain.pixels() {
             weights[i] = right[i] + right[i - 1] + below[i] + below[i - stride];
         }
-        let (diagonal, inverse) = (Blocks::zero(cells), Blocks::zero(cells));
+        let (data, diagonal, inverse) = (Blocks::zero(cells), Blocks::zero(cells), Blocks::zero(cells));
         let zero = Vectors::zero(cells);
         let (right_side, solution, residual) = (zero.clone(), zero.clone(), zero);
-        Self { domain, right, below, weights, diagonal, inverse, right_side, solution, residual }
+        Self { domain, right, below, weights, data, diagonal, inverse, right_side, solution, residual }
     }
 
     /// The pixel grid: w = lambda^2.
@@ -680,9 +655,27 @@ impl GridLevel {
         Self::new(half, right, below)
     }
 
-    fn set_data(&mut self, data: &Blocks) {
-        self.diagonal = data.plus_diagonal(&self.weights);
-        self.inverse = self.diagonal.inverse();
+    /// The diagonal and its inverse for the present data.
+    #[inline(always)]
+    fn update_diagonal(&mut self) {
+        for i in 0..self.weights.len() {
+            let (uu, vv) = (self.data.uu[i] + self.weights[i], self.data.vv[i] + self.weights[i]);
+            let uv = self.data.uv[i];
+            let determinant = uu * vv - uv * uv;
+            let is_regular = determinant > 1e-12 * (uu + vv) * (uu + vv);
+            let scale = if is_regular { 1.0 / determinant } else { 0.0 };
+            (self.diagonal.uu[i], self.diagonal.uv[i], self.diagonal.vv[i]) = (uu, uv, vv);
+            (self.inverse.uu[i], self.inverse.uv[i], self.inverse.vv[i]) =
+                (scale * vv, -scale * uv, scale * uu);
+        }
+    }
+
+    /// Sums the data over the blocks of the coarser grid.
+    #[inline(always)]
+    fn restrict_data(&self, coarse: &mut GridLevel) {
+        sum_blocks(&self.domain, &self.data.uu, &coarse.domain, &mut coarse.data.uu);
+        sum_blocks(&self.domain, &self.data.uv, &coarse.domain, &mut coarse.data.uv);
+        sum_blocks(&self.domain, &self.data.vv, &coarse.domain, &mut coarse.data.vv);
     }
 
     /// `out = A x`
@@ -816,73 +809,80 @@ impl<'a> Plus<'a> {
 
 /// Conjugate gradients preconditioned by one multigrid cycle.
 struct Multigrid {
+    /// Finest grid first.
     levels: Vec<GridLevel>,
+    /// The right side b of the equations.
+    right_side: Vectors,
+    residual: Vectors,
+    direction: Vectors,
+    product: Vectors,
 }
 
 impl Multigrid {
     /// Grids for a domain, down to at most 2x2 cells.
     fn new(domain: &Domain, lambda_sq: f64) -> Self {
         let mut levels = vec![GridLevel::finest(domain, lambda_sq)];
-        loop {
-            let coarsest = &levels[levels.len() - 1];
-            if coarsest.domain.width <= 2 && coarsest.domain.height <= 2 {
-                return Self { levels };
-            }
-            let coarser = coarsest.halved();
+        while levels.last().is_some_and(|l| l.domain.width > 2 || l.domain.height > 2) {
+            let coarser = levels[levels.len() - 1].halved();
             levels.push(coarser);
         }
+        let zero = Vectors::zero(domain.is_inside.len());
+        let (right_side, residual, direction) = (zero.clone(), zero.clone(), zero.clone());
+        Self { levels, right_side, residual, direction, product: zero }
     }
 
-    /// Sets the data terms g g^T; those of coarser grids are sums.
-    fn set_data(&mut self, mut data: Blocks) {
-        for k in 0..self.levels.len() {
-            self.levels[k].set_data(&data);
-            if let Some(coarse) = self.levels.get(k + 1) {
-                let mut sums = Blocks::zero(coarse.right.len());
-                let pairs = [(&data.uu, &mut sums.uu), (&data.uv, &mut sums.uv), (&data.vv, &mut sums.vv)];
-                for (values, sums) in pairs {
-                    sum_blocks(&self.levels[k].domain, values, &coarse.domain, sums);
-                }
-                data = sums;
-            }
-        }
+    /// Sets the constraint g . (u, v) + c = 0 of a pixel.
+    fn set_constraint(&mut self, cell: usize, g: DVec2, c: f64) {
+        let data = &mut self.levels[0].data;
+        (data.uu[cell], data.uv[cell], data.vv[cell]) = (g.x * g.x, g.x * g.y, g.y * g.y);
+        (self.right_side.u[cell], self.right_side.v[cell]) = (-g.x * c, -g.y * c);
     }
 
     /// Solves A x = b from the given x on, until |b - A x| <= tolerance |b|.
-    fn solve(&mut self, b: &Vectors, x: &mut Vectors, options: &FlowOptions) -> Solved {
-        pulp::Arch::new().dispatch(Solve { grids: self, b, x, options })
+    fn solve(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
+        pulp::Arch::new().dispatch(Solve { grids: self, x, options })
+    }
+
+    /// Completes A on all grids after the constraints were set.
+    #[inline(always)]
+    fn update_diagonals(&mut self) {
+        for k in 0..self.levels.len() {
+            self.levels[k].update_diagonal();
+            if let [fine, coarse, ..] = &mut self.levels[k..] {
+                fine.restrict_data(coarse);
+            }
+        }
     }
 
     #[inline(always)]
-    fn conjugate_gradients(&mut self, b: &Vectors, x: &mut Vectors, options: &FlowOptions) -> Solved {
-        let norm = b.dot(b).sqrt();
-        let mut product = Vectors::zero(b.u.len());
-        self.levels[0].multiply(x, &mut product);
-        let mut residual = b.clone();
-        residual.combine(1.0, -1.0, &product);
-        let mut residual_norm = residual.dot(&residual).sqrt();
-        let mut direction = Vectors::zero(b.u.len());
-        let (mut slope, mut iterations) = (f64::INFINITY, 0);
-        while residual_norm > options.tolerance * norm && iterations < options.max_iterations {
-            let preconditioned = self.precondition(&residual);
-            let next_slope = residual.dot(preconditioned);
-            direction.combine(next_slope / slope, 1.0, preconditioned);
+    fn conjugate_gradients(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
+        let goal = options.tolerance * self.right_side.norm();
+        self.levels[0].multiply(x, &mut self.residual);
+        self.residual.combine(-1.0, 1.0, &self.right_side);
+        let (mut residual_norm, mut slope, mut iterations) = (self.residual.norm(), f64::INFINITY, 0);
+        while residual_norm > goal && iterations < options.max_iterations {
+            self.precondition();
+            let preconditioned = &self.levels[0].solution;
+            let next_slope = self.residual.dot(preconditioned);
+            let memory = if iterations == 0 { 0.0 } else { next_slope / slope };
+            self.direction.combine(memory, 1.0, preconditioned);
             slope = next_slope;
-            self.levels[0].multiply(&direction, &mut product);
-            let step = slope / direction.dot(&product);
-            x.combine(1.0, step, &direction);
-            residual.combine(1.0, -step, &product);
-            residual_norm = residual.dot(&residual).sqrt();
+            self.levels[0].multiply(&self.direction, &mut self.product);
+            let step = slope / self.direction.dot(&self.product);
+            x.combine(1.0, step, &self.direction);
+            self.residual.combine(1.0, -step, &self.product);
+            residual_norm = self.residual.norm();
             iterations += 1;
         }
-        Solved { iterations, relative_residual: if norm > 0.0 { residual_norm / norm } else { 0.0 } }
+        let scale = self.right_side.norm();
+        Solved { iterations, relative_residual: if scale > 0.0 { residual_norm / scale } else { 0.0 } }
     }
 
-    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: a symmetric
-    /// approximation of the inverse of A.
+    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: multiplies the
+    /// residual by a symmetric approximation of the inverse of A. The product is the finest grid's solution.
     #[inline(always)]
-    fn precondition(&mut self, residual: &Vectors) -> &Vectors {
-        self.levels[0].right_side.clone_from(residual);
+    fn precondition(&mut self) {
+        self.levels[0].right_side.clone_from(&self.residual);
         let coarsest = self.levels.len() - 1;
         for k in 0..coarsest {
             let (fine, coarse) = self.levels.split_at_mut(k + 1);
@@ -898,14 +898,12 @@ impl Multigrid {
             fine[k].correct(&coarse[0]);
             fine[k].smooth();
         }
-        &self.levels[0].solution
     }
 }
 
 /// A solution, compiled for each width of vectors.
 struct Solve<'a> {
     grids: &'a mut Multigrid,
-    b: &'a Vectors,
     x: &'a mut Vectors,
     options: &'a FlowOptions,
 }
@@ -915,7 +913,8 @@ impl pulp::WithSimd for Solve<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Solved {
-        self.grids.conjugate_gradients(self.b, self.x, self.options)
+        self.grids.update_diagonals();
+        self.grids.conjugate_gradients(self.x, self.options)
     }
 }
 
@@ -989,17 +988,12 @@ mod tests {
         c: &[f64],
         options: &FlowOptions,
     ) -> (Vectors, Solved) {
-        let mut data = Blocks::zero(g.len());
-        let mut b = Vectors::zero(g.len());
+        let mut solver = Multigrid::new(domain, options.smoothness * options.smoothness);
         for (_, _, cell) in domain.pixels() {
-            data.set_square(cell, g[cell]);
-            b.u[cell] = -g[cell].x * c[cell];
-            b.v[cell] = -g[cell].y * c[cell];
+            solver.set_constraint(cell, g[cell], c[cell]);
         }
         let mut x = Vectors::zero(g.len());
-        let mut solver = Multigrid::new(domain, options.smoothness * options.smoothness);
-        solver.set_data(data);
-        let solved = solver.solve(&b, &mut x, options);
+        let solved = solver.solve(&mut x, options);
         (x, solved)
     }
 
