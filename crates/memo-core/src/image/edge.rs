@@ -146,8 +146,7 @@ pub fn edge_chains(
     let Some(window) = window_of_domain(frame, domain)? else {
         return Ok(EdgeChains::default());
     };
-    let arch = pulp::Arch::new();
-    let mut maxima = arch.dispatch(|| gradient_maxima(frame, &window, domain.mask, options));
+    let mut maxima = pulp::Arch::new().dispatch(FindMaxima { frame, window, mask: domain.mask, options });
     maxima.drop_faint(options.high);
     let links = maxima.link();
     Ok(maxima.chains(&links))
@@ -230,6 +229,23 @@ struct GradientRow {
     x: Vec<f32>,
     y: Vec<f32>,
     magnitude_sq: Vec<f32>,
+}
+
+/// The search for gradient maxima, compiled for each width of vectors.
+struct FindMaxima<'a> {
+    frame: &'a Frame<'a>,
+    window: Window,
+    mask: Option<&'a Mask>,
+    options: &'a EdgeOptions,
+}
+
+impl pulp::WithSimd for FindMaxima<'_> {
+    type Output = Maxima;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Maxima {
+        gradient_maxima(self.frame, &self.window, self.mask, self.options)
+    }
 }
 
 /// Gradient maxima inside `window`, above the low threshold.
@@ -395,26 +411,30 @@ impl Maxima {
             self.edgels.iter().map(|e| e.gradient.length_squared() >= high * high).collect();
         let mut open: Vec<usize> = (0..is_kept.len()).filter(|&i| is_kept[i]).collect();
         while let Some(i) = open.pop() {
-            for j in self.neighbours(i, 1) {
+            self.for_each_neighbour(i, 1, |j| {
                 if !is_kept[j] {
                     is_kept[j] = true;
                     open.push(j);
                 }
-            }
+            });
         }
         for (&cell, _) in self.cells.iter().zip(&is_kept).filter(|&(_, &kept)| !kept) {
             self.grid[cell] = 0;
         }
     }
 
-    /// The edge points within `reach` pixels of number `i`, itself excluded.
-    fn neighbours(&self, i: usize, reach: usize) -> impl Iterator<Item = usize> {
+    /// Visits the edge points within `reach` pixels of number `i`, itself excluded.
+    #[inline(always)]
+    fn for_each_neighbour(&self, i: usize, reach: usize, mut visit: impl FnMut(usize)) {
         let (cell, stride) = (self.cells[i], self.stride());
-        (0..=2 * reach).flat_map(move |row| {
-            let start = cell + row * stride - reach * stride - reach;
-            let found = self.grid[start..=start + 2 * reach].iter().filter(|&&n| n != 0);
-            found.map(|&n| n as usize - 1).filter(move |&j| j != i)
-        })
+        let corner = cell - reach * stride - reach;
+        for row in 0..=2 * reach {
+            for &number in &self.grid[corner + row * stride..][..=2 * reach] {
+                if number != 0 && number as usize != i + 1 {
+                    visit(number as usize - 1);
+                }
+            }
+        }
     }
 
     fn is_kept(&self, i: usize) -> bool {
@@ -451,22 +471,20 @@ impl Maxima {
     fn best_neighbours(&self, i: usize, reach: usize, links: &Links) -> (u32, u32) {
         let (mut next, mut previous) = (links.next[i], links.previous[i]);
         let (mut next_cost, mut previous_cost) = (f32::INFINITY, f32::INFINITY);
-        for j in self.neighbours(i, reach) {
-            let Some(step) = step_between(&self.edgels[i], &self.edgels[j]) else { continue };
-            let is_free = if step.is_forward {
-                links.next[i] == NONE && links.previous[j] == NONE
+        self.for_each_neighbour(i, reach, |j| {
+            let Some(step) = step_between(&self.edgels[i], &self.edgels[j]) else { return };
+            if step.is_forward {
+                let is_free = links.next[i] == NONE && links.previous[j] == NONE;
+                if is_free && step.cost < next_cost {
+                    (next, next_cost) = (j as u32, step.cost);
+                }
             } else {
-                links.previous[i] == NONE && links.next[j] == NONE
-            };
-            let (chosen, cost) = if step.is_forward {
-                (&mut next, &mut next_cost)
-            } else {
-                (&mut previous, &mut previous_cost)
-            };
-            if is_free && step.cost < *cost {
-                (*chosen, *cost) = (j as u32, step.cost);
+                let is_free = links.previous[i] == NONE && links.next[j] == NONE;
+                if is_free && step.cost < previous_cost {
+                    (previous, previous_cost) = (j as u32, step.cost);
+                }
             }
-        }
+        });
         (next, previous)
     }
 

@@ -182,19 +182,21 @@ impl Moments {
     }
 
     /// The line through the mean along the eigenvector of the larger eigenvalue of the scatter matrix
-    /// S = sum (p - m)(p - m)^T, with tan 2 theta = 2 `S_xy` / (`S_xx` - `S_yy`); the smaller eigenvalue is the
-    /// sum of squared distances.
+    /// S = sum (p - m)(p - m)^T. With d = `S_xx` - `S_yy` and r = sqrt(d^2 + 4 `S_xy`^2) the eigenvector is
+    /// (r + d, 2 `S_xy`) or, without cancellation where d < 0, (2 `S_xy`, r - d); the smaller eigenvalue
+    /// (`S_xx` + `S_yy` - r) / 2 is the sum of squared distances.
     fn line(self) -> Line {
         let mean = self.sum / self.count;
         let xx = self.xx - self.sum.x * mean.x;
         let xy = self.xy - self.sum.x * mean.y;
         let yy = self.yy - self.sum.y * mean.y;
-        let theta = 0.5 * (2.0 * xy).atan2(xx - yy);
-        let residual_sq = 0.5 * (xx + yy - (xx - yy).hypot(2.0 * xy));
+        let d = xx - yy;
+        let r = (d * d + 4.0 * xy * xy).sqrt();
+        let along = if d >= 0.0 { DVec2::new(r + d, 2.0 * xy) } else { DVec2::new(2.0 * xy, r - d) };
         Line {
             point: mean,
-            direction: DVec2::from_angle(theta),
-            residual_sq: residual_sq.max(0.0),
+            direction: along.normalize_or(DVec2::X),
+            residual_sq: (0.5 * (xx + yy - r)).max(0.0),
             count: self.count,
         }
     }

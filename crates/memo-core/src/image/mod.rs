@@ -4,6 +4,7 @@ pub mod background;
 pub mod change;
 pub mod clean;
 pub mod edge;
+pub mod flow;
 pub mod frame;
 pub mod gain;
 pub mod line;
@@ -17,6 +18,7 @@ pub use change::{
 };
 pub use clean::{CleanError, CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
+pub use flow::{Evidence, FlowComponent, FlowError, FlowField, FlowOptions, velocity_field};
 pub use frame::{Frame, FrameError, Image, Mask};
 pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};

@@ -1,0 +1,1188 @@
+//! The velocity field of a moving region between two frames.
+//!
+//! Minimises, over the region R alone and without a condition on its border,
+//!
+//! ```text
+//! J(u, v) = integral over R of (I_x u + I_y v + I_t)^2 + lambda^2 (|grad u|^2 + |grad v|^2)
+//! ```
+//!
+//! Sources: Rohr 1994, section 4.1; Horn & Schunck, Artificial Intelligence 17, 1981 (the functional); Schnörr,
+//! "Determining optical flow for irregular domains", IJCV 6(1), 1991 (irregular domains, existence and uniqueness).
+//!
+//! Discretised with one unknown vector a pixel and one difference for each pair of neighbours that both lie in
+//! the region. Leaving out all other differences is the natural boundary condition: nothing is drawn towards
+//! the background, and a constant motion is reproduced up to the border.
+//!
+//! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term leaves the constant
+//! vectors free, so there is exactly one minimum if and only if the gradients there have two directions, that is
+//! if the sum of grad I grad I^T over the component is regular. Components that fail this are refused by name
+//! ([`Evidence`]) and get no velocity.
+//!
+//! The motion is smoothed across the borders of limbs that move differently; grey values must persist from
+//! frame to frame; what moves farther than its own size on the coarsest pyramid level is lost.
+
+use super::edge::Window;
+use super::frame::{Frame, FrameError, Image, Mask};
+use glam::{DVec2, Vec2};
+use std::ops::Range;
+use thiserror::Error;
+
+/// Why no velocity field was computed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FlowError {
+    /// The frames or the mask differ in size.
+    #[error(transparent)]
+    Size(#[from] FrameError),
+    /// The region has no pixel.
+    #[error("the region is empty")]
+    EmptyRegion,
+    /// An option is not a number or outside its range.
+    #[error("{name} = {value}: must be positive and finite")]
+    BadOption {
+        /// Name of the field.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// How the velocity field is computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlowOptions {
+    /// Weight lambda of the smoothness, grey levels. 10: a difference of one pixel between neighbours costs as
+    /// much as a grey value that is wrong by 10, several times the noise.
+    pub smoothness: f64,
+    /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the coarsest.
+    pub levels: usize,
+    /// Linearisations on each level. 3: the error left after the third is below that of the interpolation.
+    pub warps: usize,
+    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-3 changes no
+    /// velocity by more than about 0.01 px.
+    pub tolerance: f64,
+    /// Largest number of solver steps for one linearisation. 200: ten times what regions of a person take.
+    pub max_iterations: usize,
+    /// RMS gradient in the weaker of two directions below which a component is not textured, grey levels per
+    /// pixel. 0.5: about what noise of one grey level leaves after smoothing.
+    pub min_gradient: f64,
+}
+
+impl Default for FlowOptions {
+    fn default() -> Self {
+        Self {
+            smoothness: 10.0,
+            levels: 5,
+            warps: 3,
+            tolerance: 1e-4,
+            max_iterations: 200,
+            min_gradient: 0.5,
+        }
+    }
+}
+
+impl FlowOptions {
+    fn check(&self) -> Result<(), FlowError> {
+        let fields = [
+            ("smoothness", self.smoothness),
+            ("levels", self.levels as f64),
+            ("warps", self.warps as f64),
+            ("tolerance", self.tolerance),
+            ("max_iterations", self.max_iterations as f64),
+            ("min_gradient", self.min_gradient),
+        ];
+        match fields.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            Some((name, value)) => Err(FlowError::BadOption { name, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What the grey values of a connected component say about its motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Evidence {
+    /// Gradients in two directions: there is exactly one velocity field.
+    Determined,
+    /// Gradients in one direction only: the motion along the edges is free (aperture problem).
+    OneDirection,
+    /// No gradients.
+    Textureless,
+}
+
+/// A connected component of the region (neighbours share a side).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlowComponent {
+    /// Column of its first pixel in reading order.
+    pub x: usize,
+    /// Row of its first pixel in reading order.
+    pub y: usize,
+    /// Number of pixels.
+    pub pixel_count: usize,
+    /// RMS gradient along the weaker and the stronger principal direction, grey levels per pixel.
+    pub gradient_rms: [f64; 2],
+    /// Whether its motion is determined.
+    pub evidence: Evidence,
+}
+
+/// Velocities of the pixels of a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowField {
+    /// The rectangle round the region.
+    pub window: Window,
+    /// Velocity to the right in the window, px per frame; NaN outside the determined components.
+    pub u_px: Image<f32>,
+    /// Velocity downwards in the window, px per frame; NaN outside the determined components.
+    pub v_px: Image<f32>,
+    /// The connected components of the region, in reading order of their first pixels.
+    pub components: Vec<FlowComponent>,
+    /// Solver steps on the finest level, over all linearisations.
+    pub iterations: usize,
+    /// Relative residual of the last linear equations solved.
+    pub relative_residual: f64,
+}
+
+impl FlowField {
+    /// The velocity of the pixel at column `x`, row `y` of the frame, px per frame.
+    pub fn at(&self, x: usize, y: usize) -> Option<DVec2> {
+        let (i, j) = (x.checked_sub(self.window.x)?, y.checked_sub(self.window.y)?);
+        let is_inside = i < self.window.width && j < self.window.height;
+        let velocity = is_inside.then(|| Vec2::new(self.u_px.at(i, j), self.v_px.at(i, j)))?;
+        velocity.is_finite().then(|| velocity.as_dvec2())
+    }
+}
+
+/// Computes the velocity field of a region from one frame to the next.
+///
+/// 1. Smooth both frames round the region and refuse components whose motion is not determined.
+/// 2. Build a pyramid of grey values, gradients and region.
+/// 3. From the coarsest level down: linearise about the motion found so far, solve, repeat.
+pub fn velocity_field(
+    first: &Frame<'_>,
+    second: &Frame<'_>,
+    region: &Mask,
+    options: &FlowOptions,
+) -> Result<FlowField, FlowError> {
+    options.check()?;
+    first.check_same_size(second)?;
+    let window = window_of_region(first, region)?;
+    let levels = options.levels.min(MAX_LEVELS);
+    let margin = 1 << levels;
+    let grey = Raster::smoothed(first, &window, margin);
+    let mut domain = Domain::of_region(region, &window);
+    let components = refuse_undetermined(&mut domain, &grey, margin, &window, options.min_gradient);
+    let pyramid = pyramid(grey, Raster::smoothed(second, &window, margin), domain, margin, levels);
+    let mut motion = Motion::still(&pyramid[pyramid.len() - 1].domain);
+    for (k, level) in pyramid.iter().enumerate().rev() {
+        if k + 1 < pyramid.len() {
+            motion = motion.refined(&pyramid[k + 1].domain, &level.domain);
+        }
+        motion.iterations = 0;
+        let mut solver = Multigrid::new(&level.domain, options.smoothness * options.smoothness);
+        for _ in 0..options.warps {
+            improve(&mut motion, level, &mut solver, options);
+        }
+    }
+    Ok(field_of_motion(motion, &pyramid[0].domain, window, components))
+}
+
+/// More levels than a frame of 65536 px has use for.
+const MAX_LEVELS: usize = 16;
+
+/// The rectangle round the region.
+fn window_of_region(frame: &Frame<'_>, region: &Mask) -> Result<Window, FlowError> {
+    let (width, height) = (region.width(), region.height());
+    if (width, height) != (frame.width(), frame.height()) {
+        let (expected_width, expected_height) = (frame.width(), frame.height());
+        return Err(FrameError::SizeChanged { expected_width, expected_height, width, height }.into());
+    }
+    let inside = || (0..width * height).filter(|&p| region.pixels()[p]);
+    let (Some(first), Some(last)) = (inside().next(), inside().next_back()) else {
+        return Err(FlowError::EmptyRegion);
+    };
+    let (x0, x1) = inside().fold((width, 0), |(x0, x1), p| (x0.min(p % width), x1.max(p % width)));
+    let (y0, y1) = (first / width, last / width);
+    Ok(Window { x: x0, y: y0, width: x1 - x0 + 1, height: y1 - y0 + 1 })
+}
+
+/// Pixels of the region in a window, with a free cell all round so that every pixel has four neighbours.
+#[derive(Clone)]
+struct Domain {
+    width: usize,
+    height: usize,
+    is_inside: Vec<bool>,
+}
+
+impl Domain {
+    fn empty(width: usize, height: usize) -> Self {
+        Self { width, height, is_inside: vec![false; (width + 2) * (height + 2)] }
+    }
+
+    fn of_region(region: &Mask, window: &Window) -> Self {
+        let mut domain = Self::empty(window.width, window.height);
+        for y in 0..window.height {
+            let row = &region.row(window.y + y)[window.x..window.x + window.width];
+            let start = domain.cell(0, y);
+            domain.is_inside[start..start + window.width].copy_from_slice(row);
+        }
+        domain
+    }
+
+    fn stride(&self) -> usize {
+        self.width + 2
+    }
+
+    fn cell(&self, x: usize, y: usize) -> usize {
+        (y + 1) * self.stride() + x + 1
+    }
+
+    /// Columns, rows and cells of the pixels inside, in reading order.
+    fn pixels(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        all.map(|(x, y)| (x, y, self.cell(x, y))).filter(|&(_, _, cell)| self.is_inside[cell])
+    }
+
+    /// Half the size; a pixel is inside if one of the four it covers is.
+    fn halved(&self) -> Self {
+        let mut half = Self::empty(self.width.div_ceil(2), self.height.div_ceil(2));
+        for (x, y, _) in self.pixels() {
+            let cell = half.cell(x / 2, y / 2);
+            half.is_inside[cell] = true;
+        }
+        half
+    }
+
+    /// The cells connected to `start`, itself first.
+    fn connected_to(&self, start: usize, is_seen: &mut [bool]) -> Vec<usize> {
+        let mut found = vec![start];
+        is_seen[start] = true;
+        let mut next = 0;
+        while next < found.len() {
+            let cell = found[next];
+            next += 1;
+            for neighbour in [cell - self.stride(), cell - 1, cell + 1, cell + self.stride()] {
+                if self.is_inside[neighbour] && !is_seen[neighbour] {
+                    is_seen[neighbour] = true;
+                    found.push(neighbour);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Removes the components without gradients in two directions from the domain and reports on all of them.
+fn refuse_undetermined(
+    domain: &mut Domain,
+    grey: &Raster,
+    margin: usize,
+    window: &Window,
+    min_gradient: f64,
+) -> Vec<FlowComponent> {
+    let mut components = Vec::new();
+    let mut is_seen = vec![false; domain.is_inside.len()];
+    for start in 0..domain.is_inside.len() {
+        if is_seen[start] || !domain.is_inside[start] {
+            continue;
+        }
+        let cells = domain.connected_to(start, &mut is_seen);
+        let place = |cell: usize| (cell % domain.stride() - 1, cell / domain.stride() - 1);
+        let gradients = cells.iter().map(|&cell| {
+            let (x, y) = place(cell);
+            grey.at(x + margin, y + margin).gradient.as_dvec2()
+        });
+        let gradient_rms = principal_rms(gradients);
+        let evidence = match gradient_rms {
+            [weaker, _] if weaker >= min_gradient => Evidence::Determined,
+            [_, stronger] if stronger >= min_gradient => Evidence::OneDirection,
+            _ => Evidence::Textureless,
+        };
+        let (x, y) = place(start);
+        let (x, y) = (window.x + x, window.y + y);
+        components.push(FlowComponent { x, y, pixel_count: cells.len(), gradient_rms, evidence });
+        if evidence != Evidence::Determined {
+            cells.iter().for_each(|&cell| domain.is_inside[cell] = false);
+        }
+    }
+    components
+}
+
+/// Roots of the eigenvalues, smaller first, of the mean of g g^T.
+fn principal_rms(gradients: impl Iterator<Item = DVec2>) -> [f64; 2] {
+    let (mut n, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0);
+    for g in gradients {
+        (n, xx, xy, yy) = (n + 1.0, xx + g.x * g.x, xy + g.x * g.y, yy + g.y * g.y);
+    }
+    let (half_trace, spread) = (0.5 * (xx + yy), 0.5 * (xx - yy).hypot(2.0 * xy));
+    [half_trace - spread, half_trace + spread].map(|sum| (sum.max(0.0) / n).sqrt())
+}
+
+/// Grey value and gradient at a pixel.
+#[derive(Clone, Copy, Default)]
+struct Sample {
+    grey: f32,
+    gradient: Vec2,
+}
+
+/// Smoothed grey values with gradients.
+struct Raster {
+    width: usize,
+    height: usize,
+    samples: Vec<Sample>,
+    /// The part that shows the frame rather than its repeated border.
+    low: Vec2,
+    high: Vec2,
+}
+
+impl Raster {
+    /// The window and `margin` pixels round it, smoothed with the binomial of 5 taps (sigma 1); the frame's
+    /// border is repeated outwards.
+    fn smoothed(frame: &Frame<'_>, window: &Window, margin: usize) -> Self {
+        let (width, height) = (window.width + 2 * margin, window.height + 2 * margin);
+        let origin = [window.x, window.y].map(|o| o as isize - margin as isize);
+        let clamp = |i: isize, size: usize| i.clamp(0, size as isize - 1) as usize;
+        let columns: Vec<usize> = (0..width).map(|x| clamp(origin[0] + x as isize, frame.width())).collect();
+        let mut grey = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let row = frame.row(clamp(origin[1] + y as isize, frame.height()));
+            grey.extend(columns.iter().map(|&x| f32::from(row[x])));
+        }
+        let low = Vec2::new(-origin[0] as f32, -origin[1] as f32);
+        let high = low + Vec2::new(frame.width() as f32 - 1.0, frame.height() as f32 - 1.0);
+        Self::with_gradients(width, height, &smoothed(width, height, &grey), low, high)
+    }
+
+    /// Adds central differences.
+    fn with_gradients(width: usize, height: usize, grey: &[f32], low: Vec2, high: Vec2) -> Self {
+        let mut samples = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+            let [above, row, below] = rows.map(|y| &grey[y * width..(y + 1) * width]);
+            for x in 0..width {
+                let dx = row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)];
+                samples.push(Sample { grey: row[x], gradient: 0.5 * Vec2::new(dx, below[x] - above[x]) });
+            }
+        }
+        let end = Vec2::new(width as f32 - 1.0, height as f32 - 1.0);
+        Self { width, height, samples, low: low.max(Vec2::ZERO), high: high.min(end) }
+    }
+
+    fn at(&self, x: usize, y: usize) -> Sample {
+        self.samples[y * self.width + x]
+    }
+
+    /// Between pixels the gradient is bilinear, and the grey value is the weighted mean of the four straight
+    /// continuations I + g.d / 2: the half cancels the error bilinear interpolation makes where the image is
+    /// curved. `None` outside the frame.
+    fn sample(&self, at: Vec2) -> Option<Sample> {
+        if !(at.cmpge(self.low).all() && at.cmple(self.high).all()) {
+            return None;
+        }
+        let (x, y) = (at.x as usize, at.y as usize);
+        let part = at - Vec2::new(x as f32, y as f32);
+        let mut mean = Sample::default();
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let corner = self.at((x + i).min(self.width - 1), (y + j).min(self.height - 1));
+            let step = part - Vec2::new(i as f32, j as f32);
+            let weight = (1.0 - step.x.abs()) * (1.0 - step.y.abs());
+            mean.grey += weight * (corner.grey + 0.5 * corner.gradient.dot(step));
+            mean.gradient += weight * corner.gradient;
+        }
+        Some(mean)
+    }
+
+    /// Half the size: pixel i lies between pixels 2 i and 2 i + 1 and weighs four of them (1, 3, 3, 1) / 8.
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let taps = [0.125, 0.375, 0.375, 0.125];
+        let from = |i: usize, k: usize, size: usize| (2 * i + k).saturating_sub(1).min(size - 1);
+        let mut narrow = vec![0.0f32; width * self.height];
+        for (p, grey) in narrow.iter_mut().enumerate() {
+            let (x, y) = (p % width, p / width);
+            *grey = (0..4).map(|k| taps[k] * self.at(from(x, k, self.width), y).grey).sum();
+        }
+        let mut grey = vec![0.0f32; width * height];
+        for (p, grey) in grey.iter_mut().enumerate() {
+            let (x, y) = (p % width, p / width);
+            *grey = (0..4).map(|k| taps[k] * narrow[from(y, k, self.height) * width + x]).sum();
+        }
+        let halve = |v: Vec2| 0.5 * (v - 0.5);
+        Self::with_gradients(width, height, &grey, halve(self.low), halve(self.high))
+    }
+}
+
+/// The binomial (1, 4, 6, 4, 1) / 16 along both axes.
+fn smoothed(width: usize, height: usize, grey: &[f32]) -> Vec<f32> {
+    let taps = [0.0625, 0.25, 0.375, 0.25, 0.0625f32];
+    let from = |i: usize, k: usize, size: usize| (i + k).saturating_sub(2).min(size - 1);
+    let mut along = Vec::with_capacity(grey.len());
+    for row in grey.chunks_exact(width) {
+        along.extend((0..width).map(|x| (0..5).map(|k| taps[k] * row[from(x, k, width)]).sum::<f32>()));
+    }
+    let mut out = vec![0.0; grey.len()];
+    for (y, out) in out.chunks_exact_mut(width).enumerate() {
+        for (k, tap) in taps.into_iter().enumerate() {
+            let start = from(y, k, height) * width;
+            out.iter_mut().zip(&along[start..start + width]).for_each(|(out, &g)| *out += tap * g);
+        }
+    }
+    out
+}
+
+/// One level of the pyramid. The rasters reach `margin` pixels beyond the domain.
+struct Level {
+    first: Raster,
+    second: Raster,
+    domain: Domain,
+    margin: usize,
+}
+
+/// Finest level first; ends early once the region is a single pixel.
+fn pyramid(first: Raster, second: Raster, domain: Domain, margin: usize, levels: usize) -> Vec<Level> {
+    let mut pyramid = vec![Level { first, second, domain, margin }];
+    for _ in 1..levels {
+        let fine = &pyramid[pyramid.len() - 1];
+        if fine.domain.width.max(fine.domain.height) == 1 {
+            break;
+        }
+        pyramid.push(Level {
+            first: fine.first.halved(),
+            second: fine.second.halved(),
+            domain: fine.domain.halved(),
+            margin: fine.margin / 2,
+        });
+    }
+    pyramid
+}
+
+/// A vector for each cell of a domain; zero outside.
+#[derive(Clone, Debug)]
+struct Vectors {
+    u: Vec<f64>,
+    v: Vec<f64>,
+}
+
+impl Vectors {
+    fn zero(cells: usize) -> Self {
+        Self { u: vec![0.0; cells], v: vec![0.0; cells] }
+    }
+
+    #[inline(always)]
+    fn dot(&self, other: &Self) -> f64 {
+        dot(&self.u, &other.u) + dot(&self.v, &other.v)
+    }
+
+    #[inline(always)]
+    fn norm(&self) -> f64 {
+        self.dot(self).sqrt()
+    }
+
+    /// `self = scale * self + factor * other`
+    #[inline(always)]
+    fn combine(&mut self, scale: f64, factor: f64, other: &Self) {
+        combine(&mut self.u, scale, factor, &other.u);
+        combine(&mut self.v, scale, factor, &other.v);
+    }
+}
+
+#[inline(always)]
+fn combine(a: &mut [f64], scale: f64, factor: f64, b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = scale * *a + factor * b;
+    }
+}
+
+/// Eight partial sums, so that the order of summation is the same with vectors of any length.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_blocks, b_blocks) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_blocks.remainder().iter().zip(b_blocks.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a_blocks.zip(b_blocks) {
+        for i in 0..8 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The motion found so far.
+struct Motion {
+    velocity: Vectors,
+    iterations: usize,
+    relative_residual: f64,
+}
+
+impl Motion {
+    fn still(domain: &Domain) -> Self {
+        let velocity = Vectors::zero(domain.is_inside.len());
+        Self { velocity, iterations: 0, relative_residual: 0.0 }
+    }
+
+    /// The same motion on the next finer level: each pixel takes twice the velocity of the one that covers it.
+    fn refined(&self, coarse: &Domain, fine: &Domain) -> Self {
+        let mut refined = Self::still(fine);
+        for (x, y, cell) in fine.pixels() {
+            let parent = coarse.cell(x / 2, y / 2);
+            refined.velocity.u[cell] = 2.0 * self.velocity.u[parent];
+            refined.velocity.v[cell] = 2.0 * self.velocity.v[parent];
+        }
+        refined
+    }
+}
+
+/// Linearises the grey value constraint about the motion so far, and minimises.
+fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: &FlowOptions) {
+    for (x, y, cell) in level.domain.pixels() {
+        let velocity = DVec2::new(motion.velocity.u[cell], motion.velocity.v[cell]);
+        let (gradient, offset) = constraint(level, x, y, velocity).unwrap_or_default();
+        solver.set_constraint(cell, gradient, offset);
+    }
+    let solved = solver.solve(&mut motion.velocity, options);
+    motion.iterations += solved.iterations;
+    motion.relative_residual = solved.relative_residual;
+}
+
+/// The gradient g and the offset c of the constraint g . (u, v) + c = 0 at a pixel that so far moves with w:
+/// g is the mean of both frames' gradients at the pixel's two places, c = `I_2`(x + w) - `I_1`(x) - g . w.
+/// `None` if the pixel has left the frame.
+fn constraint(level: &Level, x: usize, y: usize, velocity: DVec2) -> Option<(DVec2, f64)> {
+    let (x, y) = (x + level.margin, y + level.margin);
+    let before = level.first.at(x, y);
+    let after = level.second.sample(Vec2::new(x as f32, y as f32) + velocity.as_vec2())?;
+    let gradient = 0.5 * (before.gradient + after.gradient).as_dvec2();
+    Some((gradient, f64::from(after.grey - before.grey) - gradient.dot(velocity)))
+}
+
+/// A symmetric 2x2 matrix for each cell of a domain; zero outside.
+struct Blocks {
+    uu: Vec<f64>,
+    uv: Vec<f64>,
+    vv: Vec<f64>,
+}
+
+impl Blocks {
+    fn zero(cells: usize) -> Self {
+        Self { uu: vec![0.0; cells], uv: vec![0.0; cells], vv: vec![0.0; cells] }
+    }
+
+    /// `out += factor * self * r`, cell by cell.
+    #[inline(always)]
+    fn multiply_add(&self, factor: f64, r: &Vectors, out: &mut Vectors) {
+        let n = self.uu.len();
+        let (uu, uv, vv) = (&self.uu[..n], &self.uv[..n], &self.vv[..n]);
+        let (ru, rv) = (&r.u[..n], &r.v[..n]);
+        let (out_u, out_v) = (&mut out.u[..n], &mut out.v[..n]);
+        for i in 0..n {
+            out_u[i] += factor * (uu[i] * ru[i] + uv[i] * rv[i]);
+            out_v[i] += factor * (uv[i] * ru[i] + vv[i] * rv[i]);
+        }
+    }
+}
+
+/// Outcome of a solution.
+struct Solved {
+    iterations: usize,
+    relative_residual: f64,
+}
+
+/// Damping of the block Jacobi steps: 0.8 at least halves every wave shorter than four pixels.
+const DAMPING: f64 = 0.8;
+
+/// Block Jacobi steps on the coarsest grid, which has at most 2x2 cells.
+const COARSEST_STEPS: usize = 12;
+
+/// The linear equations A x = b of the minimum on one grid, with what solving them needs. At each pixel p, with
+/// the sum over its neighbours q inside,
+///
+/// ```text
+/// g g^T (u, v)_p + sum of w_pq ((u, v)_p - (u, v)_q) = -g c
+/// ```
+struct GridLevel {
+    domain: Domain,
+    /// Weight w of the difference to the neighbour on the right; 0 unless both are inside.
+    right: Vec<f64>,
+    /// Weight w of the difference to the neighbour below.
+    below: Vec<f64>,
+    /// Sum of the weights of a pixel's neighbours.
+    weights: Vec<f64>,
+    /// g g^T.
+    data: Blocks,
+    /// The blocks on the diagonal of A: g g^T plus the weights of all neighbours.
+    diagonal: Blocks,
+    /// Their inverses; zero for blocks that have none, which leaves the cell to the other smoothing steps.
+    inverse: Blocks,
+    right_side: Vectors,
+    solution: Vectors,
+    residual: Vectors,
+}
+
+impl GridLevel {
+    fn new(domain: Domain, right: Vec<f64>, below: Vec<f64>) -> Self {
+        let (cells, stride) = (right.len(), domain.stride());
+        let mut weights = vec![0.0; cells];
+        for (_, _, i) in domain.pixels() {
+            weights[i] = right[i] + right[i - 1] + below[i] + below[i - stride];
+        }
+        let (data, diagonal, inverse) = (Blocks::zero(cells), Blocks::zero(cells), Blocks::zero(cells));
+        let zero = Vectors::zero(cells);
+        let (right_side, solution, residual) = (zero.clone(), zero.clone(), zero);
+        Self { domain, right, below, weights, data, diagonal, inverse, right_side, solution, residual }
+    }
+
+    /// The pixel grid: w = lambda^2.
+    fn finest(domain: &Domain, lambda_sq: f64) -> Self {
+        let (mut right, mut below) = (vec![0.0; domain.is_inside.len()], vec![0.0; domain.is_inside.len()]);
+        for (_, _, cell) in domain.pixels() {
+            let weight = |neighbour: usize| if domain.is_inside[neighbour] { lambda_sq } else { 0.0 };
+            right[cell] = weight(cell + 1);
+            below[cell] = weight(cell + domain.stride());
+        }
+        Self::new(domain.clone(), right, below)
+    }
+
+    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the blocks' borders add up,
+    /// and are halved, for they stand for a slope over two pixels rather than a jump over one.
+    fn halved(&self) -> Self {
+        let half = self.domain.halved();
+        let (mut right, mut below) = (vec![0.0; half.is_inside.len()], vec![0.0; half.is_inside.len()]);
+        for (x, y, cell) in self.domain.pixels() {
+            let parent = half.cell(x / 2, y / 2);
+            if x % 2 == 1 {
+                right[parent] += 0.5 * self.right[cell];
+            }
+            if y % 2 == 1 {
+                below[parent] += 0.5 * self.below[cell];
+            }
+        }
+        Self::new(half, right, below)
+    }
+
+    /// The diagonal and its inverse for the present data.
+    #[inline(always)]
+    fn update_diagonal(&mut self) {
+        for i in 0..self.weights.len() {
+            let (uu, vv) = (self.data.uu[i] + self.weights[i], self.data.vv[i] + self.weights[i]);
+            let uv = self.data.uv[i];
+            let determinant = uu * vv - uv * uv;
+            let is_regular = determinant > 1e-12 * (uu + vv) * (uu + vv);
+            let scale = if is_regular { 1.0 / determinant } else { 0.0 };
+            (self.diagonal.uu[i], self.diagonal.uv[i], self.diagonal.vv[i]) = (uu, uv, vv);
+            (self.inverse.uu[i], self.inverse.uv[i], self.inverse.vv[i]) =
+                (scale * vv, -scale * uv, scale * uu);
+        }
+    }
+
+    /// Sums the data over the blocks of the coarser grid.
+    #[inline(always)]
+    fn restrict_data(&self, coarse: &mut GridLevel) {
+        sum_blocks(&self.domain, &self.data.uu, &coarse.domain, &mut coarse.data.uu);
+        sum_blocks(&self.domain, &self.data.uv, &coarse.domain, &mut coarse.data.uv);
+        sum_blocks(&self.domain, &self.data.vv, &coarse.domain, &mut coarse.data.vv);
+    }
+
+    /// `out = A x`
+    #[inline(always)]
+    fn multiply(&self, x: &Vectors, out: &mut Vectors) {
+        self.combine_products(x, out, |_, product| product);
+    }
+
+    /// residual = b - A x
+    #[inline(always)]
+    fn update_residual(&mut self) {
+        let mut residual = std::mem::replace(&mut self.residual, Vectors::zero(0));
+        let inner = self.inner_cells();
+        let (bu, bv) = (&self.right_side.u[inner.clone()], &self.right_side.v[inner]);
+        self.combine_products(&self.solution, &mut residual, |i, [u, v]| [bu[i] - u, bv[i] - v]);
+        self.residual = residual;
+    }
+
+    /// The cells without the free first and last row.
+    fn inner_cells(&self) -> Range<usize> {
+        self.domain.stride()..self.right.len() - self.domain.stride()
+    }
+
+    /// `out_i = f(i, (A x)_i)` at the i-th of the inner cells.
+    #[inline(always)]
+    fn combine_products(&self, x: &Vectors, out: &mut Vectors, f: impl Fn(usize, [f64; 2]) -> [f64; 2]) {
+        let (inner, stride) = (self.inner_cells(), self.domain.stride());
+        let [uu, uv, vv] =
+            [&self.diagonal.uu, &self.diagonal.uv, &self.diagonal.vv].map(|d| &d[inner.clone()]);
+        let weights = [
+            &self.right[inner.start - 1..inner.end - 1],
+            &self.right[inner.clone()],
+            &self.below[..inner.len()],
+            &self.below[inner.clone()],
+        ];
+        let (u, v) = (Plus::new(&x.u, stride), Plus::new(&x.v, stride));
+        let (out_u, out_v) = (&mut out.u[inner.clone()], &mut out.v[inner.clone()]);
+        for i in 0..inner.len() {
+            let w = weights.map(|w| w[i]);
+            let product_u = uu[i] * u.centre[i] + uv[i] * v.centre[i] - u.weighted(i, w);
+            let product_v = uv[i] * u.centre[i] + vv[i] * v.centre[i] - v.weighted(i, w);
+            [out_u[i], out_v[i]] = f(i, [product_u, product_v]);
+        }
+    }
+
+    /// One damped block Jacobi step.
+    #[inline(always)]
+    fn smooth(&mut self) {
+        self.update_residual();
+        self.inverse.multiply_add(DAMPING, &self.residual, &mut self.solution);
+    }
+
+    /// The same step from zero.
+    #[inline(always)]
+    fn smooth_from_zero(&mut self) {
+        self.solution.u.fill(0.0);
+        self.solution.v.fill(0.0);
+        self.inverse.multiply_add(DAMPING, &self.right_side, &mut self.solution);
+    }
+
+    /// Hands the residual down as the right side of the coarser grid.
+    #[inline(always)]
+    fn restrict_residual(&mut self, coarse: &mut GridLevel) {
+        self.update_residual();
+        sum_blocks(&self.domain, &self.residual.u, &coarse.domain, &mut coarse.right_side.u);
+        sum_blocks(&self.domain, &self.residual.v, &coarse.domain, &mut coarse.right_side.v);
+    }
+
+    /// Adds the correction found on the coarser grid.
+    #[inline(always)]
+    fn correct(&mut self, coarse: &GridLevel) {
+        add_parents(&coarse.domain, &coarse.solution.u, &self.domain, &mut self.solution.u);
+        add_parents(&coarse.domain, &coarse.solution.v, &self.domain, &mut self.solution.v);
+    }
+}
+
+/// Sums over blocks of 2x2 pixels. The free cells on the right and below hold zero and complete odd sizes.
+#[inline(always)]
+fn sum_blocks(fine: &Domain, values: &[f64], coarse: &Domain, sums: &mut [f64]) {
+    for y in 0..coarse.height {
+        let row = |y: usize| values[fine.cell(0, y)..][..2 * coarse.width].chunks_exact(2);
+        let sums = &mut sums[coarse.cell(0, y)..][..coarse.width];
+        for ((sum, upper), lower) in sums.iter_mut().zip(row(2 * y)).zip(row(2 * y + 1)) {
+            *sum = upper[0] + upper[1] + lower[0] + lower[1];
+        }
+    }
+}
+
+/// Adds to each pixel inside the value of the block it lies in.
+#[inline(always)]
+fn add_parents(coarse: &Domain, parents: &[f64], fine: &Domain, values: &mut [f64]) {
+    for y in 0..fine.height {
+        let row = fine.cell(0, y)..fine.cell(0, y) + 2 * coarse.width;
+        let pairs = values[row.clone()].chunks_exact_mut(2).zip(fine.is_inside[row].chunks_exact(2));
+        for ((pair, is_inside), parent) in pairs.zip(&parents[coarse.cell(0, y / 2)..]) {
+            pair[0] += if is_inside[0] { *parent } else { 0.0 };
+            pair[1] += if is_inside[1] { *parent } else { 0.0 };
+        }
+    }
+}
+
+/// The inner cells of a grid and their four neighbours, each at the index of the cell it belongs to.
+struct Plus<'a> {
+    centre: &'a [f64],
+    left: &'a [f64],
+    right: &'a [f64],
+    above: &'a [f64],
+    below: &'a [f64],
+}
+
+impl<'a> Plus<'a> {
+    #[inline(always)]
+    fn new(values: &'a [f64], stride: usize) -> Self {
+        let count = values.len() - 2 * stride;
+        Self {
+            centre: &values[stride..][..count],
+            left: &values[stride - 1..][..count],
+            right: &values[stride + 1..][..count],
+            above: &values[..count],
+            below: &values[2 * stride..][..count],
+        }
+    }
+
+    /// Sum over the neighbours on the left, right, above and below, weighted.
+    #[inline(always)]
+    fn weighted(&self, i: usize, [left, right, above, below]: [f64; 4]) -> f64 {
+        let across = left * self.left[i] + right * self.right[i];
+        across + (above * self.above[i] + below * self.below[i])
+    }
+}
+
+/// Conjugate gradients preconditioned by one multigrid cycle.
+struct Multigrid {
+    /// Finest grid first.
+    levels: Vec<GridLevel>,
+    /// The right side b of the equations.
+    right_side: Vectors,
+    residual: Vectors,
+    direction: Vectors,
+    product: Vectors,
+}
+
+impl Multigrid {
+    /// Grids for a domain, down to at most 2x2 cells.
+    fn new(domain: &Domain, lambda_sq: f64) -> Self {
+        let mut levels = vec![GridLevel::finest(domain, lambda_sq)];
+        while levels.last().is_some_and(|l| l.domain.width > 2 || l.domain.height > 2) {
+            let coarser = levels[levels.len() - 1].halved();
+            levels.push(coarser);
+        }
+        let zero = Vectors::zero(domain.is_inside.len());
+        let (right_side, residual, direction) = (zero.clone(), zero.clone(), zero.clone());
+        Self { levels, right_side, residual, direction, product: zero }
+    }
+
+    /// Sets the constraint g . (u, v) + c = 0 of a pixel.
+    fn set_constraint(&mut self, cell: usize, g: DVec2, c: f64) {
+        let data = &mut self.levels[0].data;
+        (data.uu[cell], data.uv[cell], data.vv[cell]) = (g.x * g.x, g.x * g.y, g.y * g.y);
+        (self.right_side.u[cell], self.right_side.v[cell]) = (-g.x * c, -g.y * c);
+    }
+
+    /// Solves A x = b from the given x on, until |b - A x| <= tolerance |b|.
+    fn solve(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
+        pulp::Arch::new().dispatch(Solve { grids: self, x, options })
+    }
+
+    /// Completes A on all grids after the constraints were set.
+    #[inline(always)]
+    fn update_diagonals(&mut self) {
+        for k in 0..self.levels.len() {
+            self.levels[k].update_diagonal();
+            if let [fine, coarse, ..] = &mut self.levels[k..] {
+                fine.restrict_data(coarse);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn conjugate_gradients(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
+        let goal = options.tolerance * self.right_side.norm();
+        self.levels[0].multiply(x, &mut self.residual);
+        self.residual.combine(-1.0, 1.0, &self.right_side);
+        let (mut residual_norm, mut slope, mut iterations) = (self.residual.norm(), f64::INFINITY, 0);
+        while residual_norm > goal && iterations < options.max_iterations {
+            self.precondition();
+            let preconditioned = &self.levels[0].solution;
+            let next_slope = self.residual.dot(preconditioned);
+            let memory = if iterations == 0 { 0.0 } else { next_slope / slope };
+            self.direction.combine(memory, 1.0, preconditioned);
+            slope = next_slope;
+            self.levels[0].multiply(&self.direction, &mut self.product);
+            let step = slope / self.direction.dot(&self.product);
+            x.combine(1.0, step, &self.direction);
+            self.residual.combine(1.0, -step, &self.product);
+            residual_norm = self.residual.norm();
+            iterations += 1;
+        }
+        let scale = self.right_side.norm();
+        Solved { iterations, relative_residual: if scale > 0.0 { residual_norm / scale } else { 0.0 } }
+    }
+
+    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: multiplies the
+    /// residual by a symmetric approximation of the inverse of A. The product is the finest grid's solution.
+    #[inline(always)]
+    fn precondition(&mut self) {
+        self.levels[0].right_side.clone_from(&self.residual);
+        let coarsest = self.levels.len() - 1;
+        for k in 0..coarsest {
+            let (fine, coarse) = self.levels.split_at_mut(k + 1);
+            fine[k].smooth_from_zero();
+            fine[k].restrict_residual(&mut coarse[0]);
+        }
+        self.levels[coarsest].smooth_from_zero();
+        for _ in 1..COARSEST_STEPS {
+            self.levels[coarsest].smooth();
+        }
+        for k in (0..coarsest).rev() {
+            let (fine, coarse) = self.levels.split_at_mut(k + 1);
+            fine[k].correct(&coarse[0]);
+            fine[k].smooth();
+        }
+    }
+}
+
+/// A solution, compiled for each width of vectors.
+struct Solve<'a> {
+    grids: &'a mut Multigrid,
+    x: &'a mut Vectors,
+    options: &'a FlowOptions,
+}
+
+impl pulp::WithSimd for Solve<'_> {
+    type Output = Solved;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Solved {
+        self.grids.update_diagonals();
+        self.grids.conjugate_gradients(self.x, self.options)
+    }
+}
+
+/// Cuts the padding off and marks what has no velocity.
+fn field_of_motion(
+    motion: Motion,
+    domain: &Domain,
+    window: Window,
+    components: Vec<FlowComponent>,
+) -> FlowField {
+    let mut u_px = Image::filled(window.width, window.height, f32::NAN);
+    let mut v_px = u_px.clone();
+    for (x, y, cell) in domain.pixels() {
+        u_px.set(x, y, motion.velocity.u[cell] as f32);
+        v_px.set(x, y, motion.velocity.v[cell] as f32);
+    }
+    let Motion { iterations, relative_residual, .. } = motion;
+    FlowField { window, u_px, v_px, components, iterations, relative_residual }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    const EXACT: FlowOptions = FlowOptions {
+        smoothness: 3.0,
+        levels: 1,
+        warps: 1,
+        tolerance: 1e-12,
+        max_iterations: 500,
+        min_gradient: 0.5,
+    };
+
+    fn domain_of(rows: &[&str]) -> Domain {
+        let mut domain = Domain::empty(rows[0].len(), rows.len());
+        for (y, row) in rows.iter().enumerate() {
+            for (x, c) in row.bytes().enumerate() {
+                let cell = domain.cell(x, y);
+                domain.is_inside[cell] = c == b'#';
+            }
+        }
+        domain
+    }
+
+    /// The normal equations written down from the functional, term by term, and solved directly.
+    fn dense_solution(domain: &Domain, g: &[DVec2], c: &[f64], lambda: f64) -> Option<DVector<f64>> {
+        let pixels: Vec<_> = domain.pixels().collect();
+        let mut terms: Vec<(Vec<(usize, f64)>, f64)> = Vec::new();
+        for (i, &(x, y, cell)) in pixels.iter().enumerate() {
+            terms.push((vec![(2 * i, g[cell].x), (2 * i + 1, g[cell].y)], -c[cell]));
+            let is_neighbour =
+                |&&(x2, y2, _): &&(usize, usize, usize)| (x2, y2) == (x + 1, y) || (x2, y2) == (x, y + 1);
+            for neighbour in pixels.iter().filter(is_neighbour) {
+                let j = pixels.iter().position(|p| p == neighbour).unwrap();
+                terms.extend((0..2).map(|k| (vec![(2 * i + k, lambda), (2 * j + k, -lambda)], 0.0)));
+            }
+        }
+        let mut a = DMatrix::zeros(terms.len(), 2 * pixels.len());
+        for (row, (entries, _)) in terms.iter().enumerate() {
+            entries.iter().for_each(|&(column, value)| a[(row, column)] = value);
+        }
+        let b = DVector::from_iterator(terms.len(), terms.iter().map(|t| t.1));
+        (a.transpose() * &a).cholesky().map(|f| f.solve(&(a.transpose() * b)))
+    }
+
+    fn iterated_solution(
+        domain: &Domain,
+        g: &[DVec2],
+        c: &[f64],
+        options: &FlowOptions,
+    ) -> (Vectors, Solved) {
+        let mut solver = Multigrid::new(domain, options.smoothness * options.smoothness);
+        for (_, _, cell) in domain.pixels() {
+            solver.set_constraint(cell, g[cell], c[cell]);
+        }
+        let mut x = Vectors::zero(g.len());
+        let solved = solver.solve(&mut x, options);
+        (x, solved)
+    }
+
+    const RING_WITH_TAIL: [&str; 8] = [
+        ".######....",
+        ".######....",
+        ".##..##....",
+        ".##..######",
+        ".##..######",
+        ".######..##",
+        "..####...##",
+        ".........##",
+    ];
+
+    #[test]
+    fn constant_motion_is_reproduced_up_to_the_border_of_a_ring() {
+        let domain = domain_of(&RING_WITH_TAIL);
+        let motion = DVec2::new(1.3, -0.4);
+        let g: Vec<DVec2> =
+            (0..domain.is_inside.len()).map(|i| 8.0 * DVec2::from_angle((i * i % 17) as f64)).collect();
+        let c: Vec<f64> = g.iter().map(|g| -g.dot(motion)).collect();
+        let (x, solved) = iterated_solution(&domain, &g, &c, &EXACT);
+        assert!(solved.relative_residual <= 1e-12);
+        for (_, _, cell) in domain.pixels() {
+            assert!(DVec2::new(x.u[cell], x.v[cell]).distance(motion) < 1e-9);
+        }
+        assert!((0..g.len()).all(|i| domain.is_inside[i] || x.u[i] == 0.0));
+    }
+
+    /// On a chain of pixels that is free of data between its ends, u is a straight line between them.
+    #[test]
+    fn a_flat_stretch_interpolates_linearly_between_textured_ends() {
+        let domain = domain_of(&["#####################"]);
+        let mut g = vec![DVec2::ZERO; domain.is_inside.len()];
+        let mut c = vec![0.0; g.len()];
+        for (x, u) in [(0, 1.0), (20, 3.0)] {
+            let cell = domain.cell(x, 0);
+            (g[cell], c[cell]) = (1e4 * DVec2::X, -1e4 * u);
+        }
+        let (x, _) = iterated_solution(&domain, &g, &c, &EXACT);
+        for i in 0..21 {
+            assert!((x.u[domain.cell(i, 0)] - (1.0 + 0.1 * i as f64)).abs() < 1e-5);
+        }
+    }
+
+    /// Grey values of a texture without a period, seen after it moved by `shift`.
+    fn textured(width: usize, height: usize, shift: DVec2, texture: impl Fn(DVec2) -> f64) -> Image<u8> {
+        let at = |p: usize| DVec2::new((p % width) as f64, (p / width) as f64) - shift;
+        let data = (0..width * height).map(|p| (128.0 + texture(at(p))).round() as u8).collect();
+        Image::from_vec(width, height, data).unwrap()
+    }
+
+    fn waves(p: DVec2) -> f64 {
+        let wave = |angle: f64, length: f64| {
+            (DVec2::from_angle(angle).dot(p) * std::f64::consts::TAU / length).sin()
+        };
+        20.0 * wave(0.3, 83.0)
+            + 20.0 * wave(1.9, 71.0)
+            + 15.0 * wave(1.1, 37.0)
+            + 15.0 * wave(2.6, 29.0)
+            + 12.0 * wave(0.7, 11.3)
+            + 12.0 * wave(2.2, 9.1)
+    }
+
+    fn ring_mask(width: usize, height: usize) -> Mask {
+        let inside = |p: usize| {
+            let r = DVec2::new((p % width) as f64 - 60.0, (p / width) as f64 - 50.0).length();
+            r < 38.0 && (r > 12.0 || p % width > 60)
+        };
+        Mask::from_vec(width, height, (0..width * height).map(inside).collect()).unwrap()
+    }
+
+    #[test]
+    fn translations_of_a_textured_ring_are_recovered() {
+        let region = ring_mask(120, 100);
+        let first = textured(120, 100, DVec2::ZERO, waves);
+        for shift in [(0.0, 0.0), (0.4, -0.3), (2.6, 1.2), (-6.0, 3.5), (11.0, -4.0), (-13.0, 7.5)] {
+            let shift = DVec2::from(shift);
+            let second = textured(120, 100, shift, waves);
+            let field =
+                velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default())
+                    .unwrap();
+            assert_eq!(field.components.len(), 1);
+            assert_eq!(field.components[0].evidence, Evidence::Determined);
+            let mut worst = 0.0f64;
+            for p in (0..region.pixels().len()).filter(|&p| region.pixels()[p]) {
+                worst = worst.max(field.at(p % 120, p / 120).unwrap().distance(shift));
+            }
+            println!(
+                "{shift}: worst {worst:.3} px, {} iterations, residual {:.1e}",
+                field.iterations, field.relative_residual
+            );
+            assert!(worst < 0.1, "{shift}: {worst} px off");
+        }
+    }
+
+    #[test]
+    fn components_without_two_directions_are_refused_by_name() {
+        let (width, height) = (90, 30);
+        let texture = |p: DVec2| match p.x {
+            x if x < 30.0 => waves(p),
+            x if x < 60.0 => 40.0 * (0.4 * p.x).sin(),
+            _ => 0.0,
+        };
+        let image = textured(width, height, DVec2::ZERO, texture);
+        let mut region = Mask::filled(width, height, false);
+        for y in 5..25 {
+            [5, 35, 65].iter().for_each(|&x| region.row_mut(y)[x..x + 20].fill(true));
+        }
+        let frame = image.as_frame();
+        let field = velocity_field(&frame, &frame, &region, &FlowOptions::default()).unwrap();
+        let evidence: Vec<Evidence> = field.components.iter().map(|c| c.evidence).collect();
+        assert_eq!(evidence, [Evidence::Determined, Evidence::OneDirection, Evidence::Textureless]);
+        assert_eq!((field.components[1].x, field.components[1].pixel_count), (35, 400));
+        assert!(field.at(10, 10).unwrap().length() < 1e-3);
+        assert_eq!(
+            (field.at(40, 10), field.at(70, 10), field.at(30, 10), field.at(0, 0)),
+            (None, None, None, None)
+        );
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_its_values() {
+        let image = Image::filled(8, 8, 1u8);
+        let frame = image.as_frame();
+        let run = |region: &Mask, options: FlowOptions| velocity_field(&frame, &frame, region, &options);
+        let none = Mask::filled(8, 8, false);
+        assert_eq!(run(&none, FlowOptions::default()), Err(FlowError::EmptyRegion));
+        let all = Mask::filled(8, 8, true);
+        let error = run(&all, FlowOptions { smoothness: 0.0, ..Default::default() });
+        assert_eq!(error, Err(FlowError::BadOption { name: "smoothness", value: 0.0 }));
+        let error = run(&Mask::filled(7, 8, true), FlowOptions::default()).unwrap_err();
+        assert!(matches!(error, FlowError::Size(FrameError::SizeChanged { width: 7, .. })));
+        let other = Image::filled(9, 8, 1u8);
+        assert!(velocity_field(&frame, &other.as_frame(), &all, &FlowOptions::default()).is_err());
+        let flat = run(&all, FlowOptions::default()).unwrap();
+        assert!(flat.u_px.pixels().iter().all(|u| u.is_nan()));
+    }
+
+    #[test]
+    fn regions_at_the_border_and_of_single_pixels_are_computed() {
+        let (first, second) = (textured(40, 30, DVec2::ZERO, waves), textured(40, 30, DVec2::X, waves));
+        let mut region = Mask::filled(40, 30, true);
+        let field =
+            velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
+        assert!(field.at(20, 15).unwrap().distance(DVec2::X) < 0.1);
+        region = Mask::filled(40, 30, false);
+        region.set(39, 29, true);
+        let field =
+            velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
+        assert_ne!(field.components[0].evidence, Evidence::Determined);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn the_solution_is_that_of_the_dense_equations(
+            seeds in prop::collection::vec((0.0f64..1.0, -6.0f64..6.0, -6.0f64..6.0, -9.0f64..9.0), 63),
+            share in 0.4f64..1.0, smoothness in 0.3f64..20.0,
+        ) {
+            let mut domain = Domain::empty(9, 7);
+            let mut g = vec![DVec2::ZERO; domain.is_inside.len()];
+            let mut c = vec![0.0; g.len()];
+            for (p, &(inside, gx, gy, offset)) in seeds.iter().enumerate() {
+                let cell = domain.cell(p % 9, p / 9);
+                domain.is_inside[cell] = inside < share;
+                (g[cell], c[cell]) = (DVec2::new(gx, gy), offset);
+            }
+            drop_small_components(&mut domain);
+            let expected = dense_solution(&domain, &g, &c, smoothness).unwrap();
+            let (x, _) = iterated_solution(&domain, &g, &c, &FlowOptions { smoothness, ..EXACT });
+            for (i, (_, _, cell)) in domain.pixels().enumerate() {
+                prop_assert!((x.u[cell] - expected[2 * i]).abs() < 1e-6);
+                prop_assert!((x.v[cell] - expected[2 * i + 1]).abs() < 1e-6);
+            }
+        }
+    }
+
+    /// Leaves components of three pixels and more, whose random gradients have two directions.
+    fn drop_small_components(domain: &mut Domain) {
+        let mut is_seen = vec![false; domain.is_inside.len()];
+        for start in 0..is_seen.len() {
+            if domain.is_inside[start] && !is_seen[start] {
+                let cells = domain.connected_to(start, &mut is_seen);
+                if cells.len() < 3 {
+                    cells.iter().for_each(|&cell| domain.is_inside[cell] = false);
+                }
+            }
+        }
+    }
+}
