@@ -98,6 +98,9 @@ pub fn hidden_interval(
 /// Working memory of [`visible_contours`], for views in succession.
 #[derive(Debug, Clone, Default)]
 pub struct PreparedView {
+    camera_position: DVec3,
+    /// A direction from the camera to the body, along which depths are compared.
+    towards: DVec3,
     occluders: Vec<Occluder>,
     hidden: Vec<Interval>,
     chords: Vec<RimChord>,
@@ -113,19 +116,28 @@ impl PreparedView {
         out: &mut Vec<VisibleSegment>,
     ) {
         out.clear();
-        self.occluders.clear();
-        self.occluders.extend(
-            cylinders.iter().enumerate().filter_map(|(part, k)| Occluder::new(part, k, camera_position)),
-        );
+        self.prepare(cylinders, camera_position);
         if self.occluders.iter().any(|o| matches!(o.shadow, Shadow::Everything)) {
             return;
         }
         for (part, cylinder) in cylinders.iter().enumerate() {
             for line in side_lines(cylinder, camera_position).iter().flatten() {
-                self.push_visible(part, line, camera_position, out);
+                self.push_visible(part, line, out);
             }
             if options.rims {
-                self.push_visible_rims(part, cylinder, camera_position, options.rim_chords, out);
+                self.push_visible_rims(part, cylinder, options.rim_chords, out);
+            }
+        }
+    }
+
+    fn prepare(&mut self, cylinders: &[EllipticCylinder], camera_position: DVec3) {
+        self.camera_position = camera_position;
+        self.towards = cylinders.iter().map(|k| k.centre() - camera_position).sum();
+        self.occluders.clear();
+        for (part, cylinder) in cylinders.iter().enumerate() {
+            if let Some(shadow) = Shadow::new(cylinder, camera_position) {
+                let nearest = least_along(cylinder, camera_position, self.towards);
+                self.occluders.push(Occluder { part, nearest, shadow });
             }
         }
     }
@@ -134,30 +146,24 @@ impl PreparedView {
         &mut self,
         part: usize,
         cylinder: &EllipticCylinder,
-        camera_position: DVec3,
         chords: usize,
         out: &mut Vec<VisibleSegment>,
     ) {
         let mut rim_chords = std::mem::take(&mut self.chords);
         rim_chords.clear();
-        rims(cylinder, camera_position, chords, &mut rim_chords);
+        rims(cylinder, self.camera_position, chords, &mut rim_chords);
         for chord in rim_chords.iter().filter(|chord| chord.aspect != RimAspect::Hidden) {
-            self.push_visible(part, &chord.contour, camera_position, out);
+            self.push_visible(part, &chord.contour, out);
         }
         self.chords = rim_chords;
     }
 
     /// Appends what the other parts leave of one contour.
-    fn push_visible(
-        &mut self,
-        part: usize,
-        contour: &Contour,
-        camera_position: DVec3,
-        out: &mut Vec<VisibleSegment>,
-    ) {
-        let chord = Chord { a: contour.start - camera_position, b: contour.end - camera_position };
+    fn push_visible(&mut self, part: usize, contour: &Contour, out: &mut Vec<VisibleSegment>) {
+        let chord = Chord { a: contour.start - self.camera_position, b: contour.end - self.camera_position };
+        let farthest = self.towards.dot(chord.a).max(self.towards.dot(chord.b));
         self.hidden.clear();
-        for occluder in self.occluders.iter().filter(|o| o.part != part) {
+        for occluder in self.occluders.iter().filter(|o| o.part != part && !o.is_behind(farthest)) {
             match occluder.shadow.hidden_interval(&chord) {
                 Some(Interval { t0, t1 }) if t0 <= 0.0 && t1 >= 1.0 => return,
                 Some(hidden) => self.hidden.push(hidden),
@@ -200,13 +206,23 @@ struct Interval {
 #[derive(Debug, Clone)]
 struct Occluder {
     part: usize,
+    /// The least depth of its points, along [`PreparedView::towards`].
+    nearest: f64,
     shadow: Shadow,
 }
 
 impl Occluder {
-    fn new(part: usize, cylinder: &EllipticCylinder, camera_position: DVec3) -> Option<Self> {
-        Some(Self { part, shadow: Shadow::new(cylinder, camera_position)? })
+    /// Whether it lies before the camera and behind all points of a depth: what is hidden is deeper than what hides it.
+    fn is_behind(&self, depth: f64) -> bool {
+        self.nearest > depth.max(0.0)
     }
+}
+
+/// The least product of a direction with the points of a cylinder, relative to the camera.
+fn least_along(cylinder: &EllipticCylinder, camera_position: DVec3, direction: DVec3) -> f64 {
+    let along = cylinder.world_from_cylinder.matrix3.transpose() * direction;
+    let reach = (along.truncate() * cylinder.semi_axes).length() + along.z.abs() * cylinder.half_length;
+    direction.dot(cylinder.centre() - camera_position) - reach
 }
 
 /// The hidden set S of one part in one view.
