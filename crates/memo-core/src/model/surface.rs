@@ -1,9 +1,11 @@
-//! The visible surface of a body, pixel by pixel (the 2½-D description of Rohr 1994, section 2, after Marr): depth, part, normal.
+//! The visible surface of a body, pixel by pixel (the 2½-D description of Rohr 1994, section 2, after Marr):
+//! depth, part, normal.
 //!
-//! Each pixel's sight line C + s d, d having depth 1 in the camera, is cut with each part in the part's unit frame
-//! ([`silhouette`](super::silhouette)): the slab |z| <= 1 gives one interval of s, the infinite cylinder |c + s d|² <= 1 another, the solid is
-//! their intersection, and the smallest entry over all parts is seen. Nothing is tessellated; values are exact at pixel centres. What lies
-//! between pixel centres is not represented: for exact outlines see [`visibility`](super::visibility).
+//! Each pixel's sight line C + s d, d having depth 1 in the camera, is cut with each part in the part's unit
+//! frame ([`silhouette`](super::silhouette)): the slab |z| <= 1 gives one interval of s, the infinite
+//! cylinder |c + s d|² <= 1 another, the solid is their intersection, and the smallest entry over all parts
+//! is seen. Nothing is tessellated; values are exact at pixel centres. What lies between pixel centres is not
+//! represented: for exact outlines see [`visibility`](super::visibility).
 //!
 //! Pixels are those of an ideal camera; lens distortion is not applied.
 
@@ -56,8 +58,8 @@ pub struct SurfaceMap {
 
 /// Depth, part and normal at each pixel of `window`, of the whole image by default.
 ///
-/// From a camera inside a part nothing is seen, as in [`visible_contours`](super::visible_contours); a part with a semi-axis or half
-/// length that is not positive is not seen either.
+/// From a camera inside a part nothing is seen, as in [`visible_contours`](super::visible_contours); a part
+/// with a semi-axis or half length that is not positive is not seen either.
 pub fn surface_map(
     cylinders: &[EllipticCylinder],
     camera: &Camera,
@@ -196,8 +198,8 @@ fn within_image(window: Option<PixelWindow>, camera: &Camera) -> PixelWindow {
     PixelWindow { x, y, width: asked.width.min(width - x), height: asked.height.min(height - y) }
 }
 
-/// The pixels of `window` that can show a part: the bounding rectangle of its bounding box, the whole window where the
-/// box reaches behind the camera.
+/// The pixels of `window` that can show a part: the bounding rectangle of its bounding box, the whole window
+/// where the box reaches behind the camera.
 fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: PixelWindow) -> PixelWindow {
     let extents = cylinder.semi_axes.extend(cylinder.half_length);
     let corners = (0..8).map(|i| {
@@ -228,7 +230,8 @@ mod tests {
     use super::*;
     use glam::DAffine3;
 
-    /// A camera that looks at a point with the world's up upwards in the image (along the view, world x upwards).
+    /// A camera that looks at a point with the world's up upwards in the image (along the view, world x
+    /// upwards).
     fn looking_at(position: DVec3, target: DVec3, focal_px: f64) -> Camera {
         let forward = (target - position).normalize();
         let up = if forward.z.abs() > 0.99 { DVec3::X } else { DVec3::Z };
@@ -312,7 +315,8 @@ mod tests {
         assert!((map.depth_m.at(10, 479) - 500.0 / 239.5).abs() < 1e-5);
     }
 
-    /// The point seen lies on its part's surface, no part hides it, and its normal faces the camera along the surface's gradient.
+    /// The point seen lies on its part's surface, no part hides it, and its normal faces the camera along the
+    /// surface's gradient.
     #[test]
     fn what_is_seen_is_the_nearest_surface() {
         for (bodies, camera) in views() {
@@ -341,7 +345,8 @@ mod tests {
         }
     }
 
-    /// The part seen at a point of the image between pixel centres: at a pixel of a camera shifted by the difference.
+    /// The part seen at a point of the image between pixel centres: at a pixel of a camera shifted by the
+    /// difference.
     fn part_at(bodies: &[EllipticCylinder], camera: &Camera, point_px: DVec2) -> Option<usize> {
         let pixel = point_px.round();
         if pixel.min_element() < 0.0 || pixel.x > 639.0 || pixel.y > 479.0 {
@@ -352,8 +357,8 @@ mod tests {
         surface_map(bodies, &shifted, Some(window)).ok().map(|map| usize::from(map.part.at(0, 0)))
     }
 
-    /// Just inside a visible contour its part is seen, just outside never: ray casting and the closed form of hidden
-    /// lines agree. Off by one in a thousand only where a piece begins or ends within the step.
+    /// Just inside a visible contour its part is seen, just outside never: ray casting and the closed form of
+    /// hidden lines agree. Off by one in a thousand only where a piece begins or ends within the step.
     #[test]
     fn visible_contours_bound_their_parts() {
         let (mut inside, mut agreeing, mut out) = (0, 0, Vec::new());
