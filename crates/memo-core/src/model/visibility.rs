@@ -917,6 +917,33 @@ pub(super) mod tests {
             check_against_samples(p, q, &upright(0.5, 1.0, 0.5), camera);
         }
 
+        /// The visible pieces are what the hidden intervals of all other parts leave, each part taken alone.
+        #[test]
+        fn visible_pieces_are_what_no_part_hides(
+            bodies in proptest::collection::vec(cylinder().prop_map(|k| scaled(&k, 0.5)), 1..9),
+            camera in vector(0.8),
+        ) {
+            let segments = visible(&bodies, camera);
+            let inside = bodies.iter().any(|k| k.contains(camera));
+            for (part, body) in bodies.iter().enumerate().filter(|_| !inside) {
+                for line in side_lines(body, camera).iter().flatten() {
+                    let own: Vec<_> = segments.iter().filter(|s| s.part == part && s.kind == line.kind).collect();
+                    let others = bodies.iter().enumerate().filter(|(j, _)| *j != part);
+                    let hidden: Vec<_> = others
+                        .filter_map(|(_, k)| hidden_interval(line.start, line.end, k, camera))
+                        .collect();
+                    let along = line.end - line.start;
+                    for i in 0..50 {
+                        let t = (f64::from(i) + 0.5) / 50.0;
+                        let place = |p: DVec3| (p - line.start).dot(along) / along.length_squared();
+                        let is_shown = own.iter().any(|s| place(s.start) <= t && t <= place(s.end));
+                        prop_assert_eq!(is_shown, !hidden.iter().any(|&(t0, t1)| t0 <= t && t <= t1));
+                    }
+                }
+            }
+            prop_assert!(!inside || segments.is_empty());
+        }
+
         #[test]
         fn a_side_line_is_not_hidden_by_its_own_cylinder(k in cylinder(), camera in vector(4.0)) {
             for line in side_lines(&k, camera).iter().flatten() {
