@@ -2,7 +2,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use memo_core::model::{EllipticCylinder, PreparedView, VisibilityOptions, visible_contours};
+use memo_core::model::{
+    Camera, EllipticCylinder, PixelWindow, PreparedView, VisibilityOptions, surface_map, visible_contours,
+};
 use std::hint::black_box;
 
 /// A cylinder from one end's centre to the other's, its x axis as near to `forward` as possible.
@@ -79,5 +81,27 @@ fn hidden_lines(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, hidden_lines);
+/// A 640x480 camera 6 m to the side, in which the walker is 300 pixels high.
+fn side_camera() -> Camera {
+    let rotation = DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y).transpose();
+    Camera {
+        size: [640, 480],
+        focal_px: DVec2::splat(1000.0),
+        centre_px: DVec2::new(319.5, 239.5),
+        rotation,
+        translation: rotation * DVec3::new(0.0, 6.0, -0.9),
+    }
+}
+
+fn surface(c: &mut Criterion) {
+    let (body, camera) = (walker(0.4), side_camera());
+    let around = PixelWindow { x: 220, y: 80, width: 200, height: 320 };
+    for (window, what) in [(None, "640x480"), (Some(around), "a window of 200x320")] {
+        c.bench_function(&format!("surface map of 14 cylinders, 300 px high, {what}"), |b| {
+            b.iter(|| surface_map(black_box(&body), &camera, window));
+        });
+    }
+}
+
+criterion_group!(benches, hidden_lines, surface);
 criterion_main!(benches);

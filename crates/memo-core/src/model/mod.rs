@@ -9,6 +9,7 @@ pub mod gait;
 pub mod position;
 pub mod silhouette;
 pub mod spline;
+pub mod surface;
 pub mod visibility;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
@@ -22,4 +23,5 @@ pub use position::{
     position_from_head, position_from_rectangle, position_on_ground,
 };
 pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
+pub use surface::{NO_PART, PixelWindow, SurfaceError, SurfaceMap, surface_map};
 pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};

@@ -1,13 +1,14 @@
 //! Contour generators of an elliptic cylinder under central projection (Rohr 1994, sections 3.1 and 3.2).
 //!
-//! A contour generator is the curve on a surface whose image is the silhouette. For an elliptic cylinder it consists of
-//! the two **side lines**, along which planes through the camera touch the lateral surface, and of arcs of the two
-//! **end ellipses**. Everything is solved in the cylinder's *unit frame*, in which x, y and z are divided by a, b and
-//! the half length, so that the solid is x² + y² <= 1, |z| <= 1. Scaling the axes is an affine map, and affine maps
-//! preserve lines, tangency and what lies in front of what.
+//! A contour generator is the curve on a surface whose image is the silhouette. For an elliptic cylinder it
+//! consists of the two **side lines**, along which planes through the camera touch the lateral surface, and
+//! of arcs of the two **end ellipses**. Everything is solved in the cylinder's *unit frame*, in which x, y
+//! and z are divided by a, b and the half length, so that the solid is x² + y² <= 1, |z| <= 1. Scaling the
+//! axes is an affine map, and affine maps preserve lines, tangency and what lies in front of what.
 //!
-//! Only what the cylinder hides of itself is dealt with here; [`visibility`](super::visibility) removes what other parts hide.
-//! A cylinder with a semi-axis or a half length that is not positive is no solid and has no contour.
+//! Only what the cylinder hides of itself is dealt with here; [`visibility`](super::visibility) removes what
+//! other parts hide. A cylinder with a semi-axis or a half length that is not positive is no solid and has no
+//! contour.
 
 use super::EllipticCylinder;
 use glam::{DVec2, DVec3};
@@ -15,8 +16,8 @@ use std::f64::consts::TAU;
 
 /// Which contour of a cylinder a segment belongs to.
 ///
-/// Left and right are those of an observer at the camera who faces the cylinder with his head towards its +z: with
-/// v the direction from the camera to the axis, the right line lies on the side of v × z.
+/// Left and right are those of an observer at the camera who faces the cylinder with his head towards its +z:
+/// with v the direction from the camera to the axis, the right line lies on the side of v × z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ContourKind {
     /// The side line on the observer's left.
@@ -31,8 +32,8 @@ pub enum ContourKind {
 
 /// A straight piece of a contour generator in the world, metres.
 ///
-/// A side line runs from the bottom to the top end of its cylinder; a chord of an end ellipse runs with increasing
-/// parameter angle (counterclockwise about +z).
+/// A side line runs from the bottom to the top end of its cylinder; a chord of an end ellipse runs with
+/// increasing parameter angle (counterclockwise about +z).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contour {
     /// Which contour this is a piece of.
@@ -81,8 +82,9 @@ pub fn side_lines(cylinder: &EllipticCylinder, camera_position: DVec3) -> Option
 
 /// Both end ellipses as chords of equal parameter angle, bottom then top, appended to `out`.
 ///
-/// Each ellipse gets about `chords` (at least 3) chords. Where the end points of the side lines divide the ellipse in
-/// two arcs, both arcs are subdivided separately, so that the aspect changes exactly at a chord's end.
+/// Each ellipse gets about `chords` (at least 3) chords. Where the end points of the side lines divide the
+/// ellipse in two arcs, both arcs are subdivided separately, so that the aspect changes exactly at a chord's
+/// end.
 pub fn rims(cylinder: &EllipticCylinder, camera_position: DVec3, chords: usize, out: &mut Vec<RimChord>) {
     let Some(camera) = camera_in_unit_frame(cylinder, camera_position) else { return };
     for (kind, z) in [(ContourKind::BottomRim, -1.0), (ContourKind::TopRim, 1.0)] {
@@ -115,8 +117,8 @@ struct Arc {
     lateral_visible: bool,
 }
 
-/// The unit circle cut at the two tangent points seen from c: the near arc, on which n·c > 1, and the far arc. Where c is inside the
-/// circle nothing of the lateral surface faces it, and the near arc has no chords.
+/// The unit circle cut at the two tangent points seen from c: the near arc, on which n·c > 1, and the far
+/// arc. Where c is inside the circle nothing of the lateral surface faces it, and the near arc has no chords.
 fn arcs(c: DVec2, chords: usize) -> [Arc; 2] {
     let distance = c.length();
     let half_rad = if distance > 1.0 { (1.0 / distance).acos() } else { 0.0 };
@@ -201,7 +203,8 @@ mod tests {
         assert!(chords.is_empty());
     }
 
-    /// Whether the sight line to a point of the surface leaves the solid untouched: a step toward the camera is outside.
+    /// Whether the sight line to a point of the surface leaves the solid untouched: a step toward the camera
+    /// is outside.
     fn is_visible(point: DVec3, cylinder: &EllipticCylinder, camera: DVec3) -> bool {
         !cylinder.contains(point + (camera - point) * 1e-7)
     }
@@ -218,7 +221,8 @@ mod tests {
     }
 
     proptest! {
-        /// The planes through the camera and a side line have the whole solid on one side, the left one's on the right.
+        /// The planes through the camera and a side line have the whole solid on one side, the left one's on
+        /// the right.
         #[test]
         fn side_lines_bound_the_cylinder(k in cylinder(), camera in vector(4.0)) {
             let Some([left, right]) = side_lines(&k, camera) else { return Ok(()) };

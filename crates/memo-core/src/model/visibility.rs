@@ -1,46 +1,53 @@
-//! Hidden-line removal for bodies of elliptic cylinders, exact and in closed form (Rohr 1994, section 3.2: "hidden contours have been
-//! removed").
+//! Hidden-line removal for bodies of elliptic cylinders, exact and in closed form (Rohr 1994, section 3.2:
+//! "hidden contours have been removed").
 //!
-//! A convex solid K hides from the camera C the set S = {C + m (k - C) : k in K, m >= 1}: its own points and those
-//! behind it. S is convex, so each part hides **one interval** of a segment; the visible rest is the
-//! complement of the union over all parts. The paper does not say how it removes hidden lines, the derivation is ours.
+//! A convex solid K hides from the camera C the set S = {C + m (k - C) : k in K, m >= 1}: its own points and
+//! those behind it. S is convex, so each part hides **one interval** of a segment; the visible rest is the
+//! complement of the union over all parts. The paper does not say how it removes hidden lines, the derivation
+//! is ours.
 //!
 //! # One occluder
 //!
-//! In the occluder's unit frame ([`silhouette`](super::silhouette)) let c be the camera's (x, y), T₁ and T₂ the points where the tangents
-//! from c touch the unit circle, and P a point with (x, y) = c + α (T₁ - c) + β (T₂ - c) and Δz = P_z - C_z. α, β and Δz are linear in P.
-//! Write σ = α + β and μ = 4/|c|². Then
+//! In the occluder's unit frame ([`silhouette`](super::silhouette)) let c be the camera's (x, y), T₁ and T₂
+//! the points where the tangents from c touch the unit circle, and P a point with (x, y) = c + α (T₁ - c) + β
+//! (T₂ - c) and Δz = P_z - C_z. α, β and Δz are linear in P. Write σ = α + β and μ = 4/|c|². Then
 //!
 //! * the tangent planes are α = 0 and β = 0, the plane through both tangent points is σ = 1;
-//! * the infinite cylinder is (1 - σ)² <= μ α β, and the ray from C to P is inside it for s from 1/(σ + sqrt(μ α β)) to 1/(σ - sqrt(μ α β))
-//!   (s = 0 at C, 1 at P);
-//! * the cone from C over the end ellipse in the plane z = ±1, at distance k = ±1 - C_z, is (Δz - k σ)² <= μ k² α β.
+//! * the infinite cylinder is (1 - σ)² <= μ α β, and the ray from C to P is inside it for s from 1/(σ +
+//!   sqrt(μ α β)) to 1/(σ - sqrt(μ α β)) (s = 0 at C, 1 at P);
+//! * the cone from C over the end ellipse in the plane z = ±1, at distance k = ±1 - C_z, is (Δz - k σ)² <=
+//!   μ k² α β.
 //!
-//! The infinite cylinder hides from P(t) = A + t (B - A) what lies between the tangent planes and not in front of
-//! the body. Whether the ends cut that interval is seen at its two limits: if the ray to a limit is inside the infinite cylinder only
-//! above (below) the solid, the true limit is where the segment meets the cone over the top (bottom) end ellipse or
-//! pierces that end. A camera inside the infinite cylinder, beyond an end, sees that end only: the hidden set
-//! is the cone over it, from its plane on.
+//! The infinite cylinder hides from P(t) = A + t (B - A) what lies between the tangent planes and not in
+//! front of the body. Whether the ends cut that interval is seen at its two limits: if the ray to a limit is
+//! inside the infinite cylinder only above (below) the solid, the true limit is where the segment meets the
+//! cone over the top (bottom) end ellipse or pierces that end. A camera inside the infinite cylinder, beyond
+//! an end, sees that end only: the hidden set is the cone over it, from its plane on.
 //!
 //! # What is decided where geometry leaves it open
 //!
 //! * Contact does not hide: an occluder is shrunk by 1e-11 of its size. Side lines of equal cylinders in
-//!   one row coincide with each other's surface; they would otherwise hide each other by a rounding error. With a camera
-//!   some hundred radii away rounding stays below 1e-13 radii.
+//!   one row coincide with each other's surface; they would otherwise hide each other by a rounding error.
+//!   With a camera some hundred radii away rounding stays below 1e-13 radii.
 //! * A part does not hide its own contours; points of other parts inside it are hidden.
-//! * From a camera inside a part, or within 1e-7 of its size of it, everything is hidden, the definition of S taken literally.
+//! * From a camera inside a part, or within 1e-7 of its size of it, everything is hidden, the definition of
+//!   S taken literally.
 //! * A part with a semi-axis or a half length that is not positive shows nothing and hides nothing.
-//! * No image plane enters: contours behind the camera are treated like those before it. Clipping is the projection's affair.
-//! * Visible pieces shorter than 1e-11 of their contour, rounding between two occluders that meet, are dropped.
+//! * No image plane enters: contours behind the camera are treated like those before it. Clipping is the
+//!   projection's affair.
+//! * Visible pieces shorter than 1e-11 of their contour, rounding between two occluders that meet, are
+//!   dropped.
 
 use super::silhouette::{ContourKind, RimAspect, RimChord, camera_in_unit_frame, rims, side_lines};
 use super::{Contour, EllipticCylinder};
 use glam::DVec3;
 
-/// The relative size of what is taken for rounding: occluders shrink by it, shorter visible pieces are dropped.
+/// The relative size of what is taken for rounding: occluders shrink by it, shorter visible pieces are
+/// dropped.
 const ROUNDING: f64 = 1e-11;
 
-/// A camera nearer than this fraction of a part's size counts as inside: the tangent points then lose 1e-16/1e-7 in precision.
+/// A camera nearer to a part than this fraction of its size counts as inside. On the surface the tangent
+/// planes coincide; at this distance their coordinates still keep eight digits.
 const CONTACT: f64 = 1e-7;
 
 /// A visible piece of a contour generator in the world, metres.
@@ -71,7 +78,8 @@ impl Default for VisibilityOptions {
     }
 }
 
-/// The visible pieces of all contours, into `out`, which is cleared: part by part, left before right side line.
+/// The visible pieces of all contours, into `out`, which is cleared: part by part, left before right side
+/// line.
 ///
 /// To reuse memory over many views, keep a [`PreparedView`].
 pub fn visible_contours(
@@ -98,6 +106,9 @@ pub fn hidden_interval(
 /// Working memory of [`visible_contours`], for views in succession.
 #[derive(Debug, Clone, Default)]
 pub struct PreparedView {
+    camera_position: DVec3,
+    /// A direction from the camera to the body, along which depths are compared.
+    towards: DVec3,
     occluders: Vec<Occluder>,
     hidden: Vec<Interval>,
     chords: Vec<RimChord>,
@@ -113,19 +124,28 @@ impl PreparedView {
         out: &mut Vec<VisibleSegment>,
     ) {
         out.clear();
-        self.occluders.clear();
-        self.occluders.extend(
-            cylinders.iter().enumerate().filter_map(|(part, k)| Occluder::new(part, k, camera_position)),
-        );
+        self.prepare(cylinders, camera_position);
         if self.occluders.iter().any(|o| matches!(o.shadow, Shadow::Everything)) {
             return;
         }
         for (part, cylinder) in cylinders.iter().enumerate() {
             for line in side_lines(cylinder, camera_position).iter().flatten() {
-                self.push_visible(part, line, camera_position, out);
+                self.push_visible(part, line, out);
             }
             if options.rims {
-                self.push_visible_rims(part, cylinder, camera_position, options.rim_chords, out);
+                self.push_visible_rims(part, cylinder, options.rim_chords, out);
+            }
+        }
+    }
+
+    fn prepare(&mut self, cylinders: &[EllipticCylinder], camera_position: DVec3) {
+        self.camera_position = camera_position;
+        self.towards = cylinders.iter().map(|k| k.centre() - camera_position).sum();
+        self.occluders.clear();
+        for (part, cylinder) in cylinders.iter().enumerate() {
+            if let Some(shadow) = Shadow::new(cylinder, camera_position) {
+                let nearest = least_along(cylinder, camera_position, self.towards);
+                self.occluders.push(Occluder { part, nearest, shadow });
             }
         }
     }
@@ -134,30 +154,24 @@ impl PreparedView {
         &mut self,
         part: usize,
         cylinder: &EllipticCylinder,
-        camera_position: DVec3,
         chords: usize,
         out: &mut Vec<VisibleSegment>,
     ) {
         let mut rim_chords = std::mem::take(&mut self.chords);
         rim_chords.clear();
-        rims(cylinder, camera_position, chords, &mut rim_chords);
+        rims(cylinder, self.camera_position, chords, &mut rim_chords);
         for chord in rim_chords.iter().filter(|chord| chord.aspect != RimAspect::Hidden) {
-            self.push_visible(part, &chord.contour, camera_position, out);
+            self.push_visible(part, &chord.contour, out);
         }
         self.chords = rim_chords;
     }
 
     /// Appends what the other parts leave of one contour.
-    fn push_visible(
-        &mut self,
-        part: usize,
-        contour: &Contour,
-        camera_position: DVec3,
-        out: &mut Vec<VisibleSegment>,
-    ) {
-        let chord = Chord { a: contour.start - camera_position, b: contour.end - camera_position };
+    fn push_visible(&mut self, part: usize, contour: &Contour, out: &mut Vec<VisibleSegment>) {
+        let chord = Chord { a: contour.start - self.camera_position, b: contour.end - self.camera_position };
+        let farthest = self.towards.dot(chord.a).max(self.towards.dot(chord.b));
         self.hidden.clear();
-        for occluder in self.occluders.iter().filter(|o| o.part != part) {
+        for occluder in self.occluders.iter().filter(|o| o.part != part && !o.is_behind(farthest)) {
             match occluder.shadow.hidden_interval(&chord) {
                 Some(Interval { t0, t1 }) if t0 <= 0.0 && t1 >= 1.0 => return,
                 Some(hidden) => self.hidden.push(hidden),
@@ -200,13 +214,24 @@ struct Interval {
 #[derive(Debug, Clone)]
 struct Occluder {
     part: usize,
+    /// The least depth of its points, along [`PreparedView::towards`].
+    nearest: f64,
     shadow: Shadow,
 }
 
 impl Occluder {
-    fn new(part: usize, cylinder: &EllipticCylinder, camera_position: DVec3) -> Option<Self> {
-        Some(Self { part, shadow: Shadow::new(cylinder, camera_position)? })
+    /// Whether it lies before the camera and behind all points of a depth: what is hidden is deeper than what
+    /// hides it.
+    fn is_behind(&self, depth: f64) -> bool {
+        self.nearest > depth.max(0.0)
     }
+}
+
+/// The least product of a direction with the points of a cylinder, relative to the camera.
+fn least_along(cylinder: &EllipticCylinder, camera_position: DVec3, direction: DVec3) -> f64 {
+    let along = cylinder.world_from_cylinder.matrix3.transpose() * direction;
+    let reach = (along.truncate() * cylinder.semi_axes).length() + along.z.abs() * cylinder.half_length;
+    direction.dot(cylinder.centre() - camera_position) - reach
 }
 
 /// The hidden set S of one part in one view.
@@ -265,9 +290,9 @@ struct SideShadow {
 impl SideShadow {
     /// From the camera in the unit frame and the gradients of the unit frame's coordinates.
     ///
-    /// With ρ along c and λ across it, T₁ - c = (1/|c| - |c|, -w) and T₂ - c = (1/|c| - |c|, w), w = sqrt(1 - 1/|c|²), so that
-    /// α + β = -ρ |c| / (|c|² - 1) and β - α = λ / w. In the (ρ, z) plane K is the square |ρ|, |z| <= 1; the
-    /// planes `above` and `below` go through the camera at (|c|, C_z) and a corner of it.
+    /// With ρ along c and λ across it, T₁ - c = (1/|c| - |c|, -w) and T₂ - c = (1/|c| - |c|, w), w = sqrt(1 -
+    /// 1/|c|²), so that α + β = -ρ |c| / (|c|² - 1) and β - α = λ / w. In the (ρ, z) plane K is the square
+    /// |ρ|, |z| <= 1; the planes `above` and `below` go through the camera at (|c|, C_z) and a corner of it.
     fn new(camera: DVec3, x: DVec3, y: DVec3, z: DVec3) -> Self {
         let distance_sq = camera.truncate().length_squared();
         let distance = distance_sq.sqrt();
@@ -290,15 +315,12 @@ impl SideShadow {
     }
 
     fn hidden_interval(&self, chord: &Chord) -> Option<Interval> {
-        let alpha = Linear::along(self.alpha, chord);
-        let beta = Linear::along(self.beta, chord);
-        let above = Linear::along(self.above, chord);
-        let below = Linear::along(self.below, chord);
-        if alpha.is_never_positive()
-            || beta.is_never_positive()
-            || above.is_never_negative()
-            || below.is_never_negative()
-        {
+        let is_outside = |plane: DVec3| Linear::along(plane, chord).is_never_negative();
+        if is_outside(self.above) || is_outside(self.below) {
+            return None;
+        }
+        let (alpha, beta) = (Linear::along(self.alpha, chord), Linear::along(self.beta, chord));
+        if alpha.is_never_positive() || beta.is_never_positive() {
             return None;
         }
         let ray = SideRays {
@@ -325,8 +347,9 @@ struct SideRays<'a> {
 }
 
 impl SideRays<'_> {
-    /// What the infinite cylinder hides of a piece that lies between its tangent planes. Its near surface bounds
-    /// the piece where a limit lies before the plane of the tangent points, σ < 1, and not in the body.
+    /// What the infinite cylinder hides of a piece that lies between its tangent planes. Its near surface
+    /// bounds the piece where a limit lies before the plane of the tangent points, σ < 1, and not in the
+    /// body.
     fn not_in_front(&self, between: Interval) -> Option<Interval> {
         let front = Linear { at0: 1.0, at1: 1.0 }.plus(-1.0, self.sigma);
         let (front0, front1) = (front.at(between.t0), front.at(between.t1));
@@ -396,7 +419,8 @@ enum Passage {
     Beyond(f64),
 }
 
-/// S for a camera that looks from beyond an end along the axis: x, y, z are the gradients of the unit frame's coordinates.
+/// S for a camera that looks from beyond an end along the axis: x, y, z are the gradients of the unit frame's
+/// coordinates.
 #[derive(Debug, Clone)]
 struct EndShadow {
     camera: DVec3,
@@ -417,8 +441,9 @@ impl EndShadow {
     }
 }
 
-/// The piece of a segment whose rays, z running from 0 to Δz(t), meet an end face in the plane z = k, `cone` being
-/// negative inside the double cone over it. Its limits are the segment's ends, the cone, or where the segment pierces the face.
+/// The piece of a segment whose rays, z running from 0 to Δz(t), meet an end face in the plane z = k, `cone`
+/// being negative inside the double cone over it. Its limits are the segment's ends, the cone, or where the
+/// segment pierces the face.
 fn meets_end_face(cone: &Conic, dz: &Linear, k: f64) -> Option<Interval> {
     let is_inside = |t: f64| cone.at(t) <= 0.0;
     let slack = 1e-15 * (dz.at0.abs() + dz.at1.abs());
@@ -500,7 +525,8 @@ impl Linear {
     }
 }
 
-/// e² - m α β along a segment: negative inside a cone or cylinder whose tangent planes from the camera are α = 0 and β = 0.
+/// e² - m α β along a segment: negative inside a cone or cylinder whose tangent planes from the camera are α
+/// = 0 and β = 0.
 #[derive(Debug, Clone, Copy)]
 struct Conic {
     e: Linear,
@@ -517,8 +543,9 @@ impl Conic {
 
     /// The real roots in ascending order, one of them infinite where the function is linear.
     ///
-    /// The discriminant is taken from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]) with [pq] = p₀ q₁ - p₁ q₀: products of
-    /// what differs between the ends. b² - 4ac loses all digits for a camera near the plane of an end, where m goes to 0.
+    /// The discriminant is taken from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]) with [pq] = p₀ q₁ -
+    /// p₁ q₀: products of what differs between the ends. b² - 4ac loses all digits for a camera near the
+    /// plane of an end, where m goes to 0.
     fn roots(&self) -> Option<[f64; 2]> {
         let (e, alpha, beta, m) = (self.e, self.alpha, self.beta, self.m);
         let across = alpha.cross(beta);
@@ -551,7 +578,8 @@ pub(super) mod tests {
         EllipticCylinder { world_from_cylinder: pose, semi_axes: DVec2::new(a, b), half_length }
     }
 
-    /// A man of 1.8 m walking along +x, joints penetrating; `swing_rad` moves the right leg and the left arm forward.
+    /// A man of 1.8 m walking along +x, joints penetrating; `swing_rad` moves the right leg and the left arm
+    /// forward.
     pub(in crate::model) fn walker(swing_rad: f64) -> Vec<EllipticCylinder> {
         let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
         let along = |from: DVec3, angle: f64, length: f64, a: f64, b: f64| {
@@ -614,7 +642,8 @@ pub(super) mod tests {
         s0 <= s1 && (c + d * nearest).length_squared() <= 1.0
     }
 
-    /// Compares membership at regular samples, leaving out those within 1e-6 of the surface's size of a change.
+    /// Compares membership at regular samples, leaving out those within 1e-6 of the surface's size of a
+    /// change.
     fn check_against_samples(start: DVec3, end: DVec3, k: &EllipticCylinder, camera: DVec3) {
         let hidden = hidden_interval(start, end, k, camera);
         let (smaller, larger) = (scaled(k, 1.0 - 1e-6), scaled(k, 1.0 + 1e-6));
@@ -662,7 +691,8 @@ pub(super) mod tests {
         })
     }
 
-    /// The hidden share of a segment along y behind or in a post of radius 1 and half length 1, seen from x = 2.
+    /// The hidden share of a segment along y behind or in a post of radius 1 and half length 1, seen from x =
+    /// 2.
     #[test]
     fn a_post_hides_the_tangents_chord() {
         let post = upright(1.0, 1.0, 1.0);
@@ -789,6 +819,63 @@ pub(super) mod tests {
         assert!(visible(&[], camera).is_empty());
     }
 
+    /// A camera in the plane of an end, to rounding: the cone over that end is flat.
+    #[test]
+    fn from_the_plane_of_an_end_the_other_end_and_the_side_hide() {
+        let post = upright(0.5, 1.0, 0.5);
+        for (camera, p, q) in [
+            ([0.5, 2.0, 0.5], [-0.5, 1.0, 1.5], [1.0, 0.0, -1.0]),
+            ([-2.0, -1.0, 0.5], [1.0, 1.5, -0.5], [-2.0, -1.5, 1.5]),
+            ([-0.5, 1.5, 0.5], [2.0, 1.5, -2.0], [-1.5, -1.5, 1.5]),
+            ([-1.0, 1.5, 0.5], [0.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
+        ] {
+            let (camera, p, q) = (DVec3::from(camera), DVec3::from(p), DVec3::from(q));
+            assert!(hidden_interval(p, q, &post, camera).is_some());
+            for shift in [0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-10, -1e-10, 1e-8, -1e-8] {
+                check_against_samples(p, q, &post, camera + DVec3::Z * shift);
+            }
+        }
+    }
+
+    #[test]
+    fn memory_kept_between_views_changes_nothing() {
+        let (mut view, mut out) = (PreparedView::default(), Vec::new());
+        for rims in [true, false] {
+            let options = VisibilityOptions { rims, ..VisibilityOptions::default() };
+            for (i, camera) in viewpoints().into_iter().enumerate() {
+                let bodies = &walker(0.5)[..14 - i % 3];
+                let mut fresh = Vec::new();
+                visible_contours(bodies, camera, &options, &mut fresh);
+                view.visible_contours(bodies, camera, &options, &mut out);
+                assert_eq!(out, fresh);
+            }
+        }
+    }
+
+    /// No point of a visible chord of an end ellipse is hidden by another part or behind its own.
+    #[test]
+    fn visible_end_ellipses_are_hidden_by_nothing() {
+        let options = VisibilityOptions { rims: true, rim_chords: 64 };
+        let mut out = Vec::new();
+        for camera in viewpoints() {
+            let bodies = walker(0.3);
+            visible_contours(&bodies, camera, &options, &mut out);
+            let is_rim = |s: &&VisibleSegment| matches!(s.kind, ContourKind::BottomRim | ContourKind::TopRim);
+            assert!(out.iter().filter(is_rim).count() > 200);
+            for segment in out.iter().filter(is_rim) {
+                let point = segment.start.lerp(segment.end, 0.5);
+                // A chord lies inside its own ellipse by up to 0.13 % of the semi-axis.
+                assert!(bodies.iter().enumerate().all(|(part, k)| {
+                    !is_hidden(
+                        point,
+                        &scaled(k, if part == segment.part { 0.995 } else { 1.0 - 1e-9 }),
+                        camera,
+                    )
+                }));
+            }
+        }
+    }
+
     /// On every contour of a walker, the visible length is that of the points no other part hides.
     #[test]
     fn walker_agrees_with_samples() {
@@ -811,6 +898,8 @@ pub(super) mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
         #[test]
         fn interval_agrees_with_samples(k in cylinder(), camera in vector(3.0), p in vector(2.0), q in vector(2.0)) {
             check_against_samples(p, q, &k, camera);
@@ -826,6 +915,33 @@ pub(super) mod tests {
         #[test]
         fn interval_agrees_with_samples_on_a_grid(camera in grid_vector(), p in grid_vector(), q in grid_vector()) {
             check_against_samples(p, q, &upright(0.5, 1.0, 0.5), camera);
+        }
+
+        /// The visible pieces are what the hidden intervals of all other parts leave, each part taken alone.
+        #[test]
+        fn visible_pieces_are_what_no_part_hides(
+            bodies in proptest::collection::vec(cylinder().prop_map(|k| scaled(&k, 0.5)), 1..9),
+            camera in vector(0.8),
+        ) {
+            let segments = visible(&bodies, camera);
+            let inside = bodies.iter().any(|k| k.contains(camera));
+            for (part, body) in bodies.iter().enumerate().filter(|_| !inside) {
+                for line in side_lines(body, camera).iter().flatten() {
+                    let own: Vec<_> = segments.iter().filter(|s| s.part == part && s.kind == line.kind).collect();
+                    let others = bodies.iter().enumerate().filter(|(j, _)| *j != part);
+                    let hidden: Vec<_> = others
+                        .filter_map(|(_, k)| hidden_interval(line.start, line.end, k, camera))
+                        .collect();
+                    let along = line.end - line.start;
+                    for i in 0..50 {
+                        let t = (f64::from(i) + 0.5) / 50.0;
+                        let place = |p: DVec3| (p - line.start).dot(along) / along.length_squared();
+                        let is_shown = own.iter().any(|s| place(s.start) <= t && t <= place(s.end));
+                        prop_assert_eq!(is_shown, !hidden.iter().any(|&(t0, t1)| t0 <= t && t <= t1));
+                    }
+                }
+            }
+            prop_assert!(!inside || segments.is_empty());
         }
 
         #[test]
