@@ -33,6 +33,11 @@ class Camera:
         table = tables[name] if name else next(iter(tables.values()))
         return Camera(tuple(table["size"]))
 
+    @staticmethod
+    def from_tsai(*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad):
+        assert len(pixel_mm) == len(centre_px) == 2 and len(translation_mm) == len(rotation_rad) == 3
+        return Camera(size)
+
     def project(self, points):
         width, height = self.size
         focal = width * 0.9
@@ -49,7 +54,7 @@ class Track:
         self.camera = camera
         self.columns = walk(times_s, camera)
         self.events = [
-            {"time_s": float(times_s[i]), "frame": i, "event": "heel_strike", "side": side}
+            {"time_s": float(times_s[i]), "frame": i + 0.25, "event": "heel_strike", "side": side}
             for i, side in enumerate(["right", "left"][: len(times_s)])
         ]
         self.summary = {

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from memo.overlay import CONTOUR, draw_row, draw_segments, draw_text, write_overlay
-from memo.plot import plot_angles, plot_motion, plot_similarity, plot_start, write_plots
+from memo.plot import _cut_at_wraps, plot_angles, plot_motion, plot_similarity, plot_start, write_plots
 from memo.video import Frame, VideoReader
 
 WHITE = (255, 255, 255)
@@ -130,6 +130,13 @@ def test_start_line_passes_through_the_tracked_phases(track):
     frames, swapped = ax.lines[2].get_data()
     known = ~np.isnan(swapped)
     np.testing.assert_allclose(swapped[known], (frames[known] * 0.9 / 25 + 0.5) % 1, atol=1e-6)
+
+
+def test_a_line_is_cut_where_the_phase_starts_anew_forwards_and_backwards():
+    for phases in ([0.7, 0.9, 0.1, 0.3], [0.3, 0.1, 0.9, 0.7]):
+        cut, frames = _cut_at_wraps(phases, range(4))
+        np.testing.assert_array_equal(frames, [0, 1, np.nan, 2, 3])
+        np.testing.assert_array_equal(cut[[0, 1, 3, 4]], phases)
 
 
 def test_motion_shows_measured_left_and_filtered_right(track):

@@ -150,6 +150,13 @@ def test_bad_choices_are_refused(write_video, luma_frames, choice):
         VideoReader(write_video("ten.mp4", luma_frames(count=2)), **choice)
 
 
+def test_titles_in_any_encoding_do_no_harm(write_video, luma_frames):
+    path = write_video("title.mp4", luma_frames(count=2))
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"Lavf", b"\xe9t\xe9f"))
+    assert data != path.read_bytes() and len(read(path)[0]) == 2
+
+
 def test_frames_are_read_once(write_video, luma_frames):
     with VideoReader(write_video("once.mp4", luma_frames(count=2))) as reader:
         assert len(list(reader)) == 2

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.files import JOINTS, write_events_csv, write_track_csv
+from memo.files import JOINTS, read_tsai_xml, write_events_csv, write_track_csv
 
 if TYPE_CHECKING:
     import typer
@@ -64,6 +64,11 @@ class Delivery:
     plots: bool = True
     as_json: bool = False
     quiet: bool = False
+
+    @property
+    def talks(self) -> bool:
+        """Whether results are told in sentences."""
+        return not (self.quiet or self.as_json)
 
 
 def main() -> None:
@@ -165,20 +170,19 @@ def _track_video(
 
     with opened() as reader:
         _check_camera_fits(tracker_options, reader)
-        if reader.pixel_aspect != 1:
+        if "camera" not in tracker_options and reader.pixel_aspect != 1:
             _complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
         tracker = _new_tracker(tracker_options)
         track, interrupted = _follow(reader, tracker, reader.frame_count, frame_range[0], delivery)
         if reader.damage:
             _complain(f"{video}: {reader.damage}")
     if interrupted:
-        written = _write_tables(track, delivery)
-        _report(track, written, delivery)
-        _complain("interrupted: the tables hold what was tracked until then; no overlay, no plots")
-        return Exit.INTERRUPTED
+        return _deliver_interrupted(track, delivery)
     with opened() as reader:
         written = _write_all(track, reader, reader.frame_count, reader.rate_hz, delivery)
     _report(track, written, delivery)
+    if "camera" not in tracker_options and delivery.talks:
+        print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
     return _exit_code(track)
 
 
@@ -193,7 +197,7 @@ def _demo(out: Path, seed: int) -> Exit:
     tracker = _new_tracker({"height_m": scene.height_m, "camera": scene.camera})
     track, interrupted = _follow(frames, tracker, len(frames), 0, delivery)
     if interrupted:
-        return Exit.INTERRUPTED
+        return _deliver_interrupted(track, delivery)
     rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
     written = _write_all(track, frames, len(frames), rate_hz, delivery)
     _report(track, written, delivery)
@@ -215,7 +219,7 @@ def _load_camera(path: Path, name: str | None) -> Any:
     if not path.is_file():
         raise InputError(f"{path}: no such camera file")
     if path.suffix.lower() == ".xml":
-        return memo.Camera.from_tsai(str(path))
+        return memo.Camera.from_tsai(**read_tsai_xml(path))
     return memo.Camera.from_toml(str(path), name=name)
 
 
@@ -335,12 +339,18 @@ def _write_all(
     return written
 
 
+def _deliver_interrupted(track: Any, delivery: Delivery) -> Exit:
+    _report(track, _write_tables(track, delivery), delivery)
+    _complain("interrupted: the tables hold what was tracked until then; no overlay, no plots")
+    return Exit.INTERRUPTED
+
+
 def _report(track: Any, written: list[Path], delivery: Delivery) -> None:
     if delivery.as_json:
         files = [str(path) for path in written]
         print(json.dumps(_plain({**track.summary, "rows": len(track.columns["frame"]), "files": files})))
         return
-    if delivery.quiet:
+    if not delivery.talks:
         return
     print(track.summary["message"])
     p_swapped = track.summary.get("p_swapped")

@@ -1,7 +1,7 @@
-"""The tables a tracked walk is written to: `track.csv` and `events.csv`.
+"""The tables a tracked walk is written to, `track.csv` and `events.csv`, and calibrations in XML.
 
-Comma separated, one header row, metres, radians where the name says `_rad`, degrees where it says `_deg`,
-an empty cell for a value that is not known. A file appears under its name only when it is complete.
+The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
+it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ __all__ = [
     "complete_file",
     "read_events_csv",
     "read_track_csv",
+    "read_tsai_xml",
     "write_events_csv",
     "write_track_csv",
 ]
@@ -43,10 +45,20 @@ TRACK_COLUMNS = (
 """Columns of `track.csv`, in order."""
 
 EVENT_COLUMNS = ("time_s", "frame", "event", "side")
-"""Columns of `events.csv`, in order."""
+"""Columns of `events.csv`, in order; `frame` has a fraction where the event falls between two frames."""
 
 # Digits after the point: well below what a single camera resolves, so that rounding never shows.
-_DIGITS = {"_m": 4, "_mps": 4, "_px": 2, "_deg": 2, "_rad": 5, "_s": 6, "phase": 5, "p_swapped": 6}
+_DIGITS = {
+    "frame": 2,
+    "_m": 4,
+    "_mps": 4,
+    "_px": 2,
+    "_deg": 2,
+    "_rad": 5,
+    "_s": 6,
+    "phase": 5,
+    "p_swapped": 6,
+}
 
 Column = npt.NDArray[Any]
 
@@ -82,9 +94,32 @@ def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, An
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
     """Reads what `write_events_csv` wrote."""
     return [
-        {**row, "time_s": float(row["time_s"]), "frame": int(row["frame"])}
+        {**row, "time_s": float(row["time_s"]), "frame": float(row["frame"])}
         for row in _read_rows(path, EVENT_COLUMNS)
     ]
+
+
+def read_tsai_xml(path: str | PathLike[str]) -> dict[str, Any]:
+    """Tsai's calibration from the XML of PETS and ETISEO, as the arguments of `Camera.from_tsai`."""
+    try:
+        root = ElementTree.parse(path).getroot()
+        values = {name: float(value) for part in root for name, value in part.attrib.items()}
+
+        def of(*names: str) -> tuple[float, ...]:
+            return tuple(values[name] for name in names)
+
+        return {
+            "size": tuple(int(length) for length in of("width", "height")),
+            "pixel_mm": of("dpx", "dpy"),
+            "focal_mm": values["focal"],
+            "kappa1_per_mm2": values["kappa1"],
+            "centre_px": of("cx", "cy"),
+            "sx": values["sx"],
+            "translation_mm": of("tx", "ty", "tz"),
+            "rotation_rad": of("rx", "ry", "rz"),
+        }
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise ValueError(f"{path}: not a Tsai calibration in XML: {error}") from None
 
 
 @contextmanager

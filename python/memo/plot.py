@@ -138,7 +138,7 @@ def _phase_line(columns: dict[str, Any]) -> Callable[[npt.NDArray[np.float64]], 
 def _cut_at_wraps(phases: npt.ArrayLike, *others: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
     """Phases in [0, 1), and the others, with a NaN between where they start anew: no line is drawn across."""
     wrapped = np.mod(phases, 1.0)
-    anew = 1 + np.flatnonzero(np.diff(wrapped) < -0.5)
+    anew = 1 + np.flatnonzero(np.abs(np.diff(wrapped)) > 0.5)
     return [np.insert(np.asarray(values, np.float64), anew, np.nan) for values in (wrapped, *others)]
 
 

@@ -169,7 +169,7 @@ class _File:
 
     def __init__(self, path: Path) -> None:
         try:
-            self._container = av.open(str(path))
+            self._container = av.open(str(path), metadata_errors="replace")
         except av.error.InvalidDataError:
             raise VideoError(f"{path}: not a video, or its index is missing (recording cut off)") from None
         except (av.error.FFmpegError, OSError) as error:
@@ -178,6 +178,9 @@ class _File:
             self._container.close()
             raise VideoError(f"{path}: holds no video stream")
         self._stream = self._container.streams.video[0]
+        if self._stream.codec_context is None:
+            self._container.close()
+            raise VideoError(f"{path}: no decoder for its video stream")
         self._stream.thread_type = "AUTO"
         self.undecodable = 0
         self.counted = self._stream.frames > 0
