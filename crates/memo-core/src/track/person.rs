@@ -34,7 +34,7 @@ impl Default for PersonOptions {
             angle_sd_rad: 12f64.to_radians(),
             height_sd: 0.03,
             loss_per_sd: 0.01,
-            min_gain: 0.08,
+            min_gain: 0.10,
             frames: 16,
         }
     }
