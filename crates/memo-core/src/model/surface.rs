@@ -238,6 +238,7 @@ mod tests {
         let right = forward.cross(up).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
         Camera {
+            distortion: crate::model::Distortion::None,
             size: [640, 480],
             focal_px: DVec2::splat(focal_px),
             centre_px: DVec2::new(319.5, 239.5),
