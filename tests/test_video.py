@@ -1,6 +1,7 @@
 """Videos in every state they come in: each is written here, then read back."""
 
 import struct
+import warnings
 import wave
 from fractions import Fraction
 
@@ -198,6 +199,26 @@ def test_damage_in_the_middle_is_counted(write_video, luma_frames):
         frames = list(reader)
     assert 30 < len(frames) < 60
     assert np.all(np.diff([frame.time_s for frame in frames]) > 0)
+
+
+def test_random_damage_is_refused_or_read_around(write_video, luma_frames, tmp_path):
+    rng = np.random.default_rng(7)
+    whole = write_video("whole.mp4", luma_frames(count=20)).read_bytes()
+    path, read_around = tmp_path / "hurt.mp4", 0
+    for _ in range(60):
+        data = bytearray(whole)
+        for place in rng.integers(0, len(data), rng.choice([1, 10, 100])):
+            data[place] = rng.integers(256)
+        path.write_bytes(data)
+        try:
+            with warnings.catch_warnings(), VideoReader(path) as reader:
+                warnings.simplefilter("ignore", VideoDamageWarning)
+                times_s = [frame.time_s for frame in reader]
+        except VideoError:
+            continue
+        assert np.all(np.diff(times_s) > 0)
+        read_around += reader.damage is not None
+    assert read_around > 5
 
 
 def test_what_is_not_a_video_is_named(tmp_path):

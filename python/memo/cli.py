@@ -187,13 +187,9 @@ def _track_video(
 
 
 def _demo(out: Path, seed: int) -> Exit:
-    from memo.video import Frame
-
     delivery = Delivery(out)
     _check_writable(out)
-    scene = memo.demo_scene(seed=seed)
-    timed = zip(scene.times_s, scene.frames, strict=True)
-    frames = [Frame(index, float(time_s), luma) for index, (time_s, luma) in enumerate(timed)]
+    scene, frames = _draw_scene(seed)
     tracker = _new_tracker({"height_m": scene.height_m, "camera": scene.camera})
     track, interrupted = _follow(frames, tracker, len(frames), 0, delivery)
     if interrupted:
@@ -215,6 +211,14 @@ def _new_tracker(options: dict[str, Any]) -> Any:
     return memo.Tracker(**options)
 
 
+def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
+    from memo.video import Frame
+
+    scene = memo.demo_scene(seed=seed)
+    timed = zip(scene.times_s, scene.frames, strict=True)
+    return scene, [Frame(index, float(time_s), luma) for index, (time_s, luma) in enumerate(timed)]
+
+
 def _load_camera(path: Path, name: str | None) -> Any:
     if not path.is_file():
         raise InputError(f"{path}: no such camera file")
@@ -227,8 +231,7 @@ def _follow(
     frames: "Iterable[Frame]", tracker: Any, count: int | None, first_frame: int, delivery: Delivery
 ) -> tuple[Any, bool]:
     """Gives all frames to the tracker; an interrupt ends it after the current frame."""
-    with warnings.catch_warnings(), _Interrupt() as interrupt:
-        warnings.simplefilter("ignore", UserWarning)  # damage is told at the end, in one line
+    with _Interrupt() as interrupt:
         for frame in _with_progress(frames, "tracking", count, delivery):
             tracker.update(frame.luma, frame.time_s)
             if interrupt.requested:
@@ -328,9 +331,7 @@ def _write_all(
         from memo.overlay import write_overlay
 
         path = delivery.out / "overlay.mp4"
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # damage was told after tracking
-            write_overlay(path, _with_progress(frames, "drawing", count, delivery), track, rate_hz=rate_hz)
+        write_overlay(path, _with_progress(frames, "drawing", count, delivery), track, rate_hz=rate_hz)
         written.append(path)
     if delivery.plots:
         from memo.plot import write_plots
@@ -408,8 +409,12 @@ def _with_progress(
 
 def _guarded(work: Callable[[], Exit]) -> Exit:
     """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept."""
+    from memo.video import VideoDamageWarning
+
     try:
-        return work()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", VideoDamageWarning)  # damage is told in one line instead
+            return work()
     except (ValueError, TypeError, OSError) as error:
         if os.environ.get("MEMO_DEBUG"):
             raise

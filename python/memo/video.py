@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from os import PathLike
@@ -201,8 +200,12 @@ class _File:
                 self.undecodable += 1
             else:
                 yield from frames
-        with suppress(av.error.EOFError):  # raised where the last packet has flushed the decoder already
+        try:
             yield from self._stream.codec_context.decode(None)
+        except av.error.EOFError:
+            pass  # the last packet has flushed the decoder already
+        except av.error.FFmpegError:
+            self.undecodable += 1
 
     def _packets(self) -> Iterator[av.Packet]:
         try:
