@@ -1,11 +1,24 @@
 //! Python bindings of memo-core: convert, release the interpreter lock, one call, convert back.
 
+mod array;
+mod camera;
+mod error;
+mod image;
+mod tracker;
+
 use pyo3::prelude::*;
 
 /// The compiled core of the `memo` package.
 #[pymodule]
 mod _memo {
     use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::camera::PyCamera;
+    #[pymodule_export]
+    use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::tracker::{PyTracker, PyWalk};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -17,7 +17,7 @@ use super::walk::{FrameEdges, Walk, WalkOptions};
 use crate::image::{Frame, Rectangle};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use thiserror::Error;
 
 /// Why tracking stopped with an error.
@@ -135,6 +135,25 @@ pub struct SeekReport {
     pub refused_starts: usize,
 }
 
+/// The latest filtered estimate of a stream.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Now {
+    /// Number of the frame.
+    pub frame: usize,
+    /// Its time, seconds.
+    pub time_s: f64,
+    /// Centre of the torso, metres.
+    pub torso_centre: DVec3,
+    /// Direction faced, radians about world Z.
+    pub heading_rad: f64,
+    /// Gait phase in [0, 1).
+    pub phase: f64,
+    /// Probability, on what has been seen so far, that left and right are swapped.
+    pub p_swapped: f64,
+    /// Speed along the path, metres a second.
+    pub speed_mps: f64,
+}
+
 /// A streaming tracker.
 #[derive(Debug)]
 pub struct Tracker {
@@ -200,9 +219,21 @@ impl Tracker {
         std::mem::take(&mut self.finished)
     }
 
-    /// The walk under way with its camera.
-    pub fn current(&self) -> Option<(&Walk, &Camera)> {
-        self.walking.as_ref().map(|active| (&active.walk, &active.camera))
+    /// The filtered state of the better twin at the last frame worked on, while somebody is followed.
+    pub fn current(&self) -> Option<Now> {
+        let active = self.walking.as_ref()?;
+        let step = active.walk.last()?;
+        let hypothesis = step.state.hypothesis();
+        let scene = Scene { walker: &active.walk.walker, camera: &active.camera, path: &active.walk.path };
+        Some(Now {
+            frame: step.frame,
+            time_s: step.time_s,
+            torso_centre: scene.pose(&hypothesis).torso_centre,
+            heading_rad: active.walk.path.heading_rad,
+            phase: hypothesis.phase,
+            p_swapped: active.walk.swap_probability(&self.options.walk.swap),
+            speed_mps: step.state.along.velocity,
+        })
     }
 
     /// What happened while nobody was followed.

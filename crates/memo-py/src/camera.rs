@@ -1,0 +1,108 @@
+//! `Camera`.
+
+use crate::array::{numpy_from_rows, points_from_numpy};
+use crate::error::value_error;
+use glam::{DVec2, DVec3};
+use memo_core::model::{Camera, TsaiParameters};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// A calibrated camera: OpenCV axes, world Z up, metres.
+#[pyclass(name = "Camera", module = "memo", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct PyCamera(pub Camera);
+
+#[pymethods]
+impl PyCamera {
+    /// Reads a Pose2Sim/anipose TOML file; `name` chooses one of several cameras.
+    #[staticmethod]
+    #[pyo3(signature = (path, name=None))]
+    fn from_toml(path: std::path::PathBuf, name: Option<&str>) -> PyResult<Self> {
+        let text = std::fs::read_to_string(&path)?;
+        let camera = Camera::from_toml_str(&text, name);
+        camera
+            .map(Self)
+            .map_err(|error| pyo3::exceptions::PyValueError::new_err(format!("{}: {error}", path.display())))
+    }
+
+    /// From Tsai's parameters, lengths in mm, angles in radians.
+    #[staticmethod]
+    #[pyo3(signature = (*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad))]
+    #[allow(clippy::too_many_arguments, reason = "Tsai's model has this many parameters")]
+    fn from_tsai(
+        size: (u32, u32),
+        pixel_mm: (f64, f64),
+        focal_mm: f64,
+        kappa1_per_mm2: f64,
+        centre_px: (f64, f64),
+        sx: f64,
+        translation_mm: (f64, f64, f64),
+        rotation_rad: (f64, f64, f64),
+    ) -> PyResult<Self> {
+        let tsai = TsaiParameters {
+            size: size.into(),
+            pixel_mm: DVec2::from(pixel_mm),
+            focal_mm,
+            kappa1_per_mm2,
+            centre_px: DVec2::from(centre_px),
+            sx,
+            translation_mm: DVec3::from(translation_mm),
+            rotation_rad: DVec3::from(rotation_rad),
+        };
+        Camera::from_tsai(&tsai).map(Self).map_err(value_error)
+    }
+
+    /// A level camera without distortion, looking along world Y, the origin on the ground `distance_m` before it.
+    #[staticmethod]
+    fn level(size: (u32, u32), fov_deg: f64, camera_height_m: f64, distance_m: f64) -> PyResult<Self> {
+        Camera::level(size.into(), fov_deg.to_radians(), camera_height_m, distance_m)
+            .map(Self)
+            .map_err(value_error)
+    }
+
+    /// Image width and height, pixels.
+    #[getter]
+    fn size(&self) -> (u32, u32) {
+        self.0.size.into()
+    }
+
+    /// The centre of projection in the world, metres.
+    #[getter]
+    fn position(&self) -> (f64, f64, f64) {
+        self.0.position().into()
+    }
+
+    /// Pixels (N, 2) of world points (N, 3); NaN for points the camera cannot see.
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let pixel = |p: [f64; 3]| self.0.project(DVec3::from(p)).unwrap_or(DVec2::NAN).to_array();
+        numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(pixel).collect())
+    }
+
+    /// Where the rays of pixels (N, 2) meet the plane `z_m` metres above the ground, (N, 3); NaN where they do not.
+    #[pyo3(signature = (pixels, z_m=0.0))]
+    fn ground_points<'py>(
+        &self,
+        py: Python<'py>,
+        pixels: Vec<(f64, f64)>,
+        z_m: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let point = |pixel: (f64, f64)| {
+            let ideal = self.0.undistort(DVec2::from(pixel)).ok();
+            ideal.and_then(|p| self.0.point_at_height(p, z_m)).unwrap_or(DVec3::NAN).to_array()
+        };
+        numpy_from_rows(py, pixels.into_iter().map(point).collect())
+    }
+
+    fn __repr__(&self) -> String {
+        let [width, height] = self.0.size;
+        let p = self.0.position();
+        format!(
+            "Camera({width}x{height}, f={:.0} px, at ({:.2}, {:.2}, {:.2}) m)",
+            self.0.focal_px.x, p.x, p.y, p.z
+        )
+    }
+}

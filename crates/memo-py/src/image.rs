@@ -1,0 +1,126 @@
+//! Image evidence: changes, background, edges, velocities.
+
+use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
+use crate::error::value_error;
+use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
+use memo_core::image::{
+    Background, BackgroundOptions, ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions,
+    LineOptions, clean, edge_segments as core_edge_segments, fill_holes, group_regions, pair_changes,
+    regions,
+};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// Pixels that changed between two frames (eq. 1); `threshold` in grey levels, by default from the noise.
+#[pyfunction]
+#[pyo3(signature = (a, b, threshold=None))]
+pub fn change_mask<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+    threshold: Option<f64>,
+) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let (a, b) = (frame_from_numpy(a)?, frame_from_numpy(b)?);
+    let options = ChangeOptions { threshold, ..ChangeOptions::default() };
+    let mask = py.detach(|| pair_changes(&a.as_frame(), &b.as_frame(), &options)).map_err(value_error)?;
+    numpy_from_image(py, mask)
+}
+
+/// Candidate regions of a change mask after the binary operations: (n, 5) of left, top, right, bottom (inclusive) and
+/// area, largest first.
+#[pyfunction]
+pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let mask = mask_from_numpy(mask)?;
+    let group = GroupOptions::default();
+    let cleaned = py.detach(|| clean(&mask, &CleanOptions::default())).map_err(value_error)?;
+    let found = py.detach(|| group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group));
+    let row = |r: &memo_core::image::Region| {
+        let q = r.rectangle;
+        [q.left, q.top, q.right, q.bottom, r.area].map(|v| v as f64)
+    };
+    numpy_from_rows(py, found.iter().map(row).collect())
+}
+
+/// Silhouettes of what moves before a static background, for a clip of frames (T, H, W): eq. (1) against the temporal median, cut
+/// to the pixels that differ by `threshold` grey levels.
+#[pyfunction]
+#[pyo3(signature = (frames, threshold=20.0))]
+pub fn silhouettes<'py>(
+    py: Python<'py>,
+    frames: Vec<Bound<'py, PyAny>>,
+    threshold: f64,
+) -> PyResult<Vec<Bound<'py, PyArray2<bool>>>> {
+    let images = frames.iter().map(frame_from_numpy).collect::<PyResult<Vec<_>>>()?;
+    let views: Vec<_> = images.iter().map(|image| image.as_frame()).collect();
+    let background =
+        py.detach(|| Background::from_frames(&views, BackgroundOptions::default())).map_err(value_error)?;
+    let one = |frame: &memo_core::image::Frame<'_>| {
+        let changed = background.foreground(frame).map_err(value_error)?;
+        let cleaned = clean(&changed, &CleanOptions::default()).map_err(value_error)?;
+        let group = GroupOptions::default();
+        let person = group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group);
+        let within = match person.first() {
+            Some(region) => region.mask(frame.width(), frame.height()),
+            None => memo_core::image::Mask::filled(frame.width(), frame.height(), false),
+        };
+        background.silhouette(frame, &within, threshold).map_err(value_error)
+    };
+    let masks = py.detach(|| views.iter().map(one).collect::<PyResult<Vec<_>>>())?;
+    masks.into_iter().map(|mask| numpy_from_image(py, mask)).collect()
+}
+
+/// Straight edges of a frame: (n, 6) of u0, v0, u1, v1, mean gradient, residual RMS.
+#[pyfunction]
+#[pyo3(signature = (frame, mask=None, *, sigma_px=1.0, low=5.0, high=12.0, min_length_px=8.0))]
+pub fn edge_segments<'py>(
+    py: Python<'py>,
+    frame: &Bound<'py, PyAny>,
+    mask: Option<&Bound<'py, PyAny>>,
+    sigma_px: f32,
+    low: f32,
+    high: f32,
+    min_length_px: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let frame = frame_from_numpy(frame)?;
+    let mask = mask.map(mask_from_numpy).transpose()?;
+    let edge = EdgeOptions { sigma_px, low, high };
+    let line = LineOptions { min_length_px, ..LineOptions::default() };
+    let domain = EdgeDomain { mask: mask.as_ref(), window: None };
+    let found =
+        py.detach(|| core_edge_segments(&frame.as_frame(), &domain, &edge, &line)).map_err(value_error)?;
+    let row = |s: &memo_core::image::EdgeSegment| {
+        [s.start_px.x, s.start_px.y, s.end_px.x, s.end_px.y, s.mean_gradient, s.residual_rms_px]
+    };
+    numpy_from_rows(py, found.iter().map(row).collect())
+}
+
+/// Velocity (u, v) of the pixels of a region from one frame to the next, two (H, W) arrays of pixels per frame, NaN where
+/// nothing is known.
+#[pyfunction]
+pub fn velocity_field<'py>(
+    py: Python<'py>,
+    first: &Bound<'py, PyAny>,
+    second: &Bound<'py, PyAny>,
+    region: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+    let (first, second, region) =
+        (frame_from_numpy(first)?, frame_from_numpy(second)?, mask_from_numpy(region)?);
+    let field = py
+        .detach(|| {
+            core_velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default())
+        })
+        .map_err(value_error)?;
+    let (width, height) = (first.width(), first.height());
+    let mut components = [vec![f32::NAN; width * height], vec![f32::NAN; width * height]];
+    for y in 0..height {
+        for x in 0..width {
+            if let Some(velocity) = field.at(x, y) {
+                components[0][y * width + x] = velocity.x as f32;
+                components[1][y * width + x] = velocity.y as f32;
+            }
+        }
+    }
+    let image = |data| memo_core::image::Image::from_vec(width, height, data).map_err(value_error);
+    let [u, v] = components;
+    Ok((numpy_from_image(py, image(u)?)?, numpy_from_image(py, image(v)?)?))
+}

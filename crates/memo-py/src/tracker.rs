@@ -1,0 +1,266 @@
+//! `Tracker` and the walks it finds.
+
+use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
+use crate::camera::PyCamera;
+use crate::error::value_error;
+use glam::{DVec2, DVec3};
+use memo_core::model::{SideJoints, VisibilityOptions, visible_contours};
+use memo_core::track::person::PersonOptions;
+use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
+use memo_core::track::search::Hypothesis;
+use memo_core::track::start::Direction;
+use memo_core::track::tracker::{GaitChoice, Tracker, TrackerOptions};
+use numpy::{PyArray1, PyArray2, PyArrayDyn};
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
+#[pyclass(name = "Tracker", module = "memo._memo")]
+pub struct PyTracker(Tracker);
+
+#[pymethods]
+impl PyTracker {
+    #[new]
+    #[pyo3(signature = (height_m=1.75, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13))]
+    fn new(
+        height_m: f64,
+        camera: Option<PyCamera>,
+        fov_deg: Option<f64>,
+        gait: &str,
+        adapt: bool,
+        start_frames: usize,
+    ) -> PyResult<Self> {
+        let mut options = TrackerOptions::for_height(height_m);
+        options.camera = camera.map(|camera| camera.0);
+        if let Some(degrees) = fov_deg {
+            options.field_of_view_rad = degrees.to_radians();
+        }
+        options.gait = match gait {
+            "dense" => GaitChoice::Dense,
+            "sampled_10" => GaitChoice::Sampled10,
+            other => {
+                let message = format!("gait must be 'dense' or 'sampled_10', got {other:?}");
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        options.person = adapt.then(PersonOptions::default);
+        options.start_frames = start_frames;
+        Tracker::new(options).map(Self).map_err(value_error)
+    }
+
+    /// Takes the next frame, (H, W) uint8, and its time in seconds.
+    fn update(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
+        let frame = frame_from_numpy(frame)?;
+        py.detach(|| self.0.update(&frame.as_frame(), time_s)).map_err(value_error)
+    }
+
+    /// Ends the stream.
+    fn finish(&mut self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.0.finish()).map_err(value_error)
+    }
+
+    /// The walks that have ended since this was last asked.
+    fn take_finished(&mut self) -> Vec<PyWalk> {
+        self.0.take_finished().into_iter().map(PyWalk::new).collect()
+    }
+
+    /// Filtered state of the walk under way: a dict of time, position, phase, speed and `p_swapped`, or None.
+    fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(now) = self.0.current() else { return Ok(None) };
+        let dict = PyDict::new(py);
+        dict.set_item("frame", now.frame)?;
+        dict.set_item("time_s", now.time_s)?;
+        dict.set_item("x_m", now.torso_centre.x)?;
+        dict.set_item("y_m", now.torso_centre.y)?;
+        dict.set_item("z_m", now.torso_centre.z)?;
+        dict.set_item("heading_rad", now.heading_rad)?;
+        dict.set_item("phase", now.phase)?;
+        dict.set_item("p_swapped", now.p_swapped)?;
+        dict.set_item("speed_mps", now.speed_mps)?;
+        Ok(Some(dict))
+    }
+
+    /// What happened while nobody was followed: numbers of frames.
+    fn seek_report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let report = self.0.seek_report();
+        let dict = PyDict::new(py);
+        dict.set_item("frames", report.frames)?;
+        dict.set_item("frames_with_candidate", report.frames_with_candidate)?;
+        dict.set_item("frames_cut_off", report.frames_cut_off)?;
+        dict.set_item("refused_starts", report.refused_starts)?;
+        Ok(dict)
+    }
+}
+
+/// One walk that has ended.
+#[pyclass(name = "Walk", module = "memo._memo", frozen)]
+pub struct PyWalk {
+    walk: TrackedWalk,
+    rows: Vec<Row>,
+}
+
+impl PyWalk {
+    fn new(walk: TrackedWalk) -> Self {
+        let rows = walk.rows();
+        Self { walk, rows }
+    }
+
+    fn column(&self, value: impl Fn(&Row) -> f64) -> Vec<f64> {
+        self.rows.iter().map(value).collect()
+    }
+}
+
+#[pymethods]
+impl PyWalk {
+    /// The columns of `track.csv`, an array each.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let frames: Vec<i64> = self.rows.iter().map(|row| row.frame as i64).collect();
+        dict.set_item("frame", numpy_from_column(py, frames))?;
+        let mut set = |name: &str, column: Vec<f64>| dict.set_item(name, numpy_from_column(py, column));
+        set("time_s", self.column(|r| r.time_s))?;
+        set("x_m", self.column(|r| r.torso_centre.x))?;
+        set("y_m", self.column(|r| r.torso_centre.y))?;
+        set("z_m", self.column(|r| r.torso_centre.z))?;
+        set("heading_rad", self.column(|r| r.heading_rad))?;
+        set("phase", self.column(|r| r.phase))?;
+        set("p_swapped", self.column(|r| r.p_swapped))?;
+        set("speed_mps", self.column(|r| r.speed_mps))?;
+        for (i, name) in ["sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"].into_iter().enumerate() {
+            set(name, self.column(|r| r.sd[i]))?;
+        }
+        for side in ["right", "left"] {
+            let angles = |r: &Row| if side == "right" { r.posture.right } else { r.posture.left };
+            set(&format!("{side}_hip_deg"), self.column(|r| angles(r).hip.to_degrees()))?;
+            set(&format!("{side}_knee_deg"), self.column(|r| angles(r).knee.to_degrees()))?;
+            set(&format!("{side}_shoulder_deg"), self.column(|r| angles(r).shoulder.to_degrees()))?;
+            set(&format!("{side}_elbow_deg"), self.column(|r| angles(r).elbow.to_degrees()))?;
+            for (i, joint) in SideJoints::NAMES.into_iter().enumerate() {
+                let at = |r: &Row| if side == "right" { r.right.to_array()[i] } else { r.left.to_array()[i] };
+                let pixel = |r: &Row| self.walk.camera.project(at(r)).unwrap_or(DVec2::NAN);
+                set(&format!("{side}_{joint}_x_m"), self.column(|r| at(r).x))?;
+                set(&format!("{side}_{joint}_y_m"), self.column(|r| at(r).y))?;
+                set(&format!("{side}_{joint}_z_m"), self.column(|r| at(r).z))?;
+                set(&format!("{side}_{joint}_u_px"), self.column(|r| pixel(r).x))?;
+                set(&format!("{side}_{joint}_v_px"), self.column(|r| pixel(r).y))?;
+            }
+        }
+        set("similarity", self.column(|r| r.similarity))?;
+        Ok(dict)
+    }
+
+    /// Gait events: (time_s, frame, event, side).
+    fn events(&self) -> Vec<(f64, f64, &'static str, &'static str)> {
+        let kind = |kind| match kind {
+            EventKind::HeelStrike => "heel_strike",
+            EventKind::ToeOff => "toe_off",
+        };
+        let side = |side| match side {
+            Side::Right => "right",
+            Side::Left => "left",
+        };
+        self.walk.events().into_iter().map(|e| (e.time_s, e.frame, kind(e.kind), side(e.side))).collect()
+    }
+
+    /// Best measured hypotheses per frame, (rows, 3): x or place along the path in world x, z in metres, phase; NaN where none.
+    fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let path = &self.walk.walk.path;
+        let row = |measured: &Option<Hypothesis>| match measured {
+            Some(h) => {
+                let vertical = self.walk.walk.walker.gait.vertical_m(h.phase);
+                [path.point(h.along_m, 0.0).x, h.height_m + vertical, h.phase]
+            }
+            None => [f64::NAN; 3],
+        };
+        numpy_from_rows(py, self.walk.steps().iter().map(|step| row(&step.measured)).collect())
+    }
+
+    /// Visible contours of a row's model in image pixels, (segments, 2, 2), and the body part of each segment.
+    fn contours<'py>(
+        &self,
+        py: Python<'py>,
+        row: usize,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>)> {
+        let Some(row) = self.rows.get(row) else {
+            let message = format!("row {row} of a walk with {} rows", self.rows.len());
+            return Err(PyIndexError::new_err(message));
+        };
+        let camera = &self.walk.camera;
+        let posed = self.walk.scene().pose(&row.hypothesis);
+        let options = VisibilityOptions { rims: true, ..VisibilityOptions::default() };
+        let mut visible = Vec::new();
+        visible_contours(&posed.cylinders, camera.position(), &options, &mut visible);
+        let pixel = |p: DVec3| camera.project(p).map(|q| q.to_array());
+        let (mut segments, mut parts) = (Vec::new(), Vec::new());
+        for piece in &visible {
+            if let (Some(start), Some(end)) = (pixel(piece.start), pixel(piece.end)) {
+                segments.push([start, end]);
+                parts.push(piece.part as u8);
+            }
+        }
+        Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
+    }
+
+    /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules chose.
+    fn start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let start = &self.walk.start;
+        let dict = PyDict::new(py);
+        dict.set_item("frame", numpy_from_column(py, start.frames.iter().map(|f| *f as i64).collect()))?;
+        dict.set_item("time_s", numpy_from_column(py, start.curves.iter().map(|c| c.time_s).collect()))?;
+        dict.set_item("phase", numpy_from_column(py, start.curves.iter().map(|c| c.best_phase()).collect()))?;
+        let scores: Vec<Vec<f32>> = start.curves.iter().map(|c| c.scores.clone()).collect();
+        dict.set_item("similarity", PyArray2::from_vec2(py, &scores)?)?;
+        for (name, line) in [
+            ("line", start.lines.best),
+            ("twin", start.lines.twin),
+            ("other_direction", start.other_direction),
+            ("two_line_rule", start.two_line_rule.line),
+        ] {
+            dict.set_item(name, (line.phase_at_start, line.rate_hz, line.similarity))?;
+        }
+        dict.set_item("p_other_direction", start.p_other_direction)?;
+        Ok(dict)
+    }
+
+    /// The camera given or guessed.
+    #[getter]
+    fn camera(&self) -> PyCamera {
+        PyCamera(self.walk.camera.clone())
+    }
+
+    /// "forward" or "backward".
+    #[getter]
+    fn direction(&self) -> &'static str {
+        match self.walk.direction() {
+            Direction::Forward => "forward",
+            Direction::Backward => "backward",
+        }
+    }
+
+    /// Probability that the person walks the other way round.
+    #[getter]
+    fn p_other_direction(&self) -> f64 {
+        self.walk.start.p_other_direction
+    }
+
+    /// Probability that left and right are swapped.
+    #[getter]
+    fn p_swapped(&self) -> f64 {
+        self.walk.p_swapped()
+    }
+
+    /// Fitted deviation from the average: hip and knee (radians), shoulder and hip height (fractions of body height), relative gain
+    /// of similarity, and whether it was believed and used; None where no fit was made.
+    #[getter]
+    fn deviation(&self) -> Option<(f64, f64, f64, f64, f64, bool)> {
+        self.walk.person_fit.map(|fit| {
+            let (d, gain) = (fit.deviation, fit.similarity_after / fit.similarity_before - 1.0);
+            (d.hip_rad, d.knee_rad, d.shoulder_height, d.hip_height, gain, fit.is_believed)
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.rows.len()
+    }
+}
