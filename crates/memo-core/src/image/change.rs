@@ -79,11 +79,11 @@ impl Default for ChangeOptions {
 pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
     a.check_same_size(b)?;
     if !options.compensate_gain {
-        return Ok(changes_over(a, b, pair_threshold(a, b, options)));
+        return Ok(changes_over(a, b, pair_threshold(a, b, options)?));
     }
     let matched = estimate_gain(a, b)?.apply(b);
     let matched = matched.as_frame();
-    Ok(changes_over(a, &matched, pair_threshold(a, &matched, options)))
+    Ok(changes_over(a, &matched, pair_threshold(a, &matched, options)?))
 }
 
 /// The left side of eq. (1), N in grey levels, for every pixel.
@@ -97,12 +97,13 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     Ok(norms)
 }
 
-/// The threshold T that eq. (1) uses for this pair, in grey levels.
-pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> f64 {
-    options.threshold.unwrap_or_else(|| {
-        let followed = threshold_for_noise(noise_sd(a, b), options.false_rate);
-        followed.max(options.min_threshold)
-    })
+/// The threshold T that eq. (1) uses for this pair, in grey levels; without regard to the gain.
+pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
+    a.check_same_size(b)?;
+    match options.threshold {
+        Some(threshold) => Ok(threshold),
+        None => Ok(threshold_for_noise(noise_sd(a, b)?, options.false_rate).max(options.min_threshold)),
+    }
 }
 
 /// Standard deviation of one frame's grey-value noise, from a pair of frames with unchanged pixels in the
@@ -113,15 +114,16 @@ pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> f64 {
 /// the sums over 25 pixels, so that noise below one grey level is seen, where the median absolute difference
 /// of single pixels is 0. Moving pixels bias it up: 9 % when a fifth of the frame moves. Footage whose codec
 /// repeats more than half of the blocks gives 0.
-pub fn noise_sd(a: &Frame, b: &Frame) -> f64 {
+pub fn noise_sd(a: &Frame, b: &Frame) -> Result<f64, FrameError> {
+    a.check_same_size(b)?;
     let mut norms = sampled_norms(a, b);
     if norms.is_empty() {
-        return 0.0;
+        return Ok(0.0);
     }
     let middle = norms.len() / 2;
     let median = f64::from(*norms.select_nth_unstable(middle).1) / NORM_SCALE;
     let n = (WINDOW * WINDOW) as f64;
-    (n * median / (2.0 * CHI_SQ_6_MEDIAN)).sqrt()
+    Ok((n * median / (2.0 * CHI_SQ_6_MEDIAN)).sqrt())
 }
 
 /// The T that Gaussian noise of standard deviation `noise_sd` passes with probability `false_rate` (1e-12 to
@@ -405,7 +407,7 @@ mod tests {
             let mut noise = gaussian(seed, sd);
             let a = image(160, 120, |_, _| (128.0 + noise()).round() as u8);
             let b = image(160, 120, |_, _| (128.0 + noise()).round() as u8);
-            let found = noise_sd(&a.as_frame(), &b.as_frame());
+            let found = noise_sd(&a.as_frame(), &b.as_frame()).unwrap();
             // Rounding to whole grey levels adds a variance of 1/12.
             let expected = (sd * sd + 1.0 / 12.0).sqrt();
             prop_assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
@@ -460,8 +462,8 @@ mod tests {
     fn footage_that_repeats_itself_has_the_lowest_threshold() {
         let frame = image(64, 48, |x, y| (x * 3 + y) as u8);
         let (a, options) = (frame.as_frame(), ChangeOptions::default());
-        assert_eq!(noise_sd(&a, &a), 0.0);
-        assert_eq!(pair_threshold(&a, &a, &options), options.min_threshold);
+        assert_eq!(noise_sd(&a, &a), Ok(0.0));
+        assert_eq!(pair_threshold(&a, &a, &options), Ok(options.min_threshold));
     }
 
     #[test]
@@ -476,6 +478,8 @@ mod tests {
         let (a, b) = (Image::filled(9, 9, 0u8), Image::filled(9, 8, 0u8));
         let error = pair_changes(&a.as_frame(), &b.as_frame(), &ChangeOptions::default()).unwrap_err();
         assert!(matches!(error, FrameError::SizeChanged { height: 8, expected_height: 9, .. }));
+        assert_eq!(noise_sd(&a.as_frame(), &b.as_frame()), Err(error.clone()));
+        assert_eq!(fit_norms(&a.as_frame(), &b.as_frame()), Err(error));
     }
 
     #[test]
