@@ -104,13 +104,7 @@ impl Background {
         }
         self.frames += 1;
         let step = self.step();
-        for y in 0..frame.height() {
-            let (row, levels) = (frame.row(y), self.level.row_mut(y));
-            match foreground {
-                None => move_row(levels, row, step),
-                Some(mask) => move_unmasked_row(levels, row, mask.row(y), step),
-            }
-        }
+        pulp::Arch::new().dispatch(MoveLevels { levels: &mut self.level, frame: *frame, foreground, step });
         Ok(())
     }
 
@@ -176,20 +170,47 @@ fn keep_differing(columns: &[i32], limit: i32, mask: &mut [bool]) {
     }
 }
 
+/// The level, moved by at most `step` >= 0. Not `clamp`: its check of the bounds would keep the loop scalar.
+#[inline(always)]
 fn moved(level: u16, grey: u8, step: i32) -> u16 {
     let level = i32::from(level);
-    (level + (i32::from(grey) * LEVELS - level).clamp(-step, step)) as u16
+    (level + (i32::from(grey) * LEVELS - level).max(-step).min(step)) as u16
 }
 
+/// Moves levels towards a frame, with the widest vectors found at run time.
+struct MoveLevels<'a> {
+    levels: &'a mut Image<u16>,
+    frame: Frame<'a>,
+    foreground: Option<&'a Mask>,
+    step: i32,
+}
+
+impl pulp::NullaryFnOnce for MoveLevels<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for y in 0..self.frame.height() {
+            let (row, levels) = (self.frame.row(y), self.levels.row_mut(y));
+            match self.foreground {
+                None => move_row(levels, row, self.step),
+                Some(mask) => move_unmasked_row(levels, row, mask.row(y), self.step),
+            }
+        }
+    }
+}
+
+#[inline(always)]
 fn move_row(levels: &mut [u16], row: &[u8], step: i32) {
     for (level, &grey) in levels.iter_mut().zip(row) {
         *level = moved(*level, grey, step);
     }
 }
 
+#[inline(always)]
 fn move_unmasked_row(levels: &mut [u16], row: &[u8], mask: &[bool], step: i32) {
     for ((level, &grey), &masked) in levels.iter_mut().zip(row).zip(mask) {
-        *level = if masked { *level } else { moved(*level, grey, step) };
+        *level = moved(*level, grey, step * i32::from(!masked));
     }
 }
 
