@@ -1,10 +1,11 @@
-//! A slowly varying image of the empty scene, for people who stop: against it they stay visible when eq. (1) between
-//! consecutive frames sees nothing.
+//! A slowly varying image of the empty scene, for people who stop: against it they stay visible when eq. (1)
+//! between consecutive frames sees nothing.
 //!
-//! Per pixel the temporal median, which a person in front of the pixel for less than half of the time does not disturb. From a file,
-//! [`Background::from_frames`] takes the exact median of a few frames. On a stream the median is approached by stochastic approximation (Robbins and Monro 1951):
-//! each frame moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory
-//! is one image, whatever the length of the stream. Foreground is what passes eq. (1) of [`super::change`] against this image.
+//! Per pixel the temporal median, which a person in front of the pixel for less than half of the time does
+//! not disturb. From a file, [`Background::from_frames`] takes the exact median of a few frames. On a stream
+//! the median is approached by stochastic approximation (Robbins and Monro 1951): each frame moves the level
+//! towards its grey value by at most a step that falls as 1/k to a constant. Memory is one image, whatever
+//! the length of the stream. Foreground is what passes eq. (1) of [`super::change`] against this image.
 //!
 //! It takes for background whatever covers a pixel most of the time, and needs a static camera.
 
@@ -16,14 +17,15 @@ use thiserror::Error;
 /// How the background follows the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackgroundOptions {
-    /// Largest lasting change of the level in grey levels a frame, 1/256 to 128. 0.05: follows daylight (a few grey levels a
-    /// minute) and takes a minute or so to absorb a person who stands still and is not masked.
+    /// Largest lasting change of the level in grey levels a frame, 1/256 to 128. 0.05: follows daylight (a
+    /// few grey levels a minute) and takes a minute or so to absorb a person who stands still and is not
+    /// masked.
     pub rate: f64,
-    /// The step at the second frame in grey levels, falling as 1/k until it meets `rate`. 64 lets the first dozens of frames correct a
-    /// first frame with people in it.
+    /// The step at the second frame in grey levels, falling as 1/k until it meets `rate`. 64 lets the first
+    /// dozens of frames correct a first frame with people in it.
     pub first_step: f64,
-    /// How a frame is compared with the background. T is at least 8, twice that of consecutive frames: here soft shadows
-    /// and slow changes of light appear at full strength.
+    /// How a frame is compared with the background. T is at least 8, twice that of consecutive frames: here
+    /// soft shadows and slow changes of light appear at full strength.
     pub change: ChangeOptions,
 }
 
@@ -63,8 +65,8 @@ impl Background {
         Self::from_image(&first.to_image(), 1, options)
     }
 
-    /// The temporal median of frames, best spread evenly over the footage; of an even number the lower of the two
-    /// middle values. Holds no copy of the frames.
+    /// The temporal median of frames, best spread evenly over the footage; of an even number the lower of the
+    /// two middle values. Holds no copy of the frames.
     pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
         let first = frames.first().ok_or(BackgroundError::NoFrames)?;
         frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
@@ -102,13 +104,7 @@ impl Background {
         }
         self.frames += 1;
         let step = self.step();
-        for y in 0..frame.height() {
-            let (row, levels) = (frame.row(y), self.level.row_mut(y));
-            match foreground {
-                None => move_row(levels, row, step),
-                Some(mask) => move_unmasked_row(levels, row, mask.row(y), step),
-            }
-        }
+        pulp::Arch::new().dispatch(MoveLevels { levels: &mut self.level, frame: *frame, foreground, step });
         Ok(())
     }
 
@@ -117,12 +113,14 @@ impl Background {
         pair_changes(&self.image().as_frame(), frame, &self.options.change)
     }
 
-    /// The pixels of `within` whose grey value differs from the background by more than `threshold` grey levels, holes
-    /// filled: a mask that ends at the visible edge, where eq. (1) with its 5x5 windows reaches beyond it.
+    /// The pixels of `within` whose grey value differs from the background by more than `threshold` grey
+    /// levels, holes filled: a mask that ends at the visible edge, where eq. (1) with its 5x5 windows reaches
+    /// beyond it.
     ///
-    /// The difference is smoothed by (1, 2, 1) / 4 along x and y, so noise of standard deviation s counts as 0.38 s. A good threshold is
-    /// above the darkening by soft shadows (5 to 15 grey levels) and below half of the person's contrast; 20 on well-lit footage.
-    /// What has less contrast is lost: take the region itself there.
+    /// The difference is smoothed by (1, 2, 1) / 4 along x and y, so noise of standard deviation s counts as
+    /// 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below half of
+    /// the person's contrast: 20 to 30 on well-lit footage. What has less contrast is lost: take the region
+    /// itself there.
     pub fn silhouette(&self, frame: &Frame, within: &Mask, threshold: f64) -> Result<Mask, FrameError> {
         self.check_size(frame.width(), frame.height())?;
         self.check_size(within.width(), within.height())?;
@@ -162,7 +160,8 @@ fn add_rows(frame: [&[u8]; 3], background: [&[u8]; 3], columns: &mut [i32]) {
     }
 }
 
-/// Unmarks pixels where the column sums weighted by (1, 2, 1) do not exceed the limit; beyond its ends the row repeats.
+/// Unmarks pixels where the column sums weighted by (1, 2, 1) do not exceed the limit; beyond its ends the
+/// row repeats.
 fn keep_differing(columns: &[i32], limit: i32, mask: &mut [bool]) {
     let last = columns.len() - 1;
     for (x, pixel) in mask.iter_mut().enumerate().filter(|(_, pixel)| **pixel) {
@@ -171,24 +170,52 @@ fn keep_differing(columns: &[i32], limit: i32, mask: &mut [bool]) {
     }
 }
 
+/// The level, moved by at most `step` >= 0. Not `clamp`: its check of the bounds would keep the loop scalar.
+#[inline(always)]
 fn moved(level: u16, grey: u8, step: i32) -> u16 {
     let level = i32::from(level);
-    (level + (i32::from(grey) * LEVELS - level).clamp(-step, step)) as u16
+    (level + (i32::from(grey) * LEVELS - level).max(-step).min(step)) as u16
 }
 
+/// Moves levels towards a frame, with the widest vectors found at run time.
+struct MoveLevels<'a> {
+    levels: &'a mut Image<u16>,
+    frame: Frame<'a>,
+    foreground: Option<&'a Mask>,
+    step: i32,
+}
+
+impl pulp::NullaryFnOnce for MoveLevels<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for y in 0..self.frame.height() {
+            let (row, levels) = (self.frame.row(y), self.levels.row_mut(y));
+            match self.foreground {
+                None => move_row(levels, row, self.step),
+                Some(mask) => move_unmasked_row(levels, row, mask.row(y), self.step),
+            }
+        }
+    }
+}
+
+#[inline(always)]
 fn move_row(levels: &mut [u16], row: &[u8], step: i32) {
     for (level, &grey) in levels.iter_mut().zip(row) {
         *level = moved(*level, grey, step);
     }
 }
 
+#[inline(always)]
 fn move_unmasked_row(levels: &mut [u16], row: &[u8], mask: &[bool], step: i32) {
     for ((level, &grey), &masked) in levels.iter_mut().zip(row).zip(mask) {
-        *level = if masked { *level } else { moved(*level, grey, step) };
+        *level = moved(*level, grey, step * i32::from(!masked));
     }
 }
 
-/// Lower median of each column, bit by bit: the largest value that at most (n - 1) / 2 of the n values are below.
+/// Lower median of each column, bit by bit: the largest value that at most (n - 1) / 2 of the n values are
+/// below.
 fn median_row(rows: &[&[u8]], median: &mut [u8]) {
     let most_below = (rows.len() - 1) / 2;
     let mut below = vec![0u32; median.len()];
@@ -218,7 +245,9 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn the_median_is_the_middle_of_the_sorted_values(
-            frames in (1usize..40).prop_flat_map(|w| proptest::collection::vec(proptest::collection::vec(any::<u8>(), w), 1..12))
+            frames in (1usize..40).prop_flat_map(|width| {
+                proptest::collection::vec(proptest::collection::vec(any::<u8>(), width), 1..12)
+            })
         ) {
             let images: Vec<_> = frames.iter().map(|pixels| row(pixels.clone())).collect();
             let views: Vec<_> = images.iter().map(Image::as_frame).collect();

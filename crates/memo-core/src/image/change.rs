@@ -1,17 +1,17 @@
 //! Change detection: which pixels differ between consecutive frames of a static camera.
 //!
-//! Rohr 1994, section 4.1, eq. (1). The n = 25 grey values of a 5x5 window are fitted by a bivariate polynomial of
-//! second order, g = X beta, and the fits of two frames are compared. With X* the generalised inverse, a pixel of
-//! frame k has changed when
+//! Rohr 1994, section 4.1, eq. (1). The n = 25 grey values of a 5x5 window are fitted by a bivariate
+//! polynomial of second order, g = X beta, and the fits of two frames are compared. With X* the generalised
+//! inverse, a pixel of frame k has changed when
 //!
 //! ```text
 //! N_kj = 1/sqrt(n) |X X* (g_k - g_j)|  >  T            (1)
 //! ```
 //!
-//! holds for j = k - 1 or j = k + 1. The fit is linear, so one fit of the difference d = g_k - g_j serves both frames
-//! of a pair. X X* projects on six polynomials that are separable and orthogonal over the window; with
-//! the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5, 10, 14 and c_ij the sum of d
-//! weighted by the i-th tap along x and the j-th along y,
+//! holds for j = k - 1 or j = k + 1. The fit is linear, so one fit of the difference d = g_k - g_j serves
+//! both frames of a pair. X X* projects on six polynomials that are separable and orthogonal over the window;
+//! with the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5, 10, 14 and
+//! c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
 //!
 //! ```text
 //! 25 N^2  = c00^2/25 + (c10^2 + c01^2)/50 + c11^2/100 + (c20^2 + c02^2)/70
@@ -20,12 +20,13 @@
 //!
 //! which is exact in integers: |c_ij| <= 10200 fits 16 bits and 17500 N^2 <= 17500 * 255^2 fits 32.
 //!
-//! A pixel less than two pixels from the frame's edge has no window of its own and takes the answer of the nearest
-//! whole window. So the statistics of the test, and with them its false rate, are the same everywhere, which
-//! replicated grey values would not give. A frame with a side under 5 pixels has no window and no changes.
+//! A pixel less than two pixels from the frame's edge has no window of its own and takes the answer of the
+//! nearest whole window. So the statistics of the test, and with them its false rate, are the same
+//! everywhere, which replicated grey values would not give. A frame with a side under 5 pixels has no window
+//! and no changes.
 //!
-//! It cannot tell an object from its shadow or reflection, sees nothing where a moving object has no contrast or stands still, and
-//! marks what the object covers in either neighbour frame along with what it covers now.
+//! It cannot tell an object from its shadow or reflection, sees nothing where a moving object has no contrast
+//! or stands still, and marks what the object covers in either neighbour frame along with what it covers now.
 
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
@@ -34,11 +35,13 @@ use super::gain::estimate_gain;
 const WINDOW: usize = 5;
 /// Pixels between the frame's edge and the first window centre.
 const BORDER: usize = WINDOW / 2;
-/// How far beyond the visible edge of a moving thing eq. (1) marks pixels, because a window sees the edge from two pixels away.
+/// How far beyond the visible edge of a moving thing eq. (1) marks pixels, because a window sees the edge
+/// from two pixels away.
 ///
 /// Measured at T = 4 on upright rectangles and discs at random subpixel positions, from the true edge to the
-/// outer side of the outermost marked pixel, across the direction of motion: 1.9 px at a contrast of 20 grey levels, 2.3 at 50, 2.4 at 100; 1.8, 2.4 and 2.9 with
-/// edges blurred by 0.7 px; 0.3 px standard deviation from the subpixel position. Below a contrast of 10 it falls to 1 and less.
+/// outer side of the outermost marked pixel, across the direction of motion: 1.9 px at a contrast of 20 grey
+/// levels, 2.3 at 50, 2.4 at 100; 1.8, 2.4 and 2.9 with edges blurred by 0.7 px; 0.3 px standard deviation
+/// from the subpixel position. Below a contrast of 10 it falls to 1 and less.
 pub const CHANGE_REACH_PX: f64 = 2.3;
 
 /// The integers of the test are this multiple of N^2.
@@ -49,16 +52,17 @@ const CHI_SQ_6_MEDIAN: f64 = 5.348_120_627;
 /// How a frame pair is compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeOptions {
-    /// The threshold T of eq. (1) in grey levels, 0 to 255 (values outside act as the nearest). `None` (default): T
-    /// follows the noise of the pair, because a fixed one fails as soon as the noise comes near it: at a noise standard
-    /// deviation of 6, noise alone reaches T = 4.
+    /// The threshold T of eq. (1) in grey levels, 0 to 255 (values outside act as the nearest). `None`
+    /// (default): T follows the noise of the pair, because a fixed one fails as soon as the noise comes near
+    /// it: at a noise standard deviation of 6, noise alone reaches T = 4.
     pub threshold: Option<f64>,
-    /// Fraction of unchanged pixels that may pass the test under Gaussian noise, for `threshold: None`. 1e-6 leaves about two
-    /// false pixels in a 1080p frame, which the clean-up of regions removes.
+    /// Fraction of unchanged pixels that may pass the test under Gaussian noise, for `threshold: None`. 1e-6
+    /// leaves about two false pixels in a 1080p frame, which the clean-up of regions removes.
     pub false_rate: f64,
-    /// T never follows the noise below this, in grey levels. 4 covers 99.9 % of a walker's joints in clean footage (8:
-    /// 95-98 %) and is above the residual that video codecs leave, which the noise estimate does not see: skipped blocks are
-    /// exactly equal. Reflections on a polished floor pass 4 and lengthen the region downwards; 8 to 12 cut most of them off.
+    /// T never follows the noise below this, in grey levels. 4 covers 99.9 % of a walker's joints in clean
+    /// footage (8: 95-98 %) and is above the residual that video codecs leave, which the noise estimate does
+    /// not see: skipped blocks are exactly equal. Reflections on a polished floor pass 4 and lengthen the
+    /// region downwards; 8 to 12 cut most of them off.
     pub min_threshold: f64,
     /// Remove a common change of brightness and contrast first. Off: it costs a pass over the frame, and a
     /// camera with fixed exposure, which eq. (1) assumes, does not need it.
@@ -75,11 +79,11 @@ impl Default for ChangeOptions {
 pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
     a.check_same_size(b)?;
     if !options.compensate_gain {
-        return Ok(changes_over(a, b, pair_threshold(a, b, options)));
+        return Ok(changes_over(a, b, pair_threshold(a, b, options)?));
     }
     let matched = estimate_gain(a, b)?.apply(b);
     let matched = matched.as_frame();
-    Ok(changes_over(a, &matched, pair_threshold(a, &matched, options)))
+    Ok(changes_over(a, &matched, pair_threshold(a, &matched, options)?))
 }
 
 /// The left side of eq. (1), N in grey levels, for every pixel.
@@ -93,32 +97,37 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     Ok(norms)
 }
 
-/// The threshold T that eq. (1) uses for this pair, in grey levels.
-pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> f64 {
-    options.threshold.unwrap_or_else(|| {
-        let followed = threshold_for_noise(noise_sd(a, b), options.false_rate);
-        followed.max(options.min_threshold)
-    })
+/// The threshold T that eq. (1) uses for this pair, in grey levels; without regard to the gain.
+pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
+    a.check_same_size(b)?;
+    match options.threshold {
+        Some(threshold) => Ok(threshold),
+        None => Ok(threshold_for_noise(noise_sd(a, b)?, options.false_rate).max(options.min_threshold)),
+    }
 }
 
-/// Standard deviation of one frame's grey-value noise, from a pair of frames with unchanged pixels in the majority.
+/// Standard deviation of one frame's grey-value noise, from a pair of frames with unchanged pixels in the
+/// majority.
 ///
-/// Under Gaussian noise of standard deviation s, n N^2 / (2 s^2) follows chi-square with six degrees of freedom;
-/// the median of N^2 over about 4000 windows on a grid is set equal to that distribution's. It uses the sums over 25 pixels, so
-/// that noise below one grey level is seen, where the median absolute difference of single pixels is 0. Moving pixels bias it up: 9 %
-/// when a fifth of the frame moves. Footage whose codec repeats more than half of the blocks gives 0.
-pub fn noise_sd(a: &Frame, b: &Frame) -> f64 {
+/// Under Gaussian noise of standard deviation s, n N^2 / (2 s^2) follows chi-square with six degrees of
+/// freedom; the median of N^2 over about 2000 windows on a grid is set equal to that distribution's. It uses
+/// the sums over 25 pixels, so that noise below one grey level is seen, where the median absolute difference
+/// of single pixels is 0. Moving pixels bias it up: 9 % when a fifth of the frame moves. Footage whose codec
+/// repeats more than half of the blocks gives 0.
+pub fn noise_sd(a: &Frame, b: &Frame) -> Result<f64, FrameError> {
+    a.check_same_size(b)?;
     let mut norms = sampled_norms(a, b);
     if norms.is_empty() {
-        return 0.0;
+        return Ok(0.0);
     }
     let middle = norms.len() / 2;
     let median = f64::from(*norms.select_nth_unstable(middle).1) / NORM_SCALE;
     let n = (WINDOW * WINDOW) as f64;
-    (n * median / (2.0 * CHI_SQ_6_MEDIAN)).sqrt()
+    Ok((n * median / (2.0 * CHI_SQ_6_MEDIAN)).sqrt())
 }
 
-/// The T that Gaussian noise of standard deviation `noise_sd` passes with probability `false_rate` (1e-12 to 0.5) at a pixel.
+/// The T that Gaussian noise of standard deviation `noise_sd` passes with probability `false_rate` (1e-12 to
+/// 0.5) at a pixel.
 ///
 /// T = s sqrt(2 q / 25), q the upper quantile of chi-square with six degrees of freedom; 1.75 s at 1e-6.
 pub fn threshold_for_noise(noise_sd: f64, false_rate: f64) -> f64 {
@@ -126,7 +135,8 @@ pub fn threshold_for_noise(noise_sd: f64, false_rate: f64) -> f64 {
     noise_sd * (2.0 * chi_sq_6_upper_quantile(false_rate.clamp(1e-12, 0.5)) / n).sqrt()
 }
 
-/// The x with P(chi-square_6 > x) = exp(-x/2) (1 + x/2 + x^2/8) = p, by Newton steps on the logarithm, which is concave.
+/// The x with P(chi-square_6 > x) = exp(-x/2) (1 + x/2 + x^2/8) = p, by Newton steps on the logarithm, which
+/// is concave.
 fn chi_sq_6_upper_quantile(p: f64) -> f64 {
     let mut x = CHI_SQ_6_MEDIAN;
     for _ in 0..20 {
@@ -138,11 +148,11 @@ fn chi_sq_6_upper_quantile(p: f64) -> f64 {
     x
 }
 
-/// 17500 N^2 of windows on a square grid, about 4096 of them.
+/// 17500 N^2 of windows on a square grid, about 2048 of them.
 fn sampled_norms(a: &Frame, b: &Frame) -> Vec<i32> {
-    let step = ((a.width() * a.height()) as f64 / 4096.0).sqrt().max(1.0) as usize;
+    let step = ((a.width() * a.height()) as f64 / 2048.0).sqrt().max(1.0) as usize;
     let centres = |side: usize| (BORDER..side.saturating_sub(BORDER)).step_by(step);
-    let mut norms = Vec::with_capacity(8192);
+    let mut norms = Vec::with_capacity(4096);
     for y in centres(a.height()) {
         norms.extend(centres(a.width()).map(|x| window_norm(a, b, x, y)));
     }
@@ -197,8 +207,8 @@ fn extend_to_border<T: Copy>(image: &mut Image<T>) {
 
 /// Writes `value(17500 N^2)` of every window to its centre in `out`.
 ///
-/// One pass: five rows of differences are kept, and of them the three tap sums along y. The loops are compiled for
-/// several instruction sets, of which the best is taken at run time.
+/// One pass: five rows of differences are kept, and of them the three tap sums along y. The loops are
+/// compiled for several instruction sets, of which the best is taken at run time.
 struct NormRows<'a, T, F> {
     a: Frame<'a>,
     b: Frame<'a>,
@@ -278,8 +288,8 @@ fn scaled_norm_sq(columns: [[i16; WINDOW]; 3]) -> i32 {
 
 /// Eq. (1) over a stream of frames: a pixel of frame k has changed when it did against frame k - 1 or k + 1.
 ///
-/// Each pair is fitted once and serves both of its frames. The mask of a frame can only be known when the next one has
-/// come; the first and the last frame have one neighbour.
+/// Each pair is fitted once and serves both of its frames. The mask of a frame can only be known when the
+/// next one has come; the first and the last frame have one neighbour.
 #[derive(Debug, Clone)]
 pub struct ChangeDetector {
     options: ChangeOptions,
@@ -293,8 +303,8 @@ impl ChangeDetector {
         Self { options, previous: None, previous_pair: None }
     }
 
-    /// Takes the next frame and returns the mask of the one before it, `None` for the first. A frame of another
-    /// size is refused and leaves the detector as it was.
+    /// Takes the next frame and returns the mask of the one before it, `None` for the first. A frame of
+    /// another size is refused and leaves the detector as it was.
     pub fn push(&mut self, frame: &Frame) -> Result<Option<Mask>, FrameError> {
         let Some(previous) = &self.previous else {
             self.previous = Some(frame.to_image());
@@ -397,7 +407,7 @@ mod tests {
             let mut noise = gaussian(seed, sd);
             let a = image(160, 120, |_, _| (128.0 + noise()).round() as u8);
             let b = image(160, 120, |_, _| (128.0 + noise()).round() as u8);
-            let found = noise_sd(&a.as_frame(), &b.as_frame());
+            let found = noise_sd(&a.as_frame(), &b.as_frame()).unwrap();
             // Rounding to whole grey levels adds a variance of 1/12.
             let expected = (sd * sd + 1.0 / 12.0).sqrt();
             prop_assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
@@ -452,8 +462,8 @@ mod tests {
     fn footage_that_repeats_itself_has_the_lowest_threshold() {
         let frame = image(64, 48, |x, y| (x * 3 + y) as u8);
         let (a, options) = (frame.as_frame(), ChangeOptions::default());
-        assert_eq!(noise_sd(&a, &a), 0.0);
-        assert_eq!(pair_threshold(&a, &a, &options), options.min_threshold);
+        assert_eq!(noise_sd(&a, &a), Ok(0.0));
+        assert_eq!(pair_threshold(&a, &a, &options), Ok(options.min_threshold));
     }
 
     #[test]
@@ -468,6 +478,8 @@ mod tests {
         let (a, b) = (Image::filled(9, 9, 0u8), Image::filled(9, 8, 0u8));
         let error = pair_changes(&a.as_frame(), &b.as_frame(), &ChangeOptions::default()).unwrap_err();
         assert!(matches!(error, FrameError::SizeChanged { height: 8, expected_height: 9, .. }));
+        assert_eq!(noise_sd(&a.as_frame(), &b.as_frame()), Err(error.clone()));
+        assert_eq!(fit_norms(&a.as_frame(), &b.as_frame()), Err(error));
     }
 
     #[test]

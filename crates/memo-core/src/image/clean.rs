@@ -1,13 +1,14 @@
 //! Binary image operations that turn a change mask into solid areas.
 //!
-//! Rohr 1994, section 4.1: detected pixels with a small number of detected neighbours in the 3x3 window are deleted, undetected ones
-//! with a large number are marked, recursively because each step changes its neighbours' numbers; remaining holes
-//! are filled by a separate algorithm. The thresholds are not printed.
+//! Rohr 1994, section 4.1: detected pixels with a small number of detected neighbours in the 3x3 window are
+//! deleted, undetected ones with a large number are marked, recursively because each step changes its
+//! neighbours' numbers; remaining holes are filled by a separate algorithm. The thresholds are not printed.
 //!
-//! The recursion ends. Let m be the number of marked pixels, p the number of marked neighbour pairs, and
-//! c = (few + many) / 2. Deleting a pixel with n <= few neighbours changes E = c m - p by n - c, marking one with n >= many by c - n: with
-//! few < many both lower E by at least 1/2, and E cannot fall below -4 times the number of pixels. The
-//! result may depend on the order of steps, which is fixed: row by row, then first come first served.
+//! The recursion ends. Let m be the number of marked pixels, p the number of marked neighbour pairs, and c =
+//! (few + many) / 2. Deleting a pixel with n <= few neighbours changes E = c m - p by n - c, marking one with
+//! n >= many by c - n: with few < many both lower E by at least 1/2, and E cannot fall below -4 times the
+//! number of pixels. The result may depend on the order of steps, which is fixed: row by row, then first come
+//! first served.
 //!
 //! None of this knows what a person is: two people who touch become one area, a faint person several.
 
@@ -19,11 +20,11 @@ use thiserror::Error;
 /// Neighbour numbers at which a pixel changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CleanOptions {
-    /// A marked pixel with at most this many of 8 marked neighbours is deleted. 2 removes specks, lines and spurs one
-    /// pixel wide and keeps every corner of an area at least two pixels wide.
+    /// A marked pixel with at most this many of 8 marked neighbours is deleted. 2 removes specks, lines and
+    /// spurs one pixel wide and keeps every corner of an area at least two pixels wide.
     pub few: u8,
-    /// An unmarked pixel with at least this many of 8 marked neighbours is marked; 9 marks none. 5 closes slots up to three
-    /// pixels wide and leaves straight edges and outer corners alone.
+    /// An unmarked pixel with at least this many of 8 marked neighbours is marked; 9 marks none. 5 closes
+    /// slots up to three pixels wide and leaves straight edges and outer corners alone.
     pub many: u8,
 }
 
@@ -151,8 +152,8 @@ fn is_unstable(state: u8, options: &CleanOptions) -> bool {
     deleted | marked
 }
 
-/// Marks every unmarked area that is surrounded by marked pixels: one from which no path of horizontal and vertical
-/// steps over unmarked pixels leads to the mask's edge.
+/// Marks every unmarked area that is surrounded by marked pixels: one from which no path of horizontal and
+/// vertical steps over unmarked pixels leads to the mask's edge.
 pub fn fill_holes(mask: &Mask) -> Mask {
     let (right, bottom) = (mask.width(), mask.height() - 1);
     let mut filled = mask.clone();
@@ -168,7 +169,8 @@ pub fn fill_holes(mask: &Mask) -> Mask {
     filled
 }
 
-/// Marks every pixel within a Euclidean distance of `radius_px` of a marked pixel; a radius below 1 changes nothing.
+/// Marks every pixel within a Euclidean distance of `radius_px` of a marked pixel; a radius below 1 changes
+/// nothing.
 pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
     let mut dilated = mask.clone();
     let (width, height) = (mask.width(), mask.height());

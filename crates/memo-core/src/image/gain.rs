@@ -1,11 +1,12 @@
 //! A common change of brightness and contrast between two frames, as automatic exposure makes it.
 //!
-//! Model: a = scale * b + offset at unchanged, unsaturated pixels. Both frames carry the same noise, so the line is fitted
-//! by total least squares over about 4000 pixels on a grid; pixels whose residual exceeds 2.5 robust standard deviations
-//! (moving objects) are left out and the fit repeated. The start matches the quartiles of the two frames, which
-//! moving objects hardly change.
+//! Model: a = scale * b + offset at unchanged, unsaturated pixels. Both frames carry the same noise, so the
+//! line is fitted by total least squares over about 4000 pixels on a grid; pixels whose residual exceeds 2.5
+//! robust standard deviations (moving objects) are left out and the fit repeated. The start matches the
+//! quartiles of the two frames, which moving objects hardly change.
 //!
-//! It cannot follow a change that differs over the frame (a lamp, a cloud's edge), nor a tone curve that is not straight.
+//! It cannot follow a change that differs over the frame (a lamp, a cloud's edge), nor a tone curve that is
+//! not straight.
 
 use super::frame::{Frame, FrameError, Image};
 
@@ -46,7 +47,8 @@ impl Gain {
 
 /// The line a = scale * b + offset of the unchanged pixels, which must be in the majority.
 ///
-/// Too little contrast to fix a scale gives scale 1 and the median difference; no usable pixel gives the identity.
+/// Too little contrast to fix a scale gives scale 1 and the median difference; no usable pixel gives the
+/// identity.
 pub fn estimate_gain(a: &Frame, b: &Frame) -> Result<Gain, FrameError> {
     a.check_same_size(b)?;
     let pairs = sampled_pairs(a, b);
@@ -104,7 +106,8 @@ fn inliers(pairs: &[(f64, f64)], gain: Gain) -> Vec<(f64, f64)> {
     pairs.iter().copied().filter(|pair| residual(pair) <= limit).collect()
 }
 
-/// The line with the least sum of squared perpendicular distances; `None` when the grey values hardly vary or do not vary together.
+/// The line with the least sum of squared perpendicular distances; `None` when the grey values hardly vary or
+/// do not vary together.
 fn total_least_squares(pairs: &[(f64, f64)]) -> Option<Gain> {
     let n = pairs.len() as f64;
     let mean = |value: fn(&(f64, f64)) -> f64| pairs.iter().map(value).sum::<f64>() / n;

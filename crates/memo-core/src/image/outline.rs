@@ -1,24 +1,27 @@
 //! Outlines: the ordered pixels along the borders of marked areas.
 //!
-//! Border following of Suzuki and Abe 1985 (step 3), which walks the border pixels of an area with 8 neighbours so that
-//! the unmarked side stays on one hand. Where a border starts is known from the connected areas of marked
-//! and of unmarked pixels, so their labels of borders already followed are not needed. The nesting of borders is not computed.
+//! Border following of Suzuki and Abe 1985 (step 3), which walks the border pixels of an area with 8
+//! neighbours so that the unmarked side stays on one hand. Where a border starts is known from the connected
+//! areas of marked and of unmarked pixels, so their labels of borders already followed are not needed. The
+//! nesting of borders is not computed.
 
 use super::frame::Mask;
 use super::region::{Connectivity, Run, connected_runs, runs};
 
-/// One border. Consecutive pixels are neighbours, as are the last and the first; where the area is one pixel wide a
-/// pixel occurs twice.
+/// One border. Consecutive pixels are neighbours, as are the last and the first; where the area is one pixel
+/// wide a pixel occurs twice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outline {
-    /// Columns and rows of the border's pixels, which are all marked. Anticlockwise in the image as seen for outer borders,
-    /// clockwise for holes, starting in the top row of the area or on the left of the hole's top row.
+    /// Columns and rows of the border's pixels, which are all marked. Anticlockwise in the image as seen for
+    /// outer borders, clockwise for holes, starting in the top row of the area or on the left of the hole's
+    /// top row.
     pub pixels: Vec<[usize; 2]>,
     /// Whether this is the border of a hole.
     pub is_hole: bool,
 }
 
-/// The outer border of each connected area (8 neighbours), then the border of each hole (4 neighbours), each from top to bottom.
+/// The outer border of each connected area (8 neighbours), then the border of each hole (4 neighbours), each
+/// from top to bottom.
 pub fn outlines(mask: &Mask) -> Vec<Outline> {
     let first_pixel = |area: Vec<Run>| [area[0].start, area[0].y];
     let outer = connected_runs(&runs(mask, true), Connectivity::Eight).into_iter().map(first_pixel);
@@ -60,7 +63,8 @@ fn follow(mask: &Mask, start: [usize; 2], unmarked: usize) -> Vec<[usize; 2]> {
     }
 }
 
-/// The first marked neighbour of `at` anticlockwise after the direction `back`, which leads to a marked one itself.
+/// The first marked neighbour of `at` anticlockwise after the direction `back`, which leads to a marked one
+/// itself.
 fn next_anticlockwise(mask: &Mask, at: [usize; 2], back: usize) -> ([usize; 2], usize) {
     let directions = (1..8).map(|turn| (back + 8 - turn) % 8);
     let found = directions.into_iter().find_map(|d| neighbour(mask, at, d).map(|next| (next, d)));

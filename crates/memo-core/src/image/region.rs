@@ -1,8 +1,10 @@
-//! Moving regions: connected areas of a change mask, their enclosing rectangles, and their grouping into candidates.
+//! Moving regions: connected areas of a change mask, their enclosing rectangles, and their grouping into
+//! candidates.
 //!
-//! Rohr 1994, section 4.1: the cleaned mask's area stands for the person, and its surrounding rectangle and outline
-//! are computed. On real footage a person falls apart where clothes resemble the background or where nothing moves (a
-//! foot in stance is not detected at all), so [`group_regions`] puts neighbouring areas together again.
+//! Rohr 1994, section 4.1: the cleaned mask's area stands for the person, and its surrounding rectangle and
+//! outline are computed. On real footage a person falls apart where clothes resemble the background or where
+//! nothing moves (a foot in stance is not detected at all), so [`group_regions`] puts neighbouring areas
+//! together again.
 //!
 //! It cannot separate people who overlap in the image, nor a person from shadow and reflection.
 
@@ -25,8 +27,9 @@ pub struct Run {
 
 /// An upright rectangle of whole pixels; all four sides belong to it.
 ///
-/// Around a region of changes it is larger than the moving thing: by about [`CHANGE_REACH_PX`] on every side, and by
-/// what the thing covers in the neighbour frames along its motion. [`Rectangle::sides`] takes the first back.
+/// Around a region of changes it is larger than the moving thing: by about [`CHANGE_REACH_PX`] on every side,
+/// and by what the thing covers in the neighbour frames along its motion. [`Rectangle::sides`] takes the
+/// first back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rectangle {
     /// First column.
@@ -50,9 +53,9 @@ impl Rectangle {
         self.bottom - self.top + 1
     }
 
-    /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette, [`CHANGE_REACH_PX`] for a region of
-    /// changes, where 0.7 px either way remains for contrasts of 20 to 100 grey levels. A rectangle narrower than
-    /// twice the reach shrinks to its middle.
+    /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette,
+    /// [`CHANGE_REACH_PX`] for a region of changes, where 0.7 px either way remains for contrasts of 20 to
+    /// 100 grey levels. A rectangle narrower than twice the reach shrinks to its middle.
     pub fn sides(&self, reach_px: f64) -> Sides {
         let shrunk = |first: usize, last: usize| {
             let (low, high) = (first as f64 - 0.5, last as f64 + 0.5);
@@ -83,7 +86,8 @@ impl Rectangle {
     }
 }
 
-/// The sides of an upright rectangle in pixel coordinates, where the centre of a pixel is its integer coordinate.
+/// The sides of an upright rectangle in pixel coordinates, where the centre of a pixel is its integer
+/// coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
     /// Column of the left side.
@@ -151,7 +155,8 @@ impl Region {
     }
 }
 
-/// The connected areas (8 neighbours) with at least `min_area` pixels, largest first, equal ones from top to bottom.
+/// The connected areas (8 neighbours) with at least `min_area` pixels, largest first, equal ones from top to
+/// bottom.
 pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
     let areas = connected_runs(&runs(mask, true), Connectivity::Eight);
     let mut regions: Vec<Region> = areas.into_iter().map(Region::from_runs).collect();
@@ -163,16 +168,17 @@ pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
 /// When two areas belong to one candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupOptions {
-    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16 is the
-    /// size of what one changed pixel leaves in the mask.
+    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16: less than
+    /// a shoe leaves once the 5x5 windows have widened it, more than most specks that survive the clean-up.
     pub min_part_area: usize,
-    /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can be seen.
+    /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can
+    /// be seen.
     pub min_area: usize,
-    /// Largest free height between a group and a further area, over the group's height. 0.3: the shank of a trouser leg that
-    /// resembles the floor may be missing.
+    /// Largest free height between a group and a further area, over the group's height. 0.3: the shank of a
+    /// trouser leg that resembles the floor may be missing.
     pub gap_y: f64,
-    /// Largest free width between a group and a further area, over the group's height. 0.05: wide enough for a forearm,
-    /// narrower than the space between two people side by side.
+    /// Largest free width between a group and a further area, over the group's height. 0.05: wide enough for
+    /// a forearm, narrower than the space between two people side by side.
     pub gap_x: f64,
     /// No area is added that makes the group wider than this times its height. 0.75: a long step with what
     /// the neighbour frames add; two people side by side, or a row of small things, are wider.
@@ -187,7 +193,8 @@ impl Default for GroupOptions {
 
 /// Joins regions whose rectangles overlap or nearly touch into upright candidates, largest first.
 ///
-/// The largest region takes in what is near enough, largest first, until nothing more is; then the largest one left, and so on.
+/// The largest region takes in what is near enough, largest first, until nothing more is; then the largest
+/// one left, and so on.
 pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
     let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
     parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
@@ -385,7 +392,8 @@ pub(super) mod tests {
         assert_eq!(group_regions(&row, &GroupOptions::default()), row);
     }
 
-    /// A frame of 110 grey levels with a disc of radius 20 around (x, y), its rim pixels weighted by 8x8 samples.
+    /// A frame of 110 grey levels with a disc of radius 20 around (x, y), its rim pixels weighted by 8x8
+    /// samples.
     fn disc(x: f64, y: f64, contrast: f64) -> Image<u8> {
         let covered = |column: usize, row: usize| {
             let inside = |i: usize| {
