@@ -1,6 +1,6 @@
 //! All traffic with numpy.
 
-use memo_core::image::{Frame, Image, Mask};
+use memo_core::image::{Image, Mask};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };

@@ -94,6 +94,9 @@ pub fn edge_segments<'py>(
     numpy_from_rows(py, found.iter().map(row).collect())
 }
 
+/// The components of a velocity field, (H, W) each.
+type Velocities<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
+
 /// Velocity (u, v) of the pixels of a region from one frame to the next, two (H, W) arrays of pixels per frame, NaN where
 /// nothing is known.
 #[pyfunction]
@@ -102,7 +105,7 @@ pub fn velocity_field<'py>(
     first: &Bound<'py, PyAny>,
     second: &Bound<'py, PyAny>,
     region: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+) -> PyResult<Velocities<'py>> {
     let (first, second, region) =
         (frame_from_numpy(first)?, frame_from_numpy(second)?, mask_from_numpy(region)?);
     let field = py

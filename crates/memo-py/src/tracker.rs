@@ -111,6 +111,9 @@ impl PyWalk {
     }
 }
 
+/// Segments (n, 2, 2) and the body part of each (n,).
+type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
+
 #[pymethods]
 impl PyWalk {
     /// The columns of `track.csv`, an array each.
@@ -118,7 +121,7 @@ impl PyWalk {
         let dict = PyDict::new(py);
         let frames: Vec<i64> = self.rows.iter().map(|row| row.frame as i64).collect();
         dict.set_item("frame", numpy_from_column(py, frames))?;
-        let mut set = |name: &str, column: Vec<f64>| dict.set_item(name, numpy_from_column(py, column));
+        let set = |name: &str, column: Vec<f64>| dict.set_item(name, numpy_from_column(py, column));
         set("time_s", self.column(|r| r.time_s))?;
         set("x_m", self.column(|r| r.torso_centre.x))?;
         set("y_m", self.column(|r| r.torso_centre.y))?;
@@ -177,11 +180,7 @@ impl PyWalk {
     }
 
     /// Visible contours of a row's model in image pixels, (segments, 2, 2), and the body part of each segment.
-    fn contours<'py>(
-        &self,
-        py: Python<'py>,
-        row: usize,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>)> {
+    fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
         let Some(row) = self.rows.get(row) else {
             let message = format!("row {row} of a walk with {} rows", self.rows.len());
             return Err(PyIndexError::new_err(message));

@@ -36,10 +36,13 @@ pub enum EvidenceError {
 }
 
 /// Options of the stages from pixels to regions and edges.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvidenceOptions {
-    /// Change detection, eq. (1).
+    /// Change detection, eq. (1), for where edges are looked for: the low threshold loses no limb.
     pub change: ChangeOptions,
+    /// Least threshold of the change detection for the rectangle, grey levels. 10: floor reflections and shadows change by less;
+    /// at 4 they stretch the rectangle by up to 60 px.
+    pub rectangle_threshold: f64,
     /// Recursive binary operations.
     pub clean: CleanOptions,
     /// Grouping of regions into candidates.
@@ -48,6 +51,19 @@ pub struct EvidenceOptions {
     pub edge: EdgeOptions,
     /// Straight edges.
     pub line: LineOptions,
+}
+
+impl Default for EvidenceOptions {
+    fn default() -> Self {
+        Self {
+            change: ChangeOptions::default(),
+            rectangle_threshold: 10.0,
+            clean: CleanOptions::default(),
+            group: GroupOptions::default(),
+            edge: EdgeOptions::default(),
+            line: LineOptions::default(),
+        }
+    }
 }
 
 /// Edges are taken this far outside the moving region, pixels: the change mask covers the outline, this covers the
@@ -65,12 +81,14 @@ pub struct Evidence {
     pub grey: Image<u8>,
     /// Changed pixels after the binary operations.
     pub mask: Mask,
+    /// The same with the higher threshold of the rectangle.
+    pub firm_mask: Mask,
 }
 
 impl Evidence {
     /// Candidate regions, largest first.
     pub fn candidates(&self, options: &EvidenceOptions) -> Vec<Region> {
-        group_regions(&regions(&self.mask, options.group.min_part_area), &options.group)
+        group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
     }
 
     /// Straight edges in and near the changed pixels of a rectangle, in ideal pixels of the camera; in the whole rectangle
@@ -110,7 +128,7 @@ impl Evidence {
 #[derive(Debug)]
 pub struct EvidenceStream {
     options: EvidenceOptions,
-    detector: ChangeDetector,
+    detectors: [ChangeDetector; 2],
     waiting: Option<(usize, f64, Image<u8>)>,
     frames: usize,
 }
@@ -118,7 +136,7 @@ pub struct EvidenceStream {
 impl EvidenceStream {
     /// A stream that has seen no frame.
     pub fn new(options: EvidenceOptions) -> Self {
-        Self { options, detector: ChangeDetector::new(options.change), waiting: None, frames: 0 }
+        Self { options, detectors: detectors(&options), waiting: None, frames: 0 }
     }
 
     /// Takes a frame and gives the evidence of the one before.
@@ -128,26 +146,33 @@ impl EvidenceStream {
         {
             return Err(EvidenceError::TimeOrder { previous_s, time_s });
         }
-        let mask = self.detector.push(frame)?;
+        let [low, firm] = &mut self.detectors;
+        let masks = low.push(frame)?.zip(firm.push(frame)?);
         let before = self.waiting.replace((self.frames, time_s, frame.to_image()));
         self.frames += 1;
-        self.evidence(before, mask)
+        self.evidence(before, masks)
     }
 
     /// The evidence of the last frame.
     pub fn finish(mut self) -> Result<Option<Evidence>, EvidenceError> {
         let last = self.waiting.take();
-        let detector = std::mem::replace(&mut self.detector, ChangeDetector::new(self.options.change));
-        self.evidence(last, detector.finish())
+        let [low, firm] = std::mem::replace(&mut self.detectors, detectors(&self.options));
+        self.evidence(last, low.finish().zip(firm.finish()))
     }
 
     fn evidence(
         &self,
         frame: Option<(usize, f64, Image<u8>)>,
-        mask: Option<Mask>,
+        masks: Option<(Mask, Mask)>,
     ) -> Result<Option<Evidence>, EvidenceError> {
-        let (Some((frame, time_s, grey)), Some(mask)) = (frame, mask) else { return Ok(None) };
-        let mask = fill_holes(&clean(&mask, &self.options.clean)?);
-        Ok(Some(Evidence { frame, time_s, grey, mask }))
+        let (Some((frame, time_s, grey)), Some((low, firm))) = (frame, masks) else { return Ok(None) };
+        let tidy = |mask: &Mask| Ok::<Mask, CleanError>(fill_holes(&clean(mask, &self.options.clean)?));
+        Ok(Some(Evidence { frame, time_s, grey, mask: tidy(&low)?, firm_mask: tidy(&firm)? }))
     }
+}
+
+/// Change detection with the low threshold and with the rectangle's.
+fn detectors(options: &EvidenceOptions) -> [ChangeDetector; 2] {
+    let min_threshold = options.rectangle_threshold.max(options.change.min_threshold);
+    [options.change, ChangeOptions { min_threshold, ..options.change }].map(ChangeDetector::new)
 }

@@ -49,23 +49,24 @@ pub struct Sighting {
     pub rectangle: Rectangle,
 }
 
-/// The 5x5 windows of eq. (1) mark pixels up to this far outside the person.
+/// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
 const MASK_MARGIN_PX: f64 = 2.0;
-/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for the soles.
-const SOLE_QUANTILE: f64 = 0.2;
+/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for the soles. It needs no
+/// margin: shoes change less than hair does, and the far foot stands higher than the near one.
+const SOLE_QUANTILE: f64 = 0.3;
 /// The crown bobs evenly about its median row.
 const CROWN_QUANTILE: f64 = 0.5;
 /// Standard deviation of a body height that was measured, metres: shoes and hair.
 const HEIGHT_SD_M: f64 = 0.02;
 
-/// The bottom row is disbelieved when it says nearer than the crown by this many standard deviations.
-const REFLECTION_SD: f64 = 2.0;
+/// The bottom row is disbelieved when it says nearer than the crown by more than this many standard deviations.
+const REFLECTION_SD: f64 = 1.0;
 
 /// Row of the soles and of the crown over all sightings, pixels.
 pub fn person_rows(sightings: &[Sighting]) -> (f64, f64) {
     let rows =
         |row: fn(&Rectangle) -> usize| sightings.iter().map(|s| row(&s.rectangle) as f64).collect::<Vec<_>>();
-    let sole = quantile(rows(|r| r.bottom), SOLE_QUANTILE) - MASK_MARGIN_PX;
+    let sole = quantile(rows(|r| r.bottom), SOLE_QUANTILE);
     let crown = quantile(rows(|r| r.top), CROWN_QUANTILE) + MASK_MARGIN_PX;
     (sole, crown)
 }
@@ -182,7 +183,7 @@ mod tests {
                     left: (sole.x - 40.0) as usize,
                     right: (sole.x + 40.0) as usize,
                     top: (crown.y - MASK_MARGIN_PX).round() as usize,
-                    bottom: (sole.y + MASK_MARGIN_PX).round() as usize,
+                    bottom: sole.y.round() as usize,
                 };
                 Sighting { time_s, rectangle }
             })
