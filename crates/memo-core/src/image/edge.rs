@@ -43,12 +43,13 @@ const SIGMA_PX: (f32, f32) = (0.4, 50.0);
 /// How edges are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeOptions {
-    /// Scale of the Gaussian. 1 px: 0.6 follows sensor noise, at 2 the edges inside a figure 150 px tall melt.
+    /// Scale of the Gaussian. 1 px: finer scales follow sensor noise, at 2 px the two edges of a limb 4 px wide
+    /// push each other apart.
     pub sigma_px: f32,
-    /// Gradient every edge point reaches, grey levels per pixel. 5: four times what sensor noise of 5 grey
-    /// levels leaves at sigma 1, and a step of 12 grey levels still passes.
+    /// Gradient every edge point reaches, grey levels per pixel. 5: at sigma 1 noise of 5 grey levels leaves a
+    /// gradient of 1 along either axis; a step of 13 grey levels passes.
     pub low: f32,
-    /// Gradient that at least one point of a connected edge reaches. 12: a step of 30 grey levels.
+    /// Gradient that at least one point of a connected edge reaches. 12: a step of 31 grey levels.
     pub high: f32,
 }
 

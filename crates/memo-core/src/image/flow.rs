@@ -55,7 +55,8 @@ pub struct FlowOptions {
     /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the coarsest.
     /// More than 16 are not used.
     pub levels: usize,
-    /// Linearisations on each level. 3: of a walker's velocities 95 % are within 0.06 px of those after twelve.
+    /// Linearisations on each level. 2: 95 % of a walker's velocities are within 0.01 px of those after twelve in
+    /// slow footage (6 px a frame), within 0.15 px in fast (20 px a frame).
     pub warps: usize,
     /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-4 leaves
     /// 99 % of a walker's velocities within 0.01 px of the exact solution.
@@ -72,7 +73,7 @@ impl Default for FlowOptions {
         Self {
             smoothness: 25.0,
             levels: 5,
-            warps: 3,
+            warps: 2,
             tolerance: 1e-4,
             max_iterations: 200,
             min_gradient: 0.5,
@@ -1083,11 +1084,7 @@ mod tests {
             for p in (0..region.pixels().len()).filter(|&p| region.pixels()[p]) {
                 worst = worst.max(field.at(p % 120, p / 120).unwrap().distance(shift));
             }
-            println!(
-                "{shift}: worst {worst:.3} px, {} iterations, residual {:.1e}",
-                field.iterations, field.relative_residual
-            );
-            assert!(worst < 0.1, "{shift}: {worst} px off");
+            assert!(worst < 0.05, "{shift}: {worst} px off");
         }
     }
 
@@ -1140,7 +1137,7 @@ mod tests {
         let mut region = Mask::filled(40, 30, true);
         let field =
             velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
-        assert!(field.at(20, 15).unwrap().distance(DVec2::X) < 0.1);
+        assert!(field.at(20, 15).unwrap().distance(DVec2::X) < 0.05);
         region = Mask::filled(40, 30, false);
         region.set(39, 29, true);
         let field =
