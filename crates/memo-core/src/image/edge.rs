@@ -554,8 +554,8 @@ impl Links {
 
 /// The top of the parabola through the logarithms of three equidistant (squared) magnitudes, in (-1/2, 1/2].
 ///
-/// Across a step edge the magnitude is a Gaussian, whose logarithm is a parabola: the position is exact there,
-/// where a parabola through the magnitudes themselves is off by up to 0.05 px.
+/// Across a step edge the magnitude is a Gaussian, whose logarithm is a parabola. What is left of the error,
+/// 0.03 px at a step without any blur, comes from the pixels' own width.
 #[inline(always)]
 fn peak_offset(before: f32, here: f32, after: f32) -> f32 {
     let [before, here, after] = [before, here, after].map(|m| m.max(f32::MIN_POSITIVE).ln());
@@ -589,17 +589,23 @@ fn step_between(from: &Edgel, to: &Edgel) -> Option<Step> {
 mod tests {
     use super::*;
     use crate::image::Image;
+    use glam::DVec2;
     use proptest::prelude::*;
 
-    /// Grey levels of a half plane, each pixel the mean over its square (16x16 samples).
+    /// Grey levels of a half plane, each pixel weighed by the part of its square that lies inside: a box of
+    /// width a = |n_x| smoothed by one of width b = |n_y|, integrated up to the distance of the border.
     fn half_plane(size: usize, normal: Vec2, offset_px: f32, dark: f32, bright: f32) -> Image<u8> {
-        let middle = (size / 2) as f32;
-        let is_bright = |x: f32, y: f32| normal.dot(Vec2::new(x - middle, y - middle)) > offset_px;
-        let sub = |i: usize| (i as f32 + 0.5) / 16.0 - 0.5;
+        let normal = normal.as_dvec2();
+        let (a, b) = (normal.x.abs().max(1e-4), normal.y.abs().max(1e-4));
+        let ramp_sq = |t: f64| t.max(0.0).powi(2);
+        let part = |d: f64| {
+            let (far, near) = (0.5 * (a + b), 0.5 * (a - b));
+            (ramp_sq(d + far) - ramp_sq(d + near) - ramp_sq(d - near) + ramp_sq(d - far)) / (2.0 * a * b)
+        };
         let data = (0..size * size).map(|p| {
-            let (x, y) = ((p % size) as f32, (p / size) as f32);
-            let bright_count = (0..256).filter(|s| is_bright(x + sub(s % 16), y + sub(s / 16))).count();
-            (dark + (bright - dark) * bright_count as f32 / 256.0).round() as u8
+            let at = DVec2::new((p % size) as f64, (p / size) as f64) - (size / 2) as f64;
+            let part = part(normal.dot(at) - f64::from(offset_px)) as f32;
+            (dark + (bright - dark) * part).round() as u8
         });
         Image::from_vec(size, size, data.collect()).unwrap()
     }
@@ -774,7 +780,7 @@ mod tests {
             prop_assert!(chains.edgels().len() >= 25);
             for edgel in chains.edgels() {
                 let distance = normal.dot(edgel.position_px - Vec2::splat(20.0)) - offset;
-                prop_assert!(distance.abs() < 0.06, "{distance} px off");
+                prop_assert!(distance.abs() < 0.07, "{distance} px off");
                 prop_assert!(edgel.gradient.normalize().dot(normal) > 0.999);
             }
         }
