@@ -18,6 +18,9 @@
 //! if the sum of grad I grad I^T over the component is regular. Components that fail this are refused by name
 //! ([`Evidence`]) and get no velocity.
 //!
+//! Minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine over a pyramid, the second
+//! frame being warped by the motion found so far. The oriented smoothness of Nagel is not offered.
+//!
 //! The motion is smoothed across the borders of limbs that move differently; grey values must persist from
 //! frame to frame; what moves farther than its own size on the coarsest pyramid level is lost.
 
@@ -49,17 +52,19 @@ pub enum FlowError {
 /// How the velocity field is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowOptions {
-    /// Weight lambda of the smoothness, grey levels. 10: a difference of one pixel between neighbours costs as
-    /// much as a grey value that is wrong by 10, several times the noise.
+    /// Weight lambda of the smoothness, grey levels. 25: at 10 the field runs away at limb crossings of real
+    /// footage, where grey values do not persist; at 60 the swinging and the standing leg no longer separate.
     pub smoothness: f64,
     /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the coarsest.
+    /// Small frames get fewer.
     pub levels: usize,
-    /// Linearisations on each level. 3: the error left after the third is below that of the interpolation.
+    /// Linearisations on each level. 2: 95 % of a walker's velocities are within 0.01 px of those after twelve in
+    /// slow footage (6 px a frame), within 0.15 px in fast (20 px a frame).
     pub warps: usize,
-    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-3 changes no
-    /// velocity by more than about 0.01 px.
+    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-4 leaves
+    /// 99 % of a walker's velocities within 0.01 px of the exact solution.
     pub tolerance: f64,
-    /// Largest number of solver steps for one linearisation. 200: ten times what regions of a person take.
+    /// Largest number of solver steps for one linearisation. 200: thirty times what regions of a person take.
     pub max_iterations: usize,
     /// RMS gradient in the weaker of two directions below which a component is not textured, grey levels per
     /// pixel. 0.5: about what noise of one grey level leaves after smoothing.
@@ -69,9 +74,9 @@ pub struct FlowOptions {
 impl Default for FlowOptions {
     fn default() -> Self {
         Self {
-            smoothness: 10.0,
+            smoothness: 25.0,
             levels: 5,
-            warps: 3,
+            warps: 2,
             tolerance: 1e-4,
             max_iterations: 200,
             min_gradient: 0.5,
@@ -163,7 +168,7 @@ pub fn velocity_field(
     options.check()?;
     first.check_same_size(second)?;
     let window = window_of_region(first, region)?;
-    let levels = options.levels.min(MAX_LEVELS);
+    let levels = levels_for(first, options);
     let margin = 1 << levels;
     let grey = Raster::smoothed(first, &window, margin);
     let mut domain = Domain::of_region(region, &window);
@@ -183,8 +188,11 @@ pub fn velocity_field(
     Ok(field_of_motion(motion, &pyramid[0].domain, window, components))
 }
 
-/// More levels than a frame of 65536 px has use for.
-const MAX_LEVELS: usize = 16;
+/// As many levels as asked for, but no motion of more than half the frame is looked for.
+fn levels_for(frame: &Frame<'_>, options: &FlowOptions) -> usize {
+    let side = frame.width().max(frame.height());
+    options.levels.min((side / 2).max(2).ilog2() as usize)
+}
 
 /// The rectangle round the region.
 fn window_of_region(frame: &Frame<'_>, region: &Mask) -> Result<Window, FlowError> {
@@ -1023,6 +1031,21 @@ mod tests {
         assert!((0..g.len()).all(|i| domain.is_inside[i] || x.u[i] == 0.0));
     }
 
+    #[test]
+    fn the_number_of_solver_steps_does_not_grow_with_the_region() {
+        for size in [8, 32, 128] {
+            let mut domain = Domain::empty(size, size);
+            let cells: Vec<usize> = (0..size * size).map(|p| domain.cell(p % size, p / size)).collect();
+            cells.iter().for_each(|&cell| domain.is_inside[cell] = true);
+            let g: Vec<DVec2> =
+                (0..domain.is_inside.len()).map(|i| 4.0 * DVec2::from_angle((i * i % 29) as f64)).collect();
+            let c: Vec<f64> = (0..g.len()).map(|i| (0.37 * i as f64).sin()).collect();
+            let options = FlowOptions { smoothness: 25.0, tolerance: 1e-6, ..EXACT };
+            let (_, solved) = iterated_solution(&domain, &g, &c, &options);
+            assert!(solved.iterations <= 15, "{} steps at {size}x{size}", solved.iterations);
+        }
+    }
+
     /// On a chain of pixels that is free of data between its ends, u is a straight line between them.
     #[test]
     fn a_flat_stretch_interpolates_linearly_between_textured_ends() {
@@ -1082,11 +1105,7 @@ mod tests {
             for p in (0..region.pixels().len()).filter(|&p| region.pixels()[p]) {
                 worst = worst.max(field.at(p % 120, p / 120).unwrap().distance(shift));
             }
-            println!(
-                "{shift}: worst {worst:.3} px, {} iterations, residual {:.1e}",
-                field.iterations, field.relative_residual
-            );
-            assert!(worst < 0.1, "{shift}: {worst} px off");
+            assert!(worst < 0.05, "{shift}: {worst} px off");
         }
     }
 
@@ -1129,7 +1148,7 @@ mod tests {
         assert!(matches!(error, FlowError::Size(FrameError::SizeChanged { width: 7, .. })));
         let other = Image::filled(9, 8, 1u8);
         assert!(velocity_field(&frame, &other.as_frame(), &all, &FlowOptions::default()).is_err());
-        let flat = run(&all, FlowOptions::default()).unwrap();
+        let flat = run(&all, FlowOptions { levels: usize::MAX, ..Default::default() }).unwrap();
         assert!(flat.u_px.pixels().iter().all(|u| u.is_nan()));
     }
 
@@ -1139,7 +1158,7 @@ mod tests {
         let mut region = Mask::filled(40, 30, true);
         let field =
             velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
-        assert!(field.at(20, 15).unwrap().distance(DVec2::X) < 0.1);
+        assert!(field.at(20, 15).unwrap().distance(DVec2::X) < 0.05);
         region = Mask::filled(40, 30, false);
         region.set(39, 29, true);
         let field =

@@ -398,7 +398,6 @@ mod tests {
             shift_sq += (normal.dot(found.midpoint_px() - 32.0) - offset).powi(2);
         }
         let (turn_sd, shift_sd) = ((turn_sq / f64::from(count)).sqrt(), (shift_sq / f64::from(count)).sqrt());
-        println!("direction sd {:.3} deg, offset sd {shift_sd:.4} px", turn_sd.to_degrees());
         assert!(turn_sd.to_degrees() < 0.1, "direction sd {} deg", turn_sd.to_degrees());
         assert!(shift_sd < 0.03, "offset sd {shift_sd} px");
     }
