@@ -135,29 +135,30 @@ pub fn similarity(lines: &[ModelLine], edges: &[EdgeLine], options: &SimilarityO
 }
 
 /// Edges made ready for many comparisons.
-pub(crate) struct Scorer<'a> {
+struct Scorer<'a> {
     edges: Vec<PreparedEdge>,
     options: &'a SimilarityOptions,
 }
 
+/// An edge with what every comparison needs of it.
 #[derive(Debug, Clone, Copy)]
-struct PreparedEdge {
-    start: [f32; 2],
-    end: [f32; 2],
+pub(super) struct PreparedEdge {
+    pub(super) start: [f32; 2],
+    pub(super) end: [f32; 2],
     /// Unit direction.
-    direction: [f32; 2],
-    length: f32,
+    pub(super) direction: [f32; 2],
+    pub(super) length: f32,
     /// w_G w_V.
-    weight: f32,
+    pub(super) weight: f32,
 }
 
 /// A model line's own axes: x along the line from its start, y across.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LineFrame {
+struct LineFrame {
     origin: [f32; 2],
     direction: [f32; 2],
     /// l_M.
-    pub(crate) length: f32,
+    length: f32,
     half_width: f32,
     inverse_sigma_l: f32,
     inverse_sigma_d: f32,
@@ -172,12 +173,12 @@ struct Pair {
 }
 
 /// Lines shorter than this say nothing about direction and are left out of both sums, pixels.
-const SHORTEST_LINE_PX: f32 = 1.0;
+pub(super) const SHORTEST_LINE_PX: f32 = 1.0;
 /// Angles beyond this many sigma contribute less than 2 % of an edge and are not compared.
-const ANGLE_CUT_SIGMA: f32 = 2.8;
+pub(super) const ANGLE_CUT_SIGMA: f32 = 2.8;
 
 impl LineFrame {
-    pub(crate) fn new(line: &ModelLine, options: &SimilarityOptions) -> Option<Self> {
+    fn new(line: &ModelLine, options: &SimilarityOptions) -> Option<Self> {
         let (dx, dy) = (line.end[0] - line.start[0], line.end[1] - line.start[1]);
         let length = (dx * dx + dy * dy).sqrt();
         if length.is_nan() || length < SHORTEST_LINE_PX {
@@ -196,47 +197,8 @@ impl LineFrame {
 }
 
 impl<'a> Scorer<'a> {
-    pub(crate) fn new(edges: &[EdgeLine], options: &'a SimilarityOptions) -> Self {
+    fn new(edges: &[EdgeLine], options: &'a SimilarityOptions) -> Self {
         Self { edges: edges.iter().map(|edge| PreparedEdge::new(edge, options)).collect(), options }
-    }
-
-    pub(crate) fn options(&self) -> &SimilarityOptions {
-        self.options
-    }
-
-    /// The best weighted s_i of a line among the given edges, times w_K.
-    pub(crate) fn best(&self, line: &ModelLine, frame: &LineFrame, candidates: &[u32]) -> f32 {
-        let mut best = 0.0f32;
-        for &e in candidates {
-            if let Some(value) = self.value(frame, &self.edges[e as usize], best) {
-                best = best.max(value);
-            }
-        }
-        best * self.options.part_weights[line.part as usize]
-    }
-
-    /// Edges that may answer a line whose window stays within `margin_px` of where it is now, turned by at most
-    /// `turn_rad`.
-    pub(crate) fn candidates(&self, frame: &LineFrame, margin_px: f32, turn_rad: f32, out: &mut Vec<u32>) {
-        out.clear();
-        let reach = frame.half_width + margin_px;
-        let sine_cut = match self.options.measure {
-            Measure::Rohr => (ANGLE_CUT_SIGMA * self.options.sigma_phi_rad + turn_rad).min(1.57).sin(),
-            Measure::Lowe => 1.0,
-        };
-        for (index, edge) in self.edges.iter().enumerate() {
-            if edge.sine_to(frame).abs() > sine_cut {
-                continue;
-            }
-            let ([x0, y0], [x1, y1]) = (frame.local(edge.start), frame.local(edge.end));
-            let outside = x0.max(x1) < -margin_px
-                || x0.min(x1) > frame.length + margin_px
-                || y0.max(y1) < -reach
-                || y0.min(y1) > reach;
-            if !outside {
-                out.push(index as u32);
-            }
-        }
     }
 
     fn pair(&self, frame: &LineFrame, edge: usize) -> Option<Pair> {
@@ -246,34 +208,16 @@ impl<'a> Scorer<'a> {
         }
     }
 
-    /// The value of a pair, or `None` where it cannot exceed `best`.
-    #[inline]
-    fn value(&self, frame: &LineFrame, edge: &PreparedEdge, best: f32) -> Option<f32> {
-        if self.options.measure == Measure::Lowe {
-            return self.lowe(frame, edge).map(|pair| pair.value);
-        }
-        let cut = edge.cut(frame)?;
-        if cut.overlap * edge.weight <= best {
-            return None;
-        }
-        let angle = edge.angle_to(frame, self.options.sigma_phi_rad)?;
-        Some(self.gaussian(frame, edge, &cut, angle))
-    }
-
     /// Eq. (7): s = l exp(-((l_M - l)² / sigma_l² + d² / sigma_d² + dphi² / sigma_phi²) / 2).
     fn rohr(&self, frame: &LineFrame, edge: &PreparedEdge) -> Option<Pair> {
         let cut = edge.cut(frame)?;
         let angle = edge.angle_to(frame, self.options.sigma_phi_rad)?;
-        let value = self.gaussian(frame, edge, &cut, angle);
-        Some(Pair { value, overlap: cut.overlap, distance: cut.distance, angle })
-    }
-
-    #[inline]
-    fn gaussian(&self, frame: &LineFrame, edge: &PreparedEdge, cut: &Cut, angle: f32) -> f32 {
         let missing = (frame.length - cut.overlap) * frame.inverse_sigma_l;
         let away = cut.distance * frame.inverse_sigma_d;
         let turned = angle / self.options.sigma_phi_rad;
-        edge.weight * cut.overlap * (-0.5 * (missing * missing + away * away + turned * turned)).exp()
+        let value =
+            edge.weight * cut.overlap * (-0.5 * (missing * missing + away * away + turned * turned)).exp();
+        Some(Pair { value, overlap: cut.overlap, distance: cut.distance, angle })
     }
 
     /// Eq. (10) on the uncut edge; only edges that reach the window compete.
@@ -300,7 +244,6 @@ struct Cut {
 }
 
 impl LineFrame {
-    #[inline]
     fn local(&self, point: [f32; 2]) -> [f32; 2] {
         let (x, y) = (point[0] - self.origin[0], point[1] - self.origin[1]);
         let [ux, uy] = self.direction;
@@ -309,7 +252,7 @@ impl LineFrame {
 }
 
 impl PreparedEdge {
-    fn new(edge: &EdgeLine, options: &SimilarityOptions) -> Self {
+    pub(super) fn new(edge: &EdgeLine, options: &SimilarityOptions) -> Self {
         let (dx, dy) = (edge.end[0] - edge.start[0], edge.end[1] - edge.start[1]);
         let length = (dx * dx + dy * dy).sqrt();
         let full = |value: f32, limit: Option<f32>| limit.map_or(1.0, |limit| (value / limit).min(1.0));
@@ -322,27 +265,17 @@ impl PreparedEdge {
         }
     }
 
-    #[inline]
     fn sine_to(&self, frame: &LineFrame) -> f32 {
         self.direction[1] * frame.direction[0] - self.direction[0] * frame.direction[1]
     }
 
     /// The angle between the undirected lines, `None` beyond the cut.
-    #[inline]
     fn angle_to(&self, frame: &LineFrame, sigma: f32) -> Option<f32> {
-        let sine = self.sine_to(frame).abs();
-        if sine > 0.707 {
-            let angle = sine.min(1.0).asin();
-            return (angle <= ANGLE_CUT_SIGMA * sigma).then_some(angle);
-        }
-        // asin x = x + x³/6 + 3x⁵/40 + 15x⁷/336 + 105x⁹/3456, wrong by 6e-4 at 0.6.
-        let q = sine * sine;
-        let angle = sine * (1.0 + q * (1.0 / 6.0 + q * (0.075 + q * (0.044_642_86 + q * 0.030_381_944))));
+        let angle = self.sine_to(frame).abs().min(1.0).asin();
         (angle <= ANGLE_CUT_SIGMA * sigma).then_some(angle)
     }
 
     /// Clips the edge to the window [0, l_M] x [-r, r] (Liang and Barsky).
-    #[inline]
     fn cut(&self, frame: &LineFrame) -> Option<Cut> {
         let [x0, y0] = frame.local(self.start);
         let [x1, y1] = frame.local(self.end);
@@ -359,7 +292,6 @@ impl PreparedEdge {
 }
 
 /// Narrows [t0, t1] to where low <= p + t d <= high; makes it empty where that never holds.
-#[inline]
 fn clip(p: f32, d: f32, low: f32, high: f32, t0: &mut f32, t1: &mut f32) {
     if d.abs() < 1e-12 {
         if p < low || p > high {
@@ -436,25 +368,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn candidates_lose_nothing(
-            ends in prop::collection::vec(prop::array::uniform4(-50.0f32..150.0), 1..30),
-            line in prop::array::uniform4(0.0f32..100.0),
-            shift in prop::array::uniform2(-8.0f32..8.0),
-        ) {
-            let options = SimilarityOptions::default();
-            let edges: Vec<_> = ends.iter().map(|e| edge([e[0], e[1]], [e[2], e[3]])).collect();
-            let scorer = Scorer::new(&edges, &options);
-            let anchor = model([line[0], line[1]], [line[2], line[3]]);
-            let moved = model([line[0] + shift[0], line[1] + shift[1]], [line[2] + shift[0], line[3] + shift[1]]);
-            if let (Some(at_anchor), Some(at_moved)) = (LineFrame::new(&anchor, &options), LineFrame::new(&moved, &options)) {
-                let mut few = Vec::new();
-                scorer.candidates(&at_anchor, 12.0, 0.0, &mut few);
-                let fast = scorer.best(&moved, &at_moved, &few) / at_moved.length;
-                prop_assert!((fast - value(moved, &edges, &options)).abs() < 1e-6);
-            }
-        }
-
         #[test]
         fn similarity_is_between_zero_and_one_and_blind_to_direction(
             e in prop::array::uniform4(-50.0f32..150.0),

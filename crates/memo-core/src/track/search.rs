@@ -5,8 +5,9 @@
 //! in parallel; each score depends on nothing but its own hypothesis, so the answer does not depend on the number
 //! of threads.
 
-use super::score::{EdgeLine, LineFrame, ModelLine, Scorer, SimilarityOptions};
-use crate::model::visibility::{VisibilityOptions, VisibleSegment, visible_contours};
+use super::column::{ColumnScorer, LANES, Lanes, LineLanes, Projection};
+use super::score::{EdgeLine, ModelLine, SimilarityOptions};
+use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment, visible_contours};
 use crate::model::{Camera, PosedBody, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -70,7 +71,7 @@ impl Scene<'_> {
     pub fn lines(&self, hypothesis: &Hypothesis) -> Vec<ModelLine> {
         let mut visible = Vec::new();
         visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), &LINES_ONLY, &mut visible);
-        visible.iter().filter_map(|segment| project(segment, 0.0, self.camera)).collect()
+        visible.iter().filter_map(|segment| project(segment, self.camera)).collect()
     }
 }
 
@@ -239,17 +240,20 @@ pub fn search(
     options: &SimilarityOptions,
     hidden_lines: HiddenLines,
 ) -> SearchResult {
-    let scorer = Scorer::new(edges, options);
+    let scorer = ColumnScorer::new(edges, options);
+    // The posture depends on the phase only: each body is posed once, at the path's origin, and moved from there.
+    let origin = Hypothesis { along_m: 0.0, height_m: 0.0, phase: 0.0 };
+    let pose = |p: usize| scene.pose(&Hypothesis { phase: grid.phase.at(p), ..origin });
+    let bodies: Vec<_> = (0..grid.phase.count).map(pose).collect();
     let mut scores = vec![0.0; grid.len()];
     let score_column = |work: &mut Column, (index, out): (usize, &mut [f32])| {
-        let (phase, along) =
-            (grid.phase.at(index / grid.along.count), grid.along.at(index % grid.along.count));
+        let (body, along_m) = (&bodies[index / grid.along.count], grid.along.at(index % grid.along.count));
         match hidden_lines {
-            HiddenLines::PerColumn => work.score(&scorer, scene, (along, phase), &grid.height, out),
+            HiddenLines::PerColumn => work.score(&scorer, scene, body, along_m, &grid.height, out),
             HiddenLines::PerHypothesis => {
                 for (h, score) in out.iter_mut().enumerate() {
                     let here = Axis { centre: grid.height.at(h), step: grid.height.step, count: 1 };
-                    work.score(&scorer, scene, (along, phase), &here, std::slice::from_mut(score));
+                    work.score(&scorer, scene, body, along_m, &here, std::slice::from_mut(score));
                 }
             }
         }
@@ -267,72 +271,65 @@ fn arg_max(values: &[f32]) -> usize {
 /// Working memory for one column of the grid.
 #[derive(Default)]
 struct Column {
+    view: PreparedView,
     visible: Vec<VisibleSegment>,
-    candidates: Vec<u32>,
-    /// Sum of l_M for each height.
-    shown: Vec<f32>,
+    near: Vec<u32>,
 }
 
 impl Column {
-    /// Scores all heights at one place and phase.
+    /// Scores all heights at one place along the path of a body posed at the path's origin.
     fn score(
         &mut self,
-        scorer: &Scorer<'_>,
+        scorer: &ColumnScorer<'_>,
         scene: &Scene<'_>,
-        (along_m, phase): (f64, f64),
+        body: &PosedBody,
+        along_m: f64,
         heights: &Axis,
         out: &mut [f32],
     ) {
-        // 1. The body in the middle of the column and what of it is visible.
-        let middle = Hypothesis { along_m, height_m: heights.centre, phase };
-        let posed = scene.pose(&middle);
-        visible_contours(&posed.cylinders, scene.camera.position(), &LINES_ONLY, &mut self.visible);
-        // 2. For each visible piece the edges that can answer it at any height.
-        let reach_m = 0.5 * heights.step * (heights.count.saturating_sub(1)) as f64;
-        self.shown.clear();
-        self.shown.resize(heights.count, 0.0f32);
-        out.fill(0.0);
-        for segment in &self.visible {
-            let Some(anchor) = project(segment, 0.0, scene.camera) else { continue };
-            let Some(frame) = LineFrame::new(&anchor, scorer.options()) else { continue };
-            let margin = reach_px(segment, reach_m, scene.camera);
-            scorer.candidates(&frame, margin, TURN_RAD, &mut self.candidates);
-            // 3. Eq. (11) summed over the pieces, height by height.
-            for (h, score) in out.iter_mut().enumerate() {
-                let raised = heights.at(h) - heights.centre;
-                let Some(line) = project(segment, raised, scene.camera) else { continue };
-                let Some(frame) = LineFrame::new(&line, scorer.options()) else { continue };
-                self.shown[h] += frame.length;
-                *score += scorer.best(&line, &frame, &self.candidates);
+        // 1. What is visible of the body in the middle of the column. Moving the body or the camera the other way is the same.
+        let place = scene.path.point(along_m, heights.centre) - scene.path.point(0.0, 0.0);
+        let seen_from = scene.camera.position() - place;
+        self.view.visible_contours(&body.cylinders, seen_from, &LINES_ONLY, &mut self.visible);
+        // 2. The visible pieces raised to each height, and the edges that answer them there.
+        let projection = Projection::new(scene.camera, place);
+        for (block, scores) in out.chunks_mut(LANES).enumerate() {
+            let height = |i: usize| heights.at((block * LANES + i).min(heights.count - 1));
+            let raised_m = std::array::from_fn(|i| (height(i) - heights.centre) as f32);
+            let all = pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || self.similarity(scorer, &projection, &raised_m),
+            );
+            scores.copy_from_slice(&all[..scores.len()]);
+        }
+    }
+
+    /// Eq. (11): s(p) = sum of w_K s_i over sum of l_M, at each height.
+    #[inline(always)]
+    fn similarity(
+        &mut self,
+        scorer: &ColumnScorer<'_>,
+        projection: &Projection<'_>,
+        raised_m: &Lanes,
+    ) -> Lanes {
+        let (mut answered, mut model_px) = ([0.0f32; LANES], [0.0f32; LANES]);
+        for piece in &self.visible {
+            let lines = LineLanes::new(projection, piece.start, piece.end, raised_m);
+            scorer.near(&lines, &mut self.near);
+            let best = scorer.best(piece.part, &lines, &self.near);
+            for i in 0..LANES {
+                answered[i] += best[i];
+                model_px[i] += lines.length[i];
             }
         }
-        for (score, shown) in out.iter_mut().zip(&self.shown) {
-            *score = if *shown > 0.0 { *score / shown } else { 0.0 };
-        }
+        std::array::from_fn(|i| if model_px[i] > 0.0 { answered[i] / model_px[i] } else { 0.0 })
     }
 }
 
-/// Lines turn by less than this while they move along a column, radians: 10 cm seen from 4 m.
-const TURN_RAD: f32 = 0.03;
-
-/// The largest way an end of the segment moves in the image when the body is raised or lowered by `reach_m`, plus half a
-/// pixel for the rounding of f32.
-fn reach_px(segment: &VisibleSegment, reach_m: f64, camera: &Camera) -> f32 {
-    let moved =
-        |end: DVec3, by: f64| match (camera.project_ideal(end), camera.project_ideal(end + DVec3::Z * by)) {
-            (Some(a), Some(b)) => a.distance(b),
-            _ => f64::INFINITY,
-        };
-    let ends = [segment.start, segment.end];
-    let most = ends.iter().flat_map(|&end| [moved(end, reach_m), moved(end, -reach_m)]).fold(0.0, f64::max);
-    most as f32 + 0.5
-}
-
-/// A visible piece of contour, raised by `raised_m`, as a line in ideal pixels cut to the image.
-fn project(segment: &VisibleSegment, raised_m: f64, camera: &Camera) -> Option<ModelLine> {
-    let raised = DVec3::Z * raised_m;
-    let start = camera.project_ideal(segment.start + raised)?;
-    let end = camera.project_ideal(segment.end + raised)?;
+/// A visible piece of contour as a line in ideal pixels cut to the image.
+fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
+    let start = camera.project_ideal(segment.start)?;
+    let end = camera.project_ideal(segment.end)?;
     let (t0, t1) = inside_image(start, end, camera)?;
     let at = |t: f64| {
         let p = start.lerp(end, t);

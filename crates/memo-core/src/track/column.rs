@@ -1,0 +1,449 @@
+//! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
+//!
+//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32: one lane a height. The loops over lanes are left to the
+//! compiler's vectoriser, so every function they call is `#[inline(always)]` and the caller dispatches on the instruction
+//! set. No operation is fused or reordered: the scores are the same bits on every instruction set.
+//!
+//! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32 (some 1e-4 px).
+
+use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
+use crate::model::Camera;
+use glam::DVec3;
+
+/// Heights evaluated together: the printed grid has 11.
+pub(super) const LANES: usize = 16;
+/// One f32 for each height.
+pub(super) type Lanes = [f32; LANES];
+/// Edges tested together for being near a line, one byte of a word each.
+const BATCH: usize = 8;
+/// Nearest depth that is projected, metres.
+const NEAR_M: f32 = 1e-6;
+/// What rounding may move a window's border by, pixels.
+const SLACK_PX: f32 = 0.01;
+/// What rounding may turn an edge, as a sine.
+const SLACK_SINE: f32 = 1e-4;
+
+/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, the projection being linear
+/// before its division.
+#[derive(Clone, Copy)]
+struct RaisedPoint {
+    base: [f32; 3],
+    per_metre: [f32; 3],
+}
+
+/// The ideal pixels of a camera for a body that was posed elsewhere and is moved to its place.
+pub(super) struct Projection<'a> {
+    camera: &'a Camera,
+    place: DVec3,
+    per_metre: [f32; 3],
+    /// Outermost pixels' outer borders.
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl<'a> Projection<'a> {
+    /// Of points that are moved by `place` before they are projected.
+    pub(super) fn new(camera: &'a Camera, place: DVec3) -> Self {
+        Self {
+            camera,
+            place,
+            per_metre: homogeneous(camera, camera.rotation.z_axis),
+            low: [-0.5; 2],
+            high: camera.size.map(|size| size as f32 - 0.5),
+        }
+    }
+
+    #[inline(always)]
+    fn point(&self, point: DVec3) -> RaisedPoint {
+        let base = homogeneous(self.camera, self.camera.camera_from_world(point + self.place));
+        RaisedPoint { base, per_metre: self.per_metre }
+    }
+}
+
+/// Eq. (2) before its division: (f x + c z, z).
+#[inline(always)]
+fn homogeneous(camera: &Camera, in_camera: DVec3) -> [f32; 3] {
+    let scaled = in_camera.truncate() * camera.focal_px + camera.centre_px * in_camera.z;
+    [scaled.x as f32, scaled.y as f32, in_camera.z as f32]
+}
+
+/// A model line's own axes, x along the line from its start, y across; all zeros where no line is shown.
+#[derive(Clone, Copy)]
+struct Line {
+    start: [f32; 2],
+    direction: [f32; 2],
+    /// l_M.
+    length: f32,
+    inverse_length: f32,
+}
+
+/// A visible piece of contour at each height, cut to the image.
+pub(super) struct LineLanes {
+    start: [Lanes; 2],
+    direction: [Lanes; 2],
+    pub(super) length: Lanes,
+    inverse_length: Lanes,
+}
+
+impl LineLanes {
+    /// The piece from `start` to `end`, raised by each of `raised_m`.
+    #[inline(always)]
+    pub(super) fn new(projection: &Projection<'_>, start: DVec3, end: DVec3, raised_m: &Lanes) -> Self {
+        let (start, end) = (projection.point(start), projection.point(end));
+        let zero = [0.0; LANES];
+        let mut lanes = Self { start: [zero; 2], direction: [zero; 2], length: zero, inverse_length: zero };
+        for i in 0..LANES {
+            let line = Line::new(projection, &start, &end, raised_m[i]);
+            lanes.start[0][i] = line.start[0];
+            lanes.start[1][i] = line.start[1];
+            lanes.direction[0][i] = line.direction[0];
+            lanes.direction[1][i] = line.direction[1];
+            lanes.length[i] = line.length;
+            lanes.inverse_length[i] = line.inverse_length;
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn line(&self, i: usize) -> Line {
+        Line {
+            start: [self.start[0][i], self.start[1][i]],
+            direction: [self.direction[0][i], self.direction[1][i]],
+            length: self.length[i],
+            inverse_length: self.inverse_length[i],
+        }
+    }
+}
+
+impl Line {
+    #[inline(always)]
+    fn new(projection: &Projection<'_>, start: &RaisedPoint, end: &RaisedPoint, raised_m: f32) -> Self {
+        let ([x0, y0], depth0) = start.pixel(raised_m);
+        let ([x1, y1], depth1) = end.pixel(raised_m);
+        let (dx, dy) = (x1 - x0, y1 - y0);
+        let (x_in, x_out) = clip(x0, dx, projection.low[0], projection.high[0]);
+        let (y_in, y_out) = clip(y0, dy, projection.low[1], projection.high[1]);
+        let (t0, t1) = (max(0.0, max(x_in, y_in)), min(1.0, min(x_out, y_out)));
+        let (x, y) = (dx * (t1 - t0), dy * (t1 - t0));
+        let length = (x * x + y * y).sqrt();
+        let shown = (min(depth0, depth1) > NEAR_M) & (t0 < t1) & (length >= SHORTEST_LINE_PX);
+        let inverse_length = 1.0 / length;
+        Self {
+            start: [select(shown, x0 + t0 * dx), select(shown, y0 + t0 * dy)],
+            direction: [select(shown, x * inverse_length), select(shown, y * inverse_length)],
+            length: select(shown, length),
+            inverse_length: select(shown, inverse_length),
+        }
+    }
+
+    #[inline(always)]
+    fn turned(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [ux, uy] = self.direction;
+        [x * ux + y * uy, y * ux - x * uy]
+    }
+
+    #[inline(always)]
+    fn local(&self, point: [f32; 2]) -> [f32; 2] {
+        self.turned([point[0] - self.start[0], point[1] - self.start[1]])
+    }
+
+    #[inline(always)]
+    fn end(&self) -> [f32; 2] {
+        [0, 1].map(|k| self.start[k] + self.length * self.direction[k])
+    }
+}
+
+impl RaisedPoint {
+    /// The pixel and the depth.
+    #[inline(always)]
+    fn pixel(&self, raised_m: f32) -> ([f32; 2], f32) {
+        let [x, y, depth] = [0, 1, 2].map(|k| self.base[k] + raised_m * self.per_metre[k]);
+        let inverse_depth = 1.0 / depth;
+        ([x * inverse_depth, y * inverse_depth], depth)
+    }
+}
+
+/// The edges of a frame, made ready for the columns of a grid.
+pub(super) struct ColumnScorer<'a> {
+    edges: Vec<PreparedEdge>,
+    batches: Vec<EdgeBatch>,
+    options: &'a SimilarityOptions,
+    constants: Constants,
+}
+
+/// What eq. (7) needs of the options.
+struct Constants {
+    /// r / l_M.
+    c_r: f32,
+    /// l_M / sigma_l.
+    inverse_c_l: f32,
+    /// l_M / sigma_d.
+    inverse_c_d_c_r: f32,
+    inverse_sigma_phi: f32,
+    /// Sine of the largest angle compared; above any sine where all are.
+    sine_cut: f32,
+}
+
+impl Constants {
+    fn new(options: &SimilarityOptions) -> Self {
+        let angle_cut = match options.measure {
+            Measure::Rohr => ANGLE_CUT_SIGMA * options.sigma_phi_rad,
+            Measure::Lowe => f32::INFINITY,
+        };
+        Self {
+            c_r: options.c_r,
+            inverse_c_l: 1.0 / options.c_l,
+            inverse_c_d_c_r: 1.0 / (options.c_d * options.c_r),
+            inverse_sigma_phi: 1.0 / options.sigma_phi_rad,
+            sine_cut: if angle_cut < std::f32::consts::FRAC_PI_2 { angle_cut.sin() } else { 2.0 },
+        }
+    }
+}
+
+impl<'a> ColumnScorer<'a> {
+    pub(super) fn new(edges: &[EdgeLine], options: &'a SimilarityOptions) -> Self {
+        let edges: Vec<_> = edges.iter().map(|edge| PreparedEdge::new(edge, options)).collect();
+        let batches = edges.chunks(BATCH).map(EdgeBatch::new).collect();
+        Self { edges, batches, options, constants: Constants::new(options) }
+    }
+
+    /// w_K s_i of a line at each height: the best among the edges `near` it.
+    #[inline(always)]
+    pub(super) fn best(&self, part: usize, lines: &LineLanes, near: &[u32]) -> Lanes {
+        let mut best = match self.options.measure {
+            Measure::Rohr => self.best_by(lines, near, rohr),
+            Measure::Lowe => self.best_by(lines, near, lowe),
+        };
+        for best in &mut best {
+            *best *= self.options.part_weights[part];
+        }
+        best
+    }
+
+    #[inline(always)]
+    fn best_by(
+        &self,
+        lines: &LineLanes,
+        near: &[u32],
+        measure: impl Fn(&Line, &PreparedEdge, &Constants) -> f32,
+    ) -> Lanes {
+        let mut best = [0.0; LANES];
+        for &e in near {
+            let edge = self.edges[e as usize];
+            for i in 0..LANES {
+                best[i] = max(best[i], measure(&lines.line(i), &edge, &self.constants));
+            }
+        }
+        best
+    }
+
+    /// The edges that may answer the line at one of the heights.
+    #[inline(always)]
+    pub(super) fn near(&self, lines: &LineLanes, near: &mut Vec<u32>) {
+        near.clear();
+        let area = Area::new(lines, &self.constants);
+        for (batch, first) in self.batches.iter().zip((0u32..).step_by(BATCH)) {
+            let mut marks = batch.marks(&area);
+            while marks != 0 {
+                near.push(first + marks.trailing_zeros() / 8);
+                marks &= marks - 1;
+            }
+        }
+    }
+}
+
+/// Eq. (7): s = l exp(-((l_M - l)² / sigma_l² + d² / sigma_d² + dphi² / sigma_phi²) / 2).
+#[inline(always)]
+fn rohr(line: &Line, edge: &PreparedEdge, constants: &Constants) -> f32 {
+    let cut = Cut::new(line, edge, constants.c_r * line.length);
+    let missing = (1.0 - cut.overlap * line.inverse_length) * constants.inverse_c_l;
+    let away = cut.distance * line.inverse_length * constants.inverse_c_d_c_r;
+    let turned_sq = angle_sq(cut.sine) * (constants.inverse_sigma_phi * constants.inverse_sigma_phi);
+    let value = edge.weight * cut.overlap * exp(-0.5 * (missing * missing + away * away + turned_sq));
+    select(cut.sine <= constants.sine_cut, value)
+}
+
+/// Eq. (10) on the uncut edge; only edges that reach the window compete.
+#[inline(always)]
+fn lowe(line: &Line, edge: &PreparedEdge, constants: &Constants) -> f32 {
+    let half_width = constants.c_r * line.length;
+    let cut = Cut::new(line, edge, half_width);
+    let (y0, y1) = (line.local(edge.start)[1], line.local(edge.end)[1]);
+    let floor = 0.01;
+    let missing = max((edge.length - line.length).abs() * line.inverse_length, floor);
+    let away = max((0.5 * (y0 + y1)).abs() / half_width, floor);
+    let turned = max(angle_sq(cut.sine).sqrt() * std::f32::consts::FRAC_2_PI, floor);
+    let ratio = edge.length * line.inverse_length;
+    let value =
+        edge.weight * line.length * ratio * ratio * (floor * floor * floor) / (missing * away * turned);
+    select(cut.reaches, value)
+}
+
+/// An edge cut to a line's window [0, l_M] x [-r, r].
+struct Cut {
+    reaches: bool,
+    overlap: f32,
+    distance: f32,
+    /// Of the angle between the undirected lines.
+    sine: f32,
+}
+
+impl Cut {
+    #[inline(always)]
+    fn new(line: &Line, edge: &PreparedEdge, half_width: f32) -> Self {
+        let [x, y] = line.local(edge.start);
+        let [dx, dy] = line.turned([edge.end[0] - edge.start[0], edge.end[1] - edge.start[1]]);
+        let (x_in, x_out) = clip(x, dx, 0.0, line.length);
+        let (y_in, y_out) = clip(y, dy, -half_width, half_width);
+        let (t0, t1) = (max(0.0, max(x_in, y_in)), min(1.0, min(x_out, y_out)));
+        Self {
+            reaches: t0 < t1,
+            overlap: dx.abs() * max(t1 - t0, 0.0),
+            distance: (y + 0.5 * (t0 + t1) * dy).abs(),
+            sine: line.turned(edge.direction)[1].abs(),
+        }
+    }
+}
+
+/// The t between which low <= p + t d <= high (Liang and Barsky). A d of 0 is replaced by one too small to matter.
+#[inline(always)]
+fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
+    let inverse = 1.0 / if d.abs() < 1e-12 { 1e-12 } else { d };
+    let (a, b) = ((low - p) * inverse, (high - p) * inverse);
+    (min(a, b), max(a, b))
+}
+
+/// asin² of 0 <= x <= 1 to 2.5e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 - asin sqrt(1 - q).
+#[inline(always)]
+fn angle_sq(sine: f32) -> f32 {
+    let q = min(sine * sine, 1.0);
+    let small = min(q, 1.0 - q);
+    let p = 0.158_193_29 + small * (-0.068_856_44 + small * 0.267_757_5);
+    let p = small * (0.999_998_31 + small * (0.333_575_75 + small * (0.172_293_4 + small * p)));
+    let rest = std::f32::consts::FRAC_PI_2 - p.sqrt();
+    if q <= 0.5 { p } else { rest * rest }
+}
+
+/// e^x of x <= 0 to 3e-7 of its value plus the rounding of x; 2^-126 below -87. With n the nearest integer to x / ln 2, e^x = 2^n 2^f.
+#[inline(always)]
+fn exp(x: f32) -> f32 {
+    let y = max(x, -87.0) * std::f32::consts::LOG2_E;
+    // Adding 1.5 * 2^23 rounds to an integer, which then stands in the lowest bits.
+    let magic = 12_582_912.0;
+    let shifted = y + magic;
+    let f = y - (shifted - magic);
+    let p = 0.055_503_57 + f * (0.009_676_03 + f * 0.001_339_09);
+    let p = 1.000_000_1 + f * (0.693_147_2 + f * (0.240_221_07 + f * p));
+    p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
+}
+
+// The standard library's own treat NaN in a way that costs two more instructions.
+#[inline(always)]
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn select(condition: bool, value: f32) -> f32 {
+    if condition { value } else { 0.0 }
+}
+
+/// What the windows of a line cover over all heights, in axes along the line's mean direction.
+struct Area {
+    axes: Line,
+    low: [f32; 2],
+    high: [f32; 2],
+    /// At least the sine of the largest angle with the mean direction: sin (a + b) <= sin a + sin b.
+    sine_cut: f32,
+}
+
+impl Area {
+    #[inline(always)]
+    fn new(lines: &LineLanes, constants: &Constants) -> Self {
+        let axes = Line::mean(lines);
+        let (none, mut turn) = ([f32::INFINITY; LANES], [0.0; LANES]);
+        let (mut low, mut high) = ([none; 2], [none.map(|v| -v); 2]);
+        for i in 0..LANES {
+            let line = lines.line(i);
+            let shown = line.length > 0.0;
+            let (start, end) = (axes.local(line.start), axes.local(line.end()));
+            for k in 0..2 {
+                low[k][i] = if shown { min(start[k], end[k]) } else { f32::INFINITY };
+                high[k][i] = if shown { max(start[k], end[k]) } else { -f32::INFINITY };
+            }
+            turn[i] = axes.turned(line.direction)[1].abs();
+        }
+        let reach = constants.c_r * reduce(lines.length, max) + SLACK_PX;
+        Self {
+            axes,
+            low: low.map(|low| reduce(low, min) - reach),
+            high: high.map(|high| reduce(high, max) + reach),
+            sine_cut: constants.sine_cut + reduce(turn, max) + SLACK_SINE,
+        }
+    }
+}
+
+impl Line {
+    /// Axes at the first height's start (the origin if it shows none) along the mean direction of all heights.
+    #[inline(always)]
+    fn mean(lines: &LineLanes) -> Self {
+        let [x, y] = lines.direction.map(|d| reduce(d, |a, b| a + b));
+        let length = (x * x + y * y).sqrt();
+        let direction = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
+        Self { direction, ..lines.line(0) }
+    }
+}
+
+/// Folds all lanes by halves.
+#[inline(always)]
+fn reduce(mut lanes: Lanes, fold: impl Fn(f32, f32) -> f32) -> f32 {
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            lanes[i] = fold(lanes[i], lanes[i + half]);
+        }
+    }
+    lanes[0]
+}
+
+/// Edges side by side; the last batch is filled up with NaN, which is near nothing.
+struct EdgeBatch {
+    start: [[f32; BATCH]; 2],
+    end: [[f32; BATCH]; 2],
+    direction: [[f32; BATCH]; 2],
+}
+
+impl EdgeBatch {
+    fn new(edges: &[PreparedEdge]) -> Self {
+        let side_by_side = |of: fn(&PreparedEdge) -> [f32; 2]| {
+            [0, 1].map(|k| std::array::from_fn(|i| edges.get(i).map_or(f32::NAN, |edge| of(edge)[k])))
+        };
+        Self {
+            start: side_by_side(|edge| edge.start),
+            end: side_by_side(|edge| edge.end),
+            direction: side_by_side(|edge| edge.direction),
+        }
+    }
+
+    /// Byte i is 1 where edge i reaches the area and is not turned too far.
+    #[inline(always)]
+    fn marks(&self, area: &Area) -> u64 {
+        let mut marks = [0u8; BATCH];
+        for (i, mark) in marks.iter_mut().enumerate() {
+            let [x0, y0] = area.axes.local([self.start[0][i], self.start[1][i]]);
+            let [x1, y1] = area.axes.local([self.end[0][i], self.end[1][i]]);
+            let sine = area.axes.turned([self.direction[0][i], self.direction[1][i]])[1];
+            let is_near = (max(x0, x1) >= area.low[0])
+                & (min(x0, x1) <= area.high[0])
+                & (max(y0, y1) >= area.low[1])
+                & (min(y0, y1) <= area.high[1])
+                & (sine.abs() <= area.sine_cut);
+            *mark = u8::from(is_near);
+        }
+        u64::from_le_bytes(marks)
+    }
+}
