@@ -1,5 +1,29 @@
-"""3D human motion from one fixed camera by explicit geometry."""
+"""3D human motion from one fixed camera by explicit geometry.
 
-from memo._memo import __version__
+Frames are numpy arrays (H, W) uint8, metres and seconds throughout, world Z up, gait phase in [0, 1) with 0 at
+the right heel strike.
+"""
 
-__all__ = ["__version__"]
+from memo._memo import (
+    Camera,
+    __version__,
+    change_mask,
+    edge_segments,
+    moving_regions,
+    silhouettes,
+    velocity_field,
+)
+from memo.tracking import Track, Tracker, track
+
+__all__ = [
+    "Camera",
+    "Track",
+    "Tracker",
+    "__version__",
+    "change_mask",
+    "edge_segments",
+    "moving_regions",
+    "silhouettes",
+    "track",
+    "velocity_field",
+]

@@ -41,8 +41,9 @@ TRACK_COLUMNS = (
     *("sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"),
     *(f"{side}_{angle}_deg" for side in SIDES for angle in ANGLES),
     *(f"{joint}_{axis}" for joint in JOINTS for axis in ("x_m", "y_m", "z_m", "u_px", "v_px")),
+    *("similarity", "walk"),
 )
-"""Columns of `track.csv`, in order."""
+"""Columns of `track.csv`, in order; `walk` counts the walks of a video from 0."""
 
 EVENT_COLUMNS = ("time_s", "frame", "event", "side")
 """Columns of `events.csv`, in order; `frame` has a fraction where the event falls between two frames."""
@@ -58,6 +59,8 @@ _DIGITS = {
     "_s": 6,
     "phase": 5,
     "p_swapped": 6,
+    "similarity": 5,
+    "walk": 0,
 }
 
 Column = npt.NDArray[Any]
@@ -76,11 +79,11 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads what `write_track_csv` wrote: `frame` as int64, the others as float64, empty cells as NaN."""
+    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, the others as float64, empty cells as NaN."""
     rows = _read_rows(path, TRACK_COLUMNS)
     columns: dict[str, Column] = {}
     for name in TRACK_COLUMNS:
-        kind = np.int64 if name == "frame" else np.float64
+        kind = np.int64 if name in ("frame", "walk") else np.float64
         columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
     return columns
 

@@ -1,0 +1,114 @@
+"""The compiled core; see the docstrings of the `memo` package for shapes, units and axes."""
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any, Self, final
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "Camera",
+    "Tracker",
+    "Walk",
+    "__version__",
+    "change_mask",
+    "edge_segments",
+    "moving_regions",
+    "silhouettes",
+    "velocity_field",
+]
+
+__version__: str
+
+@final
+class Camera:
+    """A calibrated camera: OpenCV axes, world Z up, metres."""
+
+    @staticmethod
+    def from_toml(path: str | PathLike[str], name: str | None = None) -> Camera: ...
+    @staticmethod
+    def from_tsai(
+        *,
+        size: tuple[int, int],
+        pixel_mm: tuple[float, float],
+        focal_mm: float,
+        kappa1_per_mm2: float,
+        centre_px: tuple[float, float],
+        sx: float,
+        translation_mm: tuple[float, float, float],
+        rotation_rad: tuple[float, float, float],
+    ) -> Camera: ...
+    @staticmethod
+    def level(
+        size: tuple[int, int], fov_deg: float, camera_height_m: float, distance_m: float
+    ) -> Camera: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    @property
+    def position(self) -> tuple[float, float, float]: ...
+    def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
+    def ground_points(
+        self, pixels: Sequence[tuple[float, float]], z_m: float = 0.0
+    ) -> npt.NDArray[np.float64]: ...
+
+@final
+class Tracker:
+    """Tracks one walker at a time; `memo.Tracker` wraps it."""
+
+    def __new__(
+        cls,
+        height_m: float = 1.75,
+        camera: Camera | None = None,
+        *,
+        fov_deg: float | None = None,
+        gait: str = "dense",
+        adapt: bool = True,
+        start_frames: int = 13,
+    ) -> Self: ...
+    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> None: ...
+    def finish(self) -> None: ...
+    def take_finished(self) -> list[Walk]: ...
+    def current(self) -> dict[str, float] | None: ...
+    def seek_report(self) -> dict[str, int]: ...
+
+@final
+class Walk:
+    """One walk that has ended."""
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
+    def events(self) -> list[tuple[float, float, str, str]]: ...
+    def measured(self) -> npt.NDArray[np.float64]: ...
+    def contours(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]: ...
+    def start(self) -> dict[str, Any]: ...
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def direction(self) -> str: ...
+    @property
+    def p_other_direction(self) -> float: ...
+    @property
+    def p_swapped(self) -> float: ...
+    @property
+    def deviation(self) -> tuple[float, float, float, float, float, bool] | None: ...
+    def __len__(self) -> int: ...
+
+def change_mask(
+    a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8], threshold: float | None = None
+) -> npt.NDArray[np.bool_]: ...
+def moving_regions(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]: ...
+def silhouettes(
+    frames: Sequence[npt.NDArray[np.uint8]] | npt.NDArray[np.uint8], threshold: float = 20.0
+) -> list[npt.NDArray[np.bool_]]: ...
+def edge_segments(
+    frame: npt.NDArray[np.uint8],
+    mask: npt.NDArray[np.bool_] | None = None,
+    *,
+    sigma_px: float = 1.0,
+    low: float = 5.0,
+    high: float = 12.0,
+    min_length_px: float = 8.0,
+) -> npt.NDArray[np.float64]: ...
+def velocity_field(
+    first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...

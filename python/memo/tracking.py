@@ -1,0 +1,237 @@
+"""Tracking as it is called from Python: `track` for files, `Tracker` for streams, `Track` for the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo
+from memo.files import TRACK_COLUMNS
+
+__all__ = ["Track", "Tracker", "track"]
+
+_WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
+
+
+class Tracker:
+    """Tracks one walker at a time through a stream of frames, with memory that does not grow.
+
+    `height_m` is the body height crown to sole. Without `camera` one is guessed from the image size, the
+    horizontal field of view `fov_deg` and the height. `gait` is "dense" or "sampled_10" (the paper's ten
+    samples); `adapt=False` stays on the average gait and body. What a frame shows is known one frame later.
+    """
+
+    def __init__(
+        self,
+        height_m: float = 1.75,
+        camera: _memo.Camera | None = None,
+        *,
+        fov_deg: float | None = None,
+        gait: str = "dense",
+        adapt: bool = True,
+        start_frames: int = 13,
+    ) -> None:
+        self._core = _memo.Tracker(
+            height_m, camera, fov_deg=fov_deg, gait=gait, adapt=adapt, start_frames=start_frames
+        )
+        self._camera = camera
+        self._walks: list[_memo.Walk] = []
+
+    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> dict[str, float] | None:
+        """Takes the next frame, (H, W) uint8; times must increase.
+
+        Returns the filtered state of the walker being followed (keys `frame, time_s, x_m, y_m, z_m,
+        heading_rad, phase, p_swapped, speed_mps`), or None while nobody is.
+        """
+        self._core.update(frame, time_s)
+        return self._core.current()
+
+    def take_finished(self) -> list[_memo.Walk]:
+        """The walks that have ended since this was last asked; on an endless stream, ask now and then."""
+        return self._core.take_finished()
+
+    def finish(self) -> Track:
+        """Ends the stream and returns all walks that were not taken before."""
+        self._core.finish()
+        self._walks += self._core.take_finished()
+        return Track(self._walks, self._core.seek_report(), self._camera)
+
+
+def track(
+    frames: Iterable[npt.NDArray[np.uint8]],
+    *,
+    height_m: float,
+    times_s: Iterable[float] | None = None,
+    fps: float | None = None,
+    camera: _memo.Camera | None = None,
+    progress: Callable[[int], object] | None = None,
+    **options: Any,
+) -> Track:
+    """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
+
+    `progress` is called with the number of frames done; `options` are those of `Tracker`. An interrupt
+    (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
+    """
+    if (times_s is None) == (fps is None):
+        raise ValueError("give either times_s or fps")
+    if fps is not None and not (np.isfinite(fps) and fps > 0):
+        raise ValueError(f"fps must be a positive number, got {fps}")
+    tracker = Tracker(height_m, camera, **options)
+    times = iter(times_s) if times_s is not None else None
+    for index, frame in enumerate(frames):
+        if times is not None:
+            try:
+                time_s = float(next(times))
+            except StopIteration:
+                raise ValueError(f"times_s has {index} values, but there are more frames") from None
+        else:
+            time_s = index / float(fps or 1)
+        tracker.update(frame, time_s)
+        if progress is not None:
+            progress(index + 1)
+    return tracker.finish()
+
+
+class Track:
+    """All walks of a video: what `track.csv` and `events.csv` hold, and everything that led there."""
+
+    def __init__(
+        self, walks: list[_memo.Walk], seek_report: dict[str, int], camera: _memo.Camera | None = None
+    ) -> None:
+        self.walks = walks
+        self.seek_report = seek_report
+        self._camera = camera
+
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """One array per column of `track.csv`; walk after walk."""
+        if not self.walks:
+            return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
+        tables = [{**walk.columns(), "walk": np.full(len(walk), k)} for k, walk in enumerate(self.walks)]
+        return {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Heel strikes and toe-offs: `time_s, frame, event, side`."""
+        names = ("time_s", "frame", "event", "side")
+        return [dict(zip(names, event, strict=True)) for walk in self.walks for event in walk.events()]
+
+    @property
+    def camera(self) -> _memo.Camera | None:
+        """The camera given, or the one guessed for the longest walk."""
+        main = self._main
+        return main.camera if main is not None else self._camera
+
+    @property
+    def start(self) -> dict[str, Any]:
+        """The starting phase of the longest walk: `frame`, `phase` and `similarity` (frames, phases)."""
+        return self._main.start() if self._main is not None else {}
+
+    @property
+    def measured(self) -> dict[str, npt.NDArray[Any]]:
+        """Raw measurements `x`, `z` (metres) and `phase` before filtering, one per row; NaN where none."""
+        tables = [walk.measured() for walk in self.walks]
+        x, z, phase = np.concatenate(tables).T if tables else np.empty((3, 0))
+        return {"x": x, "z": z, "phase": phase}
+
+    def contours(self, row: int) -> npt.NDArray[np.float64]:
+        """Visible model contours of a row in image pixels, (segments, 2, 2)."""
+        return self._located(row)[0]
+
+    def contour_parts(self, row: int) -> npt.NDArray[np.uint8]:
+        """The body part of each segment of `contours`: 0 head, 1 torso, 2-4 right arm, 5-7 left arm, 8-10 right
+        leg, 11-13 left leg."""
+        return self._located(row)[1]
+
+    def _located(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]:
+        left = row
+        for walk in self.walks:
+            if 0 <= left < len(walk):
+                return walk.contours(left)
+            left -= len(walk)
+        raise IndexError(f"row {row} of a track with {sum(map(len, self.walks))} rows")
+
+    @property
+    def _main(self) -> _memo.Walk | None:
+        return max(self.walks, key=lambda walk: (walk.direction == "forward", len(walk)), default=None)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What was seen: `status` ("tracked", "walking backwards", "never fully visible", "not walking" or
+        "nobody"), `message` in plain words, and the figures of the longest walk."""
+        main = self._main
+        if main is None:
+            return {"status": self._why_nobody(), "message": _NOBODY[self._why_nobody()], "walks": 0}
+        columns = main.columns()
+        forward = main.direction == "forward"
+        moved = self._moves_right(main)
+        speed = float(np.median(np.abs(columns["speed_mps"])))
+        strikes = [event for event in main.events() if event[2] == "heel_strike"]
+        steps = np.diff([event[0] for event in strikes])
+        cadence = 60.0 / float(np.median(steps)) if len(steps) else float("nan")
+        way = "left to right" if moved else "right to left"
+        manner = "walks" if forward else "walks backwards"
+        sure = main.p_other_direction < 0.1
+        message = (
+            f"Frames {columns['frame'][0]} to {columns['frame'][-1]}: somebody {manner} {way} at {speed:.2f} m/s"
+            + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
+            + ("." if sure else f"; forward or backward is not certain (p = {1 - main.p_other_direction:.2f}).")
+        )
+        return {
+            "status": "tracked" if forward else "walking backwards",
+            "message": message,
+            "walks": len(self.walks),
+            "direction": way,
+            "gait": main.direction,
+            "p_other_gait": main.p_other_direction,
+            "p_swapped": main.p_swapped,
+            "speed_mps": speed,
+            "cadence_steps_per_min": cadence,
+            "deviation": _deviation(main),
+        }
+
+    @staticmethod
+    def _moves_right(walk: _memo.Walk) -> bool:
+        columns = walk.columns()
+        return bool(columns["right_hip_u_px"][-1] > columns["right_hip_u_px"][0])
+
+    def _why_nobody(self) -> str:
+        seek = self.seek_report
+        if seek["frames_with_candidate"] == 0:
+            return "nobody"
+        if seek["refused_starts"]:
+            return "not walking"
+        if seek["frames_cut_off"] > 0.5 * seek["frames_with_candidate"]:
+            return "never fully visible"
+        return "nobody"
+
+    def __len__(self) -> int:
+        return sum(map(len, self.walks))
+
+    def __repr__(self) -> str:
+        return f"Track({len(self)} rows, {len(self.walks)} walks: {self.summary['message']})"
+
+
+_NOBODY = {
+    "nobody": "Nobody was seen walking.",
+    "not walking": "Something moves, but not as a person of this height walks before this camera.",
+    "never fully visible": "Somebody moves, but is never fully visible for long enough to start.",
+}
+
+
+def _deviation(walk: _memo.Walk) -> dict[str, Any] | None:
+    """The fitted deviation from the average walker in degrees and per cent of body height."""
+    if walk.deviation is None:
+        return None
+    hip, knee, shoulder_height, hip_height, gain, used = walk.deviation
+    return {
+        "hip_deg": float(np.degrees(hip)),
+        "knee_deg": float(np.degrees(knee)),
+        "shoulder_height_percent": 100 * shoulder_height,
+        "hip_height_percent": 100 * hip_height,
+        "similarity_gain": gain,
+        "used": used,
+    }
