@@ -430,12 +430,16 @@ impl Active {
         stopped || lost
     }
 
-    /// Takes the frames off the end in which the walk was already over.
+    /// Takes off the frames in which the person was not there yet, and those in which the walk was already over.
+    ///
+    /// A person who appears between two frames changes the empty one too, eq. (1) looking both ways.
     fn trim(&mut self) {
-        if self.is_over() {
-            let keep = self.walk.twins[0].steps.len().saturating_sub(RECENT_FRAMES / 2);
-            self.walk.truncate(keep);
-        }
+        let twin = &self.walk.twins[self.walk.best()];
+        let low = LOST_SHARE * twin.similarity_sum / twin.steps.len() as f64;
+        let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
+        let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
+        let end = twin.steps.len() - over;
+        self.walk.keep(absent.min(end)..end);
     }
 
     /// Fits the person to the kept frames and follows them again if that is believed; once.

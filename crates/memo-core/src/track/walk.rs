@@ -203,10 +203,11 @@ impl Walk {
         )
     }
 
-    /// Forgets all steps from the `keep`-th on; the similarity sums keep what they have seen.
-    pub(crate) fn truncate(&mut self, keep: usize) {
+    /// Keeps a range of the steps; the similarity sums keep what they have seen.
+    pub(crate) fn keep(&mut self, range: std::ops::Range<usize>) {
         for twin in &mut self.twins {
-            twin.steps.truncate(keep);
+            twin.steps.truncate(range.end);
+            twin.steps.drain(..range.start);
         }
     }
 
