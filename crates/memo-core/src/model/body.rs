@@ -317,6 +317,13 @@ impl Walker {
         (0..n).map(|i| self.torso_height_m(f64::from(i) / f64::from(n))).sum::<f64>() / f64::from(n)
     }
 
+    /// Mean height of the crown while walking, metres: bent legs take some centimetres off the body height.
+    pub fn level_crown_height_m(&self) -> f64 {
+        let p = &self.body.proportions;
+        let standing_torso = 0.5 * (p.shoulder_height + p.hip_height) * self.body.height_m;
+        self.body.height_m - (standing_torso - self.level_torso_height_m())
+    }
+
     fn torso_height_m(&self, phase: f64) -> f64 {
         let posed = self.body.pose(DVec3::ZERO, 0.0, &self.gait.posture(phase, &self.style));
         self.body.proportions.ankle_height * self.body.height_m - posed.right.ankle.z.min(posed.left.ankle.z)

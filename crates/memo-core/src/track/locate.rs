@@ -102,7 +102,8 @@ pub struct Course {
     pub depth_sd_m: f64,
 }
 
-/// Finds the line parallel to the image plane on which the sighted person moves.
+/// Finds the line parallel to the image plane on which the sighted person moves; `height_m` is the mean height of the
+/// crown while walking.
 pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<Course, LocateError> {
     // 1. Depth of the line from the pooled rows at the sightings' mean column.
     let (sole, crown) = person_rows(sightings);

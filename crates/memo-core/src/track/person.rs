@@ -16,7 +16,7 @@ use crate::model::{Camera, Walker};
 /// Options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PersonOptions {
-    /// Standard deviation over people of the angle offsets, radians: 12 degrees.
+    /// Standard deviation over people of the angle offsets, radians: 10 degrees.
     pub angle_sd_rad: f64,
     /// Standard deviation over people of shoulder and hip height, fractions of body height.
     pub height_sd: f64,
@@ -24,6 +24,8 @@ pub struct PersonOptions {
     pub loss_per_sd: f64,
     /// Relative gain of similarity below which the person counts as average.
     pub min_gain: f64,
+    /// Standard deviation of the distance that rectangles give, metres.
+    pub distance_sd_m: f64,
     /// Frames looked at, evenly chosen.
     pub frames: usize,
 }
@@ -31,10 +33,11 @@ pub struct PersonOptions {
 impl Default for PersonOptions {
     fn default() -> Self {
         Self {
-            angle_sd_rad: 12f64.to_radians(),
+            angle_sd_rad: 10f64.to_radians(),
             height_sd: 0.03,
             loss_per_sd: 0.01,
             min_gain: 0.10,
+            distance_sd_m: 0.2,
             frames: 16,
         }
     }
@@ -101,17 +104,10 @@ pub fn fit_person(
     similarity: &SimilarityOptions,
     options: &PersonOptions,
 ) -> PersonFit {
-    let stride = frames.len().div_ceil(options.frames.max(1)).max(1);
-    let chosen: Vec<_> = frames.iter().step_by(stride).collect();
     let mean = |deviation: &Deviation| {
         let walker = deviation.apply(average);
         let scene = Scene { walker: &walker, camera, path };
-        let best = |(edges, around): &&(&FrameEdges, Hypothesis)| {
-            f64::from(
-                search(&edges.edges, &scene, &near(around), similarity, HiddenLines::PerColumn).best_score(),
-            )
-        };
-        chosen.iter().map(best).sum::<f64>() / chosen.len().max(1) as f64
+        mean_similarity(&scene, frames.iter().copied(), similarity, options.frames)
     };
     let held_back = |d: &Deviation| mean(d) * (1.0 - options.loss_per_sd * sd_sq(d, options));
     let mut best = (held_back(&Deviation::default()), Deviation::default());
@@ -121,6 +117,88 @@ pub fn fit_person(
     let (similarity_before, similarity_after) = (mean(&Deviation::default()), mean(&best.1));
     let is_believed = similarity_after > similarity_before * (1.0 + options.min_gain);
     PersonFit { deviation: best.1, similarity_before, similarity_after, is_believed }
+}
+
+/// A path moved towards or away from the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// The moved path.
+    pub path: Path,
+    /// New distance from the camera over the old one.
+    pub factor: f64,
+    /// Place on the path nearest to the camera, metres.
+    along_camera_m: f64,
+    /// Height of the camera, metres.
+    camera_height_m: f64,
+}
+
+impl Distance {
+    /// The path of a scene moved `by_m` away from the camera, heading kept.
+    fn new(scene: &Scene<'_>, by_m: f64) -> Self {
+        let camera = scene.camera.position();
+        let along_camera_m = scene.path.along(camera.truncate());
+        let nearest = scene.path.point(along_camera_m, 0.0).truncate();
+        let away = nearest - camera.truncate();
+        let factor = 1.0 + by_m / away.length();
+        let path = Path { origin: scene.path.origin + away * (factor - 1.0), ..*scene.path };
+        Self { path, factor, along_camera_m, camera_height_m: camera.z }
+    }
+
+    /// The place on the moved path that is seen in the same direction.
+    pub fn along(&self, along_m: f64) -> f64 {
+        self.along_camera_m + self.factor * (along_m - self.along_camera_m)
+    }
+
+    /// The hypothesis on the moved path that is seen at the same place in the image.
+    fn moved(&self, h: &Hypothesis) -> Hypothesis {
+        let height_m = self.camera_height_m + self.factor * (h.height_m - self.camera_height_m);
+        Hypothesis { along_m: self.along(h.along_m), height_m, phase: h.phase }
+    }
+}
+
+/// Fits the distance of the path from the camera, held to the rectangles' by their standard deviation.
+pub fn fit_distance(
+    frames: &[(&FrameEdges, Hypothesis)],
+    scene: &Scene<'_>,
+    similarity: &SimilarityOptions,
+    options: &PersonOptions,
+) -> Distance {
+    let held_back = |by_m: f64| {
+        let distance = Distance::new(scene, by_m);
+        let moved = Scene { path: &distance.path, ..*scene };
+        let frames = frames.iter().map(|(edges, h)| (*edges, distance.moved(h)));
+        let mean = mean_similarity(&moved, frames, similarity, options.frames);
+        mean * (1.0 - options.loss_per_sd * (by_m / options.distance_sd_m).powi(2))
+    };
+    let mut best = (held_back(0.0), 0.0);
+    for step in [0.1, 0.05, 0.025, 0.0125] {
+        for _ in 0..6 {
+            let next = [best.1 - step, best.1 + step].map(|by| (held_back(by), by));
+            let better = if next[1].0 > next[0].0 { next[1] } else { next[0] };
+            if better.0 <= best.0 {
+                break;
+            }
+            best = better;
+        }
+    }
+    Distance::new(scene, best.1)
+}
+
+/// Mean over evenly chosen frames of the best similarity near each frame's hypothesis.
+fn mean_similarity<'a>(
+    scene: &Scene<'_>,
+    frames: impl ExactSizeIterator<Item = (&'a FrameEdges, Hypothesis)>,
+    similarity: &SimilarityOptions,
+    count: usize,
+) -> f64 {
+    let stride = frames.len().div_ceil(count.max(1)).max(1);
+    let best = |(edges, around): (&FrameEdges, Hypothesis)| {
+        f64::from(
+            search(&edges.edges, scene, &near(&around), similarity, HiddenLines::PerColumn).best_score(),
+        )
+    };
+    let scores: Vec<f64> = frames.step_by(stride).map(best).collect();
+    scores.iter().sum::<f64>() / scores.len().max(1) as f64
 }
 
 /// Squared distance from the average in standard deviations.

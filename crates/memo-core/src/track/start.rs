@@ -308,7 +308,7 @@ fn face(
     faced
 }
 
-/// Regression of place over time and the mean height, over each frame's best hypothesis at the line's phase.
+/// Regression of place over time, over each frame's best hypothesis at the line's phase.
 fn beginning(frames: &[&FrameEdges], faced: &Faced, line: &PhaseLine) -> Option<Beginning> {
     let first = frames.first()?.time_s;
     let on_line = |(frame, hypotheses): (&&FrameEdges, &Vec<Hypothesis>)| {
@@ -318,9 +318,7 @@ fn beginning(frames: &[&FrameEdges], faced: &Faced, line: &PhaseLine) -> Option<
     };
     let found: Vec<(f64, Hypothesis)> = frames.iter().zip(&faced.hypotheses).map(on_line).collect();
     let (speed_mps, along_m) = line_through(&found.iter().map(|(t, h)| (*t, h.along_m)).collect::<Vec<_>>());
-    let height_m = found.iter().map(|(_, h)| h.height_m).sum::<f64>() / found.len() as f64;
-    let hypothesis = Hypothesis { along_m, height_m, phase: line.phase_at_start };
-    Some(Beginning { time_s: first, hypothesis, speed_mps, rate_hz: line.rate_hz })
+    Some(Beginning { time_s: first, along_m, phase: line.phase_at_start, speed_mps, rate_hz: line.rate_hz })
 }
 
 fn estimates(curves: &[PhaseCurve]) -> Vec<PhaseEstimate> {

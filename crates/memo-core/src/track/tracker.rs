@@ -9,11 +9,11 @@
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
-use super::person::{PersonFit, PersonOptions, fit_person};
+use super::person::{PersonFit, PersonOptions, fit_distance, fit_person};
 use super::result::TrackedWalk;
 use super::search::{Hypothesis, Scene};
 use super::start::{CadenceRange, StartReport, start};
-use super::walk::{FrameEdges, Walk, WalkOptions};
+use super::walk::{Beginning, FrameEdges, Walk, WalkOptions};
 use crate::image::{Frame, Rectangle};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
@@ -320,11 +320,11 @@ impl Tracker {
     /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through the start frames.
     fn begin(&self, size: [u32; 2]) -> Option<Active> {
         let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
-        let (camera, course) = self.course(&sightings, size).ok()?;
+        let walker = self.walker(GaitStyle::default())?;
+        let (camera, course) = self.course(&sightings, size, walker.level_crown_height_m()).ok()?;
         if course.speed_mps < SLOWEST_MPS {
             return None;
         }
-        let walker = self.walker(GaitStyle::default())?;
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
         let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
         let mut walk = Walk::new(walker, start.path, start.beginning);
@@ -335,14 +335,17 @@ impl Tracker {
         Some(Active { camera, start, walk, kept, person_fit: None, fitted: false })
     }
 
-    fn course(&self, sightings: &[Sighting], size: [u32; 2]) -> Result<(Camera, Course), LocateError> {
+    fn course(
+        &self,
+        sightings: &[Sighting],
+        size: [u32; 2],
+        crown_m: f64,
+    ) -> Result<(Camera, Course), LocateError> {
         let camera = match &self.options.camera {
             Some(camera) => camera.clone(),
-            None => {
-                camera_from_sightings(sightings, size, self.options.field_of_view_rad, self.options.height_m)?
-            }
+            None => camera_from_sightings(sightings, size, self.options.field_of_view_rad, crown_m)?,
         };
-        let course = locate(sightings, &camera, self.options.height_m)?;
+        let course = locate(sightings, &camera, crown_m)?;
         Ok((camera, course))
     }
 
@@ -449,20 +452,48 @@ impl Active {
         }
         let kept = std::mem::take(&mut self.kept);
         let Some(person) = &options.person else { return };
-        let twin = &self.walk.twins[self.walk.best()];
-        let frames: Vec<(&FrameEdges, Hypothesis)> =
-            kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect();
         let Walk { walker, path, beginning, .. } = &self.walk;
-        let fit = fit_person(&frames, walker, &self.camera, path, &options.walk.similarity, person);
+        let fit =
+            fit_person(&self.frames(&kept), walker, &self.camera, path, &options.walk.similarity, person);
         self.person_fit = Some(fit);
         if fit.is_believed {
-            self.walk = Walk::new(fit.deviation.apply(walker), *path, *beginning);
-            for (_, edges) in &kept {
-                self.walk.follow(edges, &self.camera, &options.walk);
-            }
+            let walk = Walk::new(fit.deviation.apply(walker), *path, *beginning);
+            self.follow_again(walk, &kept, options);
+        } else {
+            self.refit_distance(&kept, options, person);
         }
     }
+
+    /// Of a body known to be average the apparent size tells the distance; a deviating one could as well be nearer or farther.
+    fn refit_distance(&mut self, kept: &Kept, options: &TrackerOptions, person: &PersonOptions) {
+        let Walk { walker, path, beginning, .. } = &self.walk;
+        let scene = Scene { walker, camera: &self.camera, path };
+        let distance = fit_distance(&self.frames(kept), &scene, &options.walk.similarity, person);
+        let beginning = Beginning {
+            along_m: distance.along(beginning.along_m),
+            speed_mps: beginning.speed_mps * distance.factor,
+            ..*beginning
+        };
+        let walk = Walk::new(walker.clone(), distance.path, beginning);
+        self.follow_again(walk, kept, options);
+    }
+
+    /// The kept frames with where the better twin saw the person in them.
+    fn frames<'a>(&self, kept: &'a Kept) -> Vec<(&'a FrameEdges, Hypothesis)> {
+        let twin = &self.walk.twins[self.walk.best()];
+        kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect()
+    }
+
+    fn follow_again(&mut self, mut walk: Walk, kept: &Kept, options: &TrackerOptions) {
+        for (_, edges) in kept {
+            walk.follow(edges, &self.camera, &options.walk);
+        }
+        self.walk = walk;
+    }
 }
+
+/// Frames kept for fitting.
+type Kept = [(Option<Sighting>, FrameEdges)];
 
 /// Bounding box of the body in the image, pixels.
 fn body_box(scene: &Scene<'_>, hypothesis: &Hypothesis) -> Option<(DVec2, DVec2)> {

@@ -24,7 +24,11 @@ pub struct WalkOptions {
 
 /// Smallest and largest half widths of the search: along the path, in height (metres) and in phase. The largest are the
 /// printed ones; the smallest keep three steps on each side.
-const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.04, 0.1), (0.06, 0.2)];
+const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
+
+/// How well the ground and the length of the legs fix the height of the torso, metres. The printed 10 cm is what one frame's
+/// contours fix it to.
+const GROUND_SD_M: f64 = 0.02;
 
 /// The filtered state of one twin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,8 +112,10 @@ pub struct Twin {
 pub struct Beginning {
     /// Time the values hold for, seconds.
     pub time_s: f64,
-    /// Place, height and phase.
-    pub hypothesis: Hypothesis,
+    /// Place along the path, metres.
+    pub along_m: f64,
+    /// Gait phase.
+    pub phase: f64,
     /// Speed along the path in the direction faced, metres a second.
     pub speed_mps: f64,
     /// Gait cycles a second.
@@ -168,17 +174,18 @@ impl Walk {
         }
     }
 
-    /// P_0 = R for the positions, the 30 % deviation of section 6 for the velocities.
+    /// P_0 = R for place and phase, the 30 % deviation of section 6 for the velocities; the height is the walker's own over the
+    /// ground.
     fn initial_state(&self, twin: usize, time_s: f64, options: &FilterOptions) -> State {
         let b = &self.beginning;
         let dt = time_s - b.time_s;
         let start = |position: f64, velocity: f64, variance: f64| {
             ConstantVelocity::new(position + dt * velocity, velocity, variance, (0.3 * velocity).powi(2))
         };
-        let phase = b.hypothesis.phase + 0.5 * twin as f64;
+        let phase = b.phase + 0.5 * twin as f64;
         State {
-            along: start(b.hypothesis.along_m, b.speed_mps, options.along.measurement_variance),
-            height: start(b.hypothesis.height_m, 0.0, options.vertical.measurement_variance),
+            along: start(b.along_m, b.speed_mps, options.along.measurement_variance),
+            height: start(self.walker.level_torso_height_m(), 0.0, GROUND_SD_M * GROUND_SD_M),
             phase: start(phase, b.rate_hz, options.phase.measurement_variance),
         }
     }
