@@ -325,9 +325,9 @@ def test_demo_of_the_compiled_core(tmp_path):
 
 def test_interrupt_of_the_compiled_core(tmp_path):
     clip, started = shared_video("mocap_a"), tmp_path / "started"
+    options = ["--camera", clip / "camera.toml", "--height", "1.86", "--out", tmp_path / "out"]
     process = subprocess.Popen(
-        [sys.executable, "-c", TELLS_FRAME_50, str(started), "track", str(clip / "video.mp4")]
-        + ["--camera", str(clip / "camera.toml"), "--height", "1.86", "--out", str(tmp_path / "out")],
+        [sys.executable, "-c", TELLS_FRAME_50, started, "track", clip / "video.mp4", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,7 +1,8 @@
 """The whole pipeline on real and on motion-captured footage, judged by `truth.py`.
 
-The limits are requirements, not past output. The clip too small to tell the sides apart is judged modulo half a
-cycle; the oblique walk only for what it must not claim. The footage is not part of this repository: see `conftest.SHARED_DATA`.
+The limits are requirements, not past output. The clip too small to tell the sides apart is judged modulo
+half a cycle, the oblique walk only for what it must not claim. The footage is not part of this repository:
+see `conftest.SHARED_DATA`.
 """
 
 from dataclasses import dataclass
@@ -50,7 +51,7 @@ def read_clip(clip):
 
 @pytest.fixture(scope="module")
 def tracked(tmp_path_factory):
-    """Tracks a clip, once for all tests: gives the track and a folder with its tables, frames as in the video."""
+    """Tracks a clip once for all tests; gives the track and a folder with its tables, numbered as the video."""
 
     @cache
     def result(name, adapt=True):
@@ -112,7 +113,7 @@ def test_phase_and_sides_are_those_captured(judged, name, adapt):
 @pytest.mark.parametrize(("adapt", "hip_deg", "knee_deg"), [(False, 9, 14), (True, 4, 7)])
 @pytest.mark.parametrize("name", MOCAP)
 def test_leg_angles_are_those_captured(judged, name, adapt, hip_deg, knee_deg):
-    """On the average gait no better than the gait itself fits these joints; fitted to the person, twice as well."""
+    """On the average gait as well as that gait fits these joints; fitted to the person, twice as well."""
     angles = judged(name, adapt).angles_deg
     for side in ("right", "left"):
         assert angles[f"{side}_hip"].rms <= hip_deg
@@ -120,7 +121,7 @@ def test_leg_angles_are_those_captured(judged, name, adapt, hip_deg, knee_deg):
 
 
 def test_an_oblique_walk_is_seen_and_its_sides_not_claimed(tracked, judged):
-    """25 degrees out of the image plane: position and phase cannot be demanded, only that no side is claimed wrongly."""
+    """25 degrees out of the image plane: no position or phase is demanded, but no side is claimed wrongly."""
     assert tracked("mocap_c_yaw25")[0].summary["status"] == "tracked"
     evaluation = judged("mocap_c_yaw25")
     assert evaluation.tracked >= 0.95 and evaluation.sides.surely_wrong == 0
@@ -235,7 +236,7 @@ def is_isolated(boxes, index):
 def isolated_people():
     """The rectangle around the changes and the true position of people who stand apart, in every fifth frame.
 
-    A person counts when exactly one rectangle overlaps the box by 0.3: those merged with a scene object do not.
+    A person counts when exactly one rectangle overlaps the box by 0.3, not merged with anything else.
     """
     scene = pets_scene()
     with VideoReader(shared_video("pets09_s2l1") / "video.mp4") as reader:
@@ -254,7 +255,7 @@ def isolated_people():
 
 
 def test_rectangles_place_isolated_people_on_the_ground():
-    """Section 4.2 with the sole on the ground, from rectangles of eq. (1), 35 m away and 7 m below the camera."""
+    """Section 4.2 with the sole on the ground, from rectangles around changes, the camera 7 m above."""
     camera = memo.Camera.from_tsai(**read_tsai_xml(shared_video("pets09_s2l1") / "View_001.xml"))
     misses = []
     for (left, top, right, bottom), position in isolated_people():
