@@ -1,6 +1,8 @@
-"""Fixtures: the stand-in core and small videos written for one test."""
+"""Fixtures: the stand-in core, small videos written for one test, and where the development footage lies."""
 
+import os
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import fake_core
@@ -8,7 +10,20 @@ import memo
 import numpy as np
 import pytest
 
-needs_core = pytest.mark.skipif(not hasattr(memo, "Tracker"), reason="needs the compiled tracker")
+needs_demo = pytest.mark.skipif(not hasattr(memo, "demo_scene"), reason="needs the compiled demo scene")
+
+#: Third-party footage with ground truth; not part of this repository.
+SHARED_DATA = Path(
+    os.environ.get("MEMO_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"
+)
+
+
+def shared_video(name):
+    """The folder of a clip of the shared footage; skips the test where it is absent."""
+    folder = SHARED_DATA / "video" / name
+    if not folder.is_dir():
+        pytest.skip(f"no footage in {folder} (set MEMO_SHARED_DATA)")
+    return folder
 
 
 @pytest.fixture

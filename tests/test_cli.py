@@ -12,7 +12,7 @@ import av
 import memo
 import numpy as np
 import pytest
-from conftest import needs_core
+from conftest import needs_demo, shared_video
 from memo import cli
 from memo.files import (
     TRACK_COLUMNS,
@@ -32,6 +32,19 @@ sys.path.insert(0, {str(TESTS)!r})
 import fake_core, memo, memo.cli
 for name, part in fake_core.PARTS.items():
     setattr(memo, name, part)
+memo.cli.main()
+"""
+TELLS_FRAME_50 = """
+import sys, pathlib, memo, memo.cli
+started = pathlib.Path(sys.argv.pop(1))
+class Telling(memo.Tracker):
+    frames = 0
+    def update(self, frame, time_s):
+        self.frames += 1
+        if self.frames == 50:
+            started.touch()
+        return super().update(frame, time_s)
+memo.Tracker = Telling
 memo.cli.main()
 """
 CAMERA = "[side]\nname = 'side'\nsize = [50, 36]\n[front]\nname = 'front'\nsize = [640, 480]\n"
@@ -300,7 +313,7 @@ def test_the_python_example_of_the_readme(core, video, monkeypatch, capsys):
     assert "20 frames, tracked." in capsys.readouterr().out and Path("track.csv").exists()
 
 
-@needs_core
+@needs_demo
 def test_demo_of_the_compiled_core(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "memo.cli", "demo", "--out", str(tmp_path)], capture_output=True, text=True
@@ -310,17 +323,17 @@ def test_demo_of_the_compiled_core(tmp_path):
     assert len(columns["frame"]) > 20 and "Against the drawn truth" in done.stdout
 
 
-@needs_core
-def test_interrupt_of_the_compiled_core(tmp_path, write_video):
-    scene = memo.demo_scene(seed=0)
-    frames = np.concatenate([scene.frames] * 5)
-    video = write_video("scene.mp4", frames[:, : frames.shape[1] // 2 * 2, : frames.shape[2] // 2 * 2])
-    out = tmp_path / "out"
+def test_interrupt_of_the_compiled_core(tmp_path):
+    clip, started = shared_video("mocap_a"), tmp_path / "started"
+    options = ["--camera", clip / "camera.toml", "--height", "1.86", "--out", tmp_path / "out"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "memo.cli", "track", str(video), "--out", str(out)],
+        [sys.executable, "-c", TELLS_FRAME_50, started, "track", clip / "video.mp4", *options],
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    code, complaint = interrupted(process, out.exists, after_s=0.5)
-    assert code == 130, complaint
-    assert "Traceback" not in complaint and (out / "track.csv").exists()
+    code, complaint = interrupted(process, started.exists, after_s=0)
+    assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
+    frames = read_track_csv(tmp_path / "out" / "track.csv")["frame"]
+    assert frames[0] <= 12 and 45 <= frames[-1] < 90, "the walk up to the interrupt, not to its end"
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"track.csv", "events.csv"}

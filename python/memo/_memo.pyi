@@ -51,6 +51,12 @@ class Camera:
     def ground_points(
         self, pixels: Sequence[tuple[float, float]], z_m: float = 0.0
     ) -> npt.NDArray[np.float64]: ...
+    def position_from_rectangle(
+        self, bottom_px: tuple[float, float], top_px: tuple[float, float], height_m: float
+    ) -> tuple[float, float, float]: ...
+    def position_on_ground(
+        self, bottom_px: tuple[float, float], top_px: tuple[float, float], height_m: float
+    ) -> tuple[float, float, float]: ...
 
 @final
 class Tracker:

@@ -3,7 +3,8 @@
 use crate::array::{numpy_from_rows, points_from_numpy};
 use crate::error::value_error;
 use glam::{DVec2, DVec3};
-use memo_core::model::{Camera, TsaiParameters};
+use memo_core::model::position::{position_from_rectangle, position_on_ground};
+use memo_core::model::{Camera, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -97,6 +98,27 @@ impl PyCamera {
         numpy_from_rows(py, pixels.into_iter().map(point).collect())
     }
 
+    /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6). Depth hangs on the
+    /// rectangle's height; the ground is not used, so z tells how well camera, height and rectangle agree.
+    fn position_from_rectangle(
+        &self,
+        bottom_px: (f64, f64),
+        top_px: (f64, f64),
+        height_m: f64,
+    ) -> PyResult<(f64, f64, f64)> {
+        self.standing_point(position_from_rectangle, bottom_px, top_px, height_m)
+    }
+
+    /// As `position_from_rectangle`, by least squares with the soles on the ground z = 0.
+    fn position_on_ground(
+        &self,
+        bottom_px: (f64, f64),
+        top_px: (f64, f64),
+        height_m: f64,
+    ) -> PyResult<(f64, f64, f64)> {
+        self.standing_point(position_on_ground, bottom_px, top_px, height_m)
+    }
+
     fn __repr__(&self) -> String {
         let [width, height] = self.0.size;
         let p = self.0.position();
@@ -104,5 +126,23 @@ impl PyCamera {
             "Camera({width}x{height}, f={:.0} px, at ({:.2}, {:.2}, {:.2}) m)",
             self.0.focal_px.x, p.x, p.y, p.z
         )
+    }
+}
+
+/// A way from the midpoints of a rectangle to a standing place.
+type PositionFn = fn(&Camera, &Midpoints, f64, &PositionOptions) -> Result<FootPosition, PositionError>;
+
+impl PyCamera {
+    fn standing_point(
+        &self,
+        find: PositionFn,
+        bottom_px: (f64, f64),
+        top_px: (f64, f64),
+        height_m: f64,
+    ) -> PyResult<(f64, f64, f64)> {
+        let midpoints =
+            Midpoints::undistorted(&self.0, bottom_px.into(), top_px.into()).map_err(value_error)?;
+        let found = find(&self.0, &midpoints, height_m, &PositionOptions::default()).map_err(value_error)?;
+        Ok(found.point_in_world.into())
     }
 }

@@ -1,0 +1,204 @@
+"""What tracking promises apart from being right: clear refusals, repeatability, bounded memory."""
+
+import os
+import subprocess
+import sys
+
+import memo
+import numpy as np
+import pytest
+from conftest import shared_video
+from memo.files import TRACK_COLUMNS
+
+GREY = np.zeros((48, 64), np.uint8)
+A_FRAME = r"numpy array of shape \(H, W\), dtype uint8; got "
+
+
+def update_all(*timed_frames):
+    """Gives (frame, time) pairs to a new tracker."""
+    tracker = memo.Tracker(1.75)
+    for frame, time_s in timed_frames:
+        tracker.update(frame, time_s)
+    return tracker
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("frame", "error", "got"),
+    [
+        (GREY.astype(np.uint16), TypeError, r"shape \[48, 64\], dtype uint16"),
+        (np.full(GREY.shape, np.nan), TypeError, r"shape \[48, 64\], dtype float64"),
+        (GREY > 0, TypeError, r"shape \[48, 64\], dtype bool"),
+        (GREY.astype(object), TypeError, r"shape \[48, 64\], dtype object"),
+        (np.zeros((48, 64, 3), np.uint8), ValueError, r"shape \[48, 64, 3\], dtype uint8"),
+        (GREY[0], ValueError, r"shape \[64\], dtype uint8"),
+        (GREY.tolist(), TypeError, "list"),
+        (None, TypeError, "NoneType"),
+        ("frame.png", TypeError, "str"),
+    ],
+    ids=["uint16", "nan", "bool", "object", "colour", "row", "list", "none", "path"],
+)
+def test_what_is_no_grey_frame_is_refused(frame, error, got):
+    with pytest.raises(error, match=A_FRAME + got):
+        memo.Tracker(1.75).update(frame, 0.0)
+
+
+def test_a_frame_without_pixels_is_refused():
+    with pytest.raises(ValueError, match="frame of 5x0 pixels"):
+        update_all((np.zeros((0, 5), np.uint8), 0.0))
+
+
+def test_frames_keep_their_size():
+    with pytest.raises(ValueError, match="expected 64x48, got 64x50"):
+        update_all((GREY, 0.0), (np.zeros((50, 64), np.uint8), 0.04))
+
+
+@pytest.mark.parametrize(("first_s", "then_s"), [(0, 0), (1, 0.5), (0, np.nan)])
+def test_times_increase(first_s, then_s):
+    with pytest.raises(ValueError, match=r"must increase: (0|0\.5|NaN) s came after [01] s"):
+        update_all((GREY, first_s), (GREY, then_s))
+
+
+def test_the_camera_is_for_these_frames():
+    camera = memo.Camera.level((640, 480), 60, 1.5, 6)
+    with pytest.raises(ValueError, match="640x480 images, the frames are 64x48"):
+        memo.Tracker(1.75, camera).update(GREY, 0.0)
+
+
+@pytest.mark.parametrize("height_m", [0, -1.7, 17, np.nan, np.inf])
+def test_height_is_that_of_a_person(height_m):
+    with pytest.raises(ValueError, match=r"between 0\.4 and 2\.6 metres, got "):
+        memo.Tracker(height_m)
+
+
+def test_height_in_centimetres_is_recognized():
+    with pytest.raises(ValueError, match=r"metres, got 175 \(that looks like centimetres\)"):
+        memo.track([GREY], height_m=175, fps=25)
+
+
+@pytest.mark.parametrize(
+    ("timing", "reason"),
+    [
+        ({}, "either times_s or fps"),
+        ({"fps": 25, "times_s": [0]}, "either times_s or fps"),
+        ({"times_s": [0, 0.04]}, "times_s has 2 values, but there are more frames"),
+        ({"fps": 0}, "positive number, got 0"),
+        ({"fps": -25}, "positive number, got -25"),
+        ({"fps": np.nan}, "positive number, got nan"),
+    ],
+    ids=str,
+)
+def test_every_frame_needs_a_time(timing, reason):
+    with pytest.raises(ValueError, match=reason):
+        memo.track([GREY] * 3, height_m=1.75, **timing)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "reason"),
+    [
+        ({"gait": "run"}, ValueError, "'dense' or 'sampled_10', got \"run\""),
+        ({"camera": "camera.toml"}, TypeError, "'str' object is not an instance of 'Camera'"),
+        ({"speed": 1}, TypeError, "speed"),
+    ],
+    ids=str,
+)
+def test_options_are_those_documented(options, error, reason):
+    with pytest.raises(error, match=reason):
+        memo.track([GREY], height_m=1.75, fps=25, **options)
+
+
+# Nobody
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 40])
+def test_nobody_is_a_result(count):
+    track = memo.track([GREY] * count, height_m=1.75, fps=25)
+    assert len(track) == 0 and track.summary["status"] == "nobody" and track.summary["walks"] == 0
+    assert track.events == [] and track.start == {} and track.camera is None
+    assert list(track.columns) == list(TRACK_COLUMNS)
+    assert all(column.shape == (0,) for column in track.columns.values())
+    assert all(column.shape == (0,) for column in track.measured.values())
+    with pytest.raises(IndexError, match="row 0 of a track with 0 rows"):
+        track.contours(0)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (7, 500)])
+def test_frames_too_small_for_a_person_are_no_error(size):
+    noise = np.random.default_rng(0).integers(0, 256, (30, *size), dtype=np.uint8)
+    assert len(memo.track(noise, height_m=1.75, fps=25)) == 0
+
+
+def test_noise_is_not_a_walker():
+    noise = np.random.default_rng(1).integers(0, 256, (40, 96, 128), dtype=np.uint8)
+    assert len(memo.track(noise, height_m=1.75, fps=25)) == 0
+
+
+def test_progress_is_told_after_every_frame():
+    told = []
+    memo.track([GREY] * 4, height_m=1.75, fps=25, progress=told.append)
+    assert told == [1, 2, 3, 4]
+
+
+# On a real walk
+
+
+READ = """
+import sys, memo
+from memo.video import VideoReader
+with VideoReader(sys.argv[1]) as reader:
+    frames = [frame.luma.copy() for frame in reader]
+"""
+FINGERPRINT = (
+    READ
+    + """
+import hashlib
+track = memo.track(frames, height_m=1.75, fps=25)
+assert len(track) > 40
+tables = [*track.columns.values(), *track.measured.values(), track.contours(20)]
+print(hashlib.sha256(b"".join(table.tobytes() for table in tables)).hexdigest(), track.events)
+"""
+)
+MEMORY = (
+    READ
+    + """
+def resident_kb():
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
+
+tracker, walks = memo.Tracker(1.75, adapt=False), 0
+for index in range(14 * len(frames)):
+    tracker.update(frames[index % len(frames)], index / 25)
+    walks += len(tracker.take_finished())
+    if index + 1 in (2 * len(frames), 14 * len(frames)):
+        print(walks, resident_kb())
+"""
+)
+
+
+def python(script, *arguments, **environment):
+    """What a script prints when run by a Python of its own."""
+    command = [sys.executable, "-c", script, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def small_walker():
+    return shared_video("weizmann_ido_walk") / "ido_walk.avi"
+
+
+def test_same_result_with_any_number_of_threads(small_walker):
+    one, two = (python(FINGERPRINT, small_walker, RAYON_NUM_THREADS=threads) for threads in "12")
+    assert one == two and "heel_strike" in one
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="needs Linux's /proc")
+def test_memory_does_not_grow_with_the_stream(small_walker):
+    """One frame is 25 kB: 516 more of them, or their edges, would show."""
+    (_, early_kb), (walks, late_kb) = (
+        map(int, line.split()) for line in python(MEMORY, small_walker).splitlines()
+    )
+    assert walks >= 12 and late_kb - early_kb < 3000
