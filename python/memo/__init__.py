@@ -13,14 +13,17 @@ from memo._memo import (
     silhouettes,
     velocity_field,
 )
+from memo.scene import DemoScene, demo_scene
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
     "Camera",
+    "DemoScene",
     "Track",
     "Tracker",
     "__version__",
     "change_mask",
+    "demo_scene",
     "edge_segments",
     "moving_regions",
     "silhouettes",

@@ -4,6 +4,7 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod synth;
 mod tracker;
 
 use pyo3::prelude::*;
@@ -17,6 +18,8 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::synth::PyScene;
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
 
