@@ -296,27 +296,35 @@ impl Column {
         for (block, scores) in out.chunks_mut(LANES).enumerate() {
             let height = |i: usize| heights.at((block * LANES + i).min(heights.count - 1));
             let raised_m = std::array::from_fn(|i| (height(i) - heights.centre) as f32);
-            let all = pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.similarity(scorer, &projection, &raised_m),
-            );
+            let (visible, near) = (&self.visible, &mut self.near);
+            let raised = Raised { scorer, projection: &projection, visible, raised_m, near };
+            let all = pulp::Arch::new().dispatch(raised);
             scores.copy_from_slice(&all[..scores.len()]);
         }
     }
+}
+
+/// The visible pieces of one body at several heights. A type and not a closure, because the compiler may call a closure that
+/// borrows mutably through a function without the dispatched instruction set.
+struct Raised<'a> {
+    scorer: &'a ColumnScorer<'a>,
+    projection: &'a Projection<'a>,
+    visible: &'a [VisibleSegment],
+    raised_m: Lanes,
+    near: &'a mut Vec<u32>,
+}
+
+impl pulp::WithSimd for Raised<'_> {
+    type Output = Lanes;
 
     /// Eq. (11): s(p) = sum of w_K s_i over sum of l_M, at each height.
     #[inline(always)]
-    fn similarity(
-        &mut self,
-        scorer: &ColumnScorer<'_>,
-        projection: &Projection<'_>,
-        raised_m: &Lanes,
-    ) -> Lanes {
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Lanes {
         let (mut answered, mut model_px) = ([0.0f32; LANES], [0.0f32; LANES]);
-        for piece in &self.visible {
-            let lines = LineLanes::new(projection, piece.start, piece.end, raised_m);
-            scorer.near(&lines, &mut self.near);
-            let best = scorer.best(piece.part, &lines, &self.near);
+        for piece in self.visible {
+            let lines = LineLanes::new(self.projection, piece.start, piece.end, &self.raised_m);
+            self.scorer.near(&lines, self.near);
+            let best = self.scorer.best(piece.part, &lines, self.near);
             for i in 0..LANES {
                 answered[i] += best[i];
                 model_px[i] += lines.length[i];
@@ -327,7 +335,7 @@ impl Column {
 }
 
 /// A visible piece of contour as a line in ideal pixels cut to the image.
-fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
+pub(super) fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
     let start = camera.project_ideal(segment.start)?;
     let end = camera.project_ideal(segment.end)?;
     let (t0, t1) = inside_image(start, end, camera)?;
