@@ -1,10 +1,12 @@
 //! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
 //!
-//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32: one lane a height. The loops over lanes are left to the
-//! compiler's vectoriser, so every function they call is `#[inline(always)]` and the caller dispatches on the instruction
-//! set. No operation is fused or reordered: the scores are the same bits on every instruction set.
+//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane a height.
+//! The loops over lanes are left to the compiler's vectoriser, so every function they call is `#[inline(always)]` and
+//! the caller dispatches on the instruction set. No operation is fused or reordered: the scores are the same bits on
+//! every instruction set.
 //!
 //! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32 (some 1e-4 px).
+#![allow(clippy::needless_range_loop, reason = "one index runs through the lanes of several arrays at once")]
 
 use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
 use crate::model::Camera;
@@ -14,8 +16,9 @@ use glam::DVec3;
 pub(super) const LANES: usize = 16;
 /// One f32 for each height.
 pub(super) type Lanes = [f32; LANES];
-/// Edges tested together for being near a line, one byte of a word each.
-const BATCH: usize = 8;
+/// Edges tested together for being near a line, one byte of a word each. 16 as well: loops of 8 are unrolled before
+/// they can be vectorised, which makes this test over twice as slow.
+const BATCH: usize = 16;
 /// Nearest depth that is projected, metres.
 const NEAR_M: f32 = 1e-6;
 /// What rounding may move a window's border by, pixels.
@@ -149,7 +152,8 @@ impl Line {
 
     #[inline(always)]
     fn end(&self) -> [f32; 2] {
-        [0, 1].map(|k| self.start[k] + self.length * self.direction[k])
+        let at = |k: usize| self.start[k] + self.length * self.direction[k];
+        [at(0), at(1)]
     }
 }
 
@@ -157,7 +161,8 @@ impl RaisedPoint {
     /// The pixel and the depth.
     #[inline(always)]
     fn pixel(&self, raised_m: f32) -> ([f32; 2], f32) {
-        let [x, y, depth] = [0, 1, 2].map(|k| self.base[k] + raised_m * self.per_metre[k]);
+        let at = |k: usize| self.base[k] + raised_m * self.per_metre[k];
+        let (x, y, depth) = (at(0), at(1), at(2));
         let inverse_depth = 1.0 / depth;
         ([x * inverse_depth, y * inverse_depth], depth)
     }
@@ -226,15 +231,19 @@ impl<'a> ColumnScorer<'a> {
     #[inline(always)]
     fn best_by_rohr(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = [0.0; LANES];
-        let mut unanswered = lines.length.map(|length| if length > 0.0 { 0.0 } else { f32::INFINITY });
+        // Heights that show no line need no answer.
+        let mut least = [0.0; LANES];
+        for i in 0..LANES {
+            least[i] = if lines.length[i] > 0.0 { 0.0 } else { f32::INFINITY };
+        }
         for &e in near {
             let edge = self.edges[e as usize];
-            if edge.most() <= reduce(unanswered, min) {
+            if edge.most() <= reduce(least, min) {
                 break;
             }
             for i in 0..LANES {
                 best[i] = max(best[i], rohr(&lines.line(i), &edge, &self.constants));
-                unanswered[i] = max(unanswered[i], best[i]);
+                least[i] = max(least[i], best[i]);
             }
         }
         best
@@ -356,7 +365,7 @@ fn exp(x: f32) -> f32 {
     let shifted = y + magic;
     let f = y - (shifted - magic);
     let p = 0.055_503_57 + f * (0.009_676_03 + f * 0.001_339_09);
-    let p = 1.000_000_1 + f * (0.693_147_2 + f * (0.240_221_07 + f * p));
+    let p = 1.000_000_1 + f * (std::f32::consts::LN_2 + f * (0.240_221_07 + f * p));
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
 }
 
@@ -376,11 +385,11 @@ fn select(condition: bool, value: f32) -> f32 {
     if condition { value } else { 0.0 }
 }
 
-/// What the windows of a line cover over all heights, in axes along the line's mean direction.
+/// The rectangle that holds the windows of a line at all heights, in axes along the line's mean direction.
 struct Area {
     axes: Line,
-    low: [f32; 2],
-    high: [f32; 2],
+    middle: [f32; 2],
+    half: [f32; 2],
     /// At least the sine of the largest angle with the mean direction: sin (a + b) <= sin a + sin b.
     sine_cut: f32,
 }
@@ -389,8 +398,8 @@ impl Area {
     #[inline(always)]
     fn new(lines: &LineLanes, constants: &Constants) -> Self {
         let axes = Line::mean(lines);
-        let (none, mut turn) = ([f32::INFINITY; LANES], [0.0; LANES]);
-        let (mut low, mut high) = ([none; 2], [none.map(|v| -v); 2]);
+        let zero = [0.0; LANES];
+        let (mut low, mut high, mut turn) = ([zero; 2], [zero; 2], zero);
         for i in 0..LANES {
             let line = lines.line(i);
             let shown = line.length > 0.0;
@@ -401,13 +410,13 @@ impl Area {
             }
             turn[i] = axes.turned(line.direction)[1].abs();
         }
+        let low = [reduce(low[0], min), reduce(low[1], min)];
+        let high = [reduce(high[0], max), reduce(high[1], max)];
         let reach = constants.c_r * reduce(lines.length, max) + SLACK_PX;
-        Self {
-            axes,
-            low: low.map(|low| reduce(low, min) - reach),
-            high: high.map(|high| reduce(high, max) + reach),
-            sine_cut: constants.sine_cut + reduce(turn, max) + SLACK_SINE,
-        }
+        let sine_cut = constants.sine_cut + reduce(turn, max) + SLACK_SINE;
+        let middle = |k: usize| 0.5 * (low[k] + high[k]);
+        let half = |k: usize| 0.5 * (high[k] - low[k]) + reach;
+        Self { axes, middle: [middle(0), middle(1)], half: [half(0), half(1)], sine_cut }
     }
 }
 
@@ -415,7 +424,8 @@ impl Line {
     /// Axes at the first height's start (the origin if it shows none) along the mean direction of all heights.
     #[inline(always)]
     fn mean(lines: &LineLanes) -> Self {
-        let [x, y] = lines.direction.map(|d| reduce(d, |a, b| a + b));
+        let sum = |lanes: Lanes| reduce(lanes, |a, b| a + b);
+        let (x, y) = (sum(lines.direction[0]), sum(lines.direction[1]));
         let length = (x * x + y * y).sqrt();
         let direction = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
         Self { direction, ..lines.line(0) }
@@ -435,39 +445,36 @@ fn reduce(mut lanes: Lanes, fold: impl Fn(f32, f32) -> f32) -> f32 {
 
 /// Edges side by side; the last batch is filled up with NaN, which is near nothing.
 struct EdgeBatch {
-    start: [[f32; BATCH]; 2],
-    end: [[f32; BATCH]; 2],
-    direction: [[f32; BATCH]; 2],
+    middle: [[f32; BATCH]; 2],
+    /// From the middle to the end.
+    half: [[f32; BATCH]; 2],
+    half_length: [f32; BATCH],
 }
 
 impl EdgeBatch {
     fn new(edges: &[PreparedEdge]) -> Self {
-        let side_by_side = |of: fn(&PreparedEdge) -> [f32; 2]| {
-            [0, 1].map(|k| std::array::from_fn(|i| edges.get(i).map_or(f32::NAN, |edge| of(edge)[k])))
-        };
+        let side_by_side =
+            |of: &dyn Fn(&PreparedEdge) -> f32| std::array::from_fn(|i| edges.get(i).map_or(f32::NAN, of));
         Self {
-            start: side_by_side(|edge| edge.start),
-            end: side_by_side(|edge| edge.end),
-            direction: side_by_side(|edge| edge.direction),
+            middle: [0, 1].map(|k| side_by_side(&|edge| 0.5 * (edge.start[k] + edge.end[k]))),
+            half: [0, 1].map(|k| side_by_side(&|edge| 0.5 * (edge.end[k] - edge.start[k]))),
+            half_length: side_by_side(&|edge| 0.5 * edge.length),
         }
     }
 
     /// Byte i is 1 where edge i reaches the area and is not turned too far.
     #[inline(always)]
-    fn marks(&self, area: &Area) -> u64 {
+    fn marks(&self, area: &Area) -> u128 {
         let mut marks = [0u8; BATCH];
         for (i, mark) in marks.iter_mut().enumerate() {
-            let [x0, y0] = area.axes.local([self.start[0][i], self.start[1][i]]);
-            let [x1, y1] = area.axes.local([self.end[0][i], self.end[1][i]]);
-            let sine = area.axes.turned([self.direction[0][i], self.direction[1][i]])[1];
-            let is_near = (max(x0, x1) >= area.low[0])
-                & (min(x0, x1) <= area.high[0])
-                & (max(y0, y1) >= area.low[1])
-                & (min(y0, y1) <= area.high[1])
-                & (sine.abs() <= area.sine_cut);
+            let [x, y] = area.axes.local([self.middle[0][i], self.middle[1][i]]);
+            let [dx, dy] = area.axes.turned([self.half[0][i], self.half[1][i]]);
+            let is_near = ((x - area.middle[0]).abs() <= area.half[0] + dx.abs())
+                & ((y - area.middle[1]).abs() <= area.half[1] + dy.abs())
+                & (dy.abs() <= area.sine_cut * self.half_length[i]);
             *mark = u8::from(is_near);
         }
-        u64::from_le_bytes(marks)
+        u128::from_le_bytes(marks)
     }
 }
 
