@@ -1,10 +1,12 @@
 //! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
 //!
-//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32: one lane a height. The loops over lanes are left to the
-//! compiler's vectoriser, so every function they call is `#[inline(always)]` and the caller dispatches on the instruction
-//! set. No operation is fused or reordered: the scores are the same bits on every instruction set.
+//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane a height.
+//! The loops over lanes are left to the compiler's vectoriser, so every function they call is `#[inline(always)]` and
+//! the caller dispatches on the instruction set. No operation is fused or reordered: the scores are the same bits on
+//! every instruction set.
 //!
 //! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32 (some 1e-4 px).
+#![allow(clippy::needless_range_loop, reason = "one index runs through the lanes of several arrays at once")]
 
 use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
 use crate::model::Camera;
@@ -14,8 +16,9 @@ use glam::DVec3;
 pub(super) const LANES: usize = 16;
 /// One f32 for each height.
 pub(super) type Lanes = [f32; LANES];
-/// Edges tested together for being near a line, one byte of a word each.
-const BATCH: usize = 8;
+/// Edges tested together for being near a line, one byte of a word each. 16 as well: loops of 8 are unrolled before
+/// they can be vectorised, which makes this test over twice as slow.
+const BATCH: usize = 16;
 /// Nearest depth that is projected, metres.
 const NEAR_M: f32 = 1e-6;
 /// What rounding may move a window's border by, pixels.
@@ -149,7 +152,8 @@ impl Line {
 
     #[inline(always)]
     fn end(&self) -> [f32; 2] {
-        [0, 1].map(|k| self.start[k] + self.length * self.direction[k])
+        let at = |k: usize| self.start[k] + self.length * self.direction[k];
+        [at(0), at(1)]
     }
 }
 
@@ -157,7 +161,8 @@ impl RaisedPoint {
     /// The pixel and the depth.
     #[inline(always)]
     fn pixel(&self, raised_m: f32) -> ([f32; 2], f32) {
-        let [x, y, depth] = [0, 1, 2].map(|k| self.base[k] + raised_m * self.per_metre[k]);
+        let at = |k: usize| self.base[k] + raised_m * self.per_metre[k];
+        let (x, y, depth) = (at(0), at(1), at(2));
         let inverse_depth = 1.0 / depth;
         ([x * inverse_depth, y * inverse_depth], depth)
     }
@@ -165,6 +170,7 @@ impl RaisedPoint {
 
 /// The edges of a frame, made ready for the columns of a grid.
 pub(super) struct ColumnScorer<'a> {
+    /// Those that can answer most first.
     edges: Vec<PreparedEdge>,
     batches: Vec<EdgeBatch>,
     options: &'a SimilarityOptions,
@@ -202,7 +208,8 @@ impl Constants {
 
 impl<'a> ColumnScorer<'a> {
     pub(super) fn new(edges: &[EdgeLine], options: &'a SimilarityOptions) -> Self {
-        let edges: Vec<_> = edges.iter().map(|edge| PreparedEdge::new(edge, options)).collect();
+        let mut edges: Vec<_> = edges.iter().map(|edge| PreparedEdge::new(edge, options)).collect();
+        edges.sort_by(|a, b| b.most().total_cmp(&a.most()));
         let batches = edges.chunks(BATCH).map(EdgeBatch::new).collect();
         Self { edges, batches, options, constants: Constants::new(options) }
     }
@@ -211,8 +218,8 @@ impl<'a> ColumnScorer<'a> {
     #[inline(always)]
     pub(super) fn best(&self, part: usize, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = match self.options.measure {
-            Measure::Rohr => self.best_by(lines, near, rohr),
-            Measure::Lowe => self.best_by(lines, near, lowe),
+            Measure::Rohr => self.best_by_rohr(lines, near),
+            Measure::Lowe => self.best_by_lowe(lines, near),
         };
         for best in &mut best {
             *best *= self.options.part_weights[part];
@@ -220,18 +227,35 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
+    /// By eq. (7) no edge answers more than its length: the rest is left out once every height has more than that.
     #[inline(always)]
-    fn best_by(
-        &self,
-        lines: &LineLanes,
-        near: &[u32],
-        measure: impl Fn(&Line, &PreparedEdge, &Constants) -> f32,
-    ) -> Lanes {
+    fn best_by_rohr(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
+        let mut best = [0.0; LANES];
+        // Heights that show no line need no answer.
+        let mut least = [0.0; LANES];
+        for i in 0..LANES {
+            least[i] = if lines.length[i] > 0.0 { 0.0 } else { f32::INFINITY };
+        }
+        for &e in near {
+            let edge = self.edges[e as usize];
+            if edge.most() <= reduce(least, min) {
+                break;
+            }
+            for i in 0..LANES {
+                best[i] = max(best[i], rohr(&lines.line(i), &edge, &self.constants));
+                least[i] = max(least[i], best[i]);
+            }
+        }
+        best
+    }
+
+    #[inline(always)]
+    fn best_by_lowe(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = [0.0; LANES];
         for &e in near {
             let edge = self.edges[e as usize];
             for i in 0..LANES {
-                best[i] = max(best[i], measure(&lines.line(i), &edge, &self.constants));
+                best[i] = max(best[i], lowe(&lines.line(i), &edge, &self.constants));
             }
         }
         best
@@ -249,6 +273,14 @@ impl<'a> ColumnScorer<'a> {
                 marks &= marks - 1;
             }
         }
+    }
+}
+
+impl PreparedEdge {
+    /// The most an edge can answer by eq. (7): l is no longer than the edge.
+    #[inline(always)]
+    fn most(&self) -> f32 {
+        self.weight * self.length
     }
 }
 
@@ -313,7 +345,7 @@ fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
     (min(a, b), max(a, b))
 }
 
-/// asin² of 0 <= x <= 1 to 2.5e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 - asin sqrt(1 - q).
+/// asin² of 0 <= x <= 1 to 4e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 - asin sqrt(1 - q).
 #[inline(always)]
 fn angle_sq(sine: f32) -> f32 {
     let q = min(sine * sine, 1.0);
@@ -333,7 +365,7 @@ fn exp(x: f32) -> f32 {
     let shifted = y + magic;
     let f = y - (shifted - magic);
     let p = 0.055_503_57 + f * (0.009_676_03 + f * 0.001_339_09);
-    let p = 1.000_000_1 + f * (0.693_147_2 + f * (0.240_221_07 + f * p));
+    let p = 1.000_000_1 + f * (std::f32::consts::LN_2 + f * (0.240_221_07 + f * p));
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
 }
 
@@ -353,11 +385,11 @@ fn select(condition: bool, value: f32) -> f32 {
     if condition { value } else { 0.0 }
 }
 
-/// What the windows of a line cover over all heights, in axes along the line's mean direction.
+/// The rectangle that holds the windows of a line at all heights, in axes along the line's mean direction.
 struct Area {
     axes: Line,
-    low: [f32; 2],
-    high: [f32; 2],
+    middle: [f32; 2],
+    half: [f32; 2],
     /// At least the sine of the largest angle with the mean direction: sin (a + b) <= sin a + sin b.
     sine_cut: f32,
 }
@@ -366,8 +398,8 @@ impl Area {
     #[inline(always)]
     fn new(lines: &LineLanes, constants: &Constants) -> Self {
         let axes = Line::mean(lines);
-        let (none, mut turn) = ([f32::INFINITY; LANES], [0.0; LANES]);
-        let (mut low, mut high) = ([none; 2], [none.map(|v| -v); 2]);
+        let zero = [0.0; LANES];
+        let (mut low, mut high, mut turn) = ([zero; 2], [zero; 2], zero);
         for i in 0..LANES {
             let line = lines.line(i);
             let shown = line.length > 0.0;
@@ -378,13 +410,13 @@ impl Area {
             }
             turn[i] = axes.turned(line.direction)[1].abs();
         }
+        let low = [reduce(low[0], min), reduce(low[1], min)];
+        let high = [reduce(high[0], max), reduce(high[1], max)];
         let reach = constants.c_r * reduce(lines.length, max) + SLACK_PX;
-        Self {
-            axes,
-            low: low.map(|low| reduce(low, min) - reach),
-            high: high.map(|high| reduce(high, max) + reach),
-            sine_cut: constants.sine_cut + reduce(turn, max) + SLACK_SINE,
-        }
+        let sine_cut = constants.sine_cut + reduce(turn, max) + SLACK_SINE;
+        let middle = |k: usize| 0.5 * (low[k] + high[k]);
+        let half = |k: usize| 0.5 * (high[k] - low[k]) + reach;
+        Self { axes, middle: [middle(0), middle(1)], half: [half(0), half(1)], sine_cut }
     }
 }
 
@@ -392,7 +424,8 @@ impl Line {
     /// Axes at the first height's start (the origin if it shows none) along the mean direction of all heights.
     #[inline(always)]
     fn mean(lines: &LineLanes) -> Self {
-        let [x, y] = lines.direction.map(|d| reduce(d, |a, b| a + b));
+        let sum = |lanes: Lanes| reduce(lanes, |a, b| a + b);
+        let (x, y) = (sum(lines.direction[0]), sum(lines.direction[1]));
         let length = (x * x + y * y).sqrt();
         let direction = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
         Self { direction, ..lines.line(0) }
@@ -412,38 +445,137 @@ fn reduce(mut lanes: Lanes, fold: impl Fn(f32, f32) -> f32) -> f32 {
 
 /// Edges side by side; the last batch is filled up with NaN, which is near nothing.
 struct EdgeBatch {
-    start: [[f32; BATCH]; 2],
-    end: [[f32; BATCH]; 2],
-    direction: [[f32; BATCH]; 2],
+    middle: [[f32; BATCH]; 2],
+    /// From the middle to the end.
+    half: [[f32; BATCH]; 2],
+    half_length: [f32; BATCH],
 }
 
 impl EdgeBatch {
     fn new(edges: &[PreparedEdge]) -> Self {
-        let side_by_side = |of: fn(&PreparedEdge) -> [f32; 2]| {
-            [0, 1].map(|k| std::array::from_fn(|i| edges.get(i).map_or(f32::NAN, |edge| of(edge)[k])))
-        };
+        let side_by_side =
+            |of: &dyn Fn(&PreparedEdge) -> f32| std::array::from_fn(|i| edges.get(i).map_or(f32::NAN, of));
         Self {
-            start: side_by_side(|edge| edge.start),
-            end: side_by_side(|edge| edge.end),
-            direction: side_by_side(|edge| edge.direction),
+            middle: [0, 1].map(|k| side_by_side(&|edge| 0.5 * (edge.start[k] + edge.end[k]))),
+            half: [0, 1].map(|k| side_by_side(&|edge| 0.5 * (edge.end[k] - edge.start[k]))),
+            half_length: side_by_side(&|edge| 0.5 * edge.length),
         }
     }
 
     /// Byte i is 1 where edge i reaches the area and is not turned too far.
     #[inline(always)]
-    fn marks(&self, area: &Area) -> u64 {
+    fn marks(&self, area: &Area) -> u128 {
         let mut marks = [0u8; BATCH];
         for (i, mark) in marks.iter_mut().enumerate() {
-            let [x0, y0] = area.axes.local([self.start[0][i], self.start[1][i]]);
-            let [x1, y1] = area.axes.local([self.end[0][i], self.end[1][i]]);
-            let sine = area.axes.turned([self.direction[0][i], self.direction[1][i]])[1];
-            let is_near = (max(x0, x1) >= area.low[0])
-                & (min(x0, x1) <= area.high[0])
-                & (max(y0, y1) >= area.low[1])
-                & (min(y0, y1) <= area.high[1])
-                & (sine.abs() <= area.sine_cut);
+            let [x, y] = area.axes.local([self.middle[0][i], self.middle[1][i]]);
+            let [dx, dy] = area.axes.turned([self.half[0][i], self.half[1][i]]);
+            let is_near = ((x - area.middle[0]).abs() <= area.half[0] + dx.abs())
+                & ((y - area.middle[1]).abs() <= area.half[1] + dy.abs())
+                & (dy.abs() <= area.sine_cut * self.half_length[i]);
             *mark = u8::from(is_near);
         }
-        u64::from_le_bytes(marks)
+        u128::from_le_bytes(marks)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::{ModelLine, similarity};
+    use super::super::search::project;
+    use super::*;
+    use crate::model::{ContourKind, VisibleSegment};
+    use glam::Vec2;
+    use proptest::prelude::*;
+
+    #[test]
+    fn exp_and_the_angle_keep_their_stated_errors() {
+        for i in 0..=100_000 {
+            let share = i as f32 / 100_000.0;
+            let x = -80.0 * share * share;
+            let exact = f64::from(x).exp();
+            let allowed = 3e-7 + 1e-7 * f64::from(x).abs();
+            assert!((f64::from(exp(x)) / exact - 1.0).abs() < allowed, "e^{x}");
+            let exact = f64::from(share).asin().powi(2);
+            assert!((f64::from(angle_sq(share)) - exact).abs() <= 4e-6 * exact, "asin² {share}");
+        }
+        assert!(exp(-1e9) < 2e-38 && exp(0.0) == 1.000_000_1);
+    }
+
+    #[test]
+    fn reduction_uses_every_lane() {
+        for i in 0..LANES {
+            let mut lanes = [0.0; LANES];
+            lanes[i] = -1.0;
+            assert_eq!(reduce(lanes, min), -1.0);
+            assert_eq!(reduce(lanes, |a, b| a + b), -1.0);
+        }
+    }
+
+    fn camera() -> Camera {
+        Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
+    }
+
+    /// s_i at each height by the readable way, `None` where an angle is so near to the largest compared that rounding decides.
+    fn plainly(piece: &VisibleSegment, raised_m: &Lanes, edges: &[EdgeLine]) -> Option<Lanes> {
+        let options = SimilarityOptions::default();
+        let mut all = [0.0; LANES];
+        for (s, z) in all.iter_mut().zip(raised_m) {
+            let up = DVec3::Z * f64::from(*z);
+            let piece = VisibleSegment { start: piece.start + up, end: piece.end + up, ..*piece };
+            let Some(line) = project(&piece, &camera()) else { continue };
+            let found = similarity(&[line], edges, &options);
+            let cut = ANGLE_CUT_SIGMA * options.sigma_phi_rad;
+            if edges.iter().any(|edge| (angle(&line, edge) - cut).abs() < 1e-3) {
+                return None;
+            }
+            *s = found.value * found.model_px;
+        }
+        Some(all)
+    }
+
+    /// An edge whose middle, length and angle are given in the line's length and direction.
+    fn edge_about(line: &ModelLine, (along, across, length, turn_rad): (f32, f32, f32, f32)) -> EdgeLine {
+        let (start, end) = (Vec2::from(line.start), Vec2::from(line.end));
+        let middle = start + along * (end - start) + across * (end - start).perp();
+        let half = 0.5 * length * Vec2::from_angle(turn_rad).rotate(end - start);
+        EdgeLine { start: (middle - half).into(), end: (middle + half).into(), gradient: 1.0, velocity: 0.0 }
+    }
+
+    fn angle(line: &ModelLine, edge: &EdgeLine) -> f32 {
+        let direction = |a: [f32; 2], b: [f32; 2]| Vec2::from(b) - Vec2::from(a);
+        let (l, e) = (direction(line.start, line.end), direction(edge.start, edge.end));
+        (l.perp_dot(e).abs() / (l.length() * e.length())).min(1.0).asin()
+    }
+
+    proptest! {
+        /// Pieces that leave the image, pass behind the camera or are short are drawn too.
+        #[test]
+        fn every_height_answers_as_the_plain_similarity(
+            ends in prop::array::uniform3(-1.5f64..1.5),
+            along in prop::array::uniform3(-0.6f64..0.6),
+            (depth, span) in (-6.5f64..8.0, prop_oneof![Just(0.0f32), 0.0f32..0.5]),
+            edges in prop::collection::vec(
+                (-0.5f32..1.5, prop_oneof![-0.05f32..0.05, -0.5f32..0.5], 0.0f32..1.5, prop_oneof![-0.1f32..0.1, -0.8f32..0.8]), 1..20),
+        ) {
+            let camera = camera();
+            let start = DVec3::new(ends[0], ends[1] + depth, 1.1 + ends[2]);
+            let piece = VisibleSegment { part: 3, kind: ContourKind::Left, start, end: start + DVec3::from(along) };
+            let line = project(&piece, &camera).unwrap_or(ModelLine { part: 3, start: [300.0, 80.0], end: [310.0, 180.0] });
+            let edges: Vec<_> = edges.iter().map(|&shape| edge_about(&line, shape)).collect();
+            let raised_m: Lanes = std::array::from_fn(|i| span * (i as f32 / 7.5 - 1.0));
+            let plain = plainly(&piece, &raised_m, &edges);
+            prop_assume!(plain.is_some());
+            let options = SimilarityOptions::default();
+            let scorer = ColumnScorer::new(&edges, &options);
+            let place = DVec3::new(0.3, -0.2, 0.1);
+            let projection = Projection::new(&camera, place);
+            let lines = LineLanes::new(&projection, start - place, piece.end - place, &raised_m);
+            let mut near = Vec::new();
+            scorer.near(&lines, &mut near);
+            let fast = scorer.best(piece.part, &lines, &near);
+            for (i, (f, p)) in fast.iter().zip(plain.unwrap()).enumerate() {
+                prop_assert!((f - p).abs() < 1e-3 * lines.length[i].max(1.0), "lane {i}: {f} against {p}, {} px", lines.length[i]);
+            }
+        }
     }
 }

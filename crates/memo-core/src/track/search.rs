@@ -296,27 +296,35 @@ impl Column {
         for (block, scores) in out.chunks_mut(LANES).enumerate() {
             let height = |i: usize| heights.at((block * LANES + i).min(heights.count - 1));
             let raised_m = std::array::from_fn(|i| (height(i) - heights.centre) as f32);
-            let all = pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.similarity(scorer, &projection, &raised_m),
-            );
+            let (visible, near) = (&self.visible, &mut self.near);
+            let raised = Raised { scorer, projection: &projection, visible, raised_m, near };
+            let all = pulp::Arch::new().dispatch(raised);
             scores.copy_from_slice(&all[..scores.len()]);
         }
     }
+}
+
+/// The visible pieces of one body at several heights. A type and not a closure, because the compiler may call a closure that
+/// borrows mutably through a function without the dispatched instruction set.
+struct Raised<'a> {
+    scorer: &'a ColumnScorer<'a>,
+    projection: &'a Projection<'a>,
+    visible: &'a [VisibleSegment],
+    raised_m: Lanes,
+    near: &'a mut Vec<u32>,
+}
+
+impl pulp::WithSimd for Raised<'_> {
+    type Output = Lanes;
 
     /// Eq. (11): s(p) = sum of w_K s_i over sum of l_M, at each height.
     #[inline(always)]
-    fn similarity(
-        &mut self,
-        scorer: &ColumnScorer<'_>,
-        projection: &Projection<'_>,
-        raised_m: &Lanes,
-    ) -> Lanes {
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Lanes {
         let (mut answered, mut model_px) = ([0.0f32; LANES], [0.0f32; LANES]);
-        for piece in &self.visible {
-            let lines = LineLanes::new(projection, piece.start, piece.end, raised_m);
-            scorer.near(&lines, &mut self.near);
-            let best = scorer.best(piece.part, &lines, &self.near);
+        for piece in self.visible {
+            let lines = LineLanes::new(self.projection, piece.start, piece.end, &self.raised_m);
+            self.scorer.near(&lines, self.near);
+            let best = self.scorer.best(piece.part, &lines, self.near);
             for i in 0..LANES {
                 answered[i] += best[i];
                 model_px[i] += lines.length[i];
@@ -327,7 +335,7 @@ impl Column {
 }
 
 /// A visible piece of contour as a line in ideal pixels cut to the image.
-fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
+pub(super) fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
     let start = camera.project_ideal(segment.start)?;
     let end = camera.project_ideal(segment.end)?;
     let (t0, t1) = inside_image(start, end, camera)?;
@@ -359,6 +367,7 @@ fn inside_image(start: DVec2, end: DVec2, camera: &Camera) -> Option<(f64, f64)>
 
 #[cfg(test)]
 mod tests {
+    use super::super::score::{Measure, similarity};
     use super::*;
     use crate::model::{Body, Gait, GaitStyle};
 
@@ -445,15 +454,43 @@ mod tests {
         let scene = Scene { walker: &walker, camera: &camera, path: &path };
         let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
         let edges = edges_of(&scene, &truth);
-        let options = SimilarityOptions::default();
         let small = |v: f64, step: f64| Axis::around(v, 2.0 * step, step);
         let grid =
             Grid { along: small(0.05, 0.02), height: small(truth.height_m, 0.02), phase: small(0.25, 0.02) };
-        let found = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
-        for (index, score) in found.scores.iter().enumerate() {
-            let plain =
-                crate::track::score::similarity(&scene.lines(&grid.hypothesis(index)), &edges, &options);
-            assert!((plain.value - score).abs() < 1e-4, "{} against {score}", plain.value);
+        let rohr = SimilarityOptions::default();
+        let mut weighted =
+            SimilarityOptions { full_gradient: Some(40.0), sigma_phi_rad: 0.7, c_l: 0.5, c_r: 0.4, ..rohr };
+        weighted.part_weights[3] = 0.2;
+        let lowe = SimilarityOptions { measure: Measure::Lowe, ..rohr };
+        for options in [rohr, weighted, lowe] {
+            let found = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
+            for (index, score) in found.scores.iter().enumerate() {
+                let plain = similarity(&scene.lines(&grid.hypothesis(index)), &edges, &options);
+                assert!((plain.value - score).abs() < 1e-4, "{} against {score}, {options:?}", plain.value);
+            }
         }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let (walker, camera) = (walker(), camera());
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.4 };
+        let scene = Scene { walker: &walker, camera: &camera, path: &path };
+        let truth = Hypothesis { along_m: 0.2, height_m: walker.level_torso_height_m(), phase: 0.3 };
+        let (edges, options) = (edges_of(&scene, &truth), SimilarityOptions::default());
+        let mut visible = Vec::new();
+        let posed = scene.pose(&Hypothesis { phase: 0.35, ..truth });
+        visible_contours(&posed.cylinders, camera.position(), &LINES_ONLY, &mut visible);
+        let on = |arch: pulp::Arch| {
+            arch.dispatch(Raised {
+                scorer: &ColumnScorer::new(&edges, &options),
+                projection: &Projection::new(&camera, DVec3::ZERO),
+                visible: &visible,
+                raised_m: std::array::from_fn(|i| 0.01 * i as f32 - 0.08),
+                near: &mut Vec::new(),
+            })
+        };
+        let (best, plain) = (on(pulp::Arch::new()), on(pulp::Arch::Scalar));
+        assert!(best[8] > 0.1 && best.map(f32::to_bits) == plain.map(f32::to_bits));
     }
 }
