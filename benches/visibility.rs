@@ -85,6 +85,7 @@ fn hidden_lines(c: &mut Criterion) {
 fn side_camera() -> Camera {
     let rotation = DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y).transpose();
     Camera {
+        distortion: memo_core::model::Distortion::None,
         size: [640, 480],
         focal_px: DVec2::splat(1000.0),
         centre_px: DVec2::new(319.5, 239.5),

@@ -1,7 +1,7 @@
 """3D human motion from one fixed camera by explicit geometry.
 
-Frames are numpy arrays (H, W) uint8, metres and seconds throughout, world Z up, gait phase in [0, 1) with 0 at
-the right heel strike.
+Frames are numpy arrays (H, W) uint8; metres and seconds throughout; world Z up; gait phase in [0, 1) with
+0 at the right heel strike.
 """
 
 from memo._memo import (

@@ -79,7 +79,7 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, the others as float64, empty cells as NaN."""
+    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN."""
     rows = _read_rows(path, TRACK_COLUMNS)
     columns: dict[str, Column] = {}
     for name in TRACK_COLUMNS:

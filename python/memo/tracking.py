@@ -142,8 +142,8 @@ class Track:
         return self._located(row)[0]
 
     def contour_parts(self, row: int) -> npt.NDArray[np.uint8]:
-        """The body part of each segment of `contours`: 0 head, 1 torso, 2-4 right arm, 5-7 left arm, 8-10 right
-        leg, 11-13 left leg."""
+        """The body part of each segment of `contours`: 0 head, 1 torso, 2-4 right arm, 5-7 left arm,
+        8-10 right leg, 11-13 left leg."""
         return self._located(row)[1]
 
     def _located(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]:
@@ -176,9 +176,10 @@ class Track:
         manner = "walks" if forward else "walks backwards"
         sure = main.p_other_direction < 0.1
         message = (
-            f"Frames {columns['frame'][0]} to {columns['frame'][-1]}: somebody {manner} {way} at {speed:.2f} m/s"
+            f"Frames {columns['frame'][0]} to {columns['frame'][-1]}: "
+            f"somebody {manner} {way} at {speed:.2f} m/s"
             + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
-            + ("." if sure else f"; forward or backward is not certain (p = {1 - main.p_other_direction:.2f}).")
+            + ("." if sure else f"; which way round is not certain (p = {1 - main.p_other_direction:.2f}).")
         )
         return {
             "status": "tracked" if forward else "walking backwards",
