@@ -51,7 +51,7 @@ def read_clip(clip):
 
 @pytest.fixture(scope="module")
 def tracked(tmp_path_factory):
-    """Tracks a clip once for all tests; gives the track and a folder with its tables."""
+    """Tracks a clip once for all tests; gives the track and a folder of its tables, numbered as the video."""
 
     @cache
     def result(name, adapt=True):

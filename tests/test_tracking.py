@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from conftest import shared_video
 from memo.files import TRACK_COLUMNS
+from memo.video import VideoReader
 
 GREY = np.zeros((48, 64), np.uint8)
 A_FRAME = r"numpy array of shape \(H, W\), dtype uint8; got "
@@ -188,6 +189,42 @@ def python(script, *arguments, **environment):
 @pytest.fixture(scope="module")
 def small_walker():
     return shared_video("weizmann_ido_walk") / "ido_walk.avi"
+
+
+@pytest.fixture(scope="module")
+def walk(small_walker):
+    """43 frames of a man who walks from left to right, 75 pixels tall."""
+    with VideoReader(small_walker) as reader:
+        return [frame.luma.copy() for frame in reader]
+
+
+def average_walker(frames):
+    """The columns found without a fit to the person, which the small image does not allow anyway."""
+    return memo.track(frames, height_m=1.75, fps=25, adapt=False).columns
+
+
+def test_the_stream_can_be_ended_at_any_frame(walk):
+    tracker = memo.Tracker(1.75, adapt=False)
+    states = [tracker.update(frame, index / 25) for index, frame in enumerate(walk[:30])]
+    assert states[0] is None and states[-1]["time_s"] == pytest.approx(28 / 25), "known one frame later"
+    columns = tracker.finish().columns
+    np.testing.assert_array_equal(columns["frame"], np.arange(30))
+
+
+def test_only_the_values_of_a_frame_count(walk):
+    plain, by_columns = average_walker(walk), average_walker([np.asfortranarray(frame) for frame in walk])
+    for name in TRACK_COLUMNS:
+        np.testing.assert_array_equal(plain[name], by_columns[name], err_msg=name)
+
+
+def test_a_mirrored_walk_is_the_mirrored_result(walk):
+    """But for the sides, which this clip does not tell."""
+    plain, mirrored = average_walker(walk), average_walker([frame[:, ::-1] for frame in walk])
+    np.testing.assert_array_equal(mirrored["frame"], plain["frame"])
+    np.testing.assert_allclose(mirrored["x_m"], -plain["x_m"], atol=0.02)
+    np.testing.assert_allclose(mirrored["z_m"], plain["z_m"], atol=0.01)
+    phase = (mirrored["phase"] - plain["phase"] + 0.25) % 0.5 - 0.25
+    np.testing.assert_allclose(phase, 0, atol=0.02)
 
 
 def test_same_result_with_any_number_of_threads(small_walker):

@@ -129,6 +129,57 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
 }
 
+/// Depth by which a path must slant over the sightings before it is believed, metres: on walks across the image the first and the
+/// last third of 40 sightings differ by up to 0.13, on one 25 degrees off by 0.43.
+const SLANT_M: f64 = 0.2;
+
+/// Finds the slanting line of a person who comes nearer or goes away, where the sightings show one clearly.
+///
+/// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` belongs to all sightings.
+pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Option<Course> {
+    let third = sightings.len() / 3;
+    if third == 0 {
+        return None;
+    }
+    // 1. Where the first and the last third stand, each on its own line parallel to the image.
+    let standing = |part: &[Sighting]| {
+        let course = locate(part, camera, height_m).ok()?;
+        let along = course.along_m.iter().sum::<f64>() / part.len() as f64;
+        Some((course.path.point(along, 0.0).truncate(), course.depth_sd_m))
+    };
+    let (start, depth_sd_m) = standing(&sightings[..third])?;
+    let (end, _) = standing(&sightings[sightings.len() - third..])?;
+    // 2. The line through both, if they differ enough in depth.
+    let view = (camera.rotation.transpose() * DVec3::Z).truncate().normalize_or(DVec2::Y);
+    if (end - start).dot(view).abs() < SLANT_M {
+        return None;
+    }
+    let path = Path { origin: start, heading_rad: (end - start).to_angle() };
+    // 3. Places along it.
+    let (sole, crown) = person_rows(sightings);
+    let places: Vec<(f64, f64)> = sightings
+        .iter()
+        .map(|s| {
+            (
+                s.time_s,
+                place(
+                    camera,
+                    &path,
+                    0.5 * (s.rectangle.left + s.rectangle.right) as f64,
+                    0.5 * (sole + crown),
+                ),
+            )
+        })
+        .collect();
+    let (speed_mps, _) = line_through(&places);
+    Some(Course {
+        path,
+        along_m: places.into_iter().map(|(_, along)| along).collect(),
+        speed_mps,
+        depth_sd_m,
+    })
+}
+
 /// Both rows weighted, unless the soles seem nearer than the crown allows: then the bottom row is a reflection's or
 /// a shadow's, which only ever lie below the feet, and the crown decides alone.
 fn stand(
@@ -222,6 +273,26 @@ mod tests {
         let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7).unwrap();
         let course = locate(&seen, &camera, 1.7).unwrap();
         assert!(course.path.origin.length() < 0.05 && (course.speed_mps - 1.4).abs() < 0.05, "{course:?}");
+    }
+
+    #[test]
+    fn a_slanting_path_is_found_and_a_parallel_one_left_alone() {
+        let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
+        assert!(locate_slanting(&sightings(&camera, 0.0, 1.4, 1.8), &camera, 1.8).is_none());
+        let slanting: Vec<Sighting> = (0..40)
+            .flat_map(|k| {
+                let time_s = f64::from(k) * 0.04;
+                let mut one = sightings(&camera, 0.5 * time_s, 1.0, 1.8)[0];
+                let foot = camera.project(DVec3::new(1.0 * time_s, 0.5 * time_s, 0.0)).unwrap();
+                (one.rectangle.left, one.rectangle.right) =
+                    ((foot.x - 40.0) as usize, (foot.x + 40.0) as usize);
+                one.time_s = time_s;
+                Some(one)
+            })
+            .collect();
+        let course = locate_slanting(&slanting, &camera, 1.8).unwrap();
+        assert!((course.path.heading_rad - 0.5f64.atan()).abs() < 0.1, "{course:?}");
+        assert!((course.speed_mps - 1.25f64.sqrt()).abs() < 0.1, "{course:?}");
     }
 
     #[test]

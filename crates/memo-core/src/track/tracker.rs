@@ -8,7 +8,7 @@
 //! the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
-use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
+use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate, locate_slanting};
 use super::person::{PersonFit, PersonOptions, fit_distance, fit_person};
 use super::result::TrackedWalk;
 use super::search::{Hypothesis, Scene};
@@ -113,6 +113,8 @@ pub const LONGEST_WALK: usize = 20_000;
 const MISSED_FRAMES: usize = 3;
 /// Slower than this nobody walks, metres a second.
 const SLOWEST_MPS: f64 = 0.25;
+/// Slower than this no legs walk, gait cycles a second.
+const SLOWEST_HZ: f64 = 0.3;
 /// A walk ends when this share of the body's height or width lies outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
 /// Number of last frames that tell whether a walk goes on.
@@ -370,7 +372,8 @@ impl Tracker {
                 active.refit(&self.options);
             }
         }
-        if active.is_over() || active.walk.twins[0].steps.len() >= LONGEST_WALK {
+        // On a wrongly assumed path a walk looks over, so the fit comes first.
+        if active.fitted && (active.is_over() || active.walk.twins[0].steps.len() >= LONGEST_WALK) {
             self.end_walk();
         }
         Ok(())
@@ -427,7 +430,9 @@ impl Active {
         let recent = &twin.steps[count - RECENT_FRAMES..];
         let (first, last) = (&recent[0], &recent[RECENT_FRAMES - 1]);
         let covered_m = (last.state.along.position - first.state.along.position).abs();
-        let stopped = covered_m < SLOWEST_MPS * (last.time_s - first.time_s);
+        let cycles = (last.state.phase.position - first.state.phase.position).abs();
+        let elapsed_s = last.time_s - first.time_s;
+        let stopped = covered_m < SLOWEST_MPS * elapsed_s || cycles < SLOWEST_HZ * elapsed_s;
         let similarity = recent.iter().map(|s| f64::from(s.similarity)).sum::<f64>() / RECENT_FRAMES as f64;
         let lost = similarity < LOST_SHARE * twin.similarity_sum / count as f64;
         stopped || lost
@@ -451,6 +456,7 @@ impl Active {
             return;
         }
         let kept = std::mem::take(&mut self.kept);
+        self.turn_path(&kept, options);
         let Some(person) = &options.person else { return };
         let Walk { walker, path, beginning, .. } = &self.walk;
         let fit =
@@ -461,6 +467,20 @@ impl Active {
             self.follow_again(walk, &kept, options);
         } else {
             self.refit_distance(&kept, options, person);
+        }
+    }
+
+    /// Starts again on a slanting path where the sightings show one.
+    fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
+        let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
+        let crown_m = self.walk.walker.level_crown_height_m();
+        let Some(course) = locate_slanting(&sightings, &self.camera, crown_m) else { return };
+        let frames: Vec<&FrameEdges> = kept.iter().map(|(_, e)| e).take(options.start_frames).collect();
+        let walker = &self.walk.walker;
+        if let Some(start) = start(&frames, &course, walker, &self.camera, &options.cadence, &options.walk) {
+            let walk = Walk::new(walker.clone(), start.path, start.beginning);
+            self.start = start;
+            self.follow_again(walk, kept, options);
         }
     }
 
