@@ -25,6 +25,12 @@ pub enum EvidenceError {
     /// The options of edge or line finding make no sense.
     #[error(transparent)]
     Line(#[from] LineError),
+    /// A frame needs a time.
+    #[error("the time of a frame must be a finite number of seconds, got {time_s}")]
+    Time {
+        /// Time given.
+        time_s: f64,
+    },
     /// Frames must come in order.
     #[error("frame times must increase: {time_s} s came after {previous_s} s")]
     TimeOrder {
@@ -141,8 +147,11 @@ impl EvidenceStream {
 
     /// Takes a frame and gives the evidence of the one before.
     pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
+        if !time_s.is_finite() {
+            return Err(EvidenceError::Time { time_s });
+        }
         if let Some((_, previous_s, _)) = self.waiting
-            && (time_s.is_nan() || time_s <= previous_s)
+            && time_s <= previous_s
         {
             return Err(EvidenceError::TimeOrder { previous_s, time_s });
         }

@@ -1,7 +1,8 @@
 //! The result: one row of position, phase, angles and joints per frame, and gait events.
 //!
 //! Rows come from the smoothed states of the better twin: what all frames, later ones included, say of each frame. The printed noise of
-//! the filter is generous, so standard deviations are scaled by how far measurements really fell from predictions.
+//! the filter is generous, so standard deviations are scaled by how far measurements really fell from predictions; to this scatter
+//! comes what no number of frames averages out: the body that is not the model's, and the distance.
 
 use super::kalman::{ConstantVelocity, Noise, smooth};
 use super::person::PersonFit;
@@ -18,6 +19,8 @@ pub struct TrackedWalk {
     pub walk: Walk,
     /// The camera given or guessed.
     pub camera: Camera,
+    /// Standard deviation of the path's distance from the camera, metres.
+    pub depth_sd_m: f64,
     /// What the starting phase found.
     pub start: StartReport,
     /// The fit of the person, where one was made.
@@ -86,6 +89,10 @@ pub struct Event {
     pub side: Side,
 }
 
+/// Errors common to all frames of a walk, standard deviations measured on motion-captured walks: along the path (metres), height
+/// (metres), phase (cycles; how heel strike is defined).
+const COMMON_SD: [f64; 3] = [0.015, 0.02, 0.015];
+
 /// Phase of toe-off on the side whose heel strikes at 0: adults at free speed stand for 61 % of the cycle.
 const TOE_OFF_PHASE: f64 = 0.61;
 
@@ -139,8 +146,16 @@ impl TrackedWalk {
             phase: phase.0.position.rem_euclid(1.0),
         };
         let posed = self.scene().pose(&hypothesis);
-        let sd = |(state, scale): (ConstantVelocity, f64)| state.position_sd() * scale;
-        let direction = self.walk.path.direction().abs() * sd(along);
+        let sd = |(state, scale): (ConstantVelocity, f64), common: f64| {
+            (state.position_sd() * scale).hypot(common)
+        };
+        // Depth also moves the place along the path, by its share of the offset from the camera's foot point.
+        let eye = self.camera.position().truncate();
+        let off_axis = (hypothesis.along_m - self.walk.path.along(eye)).abs();
+        let distance = (self.walk.path.point(self.walk.path.along(eye), 0.0).truncate() - eye).length();
+        let along_sd = sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance);
+        let heading = self.walk.path.direction();
+        let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * self.depth_sd_m);
         Row {
             frame: step.frame,
             time_s: step.time_s,
@@ -149,7 +164,12 @@ impl TrackedWalk {
             phase: hypothesis.phase,
             p_swapped,
             speed_mps: along.0.velocity,
-            sd: [direction.x, direction.y, sd(height), sd(phase)],
+            sd: [
+                forward.x.hypot(across.x),
+                forward.y.hypot(across.y),
+                sd(height, COMMON_SD[1]),
+                sd(phase, COMMON_SD[2]),
+            ],
             posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),
             right: posed.right,
             left: posed.left,

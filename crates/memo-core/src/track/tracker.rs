@@ -29,6 +29,19 @@ pub enum TrackError {
     /// A frame or an option was refused.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
+    /// An option makes no sense.
+    #[error("{name} must be {wanted}, got {got}")]
+    Option {
+        /// Name of the option.
+        name: &'static str,
+        /// What is accepted.
+        wanted: &'static str,
+        /// What was given.
+        got: f64,
+    },
+    /// The stream has been ended.
+    #[error("the stream has ended: make a new tracker for further frames")]
+    Finished,
     /// The camera belongs to images of another size.
     #[error(
         "the camera is calibrated for {camera_width}x{camera_height} images, the frames are {width}x{height}"
@@ -166,12 +179,14 @@ pub struct Tracker {
     walking: Option<Active>,
     finished: Vec<TrackedWalk>,
     report: SeekReport,
+    is_finished: bool,
 }
 
 /// The walk under way.
 #[derive(Debug)]
 struct Active {
     camera: Camera,
+    depth_sd_m: f64,
     start: StartReport,
     walk: Walk,
     /// Evidence kept until the person is fitted.
@@ -184,6 +199,7 @@ impl Tracker {
     /// A tracker that has seen no frame.
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
         Body::from_height(options.height_m)?;
+        check_options(&options)?;
         let stream = EvidenceStream::new(options.evidence);
         Ok(Self {
             options,
@@ -193,11 +209,15 @@ impl Tracker {
             walking: None,
             finished: Vec::new(),
             report: SeekReport::default(),
+            is_finished: false,
         })
     }
 
     /// Takes the next frame. What it shows is known one frame later.
     pub fn update(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<(), TrackError> {
+        if self.is_finished {
+            return Err(TrackError::Finished);
+        }
         self.check_camera(frame)?;
         self.report.frames += 1;
         if let Some(evidence) = self.stream.push(frame, time_s)? {
@@ -208,6 +228,7 @@ impl Tracker {
 
     /// Ends the stream: the last frame is worked on and the walk under way ends.
     pub fn finish(&mut self) -> Result<(), TrackError> {
+        self.is_finished = true;
         let stream = std::mem::replace(&mut self.stream, EvidenceStream::new(self.options.evidence));
         if let Some(evidence) = stream.finish()? {
             self.advance(&evidence)?;
@@ -334,7 +355,15 @@ impl Tracker {
         for (_, edges) in &kept {
             walk.follow(edges, &camera, &self.options.walk);
         }
-        Some(Active { camera, start, walk, kept, person_fit: None, fitted: false })
+        Some(Active {
+            camera,
+            depth_sd_m: course.depth_sd_m,
+            start,
+            walk,
+            kept,
+            person_fit: None,
+            fitted: false,
+        })
     }
 
     fn course(
@@ -411,6 +440,7 @@ impl Tracker {
             self.finished.push(TrackedWalk {
                 walk: active.walk,
                 camera: active.camera,
+                depth_sd_m: active.depth_sd_m,
                 start: active.start,
                 person_fit: active.person_fit,
                 options: self.options.walk,
@@ -514,6 +544,22 @@ impl Active {
 
 /// Frames kept for fitting.
 type Kept = [(Option<Sighting>, FrameEdges)];
+
+fn check_options(options: &TrackerOptions) -> Result<(), TrackError> {
+    let fov = options.field_of_view_rad.to_degrees();
+    if !(5.0..=170.0).contains(&fov) {
+        return Err(TrackError::Option {
+            name: "field of view",
+            wanted: "between 5 and 170 degrees",
+            got: fov,
+        });
+    }
+    if !(5..=100).contains(&options.start_frames) {
+        let got = options.start_frames as f64;
+        return Err(TrackError::Option { name: "start_frames", wanted: "between 5 and 100", got });
+    }
+    Ok(())
+}
 
 /// Bounding box of the body in the image, pixels.
 fn body_box(scene: &Scene<'_>, hypothesis: &Hypothesis) -> Option<(DVec2, DVec2)> {
