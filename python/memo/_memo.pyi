@@ -93,6 +93,12 @@ class Tracker:
         gait: str = "dense",
         adapt: bool = True,
         start_frames: int = 13,
+        compensate_gain: bool = False,
+        background: bool = False,
+        measure: str = "rohr",
+        full_gradient: float | None = None,
+        full_velocity: float | None = None,
+        part_weights: Sequence[float] | None = None,
     ) -> Self: ...
     def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> None: ...
     def finish(self) -> None: ...

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,17 @@ class Tracker:
     """Tracks one walker at a time through a stream of frames, with memory that does not grow.
 
     `height_m` is the body height crown to sole. Without `camera` one is guessed from the image size, the
-    horizontal field of view `fov_deg` and the height. `gait` is "dense" or "sampled_10" (the paper's ten
-    samples); `adapt=False` stays on the average gait and body. What a frame shows is known one frame later.
+    horizontal field of view `fov_deg` and the height. What a frame shows is known one frame later.
+
+    `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
+    `adapt=False` stays on the average gait, body and the first estimate of distance.
+    `start_frames`: frames of the starting phase.
+    `compensate_gain`: follow exposure drift between frames.
+    `background`: keep a slowly varying background, for people who stop.
+    `measure`: "rohr" (eq. 7) or "lowe" (eq. 10).
+    `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
+    per frame) count in proportion, w_G and w_V of eq. 11; None weighs all alike.
+    `part_weights`: w_K, 14 numbers in the order of `Track.contour_parts`.
     """
 
     def __init__(
@@ -33,9 +42,26 @@ class Tracker:
         gait: str = "dense",
         adapt: bool = True,
         start_frames: int = 13,
+        compensate_gain: bool = False,
+        background: bool = False,
+        measure: str = "rohr",
+        full_gradient: float | None = None,
+        full_velocity: float | None = None,
+        part_weights: Sequence[float] | None = None,
     ) -> None:
         self._core = _memo.Tracker(
-            height_m, camera, fov_deg=fov_deg, gait=gait, adapt=adapt, start_frames=start_frames
+            height_m,
+            camera,
+            fov_deg=fov_deg,
+            gait=gait,
+            adapt=adapt,
+            start_frames=start_frames,
+            compensate_gain=compensate_gain,
+            background=background,
+            measure=measure,
+            full_gradient=full_gradient,
+            full_velocity=full_velocity,
+            part_weights=part_weights,
         )
         self._camera = camera
         self._walks: list[_memo.Walk] = []

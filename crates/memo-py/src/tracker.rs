@@ -4,9 +4,12 @@ use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_f
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use glam::{DVec2, DVec3};
+use memo_core::image::BackgroundOptions;
+use memo_core::image::flow::FlowOptions;
 use memo_core::model::{SideJoints, VisibilityOptions, visible_contours};
 use memo_core::track::person::PersonOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
+use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
 use memo_core::track::tracker::{GaitChoice, Tracker, TrackerOptions};
@@ -22,14 +25,24 @@ pub struct PyTracker(Tracker);
 #[pymethods]
 impl PyTracker {
     #[new]
-    #[pyo3(signature = (height_m=1.75, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13))]
+    #[pyo3(signature = (
+        height_m=1.75, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, compensate_gain=false,
+        background=false, measure="rohr", full_gradient=None, full_velocity=None, part_weights=None
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
         height_m: f64,
         camera: Option<PyCamera>,
         fov_deg: Option<f64>,
         gait: &str,
         adapt: bool,
-        start_frames: usize,
+        start_frames: i64,
+        compensate_gain: bool,
+        background: bool,
+        measure: &str,
+        full_gradient: Option<f32>,
+        full_velocity: Option<f32>,
+        part_weights: Option<[f32; 14]>,
     ) -> PyResult<Self> {
         let mut options = TrackerOptions::for_height(height_m);
         options.camera = camera.map(|camera| camera.0);
@@ -39,13 +52,25 @@ impl PyTracker {
         options.gait = match gait {
             "dense" => GaitChoice::Dense,
             "sampled_10" => GaitChoice::Sampled10,
-            other => {
-                let message = format!("gait must be 'dense' or 'sampled_10', got {other:?}");
-                return Err(PyValueError::new_err(message));
-            }
+            "boulic" => GaitChoice::Boulic,
+            other => return Err(choice_error("gait", "'dense', 'sampled_10' or 'boulic'", other)),
         };
+        options.evidence.change.compensate_gain = compensate_gain;
+        options.evidence.background = background.then(BackgroundOptions::default);
+        options.evidence.flow = full_velocity.map(|_| FlowOptions::default());
+        let similarity = &mut options.walk.similarity;
+        similarity.measure = match measure {
+            "rohr" => Measure::Rohr,
+            "lowe" => Measure::Lowe,
+            other => return Err(choice_error("measure", "'rohr' or 'lowe'", other)),
+        };
+        similarity.full_gradient = positive("full_gradient", full_gradient)?;
+        similarity.full_velocity = positive("full_velocity", full_velocity)?;
+        if let Some(weights) = part_weights {
+            similarity.part_weights = weights;
+        }
         options.person = adapt.then(PersonOptions::default);
-        options.start_frames = start_frames;
+        options.start_frames = usize::try_from(start_frames).unwrap_or(0);
         Tracker::new(options).map(Self).map_err(value_error)
     }
 
@@ -90,6 +115,19 @@ impl PyTracker {
         dict.set_item("frames_cut_off", report.frames_cut_off)?;
         dict.set_item("refused_starts", report.refused_starts)?;
         Ok(dict)
+    }
+}
+
+fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
+    PyValueError::new_err(format!("{name} must be {wanted}, got {got:?}"))
+}
+
+fn positive(name: &str, value: Option<f32>) -> PyResult<Option<f32>> {
+    match value {
+        Some(v) if !(v > 0.0 && v.is_finite()) => {
+            Err(PyValueError::new_err(format!("{name} must be a positive number, got {v}")))
+        }
+        _ => Ok(value),
     }
 }
 

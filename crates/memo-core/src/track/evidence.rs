@@ -5,12 +5,15 @@
 
 use super::score::EdgeLine;
 use crate::image::edge::{EdgeDomain, EdgeOptions, Window};
+use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{LineError, LineOptions, edge_segments};
 use crate::image::{
-    ChangeDetector, ChangeOptions, CleanError, CleanOptions, Frame, FrameError, GroupOptions, Image, Mask,
-    Rectangle, Region, clean, dilate, fill_holes, group_regions, regions,
+    Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanError, CleanOptions, Frame,
+    FrameError, GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions,
+    regions,
 };
 use crate::model::Camera;
+use glam::DVec2;
 use thiserror::Error;
 
 /// Why a frame gave no evidence.
@@ -51,6 +54,10 @@ pub struct EvidenceOptions {
     pub rectangle_threshold: f64,
     /// Recursive binary operations.
     pub clean: CleanOptions,
+    /// A slowly varying background whose foreground joins the changes, for people who stop; needs some frames without them.
+    pub background: Option<BackgroundOptions>,
+    /// Velocity field of the changed pixels, for w_V; costs some 10 ms a frame.
+    pub flow: Option<FlowOptions>,
     /// Grouping of regions into candidates.
     pub group: GroupOptions,
     /// Edge points.
@@ -65,6 +72,8 @@ impl Default for EvidenceOptions {
             change: ChangeOptions::default(),
             rectangle_threshold: 10.0,
             clean: CleanOptions::default(),
+            background: None,
+            flow: None,
             group: GroupOptions::default(),
             edge: EdgeOptions::default(),
             line: LineOptions::default(),
@@ -89,6 +98,8 @@ pub struct Evidence {
     pub mask: Mask,
     /// The same with the higher threshold of the rectangle.
     pub firm_mask: Mask,
+    /// Velocities of the changed pixels towards the next frame, where asked for and determined.
+    pub velocity: Option<FlowField>,
 }
 
 impl Evidence {
@@ -109,17 +120,24 @@ impl Evidence {
         let moving = self.mask_near(&window);
         let domain = EdgeDomain { mask: moving.as_ref(), window: Some(window) };
         let segments = edge_segments(&self.grey.as_frame(), &domain, &options.edge, &options.line)?;
-        let ideal =
-            |p: glam::DVec2| camera.and_then(|c| c.undistort(p).ok()).unwrap_or(p).as_vec2().to_array();
+        let ideal = |p: DVec2| camera.and_then(|c| c.undistort(p).ok()).unwrap_or(p).as_vec2().to_array();
         Ok(segments
             .iter()
             .map(|s| EdgeLine {
                 start: ideal(s.start_px),
                 end: ideal(s.end_px),
                 gradient: s.mean_gradient as f32,
-                velocity: 0.0,
+                velocity: self.speed_px(s.midpoint_px()),
             })
             .collect())
+    }
+
+    /// Speed of the image at a point, pixels per frame; 0 where it is not known.
+    fn speed_px(&self, point: DVec2) -> f32 {
+        let at = |field: &FlowField| {
+            field.at(point.x.round().max(0.0) as usize, point.y.round().max(0.0) as usize)
+        };
+        self.velocity.as_ref().and_then(at).map_or(0.0, |velocity| velocity.length() as f32)
     }
 
     /// The dilated change mask, `None` where nothing changed in the window.
@@ -136,13 +154,14 @@ pub struct EvidenceStream {
     options: EvidenceOptions,
     detectors: [ChangeDetector; 2],
     waiting: Option<(usize, f64, Image<u8>)>,
+    background: Option<Background>,
     frames: usize,
 }
 
 impl EvidenceStream {
     /// A stream that has seen no frame.
     pub fn new(options: EvidenceOptions) -> Self {
-        Self { options, detectors: detectors(&options), waiting: None, frames: 0 }
+        Self { options, detectors: detectors(&options), waiting: None, background: None, frames: 0 }
     }
 
     /// Takes a frame and gives the evidence of the one before.
@@ -159,24 +178,49 @@ impl EvidenceStream {
         let masks = low.push(frame)?.zip(firm.push(frame)?);
         let before = self.waiting.replace((self.frames, time_s, frame.to_image()));
         self.frames += 1;
-        self.evidence(before, masks)
+        self.evidence(before, masks, Some(frame))
     }
 
     /// The evidence of the last frame.
     pub fn finish(mut self) -> Result<Option<Evidence>, EvidenceError> {
         let last = self.waiting.take();
         let [low, firm] = std::mem::replace(&mut self.detectors, detectors(&self.options));
-        self.evidence(last, low.finish().zip(firm.finish()))
+        self.evidence(last, low.finish().zip(firm.finish()), None)
     }
 
     fn evidence(
-        &self,
+        &mut self,
         frame: Option<(usize, f64, Image<u8>)>,
         masks: Option<(Mask, Mask)>,
+        next: Option<&Frame<'_>>,
     ) -> Result<Option<Evidence>, EvidenceError> {
-        let (Some((frame, time_s, grey)), Some((low, firm))) = (frame, masks) else { return Ok(None) };
+        let (Some((frame, time_s, grey)), Some((mut low, mut firm))) = (frame, masks) else {
+            return Ok(None);
+        };
+        self.add_foreground(&grey, &mut low, &mut firm)?;
         let tidy = |mask: &Mask| Ok::<Mask, CleanError>(fill_holes(&clean(mask, &self.options.clean)?));
-        Ok(Some(Evidence { frame, time_s, grey, mask: tidy(&low)?, firm_mask: tidy(&firm)? }))
+        let (mask, firm_mask) = (tidy(&low)?, tidy(&firm)?);
+        let velocity = match (&self.options.flow, next) {
+            (Some(options), Some(next)) => velocity_field(&grey.as_frame(), next, &mask, options).ok(),
+            _ => None,
+        };
+        Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity }))
+    }
+
+    /// Adds what differs from the background to the changes, then lets the background follow where nothing is.
+    fn add_foreground(
+        &mut self,
+        grey: &Image<u8>,
+        low: &mut Mask,
+        firm: &mut Mask,
+    ) -> Result<(), EvidenceError> {
+        let Some(options) = self.options.background else { return Ok(()) };
+        let background = self.background.get_or_insert_with(|| Background::new(&grey.as_frame(), options));
+        let foreground = background.foreground(&grey.as_frame())?;
+        for mask in [&mut *low, firm] {
+            mask.pixels_mut().iter_mut().zip(foreground.pixels()).for_each(|(pixel, new)| *pixel |= new);
+        }
+        Ok(background.update(&grey.as_frame(), Some(low))?)
     }
 }
 

@@ -66,13 +66,21 @@ pub enum GaitChoice {
     Dense,
     /// Ten samples a curve, the paper's form.
     Sampled10,
+    /// Boulic's formulas at the speed of the start: amplitude follows speed.
+    Boulic,
 }
 
 impl GaitChoice {
-    fn gait(self) -> Gait {
+    /// The gait of a body at a speed; Boulic's is held to the speeds its formulas cover.
+    fn gait(self, body: &Body, speed_mps: f64) -> Gait {
         match self {
             Self::Dense => Gait::dense(),
             Self::Sampled10 => Gait::sampled_10(),
+            Self::Boulic => {
+                let leg_m = body.leg_length_m();
+                let held = speed_mps.clamp(0.5 * leg_m, 3.0 * leg_m);
+                Gait::boulic(held, leg_m).unwrap_or_else(|_| Gait::dense())
+            }
         }
     }
 }
@@ -124,6 +132,8 @@ impl TrackerOptions {
 pub const LONGEST_WALK: usize = 20_000;
 /// A candidate is dropped after this many frames in a row without it.
 const MISSED_FRAMES: usize = 3;
+/// A comfortable walk, before the speed is known, metres a second.
+const COMFORTABLE_MPS: f64 = 1.3;
 /// Slower than this nobody walks, metres a second.
 const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
@@ -343,11 +353,12 @@ impl Tracker {
     /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through the start frames.
     fn begin(&self, size: [u32; 2]) -> Option<Active> {
         let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
-        let walker = self.walker(GaitStyle::default())?;
-        let (camera, course) = self.course(&sightings, size, walker.level_crown_height_m()).ok()?;
+        let crown_m = self.walker(COMFORTABLE_MPS)?.level_crown_height_m();
+        let (camera, course) = self.course(&sightings, size, crown_m).ok()?;
         if course.speed_mps < SLOWEST_MPS {
             return None;
         }
+        let walker = self.walker(course.speed_mps)?;
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
         let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
         let mut walk = Walk::new(walker, start.path, start.beginning);
@@ -380,9 +391,9 @@ impl Tracker {
         Ok((camera, course))
     }
 
-    fn walker(&self, style: GaitStyle) -> Option<Walker> {
+    fn walker(&self, speed_mps: f64) -> Option<Walker> {
         let body = Body::from_height(self.options.height_m).ok()?;
-        Some(Walker { body, gait: self.options.gait.gait(), style })
+        Some(Walker { body, gait: self.options.gait.gait(&body, speed_mps), style: GaitStyle::default() })
     }
 
     /// Follows the person into a frame, or ends the walk.
