@@ -1,19 +1,33 @@
 //! The whole tracker on synthetic sequences with ground truth: 20 seeds, noise sigma 5, both directions.
 
 use memo_core::synth::{SceneOptions, SynthScene};
-use memo_core::track::result::TrackedWalk;
+use memo_core::track::result::{EventKind, Side, TrackedWalk};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::{Tracker, TrackerOptions};
+use memo_core::track::tracker::{GaitChoice, TrackError, Tracker, TrackerOptions};
 
-fn tracked(scene: &SynthScene) -> Vec<TrackedWalk> {
-    let mut options = TrackerOptions::for_height(scene.walker.body.height_m);
-    options.camera = Some(scene.camera.clone());
+fn options_for(scene: &SynthScene) -> TrackerOptions {
+    TrackerOptions {
+        camera: Some(scene.camera.clone()),
+        ..TrackerOptions::for_height(scene.walker.body.height_m)
+    }
+}
+
+/// Tracks the given frames of a scene in the given order, shown at the scene's rate.
+fn tracked_with(
+    scene: &SynthScene,
+    frames: impl Iterator<Item = usize>,
+    options: TrackerOptions,
+) -> Vec<TrackedWalk> {
     let mut tracker = Tracker::new(options).unwrap();
-    for frame in 0..scene.len() {
-        tracker.update(&scene.frame(frame).as_frame(), scene.time_s(frame)).unwrap();
+    for (index, frame) in frames.enumerate() {
+        tracker.update(&scene.frame(frame).as_frame(), scene.time_s(index)).unwrap();
     }
     tracker.finish().unwrap();
     tracker.take_finished()
+}
+
+fn tracked(scene: &SynthScene) -> Vec<TrackedWalk> {
+    tracked_with(scene, 0..scene.len(), options_for(scene))
 }
 
 /// Root mean squares of position along the path, height (metres) and phase over all rows.
@@ -59,4 +73,87 @@ fn twenty_seeds_in_both_directions() {
         rms[0], rms[1], rms[2]
     );
     assert!(rms[0] <= 0.01 && rms[1] <= 0.01 && rms[2] <= 0.01, "{rms:?}");
+}
+
+#[test]
+fn a_film_played_backwards_shows_somebody_walking_backwards() {
+    let scene = SynthScene::new(SceneOptions { seed: 3, empty_frames: 0, ..SceneOptions::default() });
+    let walks = tracked_with(&scene, (0..scene.len()).rev(), options_for(&scene));
+    assert_eq!(walks.len(), 1);
+    assert_eq!(walks[0].direction(), Direction::Backward);
+    assert!(walks[0].start.p_other_direction < 0.1, "{}", walks[0].start.p_other_direction);
+    assert!(walks[0].rows().iter().all(|row| row.speed_mps < 0.0));
+}
+
+#[test]
+fn a_planted_deviation_is_believed_and_recovered_and_an_average_walker_left_alone() {
+    let mut scene = SynthScene::new(SceneOptions { seed: 5, ..SceneOptions::default() });
+    let average = tracked(&scene)[0].person_fit.expect("80 frames suffice for a fit");
+    assert!(!average.is_believed, "{average:?}");
+    scene.walker.style.hip_offset = -10f64.to_radians();
+    scene.walker.style.knee_offset = -8f64.to_radians();
+    let fit = tracked(&scene)[0].person_fit.unwrap();
+    assert!(fit.is_believed, "{fit:?}");
+    assert!((fit.deviation.hip_rad.to_degrees() + 10.0).abs() < 3.0, "{fit:?}");
+    assert!((fit.deviation.knee_rad.to_degrees() + 8.0).abs() < 5.0, "{fit:?}");
+}
+
+#[test]
+fn heel_strikes_fall_where_the_true_phase_passes() {
+    let scene = SynthScene::new(SceneOptions { seed: 8, ..SceneOptions::default() });
+    let walk = &tracked(&scene)[0];
+    let strikes: Vec<_> = walk.events().into_iter().filter(|e| e.kind == EventKind::HeelStrike).collect();
+    assert!(strikes.len() >= 3, "{strikes:?}");
+    for strike in &strikes {
+        let phase = scene.truth(strike.frame.round() as usize).unwrap().hypothesis.phase;
+        let mark = if strike.side == Side::Right { 0.0 } else { 0.5 };
+        let off = phase - mark - (phase - mark).round();
+        assert!(off.abs() < 0.04, "{strike:?}: true phase {phase}");
+    }
+    assert!(strikes.windows(2).all(|pair| pair[0].side != pair[1].side), "sides alternate");
+}
+
+#[test]
+fn a_path_20_degrees_off_the_image_plane_is_found() {
+    let mut scene =
+        SynthScene::new(SceneOptions { seed: 2, leftward: Some(false), ..SceneOptions::default() });
+    scene.path.heading_rad = 20f64.to_radians();
+    let walk = &tracked(&scene)[0];
+    let off = walk.rows()[30].heading_rad - scene.path.heading_rad;
+    assert!(off.abs() < 5f64.to_radians(), "heading off by {} degrees", off.to_degrees());
+    assert!(errors(&scene, walk)[2] < 0.03);
+}
+
+#[test]
+fn other_gaits_and_velocity_weights_track_as_well() {
+    let scene = SynthScene::new(SceneOptions { seed: 1, ..SceneOptions::default() });
+    for gait in [GaitChoice::Sampled10, GaitChoice::Boulic] {
+        let walks = tracked_with(&scene, 0..scene.len(), TrackerOptions { gait, ..options_for(&scene) });
+        assert!(errors(&scene, &walks[0])[2] < 0.06, "{gait:?}");
+    }
+    let mut options = options_for(&scene);
+    options.evidence.flow = Some(memo_core::image::flow::FlowOptions::default());
+    options.walk.similarity.full_velocity = Some(2.0);
+    let walks = tracked_with(&scene, 0..scene.len(), options);
+    assert!(errors(&scene, &walks[0])[2] < 0.02);
+}
+
+#[test]
+fn an_empty_scene_has_nobody_and_misuse_is_refused() {
+    let scene = SynthScene::new(SceneOptions { frames: 20, empty_frames: 20, ..SceneOptions::default() });
+    assert!(tracked(&scene).is_empty());
+    let mut tracker = Tracker::new(options_for(&scene)).unwrap();
+    let frame = scene.frame(0);
+    tracker.update(&frame.as_frame(), 0.0).unwrap();
+    assert!(
+        matches!(tracker.update(&frame.as_frame(), 0.0), Err(TrackError::Evidence(_))),
+        "times must increase"
+    );
+    let small = memo_core::image::Image::filled(32, 32, 0u8);
+    assert!(matches!(tracker.update(&small.as_frame(), 1.0), Err(TrackError::CameraSize { .. })));
+    tracker.finish().unwrap();
+    assert!(matches!(tracker.update(&frame.as_frame(), 2.0), Err(TrackError::Finished)));
+    let narrow = TrackerOptions { field_of_view_rad: f64::NAN, ..options_for(&scene) };
+    assert!(matches!(Tracker::new(narrow), Err(TrackError::Option { .. })));
+    assert!(Tracker::new(TrackerOptions::for_height(0.0)).is_err());
 }
