@@ -4,10 +4,10 @@
     python benches/peers.py CLIP [--camera CAMERA.toml] [--height 1.75] [--frames A:B]
 
 Without a clip a moving square with sensor noise is drawn, and nothing is tracked. Peers are OpenCV's, on one
-thread, as are memo's image stages. Each round runs memo, then every peer; a ratio is the median over rounds of
-(peer's time / memo's time), so that load on the machine falls on both. Speed is all that is compared: the
-results are not the same thing (MOG2 and KNN keep a background model, DIS and Farneback give a velocity where
-there is no texture).
+thread, as are memo's image stages. Each round runs memo, then every peer; a ratio is the median over rounds
+of (peer's time / memo's time), so that load on the machine falls on both. Speed is all that is compared:
+the results are not the same thing (MOG2 and KNN keep a background model, DIS and Farneback give a velocity
+where there is no texture).
 """
 
 from __future__ import annotations
