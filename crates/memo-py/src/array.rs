@@ -1,14 +1,40 @@
 //! All traffic with numpy.
 
-use memo_core::image::{Image, Mask};
+use crate::error::value_error;
+use memo_core::image::{Frame, Image, Mask};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-/// An 8-bit grey frame of shape (H, W), copied once so that the interpreter lock can be released. Any strides are taken.
-pub fn frame_from_numpy(frame: &Bound<'_, PyAny>) -> PyResult<Image<u8>> {
+/// An 8-bit grey frame of shape (H, W): numpy's own memory where it is contiguous, a copy where it has other strides.
+///
+/// Keep it alive while the interpreter lock is released. As with numpy's own functions, a thread that writes into the
+/// array meanwhile makes the result depend on when it does.
+pub enum FrameArray<'py> {
+    /// Rows follow one another in memory.
+    Borrowed(PyReadonlyArray2<'py, u8>),
+    /// Turned, cropped or padded.
+    Copied(Image<u8>),
+}
+
+impl FrameArray<'_> {
+    /// The frame, to be read without the interpreter lock.
+    pub fn as_frame(&self) -> PyResult<Frame<'_>> {
+        match self {
+            Self::Borrowed(array) => {
+                let (height, width) = array.as_array().dim();
+                Frame::new(array.as_slice()?, width, height, width).map_err(value_error)
+            }
+            Self::Copied(image) => Ok(image.as_frame()),
+        }
+    }
+}
+
+/// Takes an array of shape (H, W), dtype uint8, with any strides.
+pub fn frame_from_numpy<'py>(frame: &Bound<'py, PyAny>) -> PyResult<FrameArray<'py>> {
     let wanted = "wanted a grey frame: numpy array of shape (H, W), dtype uint8";
     let Ok(array) = frame.cast::<PyUntypedArray>() else {
         return Err(PyTypeError::new_err(format!("{wanted}; got {}", frame.get_type().name()?)));
@@ -18,14 +44,20 @@ pub fn frame_from_numpy(frame: &Bound<'_, PyAny>) -> PyResult<Image<u8>> {
         return Err(PyValueError::new_err(describe()));
     }
     let Ok(grey) = frame.cast::<PyArray2<u8>>() else { return Err(PyTypeError::new_err(describe())) };
-    let grey = grey.readonly();
+    let grey = grey.try_readonly()?;
+    if grey.is_c_contiguous() {
+        return Ok(FrameArray::Borrowed(grey));
+    }
     let view = grey.as_array();
     let (height, width) = view.dim();
-    let pixels = match view.as_slice() {
-        Some(slice) => slice.to_vec(),
-        None => view.iter().copied().collect(),
-    };
-    Image::from_vec(width, height, pixels).map_err(|error| PyValueError::new_err(error.to_string()))
+    let mut pixels = Vec::with_capacity(width * height);
+    for row in view.rows() {
+        match row.as_slice() {
+            Some(slice) => pixels.extend_from_slice(slice),
+            None => pixels.extend(row.iter().copied()),
+        }
+    }
+    Image::from_vec(width, height, pixels).map(FrameArray::Copied).map_err(value_error)
 }
 
 /// A boolean mask of shape (H, W).

@@ -1,6 +1,6 @@
 //! Image evidence: changes, background, edges, velocities.
 
-use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
+use crate::array::{FrameArray, frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
 use crate::error::value_error;
 use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
 use memo_core::image::{
@@ -21,8 +21,9 @@ pub fn change_mask<'py>(
     threshold: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let (a, b) = (frame_from_numpy(a)?, frame_from_numpy(b)?);
+    let (a, b) = (a.as_frame()?, b.as_frame()?);
     let options = ChangeOptions { threshold, ..ChangeOptions::default() };
-    let mask = py.detach(|| pair_changes(&a.as_frame(), &b.as_frame(), &options)).map_err(value_error)?;
+    let mask = py.detach(|| pair_changes(&a, &b, &options)).map_err(value_error)?;
     numpy_from_image(py, mask)
 }
 
@@ -50,8 +51,8 @@ pub fn silhouettes<'py>(
     frames: Vec<Bound<'py, PyAny>>,
     threshold: f64,
 ) -> PyResult<Vec<Bound<'py, PyArray2<bool>>>> {
-    let images = frames.iter().map(frame_from_numpy).collect::<PyResult<Vec<_>>>()?;
-    let views: Vec<_> = images.iter().map(|image| image.as_frame()).collect();
+    let arrays = frames.iter().map(frame_from_numpy).collect::<PyResult<Vec<_>>>()?;
+    let views = arrays.iter().map(FrameArray::as_frame).collect::<PyResult<Vec<_>>>()?;
     let background =
         py.detach(|| Background::from_frames(&views, BackgroundOptions::default())).map_err(value_error)?;
     let one = |frame: &memo_core::image::Frame<'_>| {
@@ -81,13 +82,13 @@ pub fn edge_segments<'py>(
     high: f32,
     min_length_px: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let frame = frame_from_numpy(frame)?;
+    let array = frame_from_numpy(frame)?;
+    let frame = array.as_frame()?;
     let mask = mask.map(mask_from_numpy).transpose()?;
     let edge = EdgeOptions { sigma_px, low, high };
     let line = LineOptions { min_length_px, ..LineOptions::default() };
     let domain = EdgeDomain { mask: mask.as_ref(), window: None };
-    let found =
-        py.detach(|| core_edge_segments(&frame.as_frame(), &domain, &edge, &line)).map_err(value_error)?;
+    let found = py.detach(|| core_edge_segments(&frame, &domain, &edge, &line)).map_err(value_error)?;
     let row = |s: &memo_core::image::EdgeSegment| {
         [s.start_px.x, s.start_px.y, s.end_px.x, s.end_px.y, s.mean_gradient, s.residual_rms_px]
     };
@@ -106,12 +107,10 @@ pub fn velocity_field<'py>(
     second: &Bound<'py, PyAny>,
     region: &Bound<'py, PyAny>,
 ) -> PyResult<Velocities<'py>> {
-    let (first, second, region) =
-        (frame_from_numpy(first)?, frame_from_numpy(second)?, mask_from_numpy(region)?);
+    let (first, second) = (frame_from_numpy(first)?, frame_from_numpy(second)?);
+    let (first, second, region) = (first.as_frame()?, second.as_frame()?, mask_from_numpy(region)?);
     let field = py
-        .detach(|| {
-            core_velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default())
-        })
+        .detach(|| core_velocity_field(&first, &second, &region, &FlowOptions::default()))
         .map_err(value_error)?;
     let (width, height) = (first.width(), first.height());
     let mut components = [vec![f32::NAN; width * height], vec![f32::NAN; width * height]];

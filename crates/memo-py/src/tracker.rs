@@ -76,8 +76,9 @@ impl PyTracker {
 
     /// Takes the next frame, (H, W) uint8, and its time in seconds.
     fn update(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
-        let frame = frame_from_numpy(frame)?;
-        py.detach(|| self.0.update(&frame.as_frame(), time_s)).map_err(value_error)
+        let array = frame_from_numpy(frame)?;
+        let frame = array.as_frame()?;
+        py.detach(|| self.0.update(&frame, time_s)).map_err(value_error)
     }
 
     /// Ends the stream.

@@ -9,16 +9,7 @@
 //! ```
 //!
 //! holds for j = k - 1 or j = k + 1. The fit is linear, so one fit of the difference d = g_k - g_j serves
-//! both frames of a pair. X X* projects on six polynomials that are separable and orthogonal over the window;
-//! with the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5, 10, 14 and
-//! c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
-//!
-//! ```text
-//! 25 N^2  = c00^2/25 + (c10^2 + c01^2)/50 + c11^2/100 + (c20^2 + c02^2)/70
-//! 17500 N^2 = 7 (4 c00^2 + 2 (c10^2 + c01^2) + c11^2) + 10 (c20^2 + c02^2)
-//! ```
-//!
-//! which is exact in integers: |c_ij| <= 10200 fits 16 bits and 17500 N^2 <= 17500 * 255^2 fits 32.
+//! both frames of a pair; `fit` computes N^2 of a window exactly, in integers.
 //!
 //! A pixel less than two pixels from the frame's edge has no window of its own and takes the answer of the
 //! nearest whole window. So the statistics of the test, and with them its false rate, are the same
@@ -28,13 +19,10 @@
 //! It cannot tell an object from its shadow or reflection, sees nothing where a moving object has no contrast
 //! or stands still, and marks what the object covers in either neighbour frame along with what it covers now.
 
+use super::fit::{BORDER, NORM_SCALE, WINDOW, for_each_window, window_norm};
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
 
-/// Side of the fit's window in pixels.
-const WINDOW: usize = 5;
-/// Pixels between the frame's edge and the first window centre.
-const BORDER: usize = WINDOW / 2;
 /// How far beyond the visible edge of a moving thing eq. (1) marks pixels, because a window sees the edge
 /// from two pixels away.
 ///
@@ -44,8 +32,6 @@ const BORDER: usize = WINDOW / 2;
 /// from the subpixel position. Below a contrast of 10 it falls to 1 and less.
 pub const CHANGE_REACH_PX: f64 = 2.3;
 
-/// The integers of the test are this multiple of N^2.
-const NORM_SCALE: f64 = 17500.0;
 /// Median of the chi-square distribution with six degrees of freedom.
 const CHI_SQ_6_MEDIAN: f64 = 5.348_120_627;
 
@@ -91,8 +77,8 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     a.check_same_size(b)?;
     let mut norms = Image::filled(a.width(), a.height(), 0f32);
     let scale = 1.0 / NORM_SCALE as f32;
-    let value = |norm_sq: i32| (norm_sq as f32 * scale).sqrt();
-    pulp::Arch::new().dispatch(NormRows { a: *a, b: *b, out: &mut norms, value });
+    let value = move |norm_sq: i32| (norm_sq as f32 * scale).sqrt();
+    for_each_window(a, b, &mut norms, value);
     extend_to_border(&mut norms);
     Ok(norms)
 }
@@ -159,28 +145,12 @@ fn sampled_norms(a: &Frame, b: &Frame) -> Vec<i32> {
     norms
 }
 
-/// 17500 N^2 of the window centred on one pixel.
-fn window_norm(a: &Frame, b: &Frame, x: usize, y: usize) -> i32 {
-    let mut columns = [[0i16; WINDOW]; 3];
-    for i in 0..WINDOW {
-        let column = std::array::from_fn(|j| difference(a, b, x + i - BORDER, y + j - BORDER));
-        for (sums, sum) in columns.iter_mut().zip(taps(column)) {
-            sums[i] = sum;
-        }
-    }
-    scaled_norm_sq(columns)
-}
-
-fn difference(a: &Frame, b: &Frame, x: usize, y: usize) -> i16 {
-    i16::from(a.at(x, y)) - i16::from(b.at(x, y))
-}
-
 /// Marks the pixels with N > `threshold`; the frames agree in size.
 fn changes_over(a: &Frame, b: &Frame, threshold: f64) -> Mask {
     let mut mask = Image::filled(a.width(), a.height(), false);
     // An integer exceeds a real number when it exceeds its floor.
     let limit = (NORM_SCALE * threshold.clamp(0.0, 255.0).powi(2)).floor() as i32;
-    pulp::Arch::new().dispatch(NormRows { a: *a, b: *b, out: &mut mask, value: |norm_sq| norm_sq > limit });
+    for_each_window(a, b, &mut mask, move |norm_sq| norm_sq > limit);
     extend_to_border(&mut mask);
     mask
 }
@@ -203,87 +173,6 @@ fn extend_to_border<T: Copy>(image: &mut Image<T>) {
         let last = (height - 1 - BORDER) * width;
         pixels.copy_within(last..last + width, (height - 1 - y) * width);
     }
-}
-
-/// Writes `value(17500 N^2)` of every window to its centre in `out`.
-///
-/// One pass: five rows of differences are kept, and of them the three tap sums along y. The loops are
-/// compiled for several instruction sets, of which the best is taken at run time.
-struct NormRows<'a, T, F> {
-    a: Frame<'a>,
-    b: Frame<'a>,
-    out: &'a mut Image<T>,
-    value: F,
-}
-
-impl<T: Copy, F: Fn(i32) -> T> pulp::NullaryFnOnce for NormRows<'_, T, F> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let (width, height) = (self.a.width(), self.a.height());
-        if width < WINDOW || height < WINDOW {
-            return;
-        }
-        let mut differences: [Vec<i16>; WINDOW] = std::array::from_fn(|_| vec![0; width]);
-        let mut columns: [Vec<i16>; 3] = std::array::from_fn(|_| vec![0; width]);
-        for y in 0..height {
-            difference_row(self.a.row(y), self.b.row(y), &mut differences[y % WINDOW]);
-            if y + 1 >= WINDOW {
-                let window = std::array::from_fn(|j| differences[(y + 1 + j) % WINDOW].as_slice());
-                column_sums(window, &mut columns);
-                let centres = &mut self.out.row_mut(y - BORDER)[BORDER..width - BORDER];
-                norm_row(&columns, centres, &self.value);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn difference_row(a: &[u8], b: &[u8], out: &mut [i16]) {
-    for ((d, &a), &b) in out.iter_mut().zip(a).zip(b) {
-        *d = i16::from(a) - i16::from(b);
-    }
-}
-
-/// The three tap sums along y of five rows, from top to bottom.
-#[inline(always)]
-fn column_sums(rows: [&[i16]; WINDOW], columns: &mut [Vec<i16>; 3]) {
-    let width = columns[0].len();
-    let rows = rows.map(|row| &row[..width]);
-    let [constant, slope, curvature] = columns.each_mut().map(|column| &mut column[..width]);
-    for x in 0..width {
-        [constant[x], slope[x], curvature[x]] = taps(rows.map(|row| row[x]));
-    }
-}
-
-/// Writes `value(17500 N^2)` of the windows in a row from their tap sums along y.
-#[inline(always)]
-fn norm_row<T>(columns: &[Vec<i16>; 3], out: &mut [T], value: impl Fn(i32) -> T) {
-    let count = out.len();
-    let shifted = columns.each_ref().map(|sums| std::array::from_fn(|i| &sums[i..i + count]));
-    let [constant, slope, curvature]: [[&[i16]; WINDOW]; 3] = shifted;
-    for x in 0..count {
-        let at = |sums: [&[i16]; WINDOW]| sums.map(|sum| sum[x]);
-        out[x] = value(scaled_norm_sq([at(constant), at(slope), at(curvature)]));
-    }
-}
-
-/// The sums of five values weighted by (1,1,1,1,1), (-2,-1,0,1,2) and (2,-1,-2,-1,2).
-#[inline(always)]
-fn taps([p, q, r, s, t]: [i16; WINDOW]) -> [i16; 3] {
-    let (outer, inner) = (p + t, q + s);
-    [outer + inner + r, 2 * (t - p) + (s - q), 2 * (outer - r) - inner]
-}
-
-/// 17500 N^2 of one window from the tap sums along y of its five columns.
-#[inline(always)]
-fn scaled_norm_sq(columns: [[i16; WINDOW]; 3]) -> i32 {
-    let [c00, c10, c20] = taps(columns[0]);
-    let [c01, c11, _] = taps(columns[1]);
-    let [c02, _, _] = taps(columns[2]);
-    let square = |c: i16| i32::from(c) * i32::from(c);
-    7 * (4 * square(c00) + 2 * (square(c10) + square(c01)) + square(c11)) + 10 * (square(c20) + square(c02))
 }
 
 /// Eq. (1) over a stream of frames: a pixel of frame k has changed when it did against frame k - 1 or k + 1.

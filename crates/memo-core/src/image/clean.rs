@@ -13,7 +13,7 @@
 //! None of this knows what a person is: two people who touch become one area, a faint person several.
 
 use super::frame::{Image, Mask};
-use super::region::{Connectivity, connected_runs, runs};
+use super::region::{self, Connectivity, Rectangle, connected_runs, runs};
 use std::collections::VecDeque;
 use thiserror::Error;
 
@@ -54,15 +54,18 @@ pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, CleanError> {
     if few >= many {
         return Err(CleanError::ThresholdsMeet { few, many });
     }
-    let mut grid = NeighbourGrid::new(mask);
-    let mut unstable = grid.unstable(options);
-    while let Some(at) = unstable.pop_front() {
-        if grid.is_unstable(at, options) {
-            grid.flip(at);
-            unstable.extend(grid.neighbours(at).filter(|&near| grid.is_unstable(near, options)));
-        }
-    }
-    Ok(grid.into_mask())
+    let Some(marked) = region::enclosing(&runs(mask, true)) else { return Ok(mask.clone()) };
+    // A pixel outside the rectangle has 3 marked neighbours at most, so it stays unmarked.
+    let area = if many > 3 { marked } else { whole(mask) };
+    let mut grid = NeighbourGrid::new(mask, &area);
+    grid.settle(options);
+    let mut cleaned = Image::filled(mask.width(), mask.height(), false);
+    grid.write_marks(&mut cleaned, &area);
+    Ok(cleaned)
+}
+
+fn whole(mask: &Mask) -> Rectangle {
+    Rectangle { left: 0, top: 0, right: mask.width() - 1, bottom: mask.height() - 1 }
 }
 
 /// Added to a pixel's neighbour number when it is marked itself.
@@ -73,18 +76,18 @@ const RIM: u8 = 128;
 /// Per pixel the number of marked neighbours, plus [`MARKED`], inside a rim one pixel wide.
 struct NeighbourGrid {
     width: usize,
-    height: usize,
     state: Vec<u8>,
 }
 
 impl NeighbourGrid {
-    fn new(mask: &Mask) -> Self {
-        let (width, height) = (mask.width() + 2, mask.height() + 2);
-        let mut grid = Self { width, height, state: vec![RIM; width * height] };
+    fn new(mask: &Mask, area: &Rectangle) -> Self {
+        let (width, height) = (area.width() + 2, area.height() + 2);
+        let mut grid = Self { width, state: vec![RIM; width * height] };
         let mut padded = vec![0u8; width * height];
-        for y in 0..mask.height() {
-            let row = &mut padded[(y + 1) * width + 1..][..mask.width()];
-            row.iter_mut().zip(mask.row(y)).for_each(|(pixel, &marked)| *pixel = u8::from(marked));
+        for y in 0..area.height() {
+            let row = &mut padded[(y + 1) * width + 1..][..area.width()];
+            let marks = &mask.row(area.top + y)[area.left..=area.right];
+            row.iter_mut().zip(marks).for_each(|(pixel, &marked)| *pixel = u8::from(marked));
         }
         let mut columns = vec![0u8; width];
         for y in 1..height - 1 {
@@ -98,6 +101,17 @@ impl NeighbourGrid {
             }
         }
         grid
+    }
+
+    /// Flips pixels until none is to be deleted or marked.
+    fn settle(&mut self, options: &CleanOptions) {
+        let mut unstable = self.unstable(options);
+        while let Some(at) = unstable.pop_front() {
+            if self.is_unstable(at, options) {
+                self.flip(at);
+                unstable.extend(self.neighbours(at).filter(|&near| self.is_unstable(near, options)));
+            }
+        }
     }
 
     fn is_unstable(&self, at: usize, options: &CleanOptions) -> bool {
@@ -134,15 +148,14 @@ impl NeighbourGrid {
         }
     }
 
-    fn into_mask(self) -> Mask {
-        let mut mask = Image::filled(self.width - 2, self.height - 2, false);
-        for y in 0..self.height - 2 {
-            let states = &self.state[(y + 1) * self.width + 1..][..self.width - 2];
-            for (pixel, state) in mask.row_mut(y).iter_mut().zip(states) {
+    fn write_marks(&self, mask: &mut Mask, area: &Rectangle) {
+        for y in 0..area.height() {
+            let states = &self.state[(y + 1) * self.width + 1..][..area.width()];
+            let row = &mut mask.row_mut(area.top + y)[area.left..=area.right];
+            for (pixel, state) in row.iter_mut().zip(states) {
                 *pixel = state & MARKED != 0;
             }
         }
-        mask
     }
 }
 
@@ -228,6 +241,24 @@ mod tests {
                 prop_assert!(is_stable);
             }
             prop_assert_eq!(&clean(&cleaned, &options).unwrap(), &cleaned);
+        }
+
+        #[test]
+        fn free_surroundings_change_nothing(mask in random_mask(), few in 0u8..4, many in 4u8..10) {
+            let options = CleanOptions { few, many };
+            let amid = |mask: &Mask| {
+                let mut larger = Image::filled(mask.width() + 5, mask.height() + 4, false);
+                for y in 0..mask.height() {
+                    larger.row_mut(y + 1)[3..3 + mask.width()].copy_from_slice(mask.row(y));
+                }
+                larger
+            };
+            let mut grid = NeighbourGrid::new(&mask, &whole(&mask));
+            grid.settle(&options);
+            let mut cleaned = mask.clone();
+            grid.write_marks(&mut cleaned, &whole(&mask));
+            prop_assert_eq!(&clean(&mask, &options).unwrap(), &cleaned);
+            prop_assert_eq!(clean(&amid(&mask), &options).unwrap(), amid(&cleaned));
         }
 
         #[test]

@@ -4,6 +4,7 @@ pub mod background;
 pub mod change;
 pub mod clean;
 pub mod edge;
+mod fit;
 pub mod flow;
 pub mod frame;
 pub mod gain;

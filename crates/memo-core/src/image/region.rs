@@ -115,12 +115,7 @@ impl Region {
     /// From at least one run, in any order, no two overlapping.
     fn from_runs(mut runs: Vec<Run>) -> Self {
         runs.sort_unstable();
-        let rectangle = Rectangle {
-            left: runs.iter().map(|run| run.start).min().unwrap_or(0),
-            top: runs.first().map_or(0, |run| run.y),
-            right: runs.iter().map(|run| run.end - 1).max().unwrap_or(0),
-            bottom: runs.last().map_or(0, |run| run.y),
-        };
+        let rectangle = enclosing(&runs).unwrap_or(Rectangle { left: 0, top: 0, right: 0, bottom: 0 });
         let area = runs.iter().map(|run| run.end - run.start).sum();
         Self { runs, rectangle, area }
     }
@@ -247,6 +242,16 @@ pub(super) fn runs(mask: &Mask, value: bool) -> Vec<Run> {
         }
     }
     runs
+}
+
+/// The smallest rectangle that holds all runs, which are in order of their rows.
+pub(super) fn enclosing(runs: &[Run]) -> Option<Rectangle> {
+    Some(Rectangle {
+        left: runs.iter().map(|run| run.start).min()?,
+        top: runs.first()?.y,
+        right: runs.iter().map(|run| run.end - 1).max()?,
+        bottom: runs.last()?.y,
+    })
 }
 
 /// Number of pixels before the first one equal to `value`. Whole blocks without it are skipped.
