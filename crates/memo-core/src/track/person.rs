@@ -12,6 +12,7 @@ use super::score::SimilarityOptions;
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
 use super::walk::FrameEdges;
 use crate::model::{Camera, Walker};
+use rayon::prelude::*;
 
 /// Options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -197,7 +198,8 @@ fn mean_similarity<'a>(
             search(&edges.edges, scene, &near(&around), similarity, HiddenLines::PerColumn).best_score(),
         )
     };
-    let scores: Vec<f64> = frames.step_by(stride).map(best).collect();
+    let chosen: Vec<_> = frames.step_by(stride).collect();
+    let scores: Vec<f64> = chosen.into_par_iter().map(best).collect();
     scores.iter().sum::<f64>() / scores.len().max(1) as f64
 }
 

@@ -156,12 +156,15 @@ impl Walk {
 
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
-        for index in 0..2 {
-            let predicted = self.predict(index, edges.time_s, &options.filter);
-            let scene = Scene { walker: &self.walker, camera, path: &self.path };
-            let step = match_frame(edges, &scene, &predicted, options);
-            self.twins[index].similarity_sum += f64::from(step.similarity);
-            self.twins[index].steps.push(step);
+        let scene = Scene { walker: &self.walker, camera, path: &self.path };
+        let step = |twin: usize| {
+            let predicted = self.predict(twin, edges.time_s, &options.filter);
+            match_frame(edges, &scene, &predicted, options)
+        };
+        let (first, second) = rayon::join(|| step(0), || step(1));
+        for (twin, step) in self.twins.iter_mut().zip([first, second]) {
+            twin.similarity_sum += f64::from(step.similarity);
+            twin.steps.push(step);
         }
         self.first_time_s.get_or_insert(edges.time_s);
     }
