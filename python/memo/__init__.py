@@ -11,6 +11,7 @@ from memo._memo import (
     edge_segments,
     moving_regions,
     silhouettes,
+    similarity,
     velocity_field,
 )
 from memo.scene import DemoScene, demo_scene
@@ -27,6 +28,7 @@ __all__ = [
     "edge_segments",
     "moving_regions",
     "silhouettes",
+    "similarity",
     "track",
     "velocity_field",
 ]

@@ -17,6 +17,7 @@ __all__ = [
     "edge_segments",
     "moving_regions",
     "silhouettes",
+    "similarity",
     "velocity_field",
 ]
 
@@ -132,8 +133,17 @@ def change_mask(
 ) -> npt.NDArray[np.bool_]: ...
 def moving_regions(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]: ...
 def silhouettes(
-    frames: Sequence[npt.NDArray[np.uint8]] | npt.NDArray[np.uint8], threshold: float = 20.0
+    frames: Sequence[npt.NDArray[np.uint8]] | npt.NDArray[np.uint8], threshold: float = 25.0
 ) -> list[npt.NDArray[np.bool_]]: ...
+def similarity(
+    lines: npt.NDArray[np.float64],
+    edges: npt.NDArray[np.float64],
+    *,
+    c_l: float = 1.0,
+    c_d: float = 0.5,
+    c_r: float = 0.25,
+    sigma_phi_rad: float = 0.20943951,
+) -> tuple[float, npt.NDArray[np.float64]]: ...
 def edge_segments(
     frame: npt.NDArray[np.uint8],
     mask: npt.NDArray[np.bool_] | None = None,

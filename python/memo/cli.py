@@ -361,7 +361,7 @@ def _report(track: Any, written: list[Path], delivery: Delivery) -> None:
 
 
 def _exit_code(track: Any) -> Exit:
-    return Exit.TRACKED if track.summary["status"] == "tracked" else Exit.NOBODY
+    return Exit.TRACKED if len(track.columns["frame"]) else Exit.NOBODY
 
 
 def _against_truth(columns: dict[str, Any], truth: dict[str, Any]) -> list[str]:

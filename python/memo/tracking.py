@@ -107,6 +107,7 @@ def track(
         raise ValueError(f"fps must be a positive number, got {fps}")
     tracker = Tracker(height_m, camera, **options)
     times = iter(times_s) if times_s is not None else None
+    index = -1
     for index, frame in enumerate(frames):
         if times is not None:
             try:
@@ -118,6 +119,8 @@ def track(
         tracker.update(frame, time_s)
         if progress is not None:
             progress(index + 1)
+    if times is not None and next(times, None) is not None:
+        raise ValueError(f"times_s has more values than the {index + 1} frames")
     return tracker.finish()
 
 
@@ -202,8 +205,8 @@ class Track:
         manner = "walks" if forward else "walks backwards"
         sure = main.p_other_direction < 0.1
         message = (
-            f"Frames {columns['frame'][0]} to {columns['frame'][-1]}: "
-            f"somebody {manner} {way} at {speed:.2f} m/s"
+            f"Somebody {manner} {way} for {columns['time_s'][-1] - columns['time_s'][0]:.1f} s "
+            f"at {speed:.2f} m/s"
             + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
             + ("." if sure else f"; which way round is not certain (p = {1 - main.p_other_direction:.2f}).")
         )

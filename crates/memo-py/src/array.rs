@@ -60,10 +60,19 @@ pub fn frame_from_numpy<'py>(frame: &Bound<'py, PyAny>) -> PyResult<FrameArray<'
     Image::from_vec(width, height, pixels).map(FrameArray::Copied).map_err(value_error)
 }
 
+/// What came: shape and dtype of an array, the type of anything else.
+fn describe(object: &Bound<'_, PyAny>) -> PyResult<String> {
+    match object.cast::<PyUntypedArray>() {
+        Ok(array) => Ok(format!("shape {:?}, dtype {}", array.shape(), array.dtype())),
+        Err(_) => Ok(object.get_type().name()?.to_string()),
+    }
+}
+
 /// A boolean mask of shape (H, W).
 pub fn mask_from_numpy(mask: &Bound<'_, PyAny>) -> PyResult<Mask> {
     let Ok(array) = mask.cast::<PyArray2<bool>>() else {
-        return Err(PyTypeError::new_err("wanted a mask: numpy array of shape (H, W), dtype bool"));
+        let wanted = "wanted a mask: numpy array of shape (H, W), dtype bool";
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(mask)?)));
     };
     let array = array.readonly();
     let view = array.as_array();
@@ -108,11 +117,28 @@ pub fn numpy_from_column<T: numpy::Element>(py: Python<'_>, column: Vec<T>) -> B
 /// Points of shape (N, 3).
 pub fn points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
     let wanted = "wanted points: numpy array of shape (N, 3), dtype float64";
-    let Ok(array) = points.cast::<PyArray2<f64>>() else { return Err(PyTypeError::new_err(wanted)) };
+    let Ok(array) = points.cast::<PyArray2<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
     let array = array.readonly();
     let view = array.as_array();
     if view.ncols() != 3 {
         return Err(PyValueError::new_err(format!("{wanted}; got shape {:?}", view.shape())));
     }
     Ok(view.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+}
+
+/// Line segments of shape (N, 2, 2).
+pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2]; 2]>> {
+    let wanted = "wanted segments: numpy array of shape (N, 2, 2), dtype float64";
+    let Ok(array) = segments.cast::<numpy::PyArray3<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(segments)?)));
+    };
+    let array = array.readonly();
+    let view = array.as_array();
+    if view.dim().1 != 2 || view.dim().2 != 2 {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(segments)?)));
+    }
+    let at = |s: usize, e: usize, k: usize| view[[s, e, k]] as f32;
+    Ok((0..view.dim().0).map(|s| [0, 1].map(|e| [at(s, e, 0), at(s, e, 1)])).collect())
 }

@@ -19,7 +19,8 @@ impl PyCamera {
     #[staticmethod]
     #[pyo3(signature = (path, name=None))]
     fn from_toml(path: std::path::PathBuf, name: Option<&str>) -> PyResult<Self> {
-        let text = std::fs::read_to_string(&path)?;
+        let unreadable = |error| pyo3::exceptions::PyOSError::new_err(format!("{}: {error}", path.display()));
+        let text = std::fs::read_to_string(&path).map_err(unreadable)?;
         let camera = Camera::from_toml_str(&text, name);
         camera
             .map(Self)

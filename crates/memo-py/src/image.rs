@@ -3,10 +3,10 @@
 use crate::array::{FrameArray, frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
 use crate::error::value_error;
 use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
+use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
-    Background, BackgroundOptions, ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions,
-    LineOptions, clean, edge_segments as core_edge_segments, fill_holes, group_regions, pair_changes,
-    regions,
+    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, LineOptions, clean,
+    edge_segments as core_edge_segments, fill_holes, group_regions, pair_changes, regions,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -22,6 +22,7 @@ pub fn change_mask<'py>(
 ) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let (a, b) = (frame_from_numpy(a)?, frame_from_numpy(b)?);
     let (a, b) = (a.as_frame()?, b.as_frame()?);
+    let threshold = threshold.map(|t| not_negative("threshold", t)).transpose()?;
     let options = ChangeOptions { threshold, ..ChangeOptions::default() };
     let mask = py.detach(|| pair_changes(&a, &b, &options)).map_err(value_error)?;
     numpy_from_image(py, mask)
@@ -45,7 +46,7 @@ pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResul
 /// Silhouettes of what moves before a static background, for a clip of frames (T, H, W): eq. (1) against the temporal median, cut
 /// to the pixels that differ by `threshold` grey levels.
 #[pyfunction]
-#[pyo3(signature = (frames, threshold=20.0))]
+#[pyo3(signature = (frames, threshold=25.0))]
 pub fn silhouettes<'py>(
     py: Python<'py>,
     frames: Vec<Bound<'py, PyAny>>,
@@ -53,20 +54,7 @@ pub fn silhouettes<'py>(
 ) -> PyResult<Vec<Bound<'py, PyArray2<bool>>>> {
     let arrays = frames.iter().map(frame_from_numpy).collect::<PyResult<Vec<_>>>()?;
     let views = arrays.iter().map(FrameArray::as_frame).collect::<PyResult<Vec<_>>>()?;
-    let background =
-        py.detach(|| Background::from_frames(&views, BackgroundOptions::default())).map_err(value_error)?;
-    let one = |frame: &memo_core::image::Frame<'_>| {
-        let changed = background.foreground(frame).map_err(value_error)?;
-        let cleaned = clean(&changed, &CleanOptions::default()).map_err(value_error)?;
-        let group = GroupOptions::default();
-        let person = group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group);
-        let within = match person.first() {
-            Some(region) => region.mask(frame.width(), frame.height()),
-            None => memo_core::image::Mask::filled(frame.width(), frame.height(), false),
-        };
-        background.silhouette(frame, &within, threshold).map_err(value_error)
-    };
-    let masks = py.detach(|| views.iter().map(one).collect::<PyResult<Vec<_>>>())?;
+    let masks = py.detach(|| core_silhouettes(&views, threshold)).map_err(value_error)?;
     masks.into_iter().map(|mask| numpy_from_image(py, mask)).collect()
 }
 
@@ -125,4 +113,13 @@ pub fn velocity_field<'py>(
     let image = |data| memo_core::image::Image::from_vec(width, height, data).map_err(value_error);
     let [u, v] = components;
     Ok((numpy_from_image(py, image(u)?)?, numpy_from_image(py, image(v)?)?))
+}
+
+fn not_negative(name: &str, value: f64) -> PyResult<f64> {
+    if value >= 0.0 && value.is_finite() {
+        return Ok(value);
+    }
+    Err(pyo3::exceptions::PyValueError::new_err(format!(
+        "{name} must be a number of grey levels from 0, got {value}"
+    )))
 }

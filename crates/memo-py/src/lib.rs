@@ -4,6 +4,7 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod score;
 mod synth;
 mod tracker;
 
@@ -18,6 +19,8 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::score::similarity;
     #[pymodule_export]
     use super::synth::PyScene;
     #[pymodule_export]

@@ -11,6 +11,7 @@ pub mod gain;
 pub mod line;
 pub mod outline;
 pub mod region;
+pub mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
 pub use change::{
@@ -25,3 +26,4 @@ pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
 pub use region::{GroupOptions, Rectangle, Region, Run, Sides, group_regions, regions};
+pub use silhouette::{SilhouetteError, silhouettes};

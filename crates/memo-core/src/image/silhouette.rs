@@ -1,0 +1,78 @@
+//! Silhouettes of the person in a clip with a static background.
+//!
+//! Where all frames are at hand, the temporal median shows the place without the person, and eq. (1) of Rohr 1994 against it
+//! finds people who stand as well as people who move. Clothes of the background's grey are lost; soft shadows are not.
+
+use super::background::{Background, BackgroundError, BackgroundOptions};
+use super::clean::{CleanError, CleanOptions, clean, fill_holes};
+use super::frame::{Frame, FrameError, Mask};
+use super::region::{GroupOptions, group_regions, regions};
+use thiserror::Error;
+
+/// Why no silhouettes were made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SilhouetteError {
+    /// The threshold is negative or not a number.
+    #[error("threshold must be a number of grey levels from 0, got {threshold}")]
+    Threshold {
+        /// The threshold given.
+        threshold: f64,
+    },
+    /// No background could be made.
+    #[error(transparent)]
+    Background(#[from] BackgroundError),
+    /// Frames of different sizes.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The binary operations were refused.
+    #[error(transparent)]
+    Clean(#[from] CleanError),
+}
+
+/// The silhouette of the largest candidate in each frame; empty masks where there is none.
+///
+/// `threshold` in grey levels as in [`Background::silhouette`].
+pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, SilhouetteError> {
+    if !(threshold >= 0.0 && threshold.is_finite()) {
+        return Err(SilhouetteError::Threshold { threshold });
+    }
+    let background = Background::from_frames(frames, BackgroundOptions::default())?;
+    frames.iter().map(|frame| silhouette(frame, &background, threshold)).collect()
+}
+
+/// 1. What differs from the background. 2. The largest candidate of it. 3. Cut to the visible edge.
+fn silhouette(frame: &Frame<'_>, background: &Background, threshold: f64) -> Result<Mask, SilhouetteError> {
+    let changed = fill_holes(&clean(&background.foreground(frame)?, &CleanOptions::default())?);
+    let group = GroupOptions::default();
+    let candidates = group_regions(&regions(&changed, group.min_part_area), &group);
+    let within = match candidates.first() {
+        Some(region) => region.mask(frame.width(), frame.height()),
+        None => Mask::filled(frame.width(), frame.height(), false),
+    };
+    Ok(background.silhouette(frame, &within, threshold)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::surface::{NO_PART, surface_map};
+    use crate::synth::{SceneOptions, SynthScene};
+
+    #[test]
+    fn the_drawn_walker_is_cut_out() {
+        let scene = SynthScene::new(SceneOptions { seed: 4, ..SceneOptions::default() });
+        let shown: Vec<usize> = (0..80).step_by(5).collect();
+        let images: Vec<_> = shown.iter().map(|&k| scene.frame(k)).collect();
+        let views: Vec<_> = images.iter().map(|image| image.as_frame()).collect();
+        let masks = silhouettes(&views, 25.0).unwrap();
+        for (mask, &k) in masks.iter().zip(&shown).skip(2) {
+            let truth = surface_map(&scene.truth(k).unwrap().posed.cylinders, &scene.camera, None).unwrap();
+            let is_body = truth.part.pixels().iter().map(|part| *part != NO_PART);
+            let (both, either) = mask.pixels().iter().zip(is_body).fold((0, 0), |(both, either), (a, b)| {
+                (both + usize::from(*a && b), either + usize::from(*a || b))
+            });
+            assert!(both * 10 > either * 8, "frame {k}: {both} of {either} pixels agree");
+        }
+        assert!(silhouettes(&views, f64::NAN).is_err() && silhouettes(&[], 25.0).is_err());
+    }
+}
