@@ -2,8 +2,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
+use memo_core::image::Window;
 use memo_core::model::{
-    Camera, EllipticCylinder, PixelWindow, PreparedView, VisibilityOptions, surface_map, visible_contours,
+    Camera, EllipticCylinder, PreparedView, VisibilityOptions, surface_map, visible_contours,
 };
 use std::hint::black_box;
 
@@ -96,7 +97,7 @@ fn side_camera() -> Camera {
 
 fn surface(c: &mut Criterion) {
     let (body, camera) = (walker(0.4), side_camera());
-    let around = PixelWindow { x: 220, y: 80, width: 200, height: 320 };
+    let around = Window { x: 220, y: 80, width: 200, height: 320 };
     for (window, what) in [(None, "640x480"), (Some(around), "a window of 200x320")] {
         c.bench_function(&format!("surface map of 14 cylinders, 300 px high, {what}"), |b| {
             b.iter(|| surface_map(black_box(&body), &camera, window));

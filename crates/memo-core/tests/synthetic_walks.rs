@@ -157,3 +157,15 @@ fn an_empty_scene_has_nobody_and_misuse_is_refused() {
     assert!(matches!(Tracker::new(narrow), Err(TrackError::Option { .. })));
     assert!(Tracker::new(TrackerOptions::for_height(0.0)).is_err());
 }
+
+#[test]
+fn a_high_camera_does_not_make_a_straight_path_slant() {
+    for seed in [2, 9, 14] {
+        let mut scene = SynthScene::new(SceneOptions { seed, ..SceneOptions::default() });
+        scene.camera = memo_core::model::Camera::level([640, 480], 0.9, 2.0, 7.0).unwrap();
+        let walk = &tracked(&scene)[0];
+        let off = walk.rows()[30].heading_rad - scene.path.heading_rad;
+        assert!(off.sin().abs() < 1e-6, "seed {seed}: heading off by {off}");
+        assert!(errors(&scene, walk)[2] < 0.02, "seed {seed}");
+    }
+}

@@ -23,5 +23,5 @@ pub use position::{
     position_from_head, position_from_rectangle, position_on_ground,
 };
 pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
-pub use surface::{NO_PART, PixelWindow, SurfaceError, SurfaceMap, surface_map};
+pub use surface::{NO_PART, SurfaceError, SurfaceMap, surface_map};
 pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};

@@ -11,7 +11,7 @@
 
 use super::silhouette::camera_in_unit_frame;
 use super::{Camera, EllipticCylinder};
-use crate::image::Image;
+use crate::image::{Image, Window};
 use glam::{DMat3, DVec2, DVec3};
 use std::ops::Range;
 use thiserror::Error;
@@ -30,24 +30,11 @@ pub enum SurfaceError {
     },
 }
 
-/// A rectangle of pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PixelWindow {
-    /// Leftmost column.
-    pub x: usize,
-    /// Topmost row.
-    pub y: usize,
-    /// Number of columns.
-    pub width: usize,
-    /// Number of rows.
-    pub height: usize,
-}
-
 /// What each pixel of a window sees; the images are as large as the window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceMap {
     /// The pixels covered: the window asked for, as far as it lies in the camera's image.
-    pub window: PixelWindow,
+    pub window: Window,
     /// Depth along the optical axis, metres; infinite where no part is seen.
     pub depth_m: Image<f32>,
     /// Index of the part seen, [`NO_PART`] where there is none.
@@ -63,7 +50,7 @@ pub struct SurfaceMap {
 pub fn surface_map(
     cylinders: &[EllipticCylinder],
     camera: &Camera,
-    window: Option<PixelWindow>,
+    window: Option<Window>,
 ) -> Result<SurfaceMap, SurfaceError> {
     if cylinders.len() > usize::from(NO_PART) {
         return Err(SurfaceError::TooManyParts { count: cylinders.len() });
@@ -81,8 +68,8 @@ pub fn surface_map(
 }
 
 impl SurfaceMap {
-    fn empty(window: PixelWindow) -> Self {
-        let PixelWindow { width, height, .. } = window;
+    fn empty(window: Window) -> Self {
+        let Window { width, height, .. } = window;
         Self {
             window,
             depth_m: Image::filled(width, height, f32::INFINITY),
@@ -92,7 +79,7 @@ impl SurfaceMap {
     }
 
     /// Draws one part where it is nearer than what is there already.
-    fn draw(&mut self, part: u8, view: &PartView, area: PixelWindow) {
+    fn draw(&mut self, part: u8, view: &PartView, area: Window) {
         for v in area.rows() {
             let row = v - self.window.y;
             let depths = self.depth_m.row_mut(row);
@@ -111,7 +98,7 @@ impl SurfaceMap {
     }
 }
 
-impl PixelWindow {
+impl Window {
     fn columns(&self) -> Range<usize> {
         self.x..self.x + self.width
     }
@@ -191,16 +178,16 @@ impl PartView {
 }
 
 /// The window as far as it lies in the image.
-fn within_image(window: Option<PixelWindow>, camera: &Camera) -> PixelWindow {
+fn within_image(window: Option<Window>, camera: &Camera) -> Window {
     let [width, height] = camera.size.map(|n| n as usize);
-    let Some(asked) = window else { return PixelWindow { x: 0, y: 0, width, height } };
+    let Some(asked) = window else { return Window { x: 0, y: 0, width, height } };
     let (x, y) = (asked.x.min(width), asked.y.min(height));
-    PixelWindow { x, y, width: asked.width.min(width - x), height: asked.height.min(height - y) }
+    Window { x, y, width: asked.width.min(width - x), height: asked.height.min(height - y) }
 }
 
 /// The pixels of `window` that can show a part: the bounding rectangle of its bounding box, the whole window
 /// where the box reaches behind the camera.
-fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: PixelWindow) -> PixelWindow {
+fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: Window) -> Window {
     let extents = cylinder.semi_axes.extend(cylinder.half_length);
     let corners = (0..8).map(|i| {
         let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
@@ -220,7 +207,7 @@ fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: PixelWind
     };
     let (x, width) = clip(window.columns(), low.x, high.x);
     let (y, height) = clip(window.rows(), low.y, high.y);
-    PixelWindow { x, y, width, height }
+    Window { x, y, width, height }
 }
 
 #[cfg(test)]
@@ -283,14 +270,14 @@ mod tests {
     fn a_window_is_cut_out_of_the_whole_map() {
         let (bodies, camera) = views().nth(1).unwrap();
         let whole = surface_map(&bodies, &camera, None).unwrap();
-        let asked = PixelWindow { x: 300, y: 150, width: 1000, height: 120 };
+        let asked = Window { x: 300, y: 150, width: 1000, height: 120 };
         let cut = surface_map(&bodies, &camera, Some(asked)).unwrap();
-        assert_eq!(cut.window, PixelWindow { width: 340, ..asked });
+        assert_eq!(cut.window, Window { width: 340, ..asked });
         for (u, v) in (0..340).flat_map(|u| (0..120).map(move |v| (u, v))) {
             assert_eq!(cut.depth_m.at(u, v), whole.depth_m.at(u + 300, v + 150));
             assert_eq!(cut.normal.at(u, v), whole.normal.at(u + 300, v + 150));
         }
-        let outside = surface_map(&bodies, &camera, Some(PixelWindow { x: 700, ..asked })).unwrap();
+        let outside = surface_map(&bodies, &camera, Some(Window { x: 700, ..asked })).unwrap();
         assert!(outside.part.pixels().is_empty());
     }
 
@@ -354,7 +341,7 @@ mod tests {
             return None;
         }
         let shifted = Camera { centre_px: camera.centre_px + pixel - point_px, ..camera.clone() };
-        let window = PixelWindow { x: pixel.x as usize, y: pixel.y as usize, width: 1, height: 1 };
+        let window = Window { x: pixel.x as usize, y: pixel.y as usize, width: 1, height: 1 };
         surface_map(bodies, &shifted, Some(window)).ok().map(|map| usize::from(map.part.at(0, 0)))
     }
 

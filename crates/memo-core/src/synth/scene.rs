@@ -5,8 +5,8 @@
 //! order; the same seed gives the same pixels.
 
 use super::random::Random;
-use crate::image::Image;
-use crate::model::surface::{NO_PART, PixelWindow, SurfaceMap, surface_map};
+use crate::image::{Image, Window};
+use crate::model::surface::{NO_PART, SurfaceMap, surface_map};
 use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
@@ -224,7 +224,7 @@ fn wall_and_floor(camera: &Camera, random: &mut Random) -> Image<f32> {
 }
 
 /// The pixels that can show the body, starting at even columns and rows.
-fn window_of(posed: &PosedBody, camera: &Camera) -> Option<PixelWindow> {
+fn window_of(posed: &PosedBody, camera: &Camera) -> Option<Window> {
     let mut bounds = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for cylinder in &posed.cylinders {
         let reach = cylinder.half_length + cylinder.semi_axes.max_element();
@@ -239,7 +239,7 @@ fn window_of(posed: &PosedBody, camera: &Camera) -> Option<PixelWindow> {
     let even = |v: f64| v as usize / 2 * 2;
     let (x, y) = (even(low.x), even(low.y));
     let (width, height) = ((high.x - x as f64).ceil() as usize, (high.y - y as f64).ceil() as usize);
-    (width > 0 && height > 0).then_some(PixelWindow { x, y, width, height })
+    (width > 0 && height > 0).then_some(Window { x, y, width, height })
 }
 
 #[cfg(test)]

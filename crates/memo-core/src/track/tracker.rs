@@ -138,6 +138,9 @@ const COMFORTABLE_MPS: f64 = 1.3;
 const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
 const SLOWEST_HZ: f64 = 0.3;
+/// A slanting path must explain the frames better than one parallel to the image by this share of similarity: seen from above
+/// a walk can seem to slant, and then fits worse.
+const SLANT_GAIN: f64 = 0.02;
 /// A walk ends when this share of the body's height or width lies outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
 /// Number of last frames that tell whether a walk goes on.
@@ -511,7 +514,7 @@ impl Active {
         }
     }
 
-    /// Starts again on a slanting path where the sightings show one.
+    /// Starts again on a slanting path where the sightings show one and the contours agree.
     fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
         let crown_m = self.walk.walker.level_crown_height_m();
@@ -519,9 +522,14 @@ impl Active {
         let frames: Vec<&FrameEdges> = kept.iter().map(|(_, e)| e).take(options.start_frames).collect();
         let walker = &self.walk.walker;
         if let Some(start) = start(&frames, &course, walker, &self.camera, &options.cadence, &options.walk) {
-            let walk = Walk::new(walker.clone(), start.path, start.beginning);
-            self.start = start;
-            self.follow_again(walk, kept, options);
+            let straight = self.walk.clone();
+            self.follow_again(Walk::new(walker.clone(), start.path, start.beginning), kept, options);
+            let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
+            if summed(&self.walk) > (1.0 + SLANT_GAIN) * summed(&straight) {
+                self.start = start;
+            } else {
+                self.walk = straight;
+            }
         }
     }
 
