@@ -10,8 +10,6 @@ import memo
 import numpy as np
 import pytest
 
-needs_demo = pytest.mark.skipif(not hasattr(memo, "demo_scene"), reason="needs the compiled demo scene")
-
 #: Third-party footage with ground truth; not part of this repository.
 SHARED_DATA = Path(
     os.environ.get("MEMO_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"

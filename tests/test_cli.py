@@ -12,7 +12,7 @@ import av
 import memo
 import numpy as np
 import pytest
-from conftest import needs_demo, shared_video
+from conftest import shared_video
 from memo import cli
 from memo.files import (
     TRACK_COLUMNS,
@@ -313,7 +313,6 @@ def test_the_python_example_of_the_readme(core, video, monkeypatch, capsys):
     assert "20 frames, tracked." in capsys.readouterr().out and Path("track.csv").exists()
 
 
-@needs_demo
 def test_demo_of_the_compiled_core(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "memo.cli", "demo", "--out", str(tmp_path)], capture_output=True, text=True

@@ -1,5 +1,6 @@
 //! Where evidence and model meet: similarity, search, start, filter, tracker.
 
+mod active;
 mod column;
 pub mod evidence;
 pub mod kalman;

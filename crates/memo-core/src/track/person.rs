@@ -5,7 +5,7 @@
 //! centimetres at shoulder and hip; both drag the position along. Four constants are fitted by similarity over many
 //! frames: offsets of hip and knee angle, heights of shoulder and hip joints.
 //!
-//! Similarity also rises a little for wrong constants (3 to 6 % on an average-like walker, 15 % and more on one who really deviates),
+//! Similarity also rises a little for wrong constants (up to 9 % on an average-like walker, 15 % and more on ones who really deviate),
 //! so the fit is kept only when it gains more than [`PersonOptions::min_gain`]; else the person counts as average.
 
 use super::score::SimilarityOptions;
@@ -37,7 +37,7 @@ impl Default for PersonOptions {
             angle_sd_rad: 10f64.to_radians(),
             height_sd: 0.03,
             loss_per_sd: 0.01,
-            min_gain: 0.10,
+            min_gain: 0.12,
             distance_sd_m: 0.2,
             frames: 16,
         }
