@@ -6,7 +6,8 @@ use memo_core::image::{
 };
 use std::hint::black_box;
 
-/// Overlapping bright and dark bars of all directions with noise: about as many edge points as a street scene.
+/// Overlapping bright and dark bars of all directions with noise: about as many edge points as a street
+/// scene.
 fn scene(width: usize, height: usize) -> Image<u8> {
     let mut noise = 12345u32;
     let grey = |p: usize| {

@@ -1,5 +1,5 @@
-//! The paper's grid searches against the edges of one frame, hidden-line removal included: 4851 hypotheses while
-//! tracking, 11550 over the whole cycle at the start.
+//! The paper's grid searches against the edges of one frame, hidden-line removal included: 4851 hypotheses
+//! while tracking, 11550 over the whole cycle at the start.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
@@ -8,7 +8,8 @@ use memo_core::track::score::{EdgeLine, SimilarityOptions};
 use memo_core::track::search::{Grid, HiddenLines, Hypothesis, Path, Scene, search};
 use std::hint::black_box;
 
-/// The walker's own contours, broken in two, plus clutter: about as many edges as a real frame's region holds.
+/// The walker's own contours, broken in two, plus clutter: about as many edges as a real frame's region
+/// holds.
 fn edges(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
     let edge = |start: [f32; 2], end: [f32; 2]| EdgeLine { start, end, gradient: 20.0, velocity: 0.0 };
     let mut edges = Vec::new();

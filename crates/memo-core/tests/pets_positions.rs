@@ -1,8 +1,8 @@
 //! Positions of PETS 2009 S2.L1 view 1 from its published boxes and Tsai calibration.
 //!
-//! The published X, Y are the ground points below unrounded boxes, so this tests the calibration and the equations,
-//! not how well boxes locate people. The data are not part of this repository: `MEMO_SHARED_DATA` names the folder
-//! that holds `video/pets09_s2l1`; without it the tests say so and pass.
+//! The published X, Y are the ground points below unrounded boxes, so this tests the calibration and the
+//! equations, not how well boxes locate people. The data are not part of this repository: `MEMO_SHARED_DATA`
+//! names the folder that holds `video/pets09_s2l1`; without it the tests say so and pass.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,10 +15,10 @@ use memo_core::model::{Camera, FootPosition, Midpoints, PositionError, PositionO
 
 /// From box coordinates to pixels with centres at integers from 0.
 ///
-/// Found from the data: X, Y projected into the image lie evenly between 1.0 and 2.0 px left of and above the boxes'
-/// feet, in u and in v. One pixel is the format's counting from 1, the even spread is its rounding of left and top;
-/// the remaining half is a rounding up or a convention of pixel corners, which cannot be told apart. With -1 instead
-/// the ground points are off by 0.04 m in the median and 0.16 m at most.
+/// Found from the data: X, Y projected into the image lie evenly between 1.0 and 2.0 px left of and above the
+/// boxes' feet, in u and in v. One pixel is the format's counting from 1, the even spread is its rounding of
+/// left and top; the remaining half is a rounding up or a convention of pixel corners, which cannot be told
+/// apart. With -1 instead the ground points are off by 0.04 m in the median and 0.16 m at most.
 const PIXEL_FROM_BOX: f64 = -1.5;
 
 struct Person {

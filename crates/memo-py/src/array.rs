@@ -9,10 +9,11 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-/// An 8-bit grey frame of shape (H, W): numpy's own memory where it is contiguous, a copy where it has other strides.
+/// An 8-bit grey frame of shape (H, W): numpy's own memory where it is contiguous, a copy where it has other
+/// strides.
 ///
-/// Keep it alive while the interpreter lock is released. As with numpy's own functions, a thread that writes into the
-/// array meanwhile makes the result depend on when it does.
+/// Keep it alive while the interpreter lock is released. As with numpy's own functions, a thread that writes
+/// into the array meanwhile makes the result depend on when it does.
 pub enum FrameArray<'py> {
     /// Rows follow one another in memory.
     Borrowed(PyReadonlyArray2<'py, u8>),

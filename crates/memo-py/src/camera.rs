@@ -54,7 +54,8 @@ impl PyCamera {
         Camera::from_tsai(&tsai).map(Self).map_err(value_error)
     }
 
-    /// A level camera without distortion, looking along world Y, the origin on the ground `distance_m` before it.
+    /// A level camera without distortion, looking along world Y, the origin on the ground `distance_m` before
+    /// it.
     #[staticmethod]
     fn level(size: (u32, u32), fov_deg: f64, camera_height_m: f64, distance_m: f64) -> PyResult<Self> {
         Camera::level(size.into(), fov_deg.to_radians(), camera_height_m, distance_m)
@@ -84,7 +85,8 @@ impl PyCamera {
         numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(pixel).collect())
     }
 
-    /// Where the rays of pixels (N, 2) meet the plane `z_m` metres above the ground, (N, 3); NaN where they do not.
+    /// Where the rays of pixels (N, 2) meet the plane `z_m` metres above the ground, (N, 3); NaN where they
+    /// do not.
     #[pyo3(signature = (pixels, z_m=0.0))]
     fn ground_points<'py>(
         &self,
@@ -99,8 +101,9 @@ impl PyCamera {
         numpy_from_rows(py, pixels.into_iter().map(point).collect())
     }
 
-    /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6). Depth hangs on the
-    /// rectangle's height; the ground is not used, so z tells how well camera, height and rectangle agree.
+    /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6).
+    /// Depth hangs on the rectangle's height; the ground is not used, so z tells how well camera, height and
+    /// rectangle agree.
     fn position_from_rectangle(
         &self,
         bottom_px: (f64, f64),

@@ -28,8 +28,8 @@ pub fn change_mask<'py>(
     numpy_from_image(py, mask)
 }
 
-/// Candidate regions of a change mask after the binary operations: (n, 5) of left, top, right, bottom (inclusive) and
-/// area, largest first.
+/// Candidate regions of a change mask after the binary operations: (n, 5) of left, top, right, bottom
+/// (inclusive) and area, largest first.
 #[pyfunction]
 pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mask = mask_from_numpy(mask)?;
@@ -43,8 +43,8 @@ pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResul
     numpy_from_rows(py, found.iter().map(row).collect())
 }
 
-/// Silhouettes of what moves before a static background, for a clip of frames (T, H, W): eq. (1) against the temporal median, cut
-/// to the pixels that differ by `threshold` grey levels.
+/// Silhouettes of what moves before a static background, for a clip of frames (T, H, W): eq. (1) against the
+/// temporal median, cut to the pixels that differ by `threshold` grey levels.
 #[pyfunction]
 #[pyo3(signature = (frames, threshold=25.0))]
 pub fn silhouettes<'py>(
@@ -86,8 +86,8 @@ pub fn edge_segments<'py>(
 /// The components of a velocity field, (H, W) each.
 type Velocities<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
 
-/// Velocity (u, v) of the pixels of a region from one frame to the next, two (H, W) arrays of pixels per frame, NaN where
-/// nothing is known.
+/// Velocity (u, v) of the pixels of a region from one frame to the next, two (H, W) arrays of pixels per
+/// frame, NaN where nothing is known.
 #[pyfunction]
 pub fn velocity_field<'py>(
     py: Python<'py>,

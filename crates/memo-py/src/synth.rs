@@ -36,8 +36,8 @@ impl PyScene {
         self.0.time_s(index)
     }
 
-    /// The truth of a frame: torso centre (x, y, z), phase, the 12 joints (12, 3) in the order right then left shoulder, elbow, wrist,
-    /// hip, knee, ankle; None before the walker is there.
+    /// The truth of a frame: torso centre (x, y, z), phase, the 12 joints (12, 3) in the order right then
+    /// left shoulder, elbow, wrist, hip, knee, ankle; None before the walker is there.
     #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
     fn truth<'py>(
         &self,

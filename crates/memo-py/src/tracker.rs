@@ -205,7 +205,8 @@ impl PyWalk {
         self.walk.events().into_iter().map(|e| (e.time_s, e.frame, kind(e.kind), side(e.side))).collect()
     }
 
-    /// Best measured hypotheses per frame, (rows, 3): x or place along the path in world x, z in metres, phase; NaN where none.
+    /// Best measured hypotheses per frame, (rows, 3): x or place along the path in world x, z in metres,
+    /// phase; NaN where none.
     fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let path = &self.walk.walk.path;
         let row = |measured: &Option<Hypothesis>| match measured {
@@ -218,7 +219,8 @@ impl PyWalk {
         numpy_from_rows(py, self.walk.steps().iter().map(|step| row(&step.measured)).collect())
     }
 
-    /// Visible contours of a row's model in image pixels, (segments, 2, 2), and the body part of each segment.
+    /// Visible contours of a row's model in image pixels, (segments, 2, 2), and the body part of each
+    /// segment.
     fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
         let Some(row) = self.rows.get(row) else {
             let message = format!("row {row} of a walk with {} rows", self.rows.len());
@@ -240,7 +242,8 @@ impl PyWalk {
         Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
     }
 
-    /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules chose.
+    /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules
+    /// chose.
     fn start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let start = &self.walk.start;
         let dict = PyDict::new(py);
@@ -288,8 +291,9 @@ impl PyWalk {
         self.walk.p_swapped()
     }
 
-    /// Fitted deviation from the average: hip and knee (radians), shoulder and hip height (fractions of body height), relative gain
-    /// of similarity, and whether it was believed and used; None where no fit was made.
+    /// Fitted deviation from the average: hip and knee (radians), shoulder and hip height (fractions of body
+    /// height), relative gain of similarity, and whether it was believed and used; None where no fit was
+    /// made.
     #[getter]
     fn deviation(&self) -> Option<(f64, f64, f64, f64, f64, bool)> {
         self.walk.person_fit.map(|fit| {

@@ -118,9 +118,9 @@ impl Background {
     /// beyond it.
     ///
     /// The difference is smoothed by (1, 2, 1) / 4 along x and y, so noise of standard deviation s counts as
-    /// 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below half of
-    /// the person's contrast: 20 to 30 on well-lit footage. What has less contrast is lost: take the region
-    /// itself there.
+    /// 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below half
+    /// of the person's contrast: 20 to 30 on well-lit footage. What has less contrast is lost: take the
+    /// region itself there.
     pub fn silhouette(&self, frame: &Frame, within: &Mask, threshold: f64) -> Result<Mask, FrameError> {
         self.check_size(frame.width(), frame.height())?;
         self.check_size(within.width(), within.height())?;

@@ -1,4 +1,5 @@
-//! Edge points: where the grey-value gradient is steepest, found to a fraction of a pixel and linked into chains.
+//! Edge points: where the grey-value gradient is steepest, found to a fraction of a pixel and linked into
+//! chains.
 //!
 //! The image is differentiated with the gradient of a Gaussian of one chosen scale, thinned across the edge,
 //! cleared of faint points by hysteresis, and the points that remain are linked along the edge.
@@ -7,8 +8,9 @@
 //! PAMI 10, 1988 (gradient of Gaussian); Canny, PAMI 8, 1986 (hysteresis); Devernay, INRIA RR-2724, 1995
 //! (thinning and localising along the image axis nearest to the gradient).
 //!
-//! One scale only: Korn's selection of the best scale for each point is not done. Two edges closer than
-//! about 2 sigma pull at each other, corners are rounded over about sigma, and lines thinner than that show as two edges.
+//! One scale only: Korn's selection of the best scale for each point is not done. Two edges closer than about
+//! 2 sigma pull at each other, corners are rounded over about sigma, and lines thinner than that show as two
+//! edges.
 
 use super::frame::{Frame, FrameError, Mask};
 use glam::Vec2;
@@ -43,11 +45,11 @@ const SIGMA_PX: (f32, f32) = (0.4, 50.0);
 /// How edges are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeOptions {
-    /// Scale of the Gaussian. 1 px: finer scales follow sensor noise, at 2 px the two edges of a limb 4 px wide
-    /// push each other apart.
+    /// Scale of the Gaussian. 1 px: finer scales follow sensor noise, at 2 px the two edges of a limb 4 px
+    /// wide push each other apart.
     pub sigma_px: f32,
-    /// Gradient every edge point reaches, grey levels per pixel. 5: at sigma 1 noise of 5 grey levels leaves a
-    /// gradient of 1 along either axis; a step of 13 grey levels passes.
+    /// Gradient every edge point reaches, grey levels per pixel. 5: at sigma 1 noise of 5 grey levels leaves
+    /// a gradient of 1 along either axis; a step of 13 grey levels passes.
     pub low: f32,
     /// Gradient that at least one point of a connected edge reaches. 12: a step of 31 grey levels.
     pub high: f32,
@@ -87,7 +89,8 @@ pub struct Window {
 
 /// Where edges are looked for: in the intersection of what is given, in the whole frame by default.
 ///
-/// Grey values outside are still read by the Gaussian, so an edge found here is the same as in the whole frame.
+/// Grey values outside are still read by the Gaussian, so an edge found here is the same as in the whole
+/// frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct EdgeDomain<'a> {
     /// Pixels that may be edge points.
@@ -120,7 +123,8 @@ pub struct EdgeChains {
 }
 
 impl EdgeChains {
-    /// The chains. Each runs with the brighter side on its right as seen in the image; none contains a junction.
+    /// The chains. Each runs with the brighter side on its right as seen in the image; none contains a
+    /// junction.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[Edgel]> {
         (0..self.ends.len()).map(|i| {
             let start = if i == 0 { 0 } else { self.ends[i - 1] };
@@ -319,7 +323,8 @@ fn filter_along_row(grey: &[f32], taps: &Taps, out: &mut FilteredRow) {
     }
 }
 
-/// `I_x = g * (g' * I)` and `I_y = g' * (g * I)`: the second factor was applied along x, the first is along y.
+/// `I_x = g * (g' * I)` and `I_y = g' * (g * I)`: the second factor was applied along x, the first is along
+/// y.
 #[inline(always)]
 fn filter_across_rows(rows: &[FilteredRow], taps: &Taps, out: &mut GradientRow) {
     let radius = taps.radius();
@@ -373,7 +378,8 @@ impl Maxima {
         self.window.width + 2 * MARGIN
     }
 
-    /// Adds the maxima of frame row `y`, the middle one of the three rows; blocks below the threshold are skipped.
+    /// Adds the maxima of frame row `y`, the middle one of the three rows; blocks below the threshold are
+    /// skipped.
     #[inline(always)]
     fn collect_row(&mut self, y: usize, rows: &[GradientRow], mask: Option<&Mask>, low: f32) {
         let width = self.window.width;
@@ -387,7 +393,8 @@ impl Maxima {
     }
 
     /// The magnitude is compared along the image axis nearest to the gradient. Along a straight edge that
-    /// finds the same points as the gradient's own direction, one for each row or column, without interpolation.
+    /// finds the same points as the gradient's own direction, one for each row or column, without
+    /// interpolation.
     fn collect_block(
         &mut self,
         y: usize,
@@ -525,8 +532,8 @@ impl Maxima {
         chains
     }
 
-    /// Where a closed chain through `i` is best opened: the point farthest from `i` is a corner if there is one.
-    /// Open chains start where they start.
+    /// Where a closed chain through `i` is best opened: the point farthest from `i` is a corner if there is
+    /// one. Open chains start where they start.
     fn start_of_loop(&self, i: usize, links: &Links) -> usize {
         if links.previous[i] == NONE {
             return i;
@@ -569,8 +576,8 @@ struct Step {
     cost: f32,
 }
 
-/// How well `to` continues the edge at `from`, `None` if it belongs to another edge: their gradients differ by
-/// more than 60 degrees, or `to` lies beside `from` rather than ahead or behind.
+/// How well `to` continues the edge at `from`, `None` if it belongs to another edge: their gradients differ
+/// by more than 60 degrees, or `to` lies beside `from` rather than ahead or behind.
 fn step_between(from: &Edgel, to: &Edgel) -> Option<Step> {
     let (a, b) = (from.gradient, to.gradient);
     let dot = a.dot(b);

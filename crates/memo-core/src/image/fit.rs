@@ -1,8 +1,9 @@
-//! The left side of Rohr 1994, eq. (1): the norm of the second-order fit to the difference of two frames in a 5x5 window.
+//! The left side of Rohr 1994, eq. (1): the norm of the second-order fit to the difference of two frames in a
+//! 5x5 window.
 //!
-//! X X* of eq. (1) projects the 25 differences d on six polynomials that are separable and orthogonal over the
-//! window. With the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5, 10, 14
-//! and c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
+//! X X* of eq. (1) projects the 25 differences d on six polynomials that are separable and orthogonal over
+//! the window. With the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5,
+//! 10, 14 and c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
 //!
 //! ```text
 //! 25 N^2  = c00^2/25 + (c10^2 + c01^2)/50 + c11^2/100 + (c20^2 + c02^2)/70
@@ -13,8 +14,8 @@
 //! fits 32.
 //!
 //! The sums along y are shared by the five windows that contain a column. Where the processor has AVX2 the
-//! rest is written in its instructions: one `vpmaddwd` squares and adds two sums, for which compilers emit four
-//! instructions.
+//! rest is written in its instructions: one `vpmaddwd` squares and adds two sums, for which compilers emit
+//! four instructions.
 
 use super::frame::{Frame, Image};
 
@@ -57,7 +58,8 @@ trait BlockFit: Copy {
     fn norms(self, columns: &ColumnSums, start: usize) -> [i32; LANES];
 }
 
-/// All windows of two frames in one pass: five rows of differences are kept, and of them the tap sums along y.
+/// All windows of two frames in one pass: five rows of differences are kept, and of them the tap sums along
+/// y.
 struct NormRows<'a, T, F, K> {
     a: Frame<'a>,
     b: Frame<'a>,
@@ -148,7 +150,8 @@ fn scaled_norm_sq(columns: [[i16; WINDOW]; 3]) -> i32 {
     7 * (4 * square(c00) + 2 * (square(c10) + square(c01)) + square(c11)) + 10 * (square(c20) + square(c02))
 }
 
-/// The block fit in AVX2 instructions, through pulp's safe wrappers. No closures: they would not be compiled for AVX2.
+/// The block fit in AVX2 instructions, through pulp's safe wrappers. No closures: they would not be compiled
+/// for AVX2.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::{BlockFit, ColumnSums, LANES, WINDOW};

@@ -6,20 +6,21 @@
 //! J(u, v) = integral over R of (I_x u + I_y v + I_t)^2 + lambda^2 (|grad u|^2 + |grad v|^2)
 //! ```
 //!
-//! Sources: Rohr 1994, section 4.1; Horn & Schunck, Artificial Intelligence 17, 1981 (the functional); Schnörr,
-//! "Determining optical flow for irregular domains", IJCV 6(1), 1991 (irregular domains, existence and uniqueness).
+//! Sources: Rohr 1994, section 4.1; Horn & Schunck, Artificial Intelligence 17, 1981 (the functional);
+//! Schnörr, "Determining optical flow for irregular domains", IJCV 6(1), 1991 (irregular domains, existence
+//! and uniqueness).
 //!
-//! Discretised with one unknown vector a pixel and one difference for each pair of neighbours that both lie in
-//! the region. Leaving out all other differences is the natural boundary condition: nothing is drawn towards
-//! the background, and a constant motion is reproduced up to the border.
+//! Discretised with one unknown vector a pixel and one difference for each pair of neighbours that both lie
+//! in the region. Leaving out all other differences is the natural boundary condition: nothing is drawn
+//! towards the background, and a constant motion is reproduced up to the border.
 //!
-//! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term leaves the constant
-//! vectors free, so there is exactly one minimum if and only if the gradients there have two directions, that is
-//! if the sum of grad I grad I^T over the component is regular. Components that fail this are refused by name
-//! ([`Evidence`]) and get no velocity.
+//! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term leaves the
+//! constant vectors free, so there is exactly one minimum if and only if the gradients there have two
+//! directions, that is if the sum of grad I grad I^T over the component is regular. Components that fail this
+//! are refused by name ([`Evidence`]) and get no velocity.
 //!
-//! Minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine over a pyramid, the second
-//! frame being warped by the motion found so far. The oriented smoothness of Nagel is not offered.
+//! Minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine over a pyramid, the
+//! second frame being warped by the motion found so far. The oriented smoothness of Nagel is not offered.
 //!
 //! The motion is smoothed across the borders of limbs that move differently; grey values must persist from
 //! frame to frame; what moves farther than its own size on the coarsest pyramid level is lost.
@@ -55,11 +56,11 @@ pub struct FlowOptions {
     /// Weight lambda of the smoothness, grey levels. 25: at 10 the field runs away at limb crossings of real
     /// footage, where grey values do not persist; at 60 the swinging and the standing leg no longer separate.
     pub smoothness: f64,
-    /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the coarsest.
-    /// Small frames get fewer.
+    /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the
+    /// coarsest. Small frames get fewer.
     pub levels: usize,
-    /// Linearisations on each level. 2: 95 % of a walker's velocities are within 0.01 px of those after twelve in
-    /// slow footage (6 px a frame), within 0.15 px in fast (20 px a frame).
+    /// Linearisations on each level. 2: 95 % of a walker's velocities are within 0.01 px of those after
+    /// twelve in slow footage (6 px a frame), within 0.15 px in fast (20 px a frame).
     pub warps: usize,
     /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-4 leaves
     /// 99 % of a walker's velocities within 0.01 px of the exact solution.
@@ -524,7 +525,8 @@ impl Motion {
         Self { velocity, iterations: 0, relative_residual: 0.0 }
     }
 
-    /// The same motion on the next finer level: each pixel takes twice the velocity of the one that covers it.
+    /// The same motion on the next finer level: each pixel takes twice the velocity of the one that covers
+    /// it.
     fn refined(&self, coarse: &Domain, fine: &Domain) -> Self {
         let mut refined = Self::still(fine);
         for (x, y, cell) in fine.pixels() {
@@ -597,8 +599,8 @@ const DAMPING: f64 = 0.8;
 /// Block Jacobi steps on the coarsest grid, which has at most 2x2 cells.
 const COARSEST_STEPS: usize = 12;
 
-/// The linear equations A x = b of the minimum on one grid, with what solving them needs. At each pixel p, with
-/// the sum over its neighbours q inside,
+/// The linear equations A x = b of the minimum on one grid, with what solving them needs. At each pixel p,
+/// with the sum over its neighbours q inside,
 ///
 /// ```text
 /// g g^T (u, v)_p + sum of w_pq ((u, v)_p - (u, v)_q) = -g c
@@ -646,8 +648,8 @@ impl GridLevel {
         Self::new(domain.clone(), right, below)
     }
 
-    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the blocks' borders add up,
-    /// and are halved, for they stand for a slope over two pixels rather than a jump over one.
+    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the blocks' borders add
+    /// up, and are halved, for they stand for a slope over two pixels rather than a jump over one.
     fn halved(&self) -> Self {
         let half = self.domain.halved();
         let (mut right, mut below) = (vec![0.0; half.is_inside.len()], vec![0.0; half.is_inside.len()]);
@@ -886,8 +888,9 @@ impl Multigrid {
         Solved { iterations, relative_residual: if scale > 0.0 { residual_norm / scale } else { 0.0 } }
     }
 
-    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: multiplies the
-    /// residual by a symmetric approximation of the inverse of A. The product is the finest grid's solution.
+    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: multiplies
+    /// the residual by a symmetric approximation of the inverse of A. The product is the finest grid's
+    /// solution.
     #[inline(always)]
     fn precondition(&mut self) {
         self.levels[0].right_side.clone_from(&self.residual);

@@ -38,7 +38,8 @@ pub struct LineOptions {
     /// Largest distance of an edge point from its line. 1 px: five times the scatter of edge points in
     /// compressed video, while the outline of a limb 100 px long that bows by 2 px is cut once.
     pub max_deviation_px: f64,
-    /// Shorter segments are dropped. 8 px: below that noise makes segments too, and their direction scatters by degrees.
+    /// Shorter segments are dropped. 8 px: below that noise makes segments too, and their direction scatters
+    /// by degrees.
     pub min_length_px: f64,
 }
 
@@ -253,8 +254,8 @@ impl<'a> Chain<'a> {
         pieces
     }
 
-    /// The inner point farthest from the chord. The fitted line would not do: a corner's line runs through both
-    /// its sides, and the ends may be as far from it as the corner.
+    /// The inner point farthest from the chord. The fitted line would not do: a corner's line runs through
+    /// both its sides, and the ends may be as far from it as the corner.
     fn farthest_from_chord(&self, piece: &Range<usize>) -> usize {
         let (a, b) = (self.points[piece.start], self.points[piece.end - 1]);
         let chord = b - a;

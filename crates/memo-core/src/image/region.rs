@@ -163,8 +163,9 @@ pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
 /// When two areas belong to one candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupOptions {
-    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16: less than
-    /// a shoe leaves once the 5x5 windows have widened it, more than most specks that survive the clean-up.
+    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16: less
+    /// than a shoe leaves once the 5x5 windows have widened it, more than most specks that survive the
+    /// clean-up.
     pub min_part_area: usize,
     /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can
     /// be seen.

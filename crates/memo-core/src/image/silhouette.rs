@@ -1,7 +1,8 @@
 //! Silhouettes of the person in a clip with a static background.
 //!
-//! Where all frames are at hand, the temporal median shows the place without the person, and eq. (1) of Rohr 1994 against it
-//! finds people who stand as well as people who move. Clothes of the background's grey are lost; soft shadows are not.
+//! Where all frames are at hand, the temporal median shows the place without the person, and eq. (1) of Rohr
+//! 1994 against it finds people who stand as well as people who move. Clothes of the background's grey are
+//! lost; soft shadows are not.
 
 use super::background::{Background, BackgroundError, BackgroundOptions};
 use super::clean::{CleanError, CleanOptions, clean, fill_holes};

@@ -1,10 +1,12 @@
 //! The body: 14 elliptic cylinders in a hierarchy of rigid transforms (Rohr 1994, section 3.1).
 //!
-//! Lengths are fractions of body height after Drillis and Contini 1966 (as printed in Winter, *Biomechanics and Motor Control
-//! of Human Movement*). Rohr measured the thickness of the parts on a clothed person and does not print it;
-//! [`Proportions::default`] holds thicknesses of a person of average build in light clothing, chosen here.
+//! Lengths are fractions of body height after Drillis and Contini 1966 (as printed in Winter, *Biomechanics
+//! and Motor Control of Human Movement*). Rohr measured the thickness of the parts on a clothed person and
+//! does not print it; [`Proportions::default`] holds thicknesses of a person of average build in light
+//! clothing, chosen here.
 //!
-//! Limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of forearm and shank.
+//! Limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of forearm
+//! and shank.
 
 use super::cylinder::EllipticCylinder;
 use super::gait::{Gait, GaitStyle, Posture, SideAngles};
@@ -206,7 +208,8 @@ impl Body {
 
     /// Places the body: torso centre and heading in the world, all joint angles given.
     ///
-    /// Every transform is `parent_from_child`; the chain is world, torso, upper limb, lower limb, hand or foot.
+    /// Every transform is `parent_from_child`; the chain is world, torso, upper limb, lower limb, hand or
+    /// foot.
     pub fn pose(&self, torso_centre: DVec3, heading_rad: f64, posture: &Posture) -> PosedBody {
         let world_from_body =
             DAffine3::from_mat3_translation(DMat3::from_rotation_z(heading_rad), torso_centre);
@@ -230,8 +233,8 @@ impl Body {
         self.cylinder(0, world_from_torso * up(centre), half_length)
     }
 
-    /// The six limb parts and joints of one side; `side` is +1 left, -1 right. Thighs are given against the vertical, so the
-    /// trunk's lean is taken out at the hip.
+    /// The six limb parts and joints of one side; `side` is +1 left, -1 right. Thighs are given against the
+    /// vertical, so the trunk's lean is taken out at the hip.
     fn side(
         &self,
         world_from_torso: DAffine3,
@@ -270,7 +273,8 @@ impl Body {
         self.cylinder(row, world_from_joint * up(-0.5 * length), 0.5 * length)
     }
 
-    /// The foot points forward at a right angle to the shank, its sole as far below the ankle as the table says.
+    /// The foot points forward at a right angle to the shank, its sole as far below the ankle as the table
+    /// says.
     fn foot(&self, world_from_ankle: DAffine3) -> EllipticCylinder {
         let (p, h) = (&self.proportions, self.height_m);
         let axis_below_ankle = p.ankle_height - p.semi_axes[7].0;
@@ -309,9 +313,11 @@ impl Walker {
         self.body.pose(centre, heading_rad, &self.gait.posture(phase, &self.style))
     }
 
-    /// Mean height of the torso's centre over a cycle with the lower ankle always at its standing height, metres.
+    /// Mean height of the torso's centre over a cycle with the lower ankle always at its standing height,
+    /// metres.
     ///
-    /// The ankle carries this and not the sole, because the model's foot does not bend: its toe would dig in at push-off.
+    /// The ankle carries this and not the sole, because the model's foot does not bend: its toe would dig in
+    /// at push-off.
     pub fn level_torso_height_m(&self) -> f64 {
         let n = 40;
         (0..n).map(|i| self.torso_height_m(f64::from(i) / f64::from(n))).sum::<f64>() / f64::from(n)

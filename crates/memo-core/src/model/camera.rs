@@ -1,7 +1,8 @@
 //! The camera: full perspective projection with lens distortion (Rohr 1994, eq. 2).
 //!
-//! *Ideal* pixels obey eq. (2) exactly; pixels without that word are those of the image file, bent by the lens.
-//! All geometry is done on ideal pixels, so a pipeline undistorts its measurements once and then forgets the lens.
+//! *Ideal* pixels obey eq. (2) exactly; pixels without that word are those of the image file, bent by the
+//! lens. All geometry is done on ideal pixels, so a pipeline undistorts its measurements once and then
+//! forgets the lens.
 //!
 //! The camera stands still and has no skew; fisheye lenses are not covered.
 
@@ -16,8 +17,8 @@ use super::distortion::Distortion;
 /// Horizontal field of view assumed when nothing is known, radians (62 degrees).
 ///
 /// A phone's main camera has the view of a 24-28 mm lens on 36 mm film; recording video crops that to that of
-/// about 28-31 mm to leave room for stabilisation: 60-65 degrees across the long side of a landscape video. In
-/// portrait the same camera sees about 37 degrees.
+/// about 28-31 mm to leave room for stabilisation: 60-65 degrees across the long side of a landscape video.
+/// In portrait the same camera sees about 37 degrees.
 pub const DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD: f64 = 62.0 * PI / 180.0;
 
 /// A camera farther from the world's origin than this is taken for one calibrated in millimetres, metres.
@@ -151,8 +152,8 @@ pub struct TsaiParameters {
 impl Camera {
     /// From Tsai's parameters.
     ///
-    /// On the sensor x_d = dpx (u - cx) / sx, y_d = dpy (v - cy), and the ideal point is x_d (1 + kappa1 r_d²), all
-    /// in mm. Divided by the focal length f: fx = sx f / dpx, fy = f / dpy, kappa = kappa1 f².
+    /// On the sensor x_d = dpx (u - cx) / sx, y_d = dpy (v - cy), and the ideal point is x_d (1 + kappa1
+    /// r_d²), all in mm. Divided by the focal length f: fx = sx f / dpx, fy = f / dpy, kappa = kappa1 f².
     pub fn from_tsai(tsai: &TsaiParameters) -> Result<Self, CameraError> {
         positive("dpx", tsai.pixel_mm.x)?;
         positive("dpy", tsai.pixel_mm.y)?;
@@ -195,12 +196,13 @@ impl Camera {
 
     /// A level camera guessed from one upright person of known height, for video without calibration.
     ///
-    /// The person's soles are seen at `foot_row_px`, the crown at `head_row_px`. With the focal length f of the
-    /// field of view the person is at depth f H / (foot - head) and the camera depth (foot - cy) / f above the
-    /// ground. World as in [`Camera::level`] with the origin at the person's depth: a walk across the image is
-    /// along y = 0.
+    /// The person's soles are seen at `foot_row_px`, the crown at `head_row_px`. With the focal length f of
+    /// the field of view the person is at depth f H / (foot - head) and the camera depth (foot - cy) / f
+    /// above the ground. World as in [`Camera::level`] with the origin at the person's depth: a walk across
+    /// the image is along y = 0.
     ///
-    /// Depths scale with the assumed focal length, heights and sideways positions at the person's depth do not.
+    /// Depths scale with the assumed focal length, heights and sideways positions at the person's depth do
+    /// not.
     pub fn from_person(
         size: [u32; 2],
         horizontal_field_of_view_rad: f64,
@@ -285,14 +287,16 @@ impl Camera {
         self.point_at_height(ideal_px, 0.0)
     }
 
-    /// Where the ray through an ideal pixel meets the horizontal plane z = `z_m`, in front of the camera only.
+    /// Where the ray through an ideal pixel meets the horizontal plane z = `z_m`, in front of the camera
+    /// only.
     pub fn point_at_height(&self, ideal_px: DVec2, z_m: f64) -> Option<DVec3> {
         let (origin, ray) = (self.position(), self.ray_in_world(ideal_px));
         let length_m = (z_m - origin.z) / ray.z;
         (length_m > 0.0 && length_m.is_finite()).then(|| (origin + ray * length_m).with_z(z_m))
     }
 
-    /// The matrix T of eq. (2) without its arbitrary third row: h (u, v, 1)ᵀ = T (X, Y, Z, 1)ᵀ in ideal pixels.
+    /// The matrix T of eq. (2) without its arbitrary third row: h (u, v, 1)ᵀ = T (X, Y, Z, 1)ᵀ in ideal
+    /// pixels.
     ///
     /// Its scale is such that h is the depth in metres.
     pub fn matrix(&self) -> Matrix3x4<f64> {
@@ -301,19 +305,22 @@ impl Camera {
         Matrix3x4::from_columns(&columns.map(|c| (intrinsics * c).to_array().into()))
     }
 
-    /// Where vertical lines meet, T (0, 0, 1, 0)ᵀ: homogeneous ideal pixels, third element zero for a level camera.
+    /// Where vertical lines meet, T (0, 0, 1, 0)ᵀ: homogeneous ideal pixels, third element zero for a level
+    /// camera.
     pub fn vanishing_point_of_vertical(&self) -> DVec3 {
         self.intrinsics() * self.rotation.z_axis
     }
 
-    /// Distance in ideal pixels from a point to the point `height_m` above it; `None` if one is behind the camera.
+    /// Distance in ideal pixels from a point to the point `height_m` above it; `None` if one is behind the
+    /// camera.
     pub fn pixel_height_at(&self, point_on_ground: DVec3, height_m: f64) -> Option<f64> {
         let foot = self.project_ideal(point_on_ground)?;
         let head = self.project_ideal(point_on_ground + DVec3::Z * height_m)?;
         Some(foot.distance(head))
     }
 
-    /// The camera of the same images resized by `factor` (pixel centres at integers, so the corner (-0.5, -0.5) stays).
+    /// The camera of the same images resized by `factor` (pixel centres at integers, so the corner (-0.5,
+    /// -0.5) stays).
     pub fn scaled(&self, factor: f64) -> Result<Self, CameraError> {
         positive("scale factor", factor)?;
         let scaled = Self {

@@ -11,8 +11,8 @@
 //! fisheye = false
 //! ```
 //!
-//! `name` and `fisheye` may be left out, a `[metadata]` section is skipped. Fisheye lenses, skew and OpenCV's longer
-//! distortion models are refused.
+//! `name` and `fisheye` may be left out, a `[metadata]` section is skipped. Fisheye lenses, skew and OpenCV's
+//! longer distortion models are refused.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use thiserror::Error;

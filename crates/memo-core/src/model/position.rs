@@ -10,8 +10,9 @@
 //! | [`position_from_head`] | top midpoint, plane z = H | the top row, H and the calibration |
 //! | [`position_on_ground`] | all of these, weighted | whichever is certain |
 //!
-//! A rectangle's height is a poor gauge of depth: one per cent of it is one per cent of depth, and reflections,
-//! shadows or missed feet change it by more. With a calibrated ground prefer [`position_on_ground`].
+//! A rectangle's height is a poor gauge of depth: one per cent of it is one per cent of depth, and
+//! reflections, shadows or missed feet change it by more. With a calibrated ground prefer
+//! [`position_on_ground`].
 //!
 //! One rectangle only: nothing is filtered over time, and a stooped or seated person is placed wrongly.
 
@@ -39,7 +40,8 @@ impl Midpoints {
 /// How certain the measurements are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionOptions {
-    /// Share in [0, 1] of the bottom midpoint when both are shifted onto a vertical line; 1 leaves it in place.
+    /// Share in [0, 1] of the bottom midpoint when both are shifted onto a vertical line; 1 leaves it in
+    /// place.
     pub bottom_weight: f64,
     /// Standard deviation of the rectangle's centre column, pixels.
     pub column_sd_px: f64,
@@ -196,8 +198,8 @@ pub fn position_from_head(
 
 /// Position on the ground z = 0 by weighted least squares on both midpoints.
 ///
-/// Minimises the squared distances of the sole's and the head's image from the midpoints, each in units of its
-/// standard deviation; an uncertain height widens the head's along the image of the vertical.
+/// Minimises the squared distances of the sole's and the head's image from the midpoints, each in units of
+/// its standard deviation; an uncertain height widens the head's along the image of the vertical.
 pub fn position_on_ground(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -240,10 +242,11 @@ struct VerticalLine {
 
 /// Projects the midpoints onto the nearest line through the vertical vanishing point v = T (0, 0, 1, 0)ᵀ.
 ///
-/// With the bottom's weight w let m = w x_u + (1-w) x_o, δ = x_o - x_u and v' = v_xy - v_h m. A line nᵀ(x - m) = d
-/// through v has d = nᵀv' / v_h and the weighted sum of squared distances nᵀ(w (1-w) δ δᵀ + v' v'ᵀ / v_h²) n. Times
-/// v_h² that stays finite for v at infinity (v_h = 0). In the basis e = v'/|v'| and f across it the matrix M has its
-/// greatest axis, the line's direction, turned from e by φ with tan 2φ = 2 M_ef / (M_ee - M_ff).
+/// With the bottom's weight w let m = w x_u + (1-w) x_o, δ = x_o - x_u and v' = v_xy - v_h m. A line nᵀ(x -
+/// m) = d through v has d = nᵀv' / v_h and the weighted sum of squared distances nᵀ(w (1-w) δ δᵀ + v' v'ᵀ /
+/// v_h²) n. Times v_h² that stays finite for v at infinity (v_h = 0). In the basis e = v'/|v'| and f across
+/// it the matrix M has its greatest axis, the line's direction, turned from e by φ with tan 2φ = 2 M_ef /
+/// (M_ee - M_ff).
 fn nearest_vertical(camera: &Camera, midpoints: &Midpoints, bottom_weight: f64) -> Option<VerticalLine> {
     let Midpoints { bottom_px: x_u, top_px: x_o } = *midpoints;
     let v = camera.vanishing_point_of_vertical();
@@ -268,10 +271,11 @@ fn nearest_vertical(camera: &Camera, midpoints: &Midpoints, bottom_weight: f64) 
     })
 }
 
-/// Eq. (6) for H = 1 after the shift: the sole as seen from the centre of projection. It is proportional to H.
+/// Eq. (6) for H = 1 after the shift: the sole as seen from the centre of projection. It is proportional to
+/// H.
 ///
-/// Row 6 is h_o = h_u + v_h; rows 4 and 5 along the line are h_u s_u - h_o s_o + v' = 0, with v' the rise of the line's
-/// origin; rows 1 to 3 are h_u x_u = K (R X_u + t).
+/// Row 6 is h_o = h_u + v_h; rows 4 and 5 along the line are h_u s_u - h_o s_o + v' = 0, with v' the rise of
+/// the line's origin; rows 1 to 3 are h_u x_u = K (R X_u + t).
 fn sole_from_camera_per_metre(
     camera: &Camera,
     midpoints: &Midpoints,

@@ -1,7 +1,8 @@
 //! Periodic cubic interpolation on the unit cycle.
 //!
-//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986); the monotone variant after Fritsch and
-//! Butland 1984 serves curves given by their extremes (Boulic et al. 1990). Knots must be distinct modulo 1.
+//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986); the monotone variant after
+//! Fritsch and Butland 1984 serves curves given by their extremes (Boulic et al. 1990). Knots must be
+//! distinct modulo 1.
 
 /// A cubic polynomial per interval of the cycle, given by values and slopes at the knots (Hermite form).
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +13,8 @@ pub struct PeriodicCubic {
 }
 
 impl PeriodicCubic {
-    /// The twice continuously differentiable periodic spline through equally spaced samples, the first at phase 0.
+    /// The twice continuously differentiable periodic spline through equally spaced samples, the first at
+    /// phase 0.
     ///
     /// With h the spacing, continuity of the second derivative at knot i reads
     /// s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)) / h.

@@ -362,7 +362,8 @@ impl SideRays<'_> {
         if !cut0 && !cut1 {
             return Some(between);
         }
-        // A segment that changes side between the tangent points runs through the body; rounding may lose the roots.
+        // A segment that changes side between the tangent points runs through the body; rounding may lose the
+        // roots.
         let touching = (cut0 != cut1).then(|| [front.root(); 2]);
         let [enter, leave] = body.roots().or(touching)?;
         let t0 = if cut0 { enter.max(between.t0) } else { between.t0 };
@@ -714,7 +715,8 @@ pub(super) mod tests {
         // Four times as far as the near side, the shadow ends at z = 4; from the far side at z = 4/3.
         assert_eq!(hidden(-2.0, 4.1), None);
         assert!(hidden(-2.0, 3.9).is_some());
-        // Above the near side's shadow only the rim bounds what is hidden: (s y)² + (2 - 4 s)² = 1 with s = 1/z.
+        // Above the near side's shadow only the rim bounds what is hidden: (s y)² + (2 - 4 s)² = 1 with s =
+        // 1/z.
         let (y0, y1) = hidden(-2.0, 3.0).unwrap();
         let expected = 3.0 * (1.0 - (2.0 - 4.0 / 3.0_f64).powi(2)).sqrt();
         assert!((y0 + expected).abs() < 1e-6 && (y1 - expected).abs() < 1e-6, "{y0} {y1} {expected}");
@@ -747,7 +749,8 @@ pub(super) mod tests {
         let (t0, t1) = along(DVec3::new(-2.0, 0.0, 0.0)).unwrap();
         assert!((t0 - 0.625).abs() < 1e-8 && t1 == 1.0);
         assert_eq!(along(DVec3::new(2.0, 3.0, 0.0)), None);
-        // Half of it behind the camera, passing beside it: hidden on the post's side, from the tangent plane on.
+        // Half of it behind the camera, passing beside it: hidden on the post's side, from the tangent plane
+        // on.
         let (start, end) = (DVec3::new(-4.0, 0.0, 0.0), DVec3::new(8.0, 1e-3, 0.0));
         let (t0, t1) = hidden_interval(start, end, &post, camera).unwrap();
         assert!(t0 == 0.0 && t1 > 0.25 && t1 < 0.5, "{t1}");

@@ -1,8 +1,8 @@
 //! A walker before a wall, drawn from the 2.5D description of the model, with everything known.
 //!
-//! The person is the model itself (the paper's synthetic sequence, Figs. 23, 26 and 27, is of this kind): what tracking
-//! reaches here is bounded by the method alone, not by how people differ from the average. Frames are drawn one by one and in any
-//! order; the same seed gives the same pixels.
+//! The person is the model itself (the paper's synthetic sequence, Figs. 23, 26 and 27, is of this kind):
+//! what tracking reaches here is bounded by the method alone, not by how people differ from the average.
+//! Frames are drawn one by one and in any order; the same seed gives the same pixels.
 
 use super::random::Random;
 use crate::image::{Image, Window};

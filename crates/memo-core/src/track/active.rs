@@ -12,8 +12,8 @@ use crate::model::Camera;
 pub(super) const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
 const SLOWEST_HZ: f64 = 0.3;
-/// A slanting path must explain the frames better than one parallel to the image by this share of similarity: seen from above
-/// a walk can seem to slant, and then fits worse.
+/// A slanting path must explain the frames better than one parallel to the image by this share of similarity:
+/// seen from above a walk can seem to slant, and then fits worse.
 const SLANT_GAIN: f64 = 0.02;
 /// Number of last frames that tell whether a walk goes on.
 const RECENT_FRAMES: usize = 12;
@@ -55,7 +55,8 @@ impl Active {
         stopped || lost
     }
 
-    /// Takes off the frames in which the person was not there yet, and those in which the walk was already over.
+    /// Takes off the frames in which the person was not there yet, and those in which the walk was already
+    /// over.
     ///
     /// A person who appears between two frames changes the empty one too, eq. (1) looking both ways.
     pub(super) fn trim(&mut self) {
@@ -106,7 +107,8 @@ impl Active {
         }
     }
 
-    /// Of a body known to be average the apparent size tells the distance; a deviating one could as well be nearer or farther.
+    /// Of a body known to be average the apparent size tells the distance; a deviating one could as well be
+    /// nearer or farther.
     fn refit_distance(&mut self, kept: &Kept, options: &TrackerOptions, person: &PersonOptions) {
         let Walk { walker, path, beginning, .. } = &self.walk;
         let scene = Scene { walker, camera: &self.camera, path };

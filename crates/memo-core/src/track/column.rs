@@ -1,11 +1,12 @@
 //! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
 //!
-//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane a height.
-//! The loops over lanes are left to the compiler's vectoriser, so every function they call is `#[inline(always)]` and
-//! the caller dispatches on the instruction set. No operation is fused or reordered: the scores are the same bits on
-//! every instruction set.
+//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane a
+//! height. The loops over lanes are left to the compiler's vectoriser, so every function they call is
+//! `#[inline(always)]` and the caller dispatches on the instruction set. No operation is fused or reordered:
+//! the scores are the same bits on every instruction set.
 //!
-//! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32 (some 1e-4 px).
+//! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32
+//! (some 1e-4 px).
 #![allow(clippy::needless_range_loop, reason = "one index runs through the lanes of several arrays at once")]
 
 use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
@@ -16,8 +17,8 @@ use glam::DVec3;
 pub(super) const LANES: usize = 16;
 /// One f32 for each height.
 pub(super) type Lanes = [f32; LANES];
-/// Edges tested together for being near a line, one byte of a word each. 16 as well: loops of 8 are unrolled before
-/// they can be vectorised, which makes this test over twice as slow.
+/// Edges tested together for being near a line, one byte of a word each. 16 as well: loops of 8 are unrolled
+/// before they can be vectorised, which makes this test over twice as slow.
 const BATCH: usize = 16;
 /// Nearest depth that is projected, metres.
 const NEAR_M: f32 = 1e-6;
@@ -26,8 +27,8 @@ const SLACK_PX: f32 = 0.01;
 /// What rounding may turn an edge, as a sine.
 const SLACK_SINE: f32 = 1e-4;
 
-/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, the projection being linear
-/// before its division.
+/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, the projection being
+/// linear before its division.
 #[derive(Clone, Copy)]
 struct RaisedPoint {
     base: [f32; 3],
@@ -227,7 +228,8 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
-    /// By eq. (7) no edge answers more than its length: the rest is left out once every height has more than that.
+    /// By eq. (7) no edge answers more than its length: the rest is left out once every height has more than
+    /// that.
     #[inline(always)]
     fn best_by_rohr(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = [0.0; LANES];
@@ -337,7 +339,8 @@ impl Cut {
     }
 }
 
-/// The t between which low <= p + t d <= high (Liang and Barsky). A d of 0 is replaced by one too small to matter.
+/// The t between which low <= p + t d <= high (Liang and Barsky). A d of 0 is replaced by one too small to
+/// matter.
 #[inline(always)]
 fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
     let inverse = 1.0 / if d.abs() < 1e-12 { 1e-12 } else { d };
@@ -345,7 +348,8 @@ fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
     (min(a, b), max(a, b))
 }
 
-/// asin² of 0 <= x <= 1 to 4e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 - asin sqrt(1 - q).
+/// asin² of 0 <= x <= 1 to 4e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 -
+/// asin sqrt(1 - q).
 #[inline(always)]
 fn angle_sq(sine: f32) -> f32 {
     let q = min(sine * sine, 1.0);
@@ -356,7 +360,8 @@ fn angle_sq(sine: f32) -> f32 {
     if q <= 0.5 { p } else { rest * rest }
 }
 
-/// e^x of x <= 0 to 3e-7 of its value plus the rounding of x; 2^-126 below -87. With n the nearest integer to x / ln 2, e^x = 2^n 2^f.
+/// e^x of x <= 0 to 3e-7 of its value plus the rounding of x; 2^-126 below -87. With n the nearest integer to
+/// x / ln 2, e^x = 2^n 2^f.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
     let y = max(x, -87.0) * std::f32::consts::LOG2_E;
@@ -421,7 +426,8 @@ impl Area {
 }
 
 impl Line {
-    /// Axes at the first height's start (the origin if it shows none) along the mean direction of all heights.
+    /// Axes at the first height's start (the origin if it shows none) along the mean direction of all
+    /// heights.
     #[inline(always)]
     fn mean(lines: &LineLanes) -> Self {
         let sum = |lanes: Lanes| reduce(lanes, |a, b| a + b);
@@ -515,7 +521,8 @@ mod tests {
         Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
     }
 
-    /// s_i at each height by the readable way, `None` where an angle is so near to the largest compared that rounding decides.
+    /// s_i at each height by the readable way, `None` where an angle is so near to the largest compared that
+    /// rounding decides.
     fn plainly(piece: &VisibleSegment, raised_m: &Lanes, edges: &[EdgeLine]) -> Option<Lanes> {
         let options = SimilarityOptions::default();
         let mut all = [0.0; LANES];

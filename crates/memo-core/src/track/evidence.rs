@@ -1,7 +1,8 @@
-//! What each frame contributes to tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and 4.3).
+//! What each frame contributes to tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and
+//! 4.3).
 //!
-//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two frames are
-//! kept, however long the stream.
+//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late.
+//! Two frames are kept, however long the stream.
 
 use super::score::EdgeLine;
 use crate::image::edge::{EdgeDomain, EdgeOptions, Window};
@@ -49,12 +50,13 @@ pub enum EvidenceError {
 pub struct EvidenceOptions {
     /// Change detection, eq. (1), for where edges are looked for: the low threshold loses no limb.
     pub change: ChangeOptions,
-    /// Least threshold of the change detection for the rectangle, grey levels. 10: floor reflections and shadows change by less;
-    /// at 4 they stretch the rectangle by up to 60 px.
+    /// Least threshold of the change detection for the rectangle, grey levels. 10: floor reflections and
+    /// shadows change by less; at 4 they stretch the rectangle by up to 60 px.
     pub rectangle_threshold: f64,
     /// Recursive binary operations.
     pub clean: CleanOptions,
-    /// A slowly varying background whose foreground joins the changes, for people who stop; needs some frames without them.
+    /// A slowly varying background whose foreground joins the changes, for people who stop; needs some frames
+    /// without them.
     pub background: Option<BackgroundOptions>,
     /// Velocity field of the changed pixels, for w_V; costs some 10 ms a frame.
     pub flow: Option<FlowOptions>,
@@ -81,8 +83,8 @@ impl Default for EvidenceOptions {
     }
 }
 
-/// Edges are taken this far outside the moving region, pixels: the change mask covers the outline, this covers the
-/// parts of a limb that stood still between two frames.
+/// Edges are taken this far outside the moving region, pixels: the change mask covers the outline, this
+/// covers the parts of a limb that stood still between two frames.
 const EDGE_MARGIN_PX: f64 = 5.0;
 
 /// One frame with its change mask.
@@ -108,8 +110,8 @@ impl Evidence {
         group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
     }
 
-    /// Straight edges in and near the changed pixels of a rectangle, in ideal pixels of the camera; in the whole rectangle
-    /// where nothing changed in it.
+    /// Straight edges in and near the changed pixels of a rectangle, in ideal pixels of the camera; in the
+    /// whole rectangle where nothing changed in it.
     pub fn edges(
         &self,
         window: &Rectangle,
@@ -207,7 +209,8 @@ impl EvidenceStream {
         Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity }))
     }
 
-    /// Adds what differs from the background to the changes, then lets the background follow where nothing is.
+    /// Adds what differs from the background to the changes, then lets the background follow where nothing
+    /// is.
     fn add_foreground(
         &mut self,
         grey: &Image<u8>,

@@ -1,8 +1,9 @@
 //! The discrete linear Kalman filter of the walker's state (Rohr 1994, section 5.2, eqs. 12-22).
 //!
-//! The state is (X, X', Y, Y', Z, Z', pose, pose') and all matrices of eqs. (19)-(22) are block diagonal, so the filter
-//! splits exactly into four independent filters of position and velocity; [`ConstantVelocity`] is one of them.
-//! Seconds take the place of the paper's images, so that any frame rate and uneven time stamps work.
+//! The state is (X, X', Y, Y', Z, Z', pose, pose') and all matrices of eqs. (19)-(22) are block diagonal, so
+//! the filter splits exactly into four independent filters of position and velocity; [`ConstantVelocity`] is
+//! one of them. Seconds take the place of the paper's images, so that any frame rate and uneven time stamps
+//! work.
 
 /// Process and measurement noise of one coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -209,7 +210,8 @@ mod tests {
 
     #[test]
     fn the_smoother_equals_least_squares_over_all_frames() {
-        // Without process noise the state is a straight line, and smoothing is weighted least squares with the prior.
+        // Without process noise the state is a straight line, and smoothing is weighted least squares with
+        // the prior.
         let noise = Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.5 };
         let z = [0.3, 0.9, 2.4, 2.8, 4.4, 4.9];
         let mut state = ConstantVelocity::new(0.0, 0.0, 1e6, 1e6);

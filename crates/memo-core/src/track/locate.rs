@@ -1,8 +1,8 @@
 //! From rectangles to the path walked: depth, direction and speed (Rohr 1994, sections 4.2 and 6).
 //!
-//! The paper's assumption holds here too: the person walks parallel to the image plane on level ground. A single
-//! rectangle is a poor gauge (arms and feet swing its centre by 7-10 cm, reflections stretch it by half a metre of depth), so rows are
-//! pooled over the frames before they become a depth.
+//! The paper's assumption holds here too: the person walks parallel to the image plane on level ground. A
+//! single rectangle is a poor gauge (arms and feet swing its centre by 7-10 cm, reflections stretch it by
+//! half a metre of depth), so rows are pooled over the frames before they become a depth.
 
 use super::search::Path;
 use super::start::line_through;
@@ -51,15 +51,17 @@ pub struct Sighting {
 
 /// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
 const MASK_MARGIN_PX: f64 = 2.0;
-/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for the soles. It needs no
-/// margin: shoes change less than hair does, and the far foot stands higher than the near one.
+/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for
+/// the soles. It needs no margin: shoes change less than hair does, and the far foot stands higher than the
+/// near one.
 const SOLE_QUANTILE: f64 = 0.3;
 /// The crown bobs evenly about its median row.
 const CROWN_QUANTILE: f64 = 0.5;
 /// Standard deviation of a body height that was measured, metres: shoes and hair.
 const HEIGHT_SD_M: f64 = 0.02;
 
-/// The bottom row is disbelieved when it says nearer than the crown by more than this many standard deviations.
+/// The bottom row is disbelieved when it says nearer than the crown by more than this many standard
+/// deviations.
 const REFLECTION_SD: f64 = 1.0;
 
 /// Row of the soles and of the crown over all sightings, pixels.
@@ -102,8 +104,8 @@ pub struct Course {
     pub depth_sd_m: f64,
 }
 
-/// Finds the line parallel to the image plane on which the sighted person moves; `height_m` is the mean height of the
-/// crown while walking.
+/// Finds the line parallel to the image plane on which the sighted person moves; `height_m` is the mean
+/// height of the crown while walking.
 pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<Course, LocateError> {
     // 1. Depth of the line from the pooled rows at the sightings' mean column.
     let (sole, crown) = person_rows(sightings);
@@ -129,13 +131,14 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
 }
 
-/// Depth by which a path must slant over the sightings before it is believed, metres: on walks across the image the first and the
-/// last third of 40 sightings differ by up to 0.13, on one 25 degrees off by 0.43.
+/// Depth by which a path must slant over the sightings before it is believed, metres: on walks across the
+/// image the first and the last third of 40 sightings differ by up to 0.13, on one 25 degrees off by 0.43.
 const SLANT_M: f64 = 0.2;
 
 /// Finds the slanting line of a person who comes nearer or goes away, where the sightings show one clearly.
 ///
-/// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` belongs to all sightings.
+/// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` belongs to all
+/// sightings.
 pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Option<Course> {
     let third = sightings.len() / 3;
     if third == 0 {
@@ -180,8 +183,8 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -
     })
 }
 
-/// Both rows weighted, unless the soles seem nearer than the crown allows: then the bottom row is a reflection's or
-/// a shadow's, which only ever lie below the feet, and the crown decides alone.
+/// Both rows weighted, unless the soles seem nearer than the crown allows: then the bottom row is a
+/// reflection's or a shadow's, which only ever lie below the feet, and the crown decides alone.
 fn stand(
     camera: &Camera,
     midpoints: &Midpoints,

@@ -1,12 +1,14 @@
 //! How a person deviates from the average, found from the walk itself.
 //!
-//! Rohr's conclusion (section 7) proposes to continue with adaptively estimated motion curves and additional parameters for the
-//! body. Average curves are off by up to 9 degrees at the hip and 12 at the knee for some people, and table proportions by several
-//! centimetres at shoulder and hip; both drag the position along. Four constants are fitted by similarity over many
-//! frames: offsets of hip and knee angle, heights of shoulder and hip joints.
+//! Rohr's conclusion (section 7) proposes to continue with adaptively estimated motion curves and additional
+//! parameters for the body. Average curves are off by up to 9 degrees at the hip and 12 at the knee for some
+//! people, and table proportions by several centimetres at shoulder and hip; both drag the position along.
+//! Four constants are fitted by similarity over many frames: offsets of hip and knee angle, heights of
+//! shoulder and hip joints.
 //!
-//! Similarity also rises a little for wrong constants (up to 9 % on an average-like walker, 15 % and more on ones who really deviate),
-//! so the fit is kept only when it gains more than [`PersonOptions::min_gain`]; else the person counts as average.
+//! Similarity also rises a little for wrong constants (up to 9 % on an average-like walker, 15 % and more on
+//! ones who really deviate), so the fit is kept only when it gains more than [`PersonOptions::min_gain`];
+//! else the person counts as average.
 
 use super::score::SimilarityOptions;
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
@@ -21,7 +23,8 @@ pub struct PersonOptions {
     pub angle_sd_rad: f64,
     /// Standard deviation over people of shoulder and hip height, fractions of body height.
     pub height_sd: f64,
-    /// Relative loss of similarity that one standard deviation costs. 0.01 holds back what the frames do not show.
+    /// Relative loss of similarity that one standard deviation costs. 0.01 holds back what the frames do not
+    /// show.
     pub loss_per_sd: f64,
     /// Relative gain of similarity below which the person counts as average.
     pub min_gain: f64,
@@ -209,8 +212,9 @@ fn sd_sq(d: &Deviation, options: &PersonOptions) -> f64 {
     angles + (d.shoulder_height.powi(2) + d.hip_height.powi(2)) / options.height_sd.powi(2)
 }
 
-/// Directions of the search with the steps of the coarsest level: 4 degrees, 2 % of body height. Hip and knee are also moved
-/// together, as a person's thigh hides in the pair, and shoulder and hip, as the trunk slides along the body.
+/// Directions of the search with the steps of the coarsest level: 4 degrees, 2 % of body height. Hip and knee
+/// are also moved together, as a person's thigh hides in the pair, and shoulder and hip, as the trunk slides
+/// along the body.
 const DIRECTIONS: [[f64; 4]; 6] = [
     [0.07, 0.0, 0.0, 0.0],
     [0.0, 0.07, 0.0, 0.0],

@@ -1,8 +1,9 @@
 //! The result: one row of position, phase, angles and joints per frame, and gait events.
 //!
-//! Rows come from the smoothed states of the better twin: what all frames, later ones included, say of each frame. The printed noise of
-//! the filter is generous, so standard deviations are scaled by how far measurements really fell from predictions; to this scatter
-//! comes what no number of frames averages out: the body that is not the model's, and the distance.
+//! Rows come from the smoothed states of the better twin: what all frames, later ones included, say of each
+//! frame. The printed noise of the filter is generous, so standard deviations are scaled by how far
+//! measurements really fell from predictions; to this scatter comes what no number of frames averages out:
+//! the body that is not the model's, and the distance.
 
 use super::kalman::{ConstantVelocity, Noise, smooth};
 use super::person::PersonFit;
@@ -89,8 +90,8 @@ pub struct Event {
     pub side: Side,
 }
 
-/// Errors common to all frames of a walk, standard deviations measured on motion-captured walks: along the path (metres), height
-/// (metres), phase (cycles; how heel strike is defined).
+/// Errors common to all frames of a walk, standard deviations measured on motion-captured walks: along the
+/// path (metres), height (metres), phase (cycles; how heel strike is defined).
 const COMMON_SD: [f64; 3] = [0.015, 0.02, 0.015];
 
 /// Phase of toe-off on the side whose heel strikes at 0: adults at free speed stand for 61 % of the cycle.

@@ -2,9 +2,10 @@
 //!
 //! Symbols of the paper: l_M `model_px`, l `overlap_px`, d `distance_px`, delta phi `angle_rad`.
 //!
-//! The search window of a model line is the rectangle of the line's length and half width r = c_r l_M about it; an edge is cut
-//! to that window before it is compared. One edge, the best, answers for each line. Both sides are straight lines in ideal
-//! (distortion-free) pixels. Scores are f32: they differ from f64 by some 1e-7, geometry stays f64 until it is projected.
+//! The search window of a model line is the rectangle of the line's length and half width r = c_r l_M about
+//! it; an edge is cut to that window before it is compared. One edge, the best, answers for each line. Both
+//! sides are straight lines in ideal (distortion-free) pixels. Scores are f32: they differ from f64 by some
+//! 1e-7, geometry stays f64 until it is projected.
 
 use crate::model::body::PART_COUNT;
 
@@ -14,26 +15,30 @@ pub enum Measure {
     /// Eqs. (7), (8): Gaussian in missing length, distance and angle, weighted by the overlap.
     #[default]
     Rohr,
-    /// Eq. (10), Lowe 1987: l_GW² / ((l_M - l_GW) d delta phi) on uncut edges, for comparison.
-    /// Each factor is held above one hundredth of its window, where the measure has its pole, and the value is scaled to 1 there.
+    /// Eq. (10), Lowe 1987: l_GW² / ((l_M - l_GW) d delta phi) on uncut edges, for comparison. Each factor is
+    /// held above one hundredth of its window, where the measure has its pole, and the value is scaled to 1
+    /// there.
     Lowe,
 }
 
 /// Parameters of the similarity. The paper prints none of them; each default says where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimilarityOptions {
-    /// sigma_l = c_l l_M. 1: real edges are broken, and 0.5 already punishes a half-found limb so much that single frames
-    /// drop from 94 % to 81 % right on real footage; 1 to 3 behave alike.
+    /// sigma_l = c_l l_M. 1: real edges are broken, and 0.5 already punishes a half-found limb so much that
+    /// single frames drop from 94 % to 81 % right on real footage; 1 to 3 behave alike.
     pub c_l: f32,
     /// sigma_d = c_d c_r l_M. 0.5: an edge at the window's border is two sigma away.
     pub c_d: f32,
-    /// Half width of the search window over the line's length. 0.25 separates the two sides of a limb; 0.5 mixes them.
+    /// Half width of the search window over the line's length. 0.25 separates the two sides of a limb; 0.5
+    /// mixes them.
     pub c_r: f32,
     /// sigma of the angle, radians. 12 degrees: differences of people's joint angles from the average gait.
     pub sigma_phi_rad: f32,
-    /// w_K: significance of each body part in the order of `Part::ALL`. All equal, as in the paper's experiments.
+    /// w_K: significance of each body part in the order of `Part::ALL`. All equal, as in the paper's
+    /// experiments.
     pub part_weights: [f32; PART_COUNT],
-    /// w_G = min(1, gradient / this), grey levels per pixel; `None` weighs all edges alike, which measured best.
+    /// w_G = min(1, gradient / this), grey levels per pixel; `None` weighs all edges alike, which measured
+    /// best.
     pub full_gradient: Option<f32>,
     /// w_V = min(1, velocity / this), pixels per frame, where edges carry a velocity; `None` ignores it.
     pub full_velocity: Option<f32>,

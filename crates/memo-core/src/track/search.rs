@@ -1,9 +1,9 @@
 //! Grid search over position and gait phase (Rohr 1994, sections 4.3, 5.1 and 6).
 //!
-//! Hidden-line removal leaves no analytical relation between parameters and similarity, so every point of an equally spaced
-//! grid is scored and the best one taken. Columns of the grid (one phase, one place along the path) are independent and run
-//! in parallel; each score depends on nothing but its own hypothesis, so the answer does not depend on the number
-//! of threads.
+//! Hidden-line removal leaves no analytical relation between parameters and similarity, so every point of an
+//! equally spaced grid is scored and the best one taken. Columns of the grid (one phase, one place along the
+//! path) are independent and run in parallel; each score depends on nothing but its own hypothesis, so the
+//! answer does not depend on the number of threads.
 
 use super::column::{ColumnScorer, LANES, Lanes, LineLanes, Projection};
 use super::score::{EdgeLine, ModelLine, SimilarityOptions};
@@ -128,8 +128,8 @@ pub const POSITION_STEP_M: f64 = 0.02;
 pub const PHASE_STEP: f64 = 0.02;
 
 impl Grid {
-    /// The paper's tracking grid around a prediction: 2dX = 40 cm, 2dY = 20 cm, 2dpose = 0.4, steps 2 cm, 2 cm and 0.02;
-    /// 21 x 11 x 21 = 4851 hypotheses.
+    /// The paper's tracking grid around a prediction: 2dX = 40 cm, 2dY = 20 cm, 2dpose = 0.4, steps 2 cm, 2
+    /// cm and 0.02; 21 x 11 x 21 = 4851 hypotheses.
     pub fn printed(around: &Hypothesis) -> Self {
         Self {
             along: Axis::around(around.along_m, 0.2, POSITION_STEP_M),
@@ -180,8 +180,9 @@ impl Grid {
 /// How often hidden lines are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HiddenLines {
-    /// Once for each phase and place along the path, at the middle height; the visible pieces are then moved up and down.
-    /// Seen from 6 m the view turns by less than 1 degree over the 20 cm of heights, and the score changes by less than 1 %.
+    /// Once for each phase and place along the path, at the middle height; the visible pieces are then moved
+    /// up and down. Seen from 6 m the view turns by less than 1 degree over the 20 cm of heights, and the
+    /// score changes by less than 1 %.
     #[default]
     PerColumn,
     /// For each hypothesis anew.
@@ -221,7 +222,8 @@ impl SearchResult {
         }
     }
 
-    /// For each phase of the grid its best hypothesis and score: the similarity curve of the paper's Figs. 19 and 21.
+    /// For each phase of the grid its best hypothesis and score: the similarity curve of the paper's Figs. 19
+    /// and 21.
     pub fn curve(&self) -> Vec<(Hypothesis, f32)> {
         let slice = self.grid.along.count * self.grid.height.count;
         let best_of = |(p, scores): (usize, &[f32])| {
@@ -241,7 +243,8 @@ pub fn search(
     hidden_lines: HiddenLines,
 ) -> SearchResult {
     let scorer = ColumnScorer::new(edges, options);
-    // The posture depends on the phase only: each body is posed once, at the path's origin, and moved from there.
+    // The posture depends on the phase only: each body is posed once, at the path's origin, and moved from
+    // there.
     let origin = Hypothesis { along_m: 0.0, height_m: 0.0, phase: 0.0 };
     let pose = |p: usize| scene.pose(&Hypothesis { phase: grid.phase.at(p), ..origin });
     let bodies: Vec<_> = (0..grid.phase.count).map(pose).collect();
@@ -287,7 +290,8 @@ impl Column {
         heights: &Axis,
         out: &mut [f32],
     ) {
-        // 1. What is visible of the body in the middle of the column. Moving the body or the camera the other way is the same.
+        // 1. What is visible of the body in the middle of the column. Moving the body or the camera the other
+        //    way is the same.
         let place = scene.path.point(along_m, heights.centre) - scene.path.point(0.0, 0.0);
         let seen_from = scene.camera.position() - place;
         self.view.visible_contours(&body.cylinders, seen_from, &LINES_ONLY, &mut self.visible);
@@ -304,8 +308,8 @@ impl Column {
     }
 }
 
-/// The visible pieces of one body at several heights. A type and not a closure, because the compiler may call a closure that
-/// borrows mutably through a function without the dispatched instruction set.
+/// The visible pieces of one body at several heights. A type and not a closure, because the compiler may call
+/// a closure that borrows mutably through a function without the dispatched instruction set.
 struct Raised<'a> {
     scorer: &'a ColumnScorer<'a>,
     projection: &'a Projection<'a>,

@@ -1,10 +1,11 @@
-//! Starting phase: from similarity curves of single frames to a line of phase over time (Rohr 1994, sections 5.1 and 6).
+//! Starting phase: from similarity curves of single frames to a line of phase over time (Rohr 1994, sections
+//! 5.1 and 6).
 //!
-//! A walker's phase grows linearly, so the estimates of 10-15 frames lie on a line; because the two legs look alike, about as
-//! many lie on its twin half a cycle away. [`two_line_rule`] is the paper's way: group the best phases of the frames on the two
-//! lines and choose by count, or by mean similarity where the counts are close. [`phase_lines`] is the better way: sum the
-//! whole similarity curves along every line. Both twins are returned; [`swap_probability`] says how far the
-//! evidence separates them.
+//! A walker's phase grows linearly, so the estimates of 10-15 frames lie on a line; because the two legs look
+//! alike, about as many lie on its twin half a cycle away. [`two_line_rule`] is the paper's way: group the
+//! best phases of the frames on the two lines and choose by count, or by mean similarity where the counts are
+//! close. [`phase_lines`] is the better way: sum the whole similarity curves along every line. Both twins are
+//! returned; [`swap_probability`] says how far the evidence separates them.
 
 use super::locate::Course;
 use super::search::{Grid, Hypothesis, Path, Scene, search};
@@ -84,8 +85,8 @@ pub struct TwinLines {
 const RATE_STEPS: usize = 40;
 const OFFSET_STEPS: usize = 100;
 
-/// Sums the similarity curves along every line of the cadence range (both signs as given) and returns the best with its
-/// twin; `None` without curves.
+/// Sums the similarity curves along every line of the cadence range (both signs as given) and returns the
+/// best with its twin; `None` without curves.
 pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLines> {
     let first = curves.first()?.time_s;
     let mean_along = |phase: f64, rate: f64| {
@@ -129,9 +130,9 @@ pub struct TwoLineChoice {
 
 /// Groups single-frame estimates on two lines half a cycle apart and chooses one (section 6).
 ///
-/// Rate and offset modulo half a cycle come from a vote, the sum of cos(4 pi (phase - line)) over the frames, which neither
-/// twin can sway. "Number for one line higher than half of the number for the other" is read as min > max / 2: then the
-/// line of the higher mean similarity wins, else the longer one.
+/// Rate and offset modulo half a cycle come from a vote, the sum of cos(4 pi (phase - line)) over the frames,
+/// which neither twin can sway. "Number for one line higher than half of the number for the other" is read as
+/// min > max / 2: then the line of the higher mean similarity wins, else the longer one.
 pub fn two_line_rule(estimates: &[PhaseEstimate], rates: &CadenceRange) -> Option<TwoLineChoice> {
     let first = estimates.first()?.time_s;
     let (rate, offset) = vote(estimates, rates, first);
@@ -242,7 +243,8 @@ struct Faced {
     hypotheses: Vec<Vec<Hypothesis>>,
 }
 
-/// Starts a walk on a handful of frames: whole-cycle search, phase lines for forward and backward walking, regression.
+/// Starts a walk on a handful of frames: whole-cycle search, phase lines for forward and backward walking,
+/// regression.
 pub fn start(
     frames: &[&FrameEdges],
     course: &Course,
@@ -334,7 +336,8 @@ fn estimates(curves: &[PhaseCurve]) -> Vec<PhaseEstimate> {
 pub struct SwapModel {
     /// Typical margin (S_right - S_wrong) / S_right of the summed similarity. Measured medians: 0.13 to 0.17.
     pub margin: f64,
-    /// Its standard deviation over independent glimpses of one walk: wrong windows of 0.4 s had margins up to 0.07.
+    /// Its standard deviation over independent glimpses of one walk: wrong windows of 0.4 s had margins up to
+    /// 0.07.
     pub glimpse_sd: f64,
     /// Standard deviation that no amount of time removes: people whose arms or legs differ from the average.
     pub person_sd: f64,
@@ -348,10 +351,11 @@ impl Default for SwapModel {
     }
 }
 
-/// Probability that the twin with the summed similarity `other`, and not the one with `chosen`, is the true one.
+/// Probability that the twin with the summed similarity `other`, and not the one with `chosen`, is the true
+/// one.
 ///
-/// The margin m = (chosen - other) / max is taken as normal about ±mu with variance v = person² + glimpse² / n, n the number of
-/// independent glimpses in `duration_s`; then log odds = 2 mu m / v.
+/// The margin m = (chosen - other) / max is taken as normal about ±mu with variance v = person² + glimpse² /
+/// n, n the number of independent glimpses in `duration_s`; then log odds = 2 mu m / v.
 pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
     let top = chosen.max(other);
     if top <= 0.0 {

@@ -1,11 +1,12 @@
 //! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
 //!
-//! It seeks a moving region that could be a person, starts on 13 frames of it, follows both half-cycle twins with filters, fits
-//! the person's deviation once enough of the walk is seen, and ends the walk when the person leaves or stops walking. Then it
-//! seeks again. One person at a time: the largest moving region that is fully visible.
+//! It seeks a moving region that could be a person, starts on 13 frames of it, follows both half-cycle twins
+//! with filters, fits the person's deviation once enough of the walk is seen, and ends the walk when the
+//! person leaves or stops walking. Then it seeks again. One person at a time: the largest moving region that
+//! is fully visible.
 //!
-//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`] frames, and
-//! the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
+//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`]
+//! frames, and the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
 
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
@@ -101,7 +102,8 @@ pub struct TrackerOptions {
     pub start_frames: usize,
     /// Fit of the person's deviation from the average; `None` stays on the average.
     pub person: Option<PersonOptions>,
-    /// Frames that must be followed before the person is fitted. 40: a stride and a half at 25 images a second.
+    /// Frames that must be followed before the person is fitted. 40: a stride and a half at 25 images a
+    /// second.
     pub person_frames: usize,
     /// Cadences that are considered.
     pub cadence: CadenceRange,
@@ -330,7 +332,8 @@ impl Tracker {
         }
     }
 
-    /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through the start frames.
+    /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through
+    ///    the start frames.
     fn begin(&self, size: [u32; 2]) -> Option<Active> {
         let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
         let crown_m = self.walker(COMFORTABLE_MPS)?.level_crown_height_m();

@@ -1,7 +1,8 @@
-//! One walk being followed: prediction, narrow search, filter update, for both half-cycle twins (Rohr 1994, sections 5.2, 6).
+//! One walk being followed: prediction, narrow search, filter update, for both half-cycle twins (Rohr 1994,
+//! sections 5.2, 6).
 //!
-//! A track started half a cycle off never corrects itself: its legs fit almost as well. So both twins are followed, each with
-//! its own filters, and the similarities they collect decide between them.
+//! A track started half a cycle off never corrects itself: its legs fit almost as well. So both twins are
+//! followed, each with its own filters, and the similarities they collect decide between them.
 
 use super::kalman::{ConstantVelocity, FilterOptions};
 use super::score::{EdgeLine, SimilarityOptions};
@@ -22,12 +23,12 @@ pub struct WalkOptions {
     pub hidden_lines: HiddenLines,
 }
 
-/// Smallest and largest half widths of the search: along the path, in height (metres) and in phase. The largest are the
-/// printed ones; the smallest keep three steps on each side.
+/// Smallest and largest half widths of the search: along the path, in height (metres) and in phase. The
+/// largest are the printed ones; the smallest keep three steps on each side.
 const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
 
-/// How well the ground and the length of the legs fix the height of the torso, metres. The printed 10 cm is what one frame's
-/// contours fix it to.
+/// How well the ground and the length of the legs fix the height of the torso, metres. The printed 10 cm is
+/// what one frame's contours fix it to.
 const GROUND_SD_M: f64 = 0.02;
 
 /// The filtered state of one twin.
@@ -169,7 +170,8 @@ impl Walk {
         self.first_time_s.get_or_insert(edges.time_s);
     }
 
-    /// A twin's prediction for a time: from its last step, or from the beginning with the measurement's uncertainty.
+    /// A twin's prediction for a time: from its last step, or from the beginning with the measurement's
+    /// uncertainty.
     pub fn predict(&self, twin: usize, time_s: f64, options: &FilterOptions) -> State {
         match self.twins[twin].steps.last() {
             Some(step) => step.state.predict(time_s - step.time_s, options),
@@ -177,8 +179,8 @@ impl Walk {
         }
     }
 
-    /// P_0 = R for place and phase, the 30 % deviation of section 6 for the velocities; the height is the walker's own over the
-    /// ground.
+    /// P_0 = R for place and phase, the 30 % deviation of section 6 for the velocities; the height is the
+    /// walker's own over the ground.
     fn initial_state(&self, twin: usize, time_s: f64, options: &FilterOptions) -> State {
         let b = &self.beginning;
         let dt = time_s - b.time_s;
