@@ -38,6 +38,8 @@ EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 
 3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
 (what was tracked until then is written)."""
 
+_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png")
+
 _LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at before they are used
 
 
@@ -230,12 +232,22 @@ def _load_camera(path: Path, name: str | None) -> Any:
 def _follow(
     frames: "Iterable[Frame]", tracker: Any, count: int | None, first_frame: int, delivery: Delivery
 ) -> tuple[Any, bool]:
-    """Gives all frames to the tracker; an interrupt ends it after the current frame."""
-    with _Interrupt() as interrupt:
-        for frame in _with_progress(frames, "tracking", count, delivery):
-            tracker.update(frame.luma, frame.time_s)
-            if interrupt.requested:
-                break
+    """Gives all frames to the tracker; an interrupt ends it after the current frame.
+
+    An error in the middle is raised again once the tables hold what was tracked until then.
+    """
+    try:
+        with _Interrupt() as interrupt:
+            for frame in _with_progress(frames, "tracking", count, delivery):
+                tracker.update(frame.luma, frame.time_s)
+                if interrupt.requested:
+                    break
+    except ValueError as error:
+        track = _snapshot(tracker.finish(), first_frame)
+        if not len(track.columns["frame"]):
+            raise
+        _write_tables(track, delivery)
+        raise InputError(f"{error}; the tables hold what was tracked until then") from error
     return _snapshot(tracker.finish(), first_frame), interrupt.requested
 
 
@@ -315,6 +327,8 @@ def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
 
 
 def _write_tables(track: Any, delivery: Delivery) -> list[Path]:
+    for stale in _DRAWN:  # of an earlier run: they would stand beside tables they do not belong to
+        (delivery.out / stale).unlink(missing_ok=True)
     table, events = delivery.out / "track.csv", delivery.out / "events.csv"
     write_track_csv(table, track.columns)
     write_events_csv(events, track.events)
@@ -415,7 +429,7 @@ def _guarded(work: Callable[[], Exit]) -> Exit:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", VideoDamageWarning)  # damage is told in one line instead
             return work()
-    except (ValueError, TypeError, OSError) as error:
+    except (ValueError, TypeError, OSError, OverflowError) as error:
         if os.environ.get("MEMO_DEBUG"):
             raise
         _complain(" ".join(str(error).split()))

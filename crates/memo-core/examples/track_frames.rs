@@ -22,7 +22,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(frames)?.map(|entry| entry.map(|e| e.path())).collect::<Result<_, _>>()?;
-    files.sort();
+    files.retain(|file| file.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")));
+    // frame9 before frame10: shorter names first, then by letter.
+    files.sort_by_key(|file| (file.as_os_str().len(), file.clone()));
     let mut tracker = Tracker::new(options)?;
     for (index, file) in files.iter().enumerate() {
         let grey = image::open(file)?.to_luma8();

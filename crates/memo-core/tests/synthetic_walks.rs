@@ -169,3 +169,30 @@ fn a_high_camera_does_not_make_a_straight_path_slant() {
         assert!(errors(&scene, walk)[2] < 0.02, "seed {seed}");
     }
 }
+
+#[test]
+fn a_sliding_box_is_not_a_walker_and_cut_off_feet_are_not_fully_visible() {
+    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() });
+    let mut slid = Tracker::new(options_for(&scene)).unwrap();
+    let mut cropped = Tracker::new(TrackerOptions::for_height(scene.walker.body.height_m)).unwrap();
+    for k in 0..scene.len() {
+        let mut frame = scene.frame(k % 4);
+        for y in 180..380 {
+            frame.row_mut(y)[60 + 5 * k..130 + 5 * k].fill(60);
+        }
+        slid.update(&frame.as_frame(), scene.time_s(k)).unwrap();
+
+        let walked = scene.frame(k);
+        let sole = scene
+            .truth(scene.len() - 1)
+            .map_or(0.0, |t| scene.camera.project(t.posed.right.ankle).unwrap().y);
+        let rows = sole as usize - 20;
+        let view = memo_core::image::Frame::new(walked.pixels(), 640, rows, 640).unwrap();
+        cropped.update(&view, scene.time_s(k)).unwrap();
+    }
+    for tracker in [&mut slid, &mut cropped] {
+        tracker.finish().unwrap();
+        assert!(tracker.take_finished().is_empty());
+        assert!(tracker.seek_report().refused_starts > 0);
+    }
+}

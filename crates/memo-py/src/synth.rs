@@ -4,7 +4,7 @@ use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use memo_core::synth::{SceneOptions, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
-use pyo3::exceptions::PyIndexError;
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
 /// A walker before a wall with everything known; frames are drawn when asked for.
@@ -15,8 +15,14 @@ pub struct PyScene(SynthScene);
 impl PyScene {
     #[new]
     #[pyo3(signature = (seed=0, *, frames=80, noise_sd=5.0, leftward=None))]
-    fn new(seed: u64, frames: usize, noise_sd: f32, leftward: Option<bool>) -> Self {
-        Self(SynthScene::new(SceneOptions { seed, frames, noise_sd, leftward, ..SceneOptions::default() }))
+    fn new(seed: u64, frames: usize, noise_sd: f32, leftward: Option<bool>) -> PyResult<Self> {
+        let options = SceneOptions { seed, frames, noise_sd, leftward, ..SceneOptions::default() };
+        if frames <= options.empty_frames || !(0.0..=255.0).contains(&noise_sd) {
+            let wanted =
+                format!("frames must exceed {} and noise_sd lie between 0 and 255", options.empty_frames);
+            return Err(PyValueError::new_err(format!("{wanted}; got {frames} and {noise_sd}")));
+        }
+        Ok(Self(SynthScene::new(options)))
     }
 
     /// One grey frame, (H, W) uint8.

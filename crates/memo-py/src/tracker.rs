@@ -67,6 +67,10 @@ impl PyTracker {
         similarity.full_gradient = positive("full_gradient", full_gradient)?;
         similarity.full_velocity = positive("full_velocity", full_velocity)?;
         if let Some(weights) = part_weights {
+            if weights.iter().any(|w| !(w.is_finite() && *w >= 0.0)) || weights.iter().all(|w| *w == 0.0) {
+                let message = format!("part_weights must be 14 numbers from 0, not all 0, got {weights:?}");
+                return Err(PyValueError::new_err(message));
+            }
             similarity.part_weights = weights;
         }
         options.person = adapt.then(PersonOptions::default);

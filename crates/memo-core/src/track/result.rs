@@ -179,8 +179,12 @@ impl TrackedWalk {
         }
     }
 
-    /// Heel strikes and toe-offs where the phase passes them.
+    /// Heel strikes and toe-offs where the phase passes them; none for walking backwards, where toes land
+    /// first and the phases of contact are not known.
     pub fn events(&self) -> Vec<Event> {
+        if self.direction() == Direction::Backward {
+            return Vec::new();
+        }
         let rows = self.rows();
         let marks = [
             (0.0, EventKind::HeelStrike, Side::Right),
@@ -236,6 +240,6 @@ impl Coordinate {
         };
         let ratios: Vec<f64> = (1..steps.len()).filter_map(ratio).collect();
         let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
-        Self { smoothed, sd_scale: mean.sqrt() }
+        Self { smoothed, sd_scale: if ratios.is_empty() { 1.0 } else { mean.sqrt() } }
     }
 }

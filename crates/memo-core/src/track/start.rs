@@ -236,6 +236,16 @@ pub struct StartReport {
     pub frames: Vec<usize>,
 }
 
+impl StartReport {
+    /// Similarity along the best line over the mean over all phases: near 1 where no phase fits better than
+    /// another, as for things that do not walk.
+    pub fn contrast(&self) -> f64 {
+        let all: Vec<f64> = self.curves.iter().flat_map(|c| &c.scores).map(|s| f64::from(*s)).collect();
+        let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
+        if mean > 0.0 { self.lines.best.similarity / mean } else { 0.0 }
+    }
+}
+
 /// Whole-cycle search in every frame, for one direction of facing.
 struct Faced {
     path: Path,
