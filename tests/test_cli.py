@@ -336,3 +336,22 @@ def test_interrupt_of_the_compiled_core(tmp_path):
     frames = read_track_csv(tmp_path / "out" / "track.csv")["frame"]
     assert frames[0] <= 12 and 45 <= frames[-1] < 90, "the walk up to the interrupt, not to its end"
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"track.csv", "events.csv"}
+
+
+def test_a_frame_that_fails_costs_only_what_follows(tmp_path):
+    clip = tmp_path / "frames"
+    clip.mkdir()
+    scene = memo.demo_scene(seed=1, frames=60)
+    for index, frame in enumerate([*scene.frames, np.zeros((240, 320), np.uint8)]):
+        picture = av.VideoFrame.from_ndarray(frame, format="gray")
+        with av.open(str(clip / f"{index:03d}.png"), "w", format="image2", options={"update": "1"}) as file:
+            stream = file.add_stream("png", rate=1)
+            stream.width, stream.height, stream.pix_fmt = frame.shape[1], frame.shape[0], "gray"
+            file.mux(stream.encode(picture))
+            file.mux(stream.encode(None))
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", "import memo.cli; memo.cli.main()", "track", str(clip), "--fps", "25"]
+    done = subprocess.run([*command, "--out", str(out)], capture_output=True, text=True)
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    assert "the tables hold what was tracked until then" in done.stderr
+    assert len(read_track_csv(out / "track.csv")["frame"]) > 40
