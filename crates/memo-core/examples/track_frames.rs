@@ -1,4 +1,4 @@
-//! Tracks a walker through a folder of PNG frames and prints `track.csv` rows.
+//! Tracks a walker through a folder of PNG frames and prints `track.csv` rows, the gait events on standard error.
 //!
 //! `cargo run --release -p memo-core --example track_frames -- FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]`
 
@@ -57,6 +57,9 @@ fn report(walk: &TrackedWalk) {
         walk.p_swapped(),
         walk.person_fit
     );
+    for event in walk.events() {
+        eprintln!("{:.4} s, frame {:.2}: {:?}, {:?}", event.time_s, event.frame, event.kind, event.side);
+    }
 }
 
 fn header() -> String {

@@ -341,7 +341,8 @@ fn estimates(curves: &[PhaseCurve]) -> Vec<PhaseEstimate> {
     curves.iter().map(estimate).collect()
 }
 
-/// How the margin between the twins behaves; measured on real and motion-captured walks.
+/// How the margin between the twins behaves, after a handful of real and motion-captured walks: probabilities
+/// far from 1/2 mean "sure", their size is not a rate that was counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwapModel {
     /// Typical margin (S_right - S_wrong) / S_right of the summed similarity. Measured medians: 0.13 to 0.17.

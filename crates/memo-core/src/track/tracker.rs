@@ -6,7 +6,8 @@
 //! is fully visible.
 //!
 //! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`]
-//! frames, and the rows of the walk under way, which is handed out in pieces of [`LONGEST_WALK`] frames.
+//! or `start_frames` frames, whichever is more, and the rows of the walk under way, which is handed out in
+//! pieces of [`LONGEST_WALK`] frames.
 
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
@@ -147,7 +148,7 @@ const OUTSIDE_SHARE: f64 = 0.4;
 /// Edges are looked for this far around the predicted body, pixels.
 const WINDOW_MARGIN_PX: f64 = 16.0;
 
-/// Why nobody has been followed so far; counts frames of the whole stream.
+/// Counts over the whole stream, walks included, that say why nobody was followed if nobody was.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SeekReport {
     /// Frames seen.
@@ -256,7 +257,7 @@ impl Tracker {
         })
     }
 
-    /// What happened while nobody was followed.
+    /// Counts of candidates and refused starts so far.
     pub fn seek_report(&self) -> SeekReport {
         self.report
     }
