@@ -1,0 +1,5 @@
+//! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985).
+
+pub mod angles;
+pub mod lift;
+pub mod skeleton;
