@@ -105,17 +105,13 @@ impl Roots {
 ///
 /// Roots nearer to each other than `merge_m` are taken for one, their middle. A root behind the camera
 /// (k <= 0) does not count. `noise_rad` is the noise of an image point as an angle.
-///
-/// The extent h = sqrt(l² - d²) along the ray feels the noise e of d most where the segment is nearly
-/// perpendicular to the ray; its standard deviation is taken as sqrt(h² + 2 d e + e²) - h, which is d e / h
-/// for small noise and stays finite at h = 0.
 pub fn roots(start: DVec3, ray: DVec3, length_m: f64, noise_rad: f64, merge_m: f64) -> Roots {
     let middle = start.dot(ray);
     let across = (start - middle * ray).length();
     let half_sq = (length_m - across) * (length_m + across);
     let half = half_sq.max(0.0).sqrt();
     let noise_m = std::f64::consts::SQRT_2 * noise_rad * start.length();
-    let sd_m = (half * half + 2.0 * across * noise_m + noise_m * noise_m).sqrt() - half;
+    let sd_m = extent_sd(half, across, noise_m);
     let at = |k: f64| k * ray;
     let one = |k: f64, kind| Roots { near: at(k), far: at(k), kind, sd_m };
     if half_sq < 0.0 {
@@ -131,6 +127,14 @@ pub fn roots(start: DVec3, ray: DVec3, length_m: f64, noise_rad: f64, merge_m: f
         return one(middle, RootKind::Degenerate);
     }
     Roots { near: at(middle - half), far: at(middle + half), kind: RootKind::Two, sd_m }
+}
+
+/// Standard deviation of a segment's extent h = sqrt(l² - d²) along the ray, for an error e of d or of l.
+///
+/// It feels the error most where the segment is nearly perpendicular to the ray; sqrt(h² + 2 d e + e²) - h
+/// is d e / h for small errors and stays finite at h = 0.
+pub fn extent_sd(extent_m: f64, across_m: f64, error_m: f64) -> f64 {
+    (extent_m * extent_m + 2.0 * across_m * error_m + error_m * error_m).sqrt() - extent_m
 }
 
 #[cfg(test)]

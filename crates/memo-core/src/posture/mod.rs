@@ -2,4 +2,8 @@
 
 pub mod angles;
 pub mod lift;
+pub mod link;
+pub mod prior;
 pub mod skeleton;
+pub mod smooth;
+pub mod viterbi;
