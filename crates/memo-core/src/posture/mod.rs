@@ -1,0 +1,5 @@
+//! One view, known lengths: three-dimensional postures from the image points of one frame (Lee and Chen 1985).
+
+pub mod head;
+
+pub use head::{HeadError, HeadModel, HeadPose, HeadSolution};
