@@ -1,4 +1,4 @@
-//! One view, known lengths: three-dimensional postures from the image points of one frame (Lee and Chen 1985).
+//! One view, known lengths: 3D postures from the image points of one frame (Lee and Chen 1985).
 
 pub mod head;
 

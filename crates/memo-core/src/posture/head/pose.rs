@@ -60,7 +60,8 @@ pub struct HeadPose {
     pub residuals: Vec<DVec2>,
     /// Standard deviation of an image coordinate, given or estimated, image units.
     pub image_sd: f64,
-    /// Sum of the squared residuals over `image_sd`²; about `degrees_of_freedom` if model and noise are right.
+    /// Sum of the squared residuals over `image_sd`²; about `degrees_of_freedom` if model and noise hold.
+    /// Says nothing if `image_sd` was estimated.
     pub chi_squared: f64,
     /// Image coordinates less parameters.
     pub degrees_of_freedom: usize,
