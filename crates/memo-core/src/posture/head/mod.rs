@@ -25,8 +25,8 @@
 //!
 //! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 5 to 7 cm for each pixel of
 //! noise and its facing by 1 to 3 degrees; with f free the depth is next to undetermined. Points are taken as
-//! matched and independent, with one standard deviation: outliers are not searched for, but with a given standard
-//! deviation they show in [`HeadPose::chi_squared`].
+//! matched and independent, with one standard deviation: outliers are not searched for, but show in
+//! [`HeadPose::chi_squared`] if that is given.
 
 mod linear;
 mod model;
@@ -35,7 +35,7 @@ mod search;
 mod table;
 
 pub use linear::{Conditioning, LinearHead, PaperView, linear_head};
-pub use model::{HeadModel, HeadPoint};
+pub use model::{HeadModel, HeadPoint, LEE_CHEN_BODY_HEIGHT_M};
 pub use pose::{Facing, HeadPose, PointEstimate};
 pub use search::{Focal, HeadOptions, HeadSolution, head_pose, head_pose_in_image};
 pub use table::{HeadTable, HeadTableColumn, exact_projections, table_2};
