@@ -2,10 +2,11 @@
 
 use super::PaperView;
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{Matrix3x6, Matrix6, SMatrix};
+use nalgebra::{Matrix3x6, Matrix6, SMatrix, SVector};
 
 /// Rotation vector (3), translation (3), focal length (1).
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
+pub(super) type Vector7 = SVector<f64, 7>;
 type Matrix3x7 = SMatrix<f64, 3, 7>;
 
 /// A point with its first-order covariance.

@@ -14,12 +14,12 @@
 //! more than a tenth of the depth, the true distribution is skewed towards the far side.
 
 use super::linear::LINEAR_POINTS;
-use super::pose::{Matrix7, point_jacobian};
+use super::pose::{Matrix7, Vector7, point_jacobian};
 use super::{Conditioning, HeadError, HeadPose, MAX_COORDINATE, Shape, checked_shape, linear_head};
 use super::{centroid_and_spread, right_svd};
 use crate::model::Camera;
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Points needed with the focal length known: three leave up to four poses, the fourth leaves two equations
 /// to spare.
@@ -214,13 +214,12 @@ struct State {
 
 impl State {
     /// The state after the step (w, dt, df).
-    fn moved(&self, step: &DVector<f64>) -> Self {
+    fn moved(&self, step: &Vector7) -> Self {
         let turn = DQuat::from_scaled_axis(DVec3::new(step[0], step[1], step[2]));
-        let focal_step = if step.len() > 6 { step[6] } else { 0.0 };
         Self {
             rotation: self.rotation * DMat3::from_quat(turn),
             centre: self.centre + DVec3::new(step[3], step[4], step[5]),
-            focal: self.focal + focal_step,
+            focal: self.focal + step[6],
         }
     }
 
@@ -277,24 +276,35 @@ impl Problem<'_> {
         sum.filter(|sum| sum.is_finite()).unwrap_or(f64::INFINITY)
     }
 
+    /// The two rows of J of a point, by (w, t, f); the last column is zero if f is known.
+    ///
     /// d(u, v) = diag(fx, fy) [1/qz, 0, -qx/qz²; 0, 1/qz, -qy/qz²] dq + (qx, qy)/qz df.
-    fn jacobian(&self, state: &State) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(2 * self.centred.len(), self.parameters());
-        for (i, point) in self.centred.iter().enumerate() {
-            let q = state.rotation * *point + state.centre;
-            let plane = q.truncate() / q.z;
-            let moved = point_jacobian(state.rotation, *point);
-            for row in 0..2 {
-                for column in 0..6 {
-                    let slope = (moved[(row, column)] - plane[row] * moved[(2, column)]) / q.z;
-                    jacobian[(2 * i + row, column)] = state.focal[row] * slope;
-                }
-                if self.is_focal_free {
-                    jacobian[(2 * i + row, 6)] = plane[row];
-                }
+    fn jacobian_rows(&self, state: &State, point: DVec3) -> [Vector7; 2] {
+        let q = state.rotation * point + state.centre;
+        let plane = q.truncate() / q.z;
+        let moved = point_jacobian(state.rotation, point);
+        [0, 1].map(|row| {
+            let mut slopes = Vector7::zeros();
+            for column in 0..6 {
+                let slope = (moved[(row, column)] - plane[row] * moved[(2, column)]) / q.z;
+                slopes[column] = state.focal[row] * slope;
+            }
+            slopes[6] = if self.is_focal_free { plane[row] } else { 0.0 };
+            slopes
+        })
+    }
+
+    /// JᵀJ and Jᵀr. With f known an equation 1 df = 0 keeps JᵀJ regular.
+    fn normal_equations(&self, state: &State, residuals: &[DVec2]) -> (Matrix7, Vector7) {
+        let (mut normal, mut gradient) = (Matrix7::zeros(), Vector7::zeros());
+        normal[(6, 6)] = if self.is_focal_free { 0.0 } else { 1.0 };
+        for (point, residual) in self.centred.iter().zip(residuals) {
+            for (row, error) in self.jacobian_rows(state, *point).iter().zip(residual.to_array()) {
+                normal += row * row.transpose();
+                gradient += row * error;
             }
         }
-        jacobian
+        (normal, gradient)
     }
 
     /// A rotation and the translation that suits it best: linear in t,
@@ -344,10 +354,8 @@ impl Problem<'_> {
         let mut current = Minimum { state: start, sum_sq: self.sum_sq(&start) };
         let mut damping = 1e-3;
         for _ in 0..MAX_ITERATIONS {
-            let jacobian = self.jacobian(&current.state);
-            let residuals = flattened(&self.residuals(&current.state)?);
-            let normal = jacobian.tr_mul(&jacobian);
-            let gradient = jacobian.tr_mul(&residuals);
+            let residuals = self.residuals(&current.state)?;
+            let (normal, gradient) = self.normal_equations(&current.state, &residuals);
             // What moves the image by less than this is rounding.
             let still_sq = (1e-12 * self.spread).powi(2).max(1e-20 * current.sum_sq);
             let Some(descent) = self.descent(&current, &normal, &gradient, &mut damping) else {
@@ -368,13 +376,13 @@ impl Problem<'_> {
     fn descent(
         &self,
         from: &Minimum,
-        normal: &DMatrix<f64>,
-        gradient: &DVector<f64>,
+        normal: &Matrix7,
+        gradient: &Vector7,
         damping: &mut f64,
     ) -> Option<Descent> {
         while *damping < 1e8 {
-            let mut damped = normal.clone();
-            for k in 0..damped.nrows() {
+            let mut damped = *normal;
+            for k in 0..7 {
                 damped[(k, k)] *= 1.0 + *damping;
             }
             if let Some(factor) = damped.cholesky() {
@@ -451,7 +459,9 @@ impl Problem<'_> {
     /// D⁻¹ V S⁻² Vᵀ D⁻¹.
     fn inverse_normal(&self, state: &State) -> Result<Matrix7, HeadError> {
         let undetermined = |ratio| HeadError::Undetermined { ratio, needed: MIN_RATIO };
-        let mut jacobian = self.jacobian(state);
+        let rows: Vec<Vector7> =
+            self.centred.iter().flat_map(|point| self.jacobian_rows(state, *point)).collect();
+        let mut jacobian = DMatrix::from_fn(rows.len(), self.parameters(), |i, j| rows[i][j]);
         let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         for (mut column, length) in jacobian.column_iter_mut().zip(&lengths) {
             column /= *length;
@@ -470,10 +480,6 @@ impl Problem<'_> {
         }
         Ok(inverse)
     }
-}
-
-fn flattened(residuals: &[DVec2]) -> DVector<f64> {
-    DVector::from_iterator(2 * residuals.len(), residuals.iter().flat_map(|r| r.to_array()))
 }
 
 #[cfg(test)]
@@ -660,7 +666,7 @@ mod tests {
             }
             errors_deg.sort_by(f64::total_cmp);
             eprintln!(
-                "{sd_px} px, {turn_deg} deg: neck depth {:.1} cm (found {:.1}), facing {:.1} deg (median {:.1})",
+                "{sd_px} px, {turn_deg} deg: depth {:.1} cm (found {:.1}), facing {:.1} deg (median {:.1})",
                 100.0 * depth_sd_m,
                 100.0 * f64::sqrt(depth_sq),
                 predicted.facing().sd_rad().to_degrees(),
