@@ -11,8 +11,9 @@
 //! Each point gives two equations (2) in the twelve elements of `[T]`; together A W = 0 (3). W is the right
 //! singular vector of A's smallest singular value: the solution for six points, least squares for more.
 //!
-//! Nothing makes `[R]` a rotation. With noise it is far from one, and small heads magnify the noise: printed
-//! to five digits, the paper's own input puts the camera 4 cm off. [`super::head_pose`] does better.
+//! Nothing makes `[R]` a rotation, and small heads magnify noise: printed to five digits, the paper's own input
+//! puts the camera 4 cm off. With 1 px of noise on a head at 4 m and 480 px/m nearly half the solutions are
+//! refused and the others are off by some 3 m: in images, use [`super::head_pose`].
 
 use super::{HeadError, MIN_SHAPE_RATIO, Shape};
 use super::{centroid_and_spread, checked_shape, nearest_rotation, right_svd};

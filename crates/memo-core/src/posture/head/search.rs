@@ -707,6 +707,26 @@ mod tests {
         assert!(promised < 0.95 * ambiguous, "no test of probabilities near one");
     }
 
+    /// Why the linear solution is not for images: 1 px of noise, 4 m, seen from the front.
+    #[test]
+    fn the_linear_solution_breaks_where_least_squares_hold() {
+        let points = HeadModel::lee_chen().points_m;
+        let exact = projected(&points, turned(0.0, 0.0, 4.0), FOCAL_PX);
+        let mut random = Random::new(3);
+        let mut depth_errors_m = Vec::new();
+        for _ in 0..100 {
+            let upright = noisy(&exact, 1.0, &mut random).into_iter().map(|q| DVec2::new(q.x, -q.y));
+            if let Ok(linear) = linear_head(&points, &upright.collect::<Vec<_>>(), Conditioning::Normalised) {
+                let (rotation, translation) = linear.camera_from_head();
+                depth_errors_m.push(((rotation * points[0] + translation).z - 4.0).abs());
+            }
+        }
+        depth_errors_m.sort_by(f64::total_cmp);
+        assert!((30..75).contains(&depth_errors_m.len()), "{} answers", depth_errors_m.len());
+        let median_m = depth_errors_m[depth_errors_m.len() / 2];
+        assert!((2.5..4.0).contains(&median_m), "{median_m}");
+    }
+
     #[test]
     fn estimated_noise_is_the_noise() {
         let points = HeadModel::lee_chen().points_m;
