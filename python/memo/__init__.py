@@ -9,26 +9,35 @@ from memo._memo import (
     __version__,
     change_mask,
     edge_segments,
+    head_points,
     moving_regions,
     silhouettes,
     similarity,
+    stick_joints,
     velocity_field,
 )
+from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.scene import DemoScene, demo_scene
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
     "Camera",
     "DemoScene",
+    "Keypoints",
+    "KeypointsError",
     "Track",
     "Tracker",
     "__version__",
     "change_mask",
     "demo_scene",
     "edge_segments",
+    "head_points",
+    "layouts",
     "moving_regions",
+    "read_keypoints",
     "silhouettes",
     "similarity",
+    "stick_joints",
     "track",
     "velocity_field",
 ]

@@ -4,6 +4,7 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod keypoints;
 mod score;
 mod synth;
 mod tracker;
@@ -19,6 +20,11 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::keypoints::{
+        follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
+        stick_joints,
+    };
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
