@@ -12,5 +12,6 @@
 
 pub mod image;
 pub mod model;
+pub mod posture;
 pub mod synth;
 pub mod track;

@@ -1,0 +1,3 @@
+//! Joints of one view and what they say about posture.
+
+pub mod unswap;
