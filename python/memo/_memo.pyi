@@ -18,6 +18,7 @@ __all__ = [
     "moving_regions",
     "silhouettes",
     "similarity",
+    "unswap",
     "velocity_field",
 ]
 
@@ -156,3 +157,14 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+def unswap(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64] | None = None,
+    *,
+    groups: dict[str, dict[str, list[tuple[int, int]]]],
+    as_is_nats: float | None = None,
+    partial_begin_nats: float | None = None,
+    partial_stay_nats: float | None = None,
+    decided_at: float | None = None,
+) -> dict[str, Any]: ...

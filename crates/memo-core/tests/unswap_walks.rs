@@ -69,11 +69,8 @@ impl Motion {
     /// Times at which the ankles pass one another along the heading.
     fn crossings_s(&self) -> Vec<f64> {
         let [x, y] = self.heading();
-        let ahead: Vec<f64> = self
-            .frames
-            .iter()
-            .map(|f| (f[11][0] - f[8][0]) * x + (f[11][1] - f[8][1]) * y)
-            .collect();
+        let ahead: Vec<f64> =
+            self.frames.iter().map(|f| (f[11][0] - f[8][0]) * x + (f[11][1] - f[8][1]) * y).collect();
         let crossed = (1..ahead.len()).filter(|&i| ahead[i - 1] * ahead[i] <= 0.0);
         crossed.map(|i| i as f64 / self.rate_hz).collect()
     }
@@ -165,7 +162,9 @@ fn repair(times_s: &[f64], points_px: &[[f64; 2]], groups: &[LimbGroup]) -> Unsw
     unswap(&keypoints, groups, &UnswapOptions::default()).unwrap()
 }
 
-/// Counts of flips planted, found and false, and of decided and wrong frames.
+/// Counts of flips planted, found and false, and of decided and wrong frames, judged by the outermost level.
+///
+/// Frames that show no pair on both sides are counted apart: nothing can be known of them.
 #[derive(Clone, Copy, Default)]
 struct Count {
     planted: usize,
@@ -174,16 +173,22 @@ struct Count {
     wrong_flips: usize,
     decided_right: usize,
     decided_wrong: usize,
+    unseen: usize,
 }
 
 impl Count {
     fn add(&mut self, flips: &[bool], verdicts: &[Verdict]) {
         for (&flip, verdict) in flips.iter().zip(verdicts) {
+            if verdict.reason == Reason::NothingSeen {
+                self.unseen += 1;
+                continue;
+            }
+            let outer = *verdict.level_flipped.last().unwrap();
             self.frames += 1;
             self.planted += usize::from(flip);
-            self.found += usize::from(flip && verdict.flipped);
-            self.wrong_flips += usize::from(!flip && verdict.flipped);
-            let right = flip == verdict.flipped;
+            self.found += usize::from(flip && outer);
+            self.wrong_flips += usize::from(!flip && outer);
+            let right = flip == outer;
             self.decided_right += usize::from(verdict.decided && right);
             self.decided_wrong += usize::from(verdict.decided && !right);
         }
@@ -201,7 +206,7 @@ impl Count {
         let percent = |n: usize| 100.0 * n as f64 / self.frames.max(1) as f64;
         println!(
             "{what:<34} {:6} frames {:5} flips | found {:6.2} % false {:5.2} % | decided right {:6.2} % \
-             undecided {:6.2} % decided wrong {:5.2} %",
+             undecided {:6.2} % decided wrong {:5.2} % | {} frames show nothing",
             self.frames,
             self.planted,
             self.found_percent(),
@@ -209,6 +214,7 @@ impl Count {
             percent(self.decided_right),
             percent(self.frames - self.decided_right - self.decided_wrong),
             percent(self.decided_wrong),
+            self.unseen,
         );
     }
 }
@@ -221,7 +227,7 @@ impl Calibration {
     const EDGES: [f64; 8] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0];
 
     fn add(&mut self, flips: &[bool], verdicts: &[Verdict]) {
-        for (&flip, v) in flips.iter().zip(verdicts) {
+        for (&flip, v) in flips.iter().zip(verdicts).filter(|(_, v)| v.reason != Reason::NothingSeen) {
             let says = v.probability > 0.5;
             self.0.push((if says { v.probability } else { 1.0 - v.probability }, says == flip));
         }
@@ -243,15 +249,17 @@ impl Calibration {
     }
 }
 
-fn walks() -> Vec<Motion> {
-    WALKS.iter().filter_map(|&(name, skip)| motion(name, skip)).collect()
+fn walks() -> Option<Vec<Motion>> {
+    WALKS.iter().map(|&(name, skip)| motion(name, skip)).collect()
 }
 
 /// Both cameras, both noises.
 fn views(azimuth_deg: f64) -> impl Iterator<Item = View> {
-    [(true, 0.0), (true, 3.0), (false, 0.0), (false, 3.0)]
-        .into_iter()
-        .map(move |(follows, noise_px)| View { azimuth_deg, follows, noise_px })
+    [(true, 0.0), (true, 3.0), (false, 0.0), (false, 3.0)].into_iter().map(move |(follows, noise_px)| View {
+        azimuth_deg,
+        follows,
+        noise_px,
+    })
 }
 
 /// Plants exchanges of `levels` of the group in all walks from this direction at this rate.
@@ -264,7 +272,9 @@ fn planted_cases(
     mut look: impl FnMut(View, &[bool], &Unswapped),
 ) {
     for (w, walk) in walks.iter().enumerate() {
-        for (c, (share, length)) in [(0.1, 1), (0.2, 1), (0.4, 1), (0.3, 5), (0.4, 15)].into_iter().enumerate() {
+        for (c, (share, length)) in
+            [(0.1, 1), (0.2, 1), (0.4, 1), (0.3, 5), (0.4, 15)].into_iter().enumerate()
+        {
             for (v, view) in views(azimuth_deg).enumerate() {
                 let mut random = Random::new((1000 * w + 10 * c + v) as u64 + rate_hz as u64 * 100_000);
                 let times_s = walk.times_s(rate_hz);
@@ -280,17 +290,24 @@ fn planted_cases(
 
 #[test]
 fn exchanged_legs_are_found() {
-    let walks = walks();
+    let Some(walks) = walks() else { return };
     let mut calibration = Calibration::default();
     let mut all = Count::default();
     for (name, azimuth) in VIEWS {
         for rate in RATES {
             let mut counts = [Count::default(); 2];
-            planted_cases(&walks, azimuth, rate, &legs(), |_, _| (), |view, flips, answer| {
-                counts[usize::from(view.noise_px > 0.0)].add(flips, &answer.groups[0].verdicts);
-                all.add(flips, &answer.groups[0].verdicts);
-                calibration.add(flips, &answer.groups[0].verdicts);
-            });
+            planted_cases(
+                &walks,
+                azimuth,
+                rate,
+                &legs(),
+                |_, _| (),
+                |view, flips, answer| {
+                    counts[usize::from(view.noise_px > 0.0)].add(flips, &answer.groups[0].verdicts);
+                    all.add(flips, &answer.groups[0].verdicts);
+                    calibration.add(flips, &answer.groups[0].verdicts);
+                },
+            );
             for (count, noise) in counts.iter().zip(["0 px", "3 px"]) {
                 count.print(&format!("legs {name} {rate} fps {noise}"));
             }
@@ -298,6 +315,192 @@ fn exchanged_legs_are_found() {
     }
     all.print("legs, all");
     calibration.print();
-    assert!(walks.is_empty() || all.found_percent() >= 99.5, "{}", all.found_percent());
+    assert!(all.found_percent() >= 99.5, "{}", all.found_percent());
     assert!(all.false_percent() <= 0.2, "{}", all.false_percent());
+}
+
+/// Without the frames within `gap_s` / 2 of a time at which the ankles pass.
+fn without_crossings(times_s: &[f64], crossings_s: &[f64], gap_s: f64) -> Vec<f64> {
+    let near = |t: f64| crossings_s.iter().any(|c| (t - c).abs() <= 0.5 * gap_s);
+    times_s.iter().copied().filter(|t| !near(*t)).collect()
+}
+
+#[test]
+fn unseen_crossings_are_undecided_rather_than_wrong() {
+    let Some(walks) = walks() else { return };
+    let mut calibration = Calibration::default();
+    for gap_s in [0.12, 0.24, 0.36] {
+        for rate in RATES {
+            let mut count = Count::default();
+            let mut wrong_of_decided = Count::default();
+            let (mut runs, mut reasons) = (0, 0);
+            for (w, walk) in walks.iter().enumerate() {
+                for ((_, azimuth), seed) in VIEWS.into_iter().zip(0..).flat_map(|v| [v; 2]) {
+                    for (v, view) in views(azimuth).enumerate() {
+                        for (share, length) in [(0.0, 1), (0.2, 1), (0.3, 5), (0.4, 15)] {
+                            let mut random = Random::new(
+                                (w * 1000 + seed * 100 + v * 10 + length) as u64
+                                    + (rate * gap_s * 1e6) as u64,
+                            );
+                            let times_s = without_crossings(&walk.times_s(rate), &walk.crossings_s(), gap_s);
+                            let mut points = project(walk, &times_s, view, &mut random);
+                            let flips = planted(times_s.len(), share, length, &mut random);
+                            exchange(&mut points, &flips, &legs().levels);
+                            let answer = repair(&times_s, &points, &[legs()]);
+                            let verdicts = &answer.groups[0].verdicts;
+                            count.add(&flips, verdicts);
+                            if azimuth == 90.0 {
+                                wrong_of_decided.add(&flips, verdicts);
+                            }
+                            calibration.add(&flips, verdicts);
+                            runs += answer.groups[0].runs.len();
+                            let unseen = |v: &&Verdict| matches!(v.reason, Reason::UnseenCrossing { .. });
+                            reasons += verdicts.iter().filter(unseen).count();
+                        }
+                    }
+                }
+            }
+            count.print(&format!("gap {gap_s} s {rate} fps"));
+            wrong_of_decided.print("    of these side view");
+            println!("    {runs} runs, {reasons} frames named an unseen crossing");
+            assert!(count.decided_wrong as f64 <= 0.02 * count.frames as f64, "{}", count.decided_wrong);
+        }
+    }
+    calibration.print();
+}
+
+#[test]
+fn knee_and_ankle_alone_are_found() {
+    let Some(walks) = walks() else { return };
+    let outer = LimbGroup { name: "legs".into(), levels: legs().levels[1..].to_vec() };
+    for (name, azimuth) in VIEWS {
+        for rate in RATES {
+            let (mut with_hips, mut hips, mut without_hips) =
+                (Count::default(), [0usize; 2], Count::default());
+            for (w, walk) in walks.iter().enumerate() {
+                for (v, view) in views(azimuth).enumerate() {
+                    for (share, length) in [(0.2, 1), (0.3, 5), (0.4, 15)] {
+                        let mut random =
+                            Random::new((w * 100 + v * 20 + length) as u64 + rate as u64 * 10_000);
+                        let times_s = walk.times_s(rate);
+                        let mut points = project(walk, &times_s, view, &mut random);
+                        let flips = planted(times_s.len(), share, length, &mut random);
+                        exchange(&mut points, &flips, &outer.levels);
+                        let answer = repair(&times_s, &points, &[legs()]);
+                        with_hips.add(&flips, &answer.groups[0].verdicts);
+                        let hip = answer.groups[0].verdicts.iter().filter(|v| v.level_flipped[0]).count();
+                        hips = [hips[0] + hip, hips[1] + flips.len()];
+                        let answer = repair(&times_s, &points, std::slice::from_ref(&outer));
+                        without_hips.add(&flips, &answer.groups[0].verdicts);
+                    }
+                }
+            }
+            with_hips.print(&format!("knee+ankle {name} {rate} fps"));
+            println!("    hips exchanged wrongly {:.2} %", 100.0 * hips[0] as f64 / hips[1].max(1) as f64);
+            without_hips.print("    no hips given");
+        }
+    }
+}
+
+#[test]
+fn exchanged_arms_are_found() {
+    let Some(walks) = walks() else { return };
+    let mut all = Count::default();
+    for (name, azimuth) in VIEWS {
+        for rate in RATES {
+            let mut count = Count::default();
+            planted_cases(
+                &walks,
+                azimuth,
+                rate,
+                &arms(),
+                |_, _| (),
+                |_, flips, answer| {
+                    count.add(flips, &answer.groups[0].verdicts);
+                    all.add(flips, &answer.groups[0].verdicts);
+                },
+            );
+            count.print(&format!("arms {name} {rate} fps"));
+        }
+    }
+    all.print("arms, all");
+}
+
+#[test]
+fn missing_joints_and_bad_detections_cost_little() {
+    let Some(walks) = walks() else { return };
+    let missing = |points: &mut [[f64; 2]], random: &mut Random| {
+        points.iter_mut().filter(|_| random.uniform(0.0, 1.0) < 0.1).for_each(|p| *p = [f64::NAN; 2]);
+    };
+    let outliers = |points: &mut [[f64; 2]], random: &mut Random| {
+        for p in points {
+            if random.uniform(0.0, 1.0) < 0.05 {
+                *p = p.map(|c| c + random.uniform(-150.0, 150.0));
+            }
+        }
+    };
+    let mut all = [Count::default(); 2];
+    for (name, azimuth) in VIEWS {
+        for rate in RATES {
+            let mut counts = [Count::default(); 2];
+            planted_cases(&walks, azimuth, rate, &legs(), missing, |_, flips, answer| {
+                counts[0].add(flips, &answer.groups[0].verdicts);
+                all[0].add(flips, &answer.groups[0].verdicts);
+            });
+            planted_cases(&walks, azimuth, rate, &legs(), outliers, |_, flips, answer| {
+                counts[1].add(flips, &answer.groups[0].verdicts);
+                all[1].add(flips, &answer.groups[0].verdicts);
+            });
+            counts[0].print(&format!("10 % missing {name} {rate} fps"));
+            counts[1].print(&format!("5 % outliers {name} {rate} fps"));
+        }
+    }
+    all[0].print("10 % missing, all");
+    all[1].print("5 % outliers, all");
+}
+
+#[test]
+fn nothing_is_exchanged_where_nothing_was() {
+    for (name, skip) in WALKS.into_iter().chain([("CMU_02_05_punch", 0)]) {
+        let Some(motion) = motion(name, skip) else { return };
+        let mut counts = [Count::default(); 2];
+        for (_, azimuth) in VIEWS {
+            for rate in RATES {
+                for (v, view) in views(azimuth).enumerate() {
+                    let times_s = motion.times_s(rate);
+                    let points = project(&motion, &times_s, view, &mut Random::new(v as u64));
+                    let answer = repair(&times_s, &points, &[legs(), arms()]);
+                    for (count, group) in counts.iter_mut().zip(&answer.groups) {
+                        count.add(&vec![false; times_s.len()], &group.verdicts);
+                    }
+                }
+            }
+        }
+        counts[0].print(&format!("{name} legs as they are"));
+        counts[1].print(&format!("{name} arms as they are"));
+    }
+}
+
+#[test]
+fn punching_while_standing() {
+    let Some(punch) = motion("CMU_02_05_punch", 0) else { return };
+    for group in [legs(), arms()] {
+        for (name, azimuth) in VIEWS {
+            let mut count = Count::default();
+            for rate in RATES {
+                let walks = std::slice::from_ref(&punch);
+                planted_cases(
+                    walks,
+                    azimuth,
+                    rate,
+                    &group,
+                    |_, _| (),
+                    |_, flips, answer| {
+                        count.add(flips, &answer.groups[0].verdicts);
+                    },
+                );
+            }
+            count.print(&format!("punch, {} {name}", group.name));
+        }
+    }
 }

@@ -7,6 +7,7 @@ mod image;
 mod score;
 mod synth;
 mod tracker;
+mod unswap;
 
 use pyo3::prelude::*;
 
@@ -25,6 +26,8 @@ mod _memo {
     use super::synth::PyScene;
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
+    #[pymodule_export]
+    use super::unswap::unswap;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -71,11 +71,12 @@ pub struct LimbGroup {
 /// Priors, in nats (natural log of odds), and when to be sure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnswapOptions {
-    /// Per frame, against its labels being exchanged. 0.2: a run of 15 exchanged frames costs 3, far less than
-    /// two broken motions (10 to 30), and 12 more frames one way than the other decide the global label with
-    /// 0.9. Larger values harm long runs.
+    /// Per frame, against its labels being exchanged. 0.25: a run of 15 exchanged frames costs 4, far less than
+    /// two broken motions (10 to 30), and 9 more frames one way than the other decide a label with 0.9. Larger
+    /// values harm long runs. Frames count as independent: a detector that errs in runs longer than half a
+    /// step makes the probability of a run's label too sure.
     pub as_is_nats: f64,
-    /// Against neighbouring levels beginning to differ (once in fifty frames).
+    /// Against neighbouring levels beginning to differ (once in a hundred and fifty frames).
     pub partial_begin_nats: f64,
     /// Against their differing for a further frame.
     pub partial_stay_nats: f64,
@@ -85,7 +86,7 @@ pub struct UnswapOptions {
 
 impl Default for UnswapOptions {
     fn default() -> Self {
-        Self { as_is_nats: 0.2, partial_begin_nats: 4.0, partial_stay_nats: 0.3, decided_at: 0.9 }
+        Self { as_is_nats: 0.25, partial_begin_nats: 5.0, partial_stay_nats: 0.3, decided_at: 0.9 }
     }
 }
 
@@ -295,7 +296,9 @@ impl Reason {
                 format!("undecided: joints coincide within {distance_px:.1} px")
             }
             Self::Unclear => "undecided: motion fits both labels".into(),
-            Self::GlobalLabel => "undecided: labels agree with one another, no majority for either side".into(),
+            Self::GlobalLabel => {
+                "undecided: labels agree with one another, no majority for either side".into()
+            }
             Self::NothingSeen => "kept: nothing seen".into(),
         }
     }
@@ -431,7 +434,8 @@ impl<'a> Limb<'a> {
                 let triple = relative::triple_costs(times_s, [a, b, c], scale);
                 costs[level].iter_mut().zip(triple).for_each(|(sum, cost)| *sum += cost);
             }
-            for (_, past) in past.iter_mut().enumerate().filter(|(level, _)| seen >> level & 1 == 1) {
+            let seen = past.iter_mut().enumerate().filter(|(level, _)| seen >> level & 1 == 1);
+            for (_, past) in seen {
                 *past = [past[1], Some(t)];
             }
             all.push(costs);
@@ -500,9 +504,11 @@ impl<'a> Limb<'a> {
     /// Level and distance, px, of the pair furthest apart.
     fn furthest(&self, step: usize) -> (usize, f64) {
         let t = self.shown[step].0;
-        let apart = self.tracks.iter().zip(&self.level_of).filter_map(|(track, &level)| {
-            track[t].map(|sample| (level, sample.difference.length()))
-        });
+        let apart = self
+            .tracks
+            .iter()
+            .zip(&self.level_of)
+            .filter_map(|(track, &level)| track[t].map(|sample| (level, sample.difference.length())));
         apart.fold((0, -1.0), |best, other| if other.1 > best.1 { other } else { best })
     }
 
@@ -679,4 +685,160 @@ fn check_options(options: &UnswapOptions) -> Result<(), UnswapError> {
         return Err(UnswapError::Option { name: "decided_at", wanted: "a probability in (0.5, 1)", value });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::Random;
+
+    /// One pair swinging against each other, joint 0 left, joint 1 right.
+    fn swing(times_s: &[f64], scale_px: f64) -> Vec<[f64; 2]> {
+        let pair = |t: &f64| {
+            let reach = scale_px * (6.0 * t).sin();
+            [[40.0 * scale_px + reach, 0.3 * scale_px], [40.0 * scale_px - reach, 0.0]]
+        };
+        times_s.iter().flat_map(pair).collect()
+    }
+
+    fn times(n: usize) -> Vec<f64> {
+        (0..n).map(|t| 0.04 * t as f64).collect()
+    }
+
+    fn one_pair() -> [LimbGroup; 1] {
+        let levels = vec![Level { name: "ankle".into(), pairs: vec![[0, 1]] }];
+        [LimbGroup { name: "legs".into(), levels }]
+    }
+
+    fn solve(times_s: &[f64], points_px: &[[f64; 2]], scores: Option<&[f64]>) -> Unswapped {
+        let keypoints = Keypoints { times_s, joints: 2, points_px, scores };
+        unswap(&keypoints, &one_pair(), &UnswapOptions::default()).unwrap()
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn planted_exchanges_are_undone_at_any_scale_and_with_uneven_times(
+            seed in 0u64..1000, scale_px in 1e-3..1e4f64, share in 0.0..0.35f64,
+        ) {
+            let mut random = Random::new(seed);
+            let mut time_s = random.uniform(-1e6, 1e6);
+            let times_s: Vec<f64> = (0..80).map(|_| { time_s += random.uniform(0.03, 0.05); time_s }).collect();
+            let start_s = times_s[0];
+            let truth = swing(&times_s.iter().map(|t| t - start_s).collect::<Vec<_>>(), scale_px);
+            let mut seen = truth.clone();
+            let mut scores = vec![0.9; 160];
+            for t in 0..80 {
+                scores[2 * t] = 0.8;
+                if random.uniform(0.0, 1.0) < share {
+                    seen.swap(2 * t, 2 * t + 1);
+                    scores.swap(2 * t, 2 * t + 1);
+                }
+            }
+            let found = solve(&times_s, &seen, Some(&scores));
+            proptest::prop_assert_eq!(&found.points_px, &truth);
+            proptest::prop_assert!(found.scores.unwrap().chunks(2).all(|s| s == [0.8, 0.9]));
+        }
+
+        #[test]
+        fn whatever_comes_only_partners_are_exchanged(
+            points in proptest::collection::vec(
+                proptest::array::uniform2(proptest::prop_oneof![
+                    4 => -1e7..1e7f64, 1 => proptest::strategy::Just(f64::NAN), 1 => proptest::strategy::Just(0.0),
+                ]),
+                0..40,
+            ),
+        ) {
+            let points = &points[..points.len() / 2 * 2];
+            let found = solve(&times(points.len() / 2), points, None);
+            for (t, (before, after)) in points.chunks(2).zip(found.points_px.chunks(2)).enumerate() {
+                let same = |a: [f64; 2], b: [f64; 2]| a.map(f64::to_bits) == b.map(f64::to_bits);
+                let verdict = &found.groups[0].verdicts[t];
+                let [l, r] = if verdict.level_flipped[0] { [1, 0] } else { [0, 1] };
+                proptest::prop_assert!(same(before[0], after[l]) && same(before[1], after[r]));
+                proptest::prop_assert!((0.0..=1.0).contains(&verdict.probability));
+            }
+        }
+    }
+
+    #[test]
+    fn a_level_seen_on_one_side_goes_with_its_group() {
+        let times_s = times(50);
+        let two = |points: Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+            points.chunks(2).flat_map(|p| [p[0], p[1], [p[0][0], 90.0], [f64::NAN; 2]]).collect()
+        };
+        let truth = two(swing(&times_s, 50.0));
+        let mut seen = truth.clone();
+        seen[4 * 20..4 * 21].copy_from_slice(&[1, 0, 3, 2].map(|j| truth[80 + j]));
+        let levels = [("knee", [0, 1]), ("ankle", [2, 3])]
+            .map(|(name, pair)| Level { name: name.into(), pairs: vec![pair] });
+        let group = [LimbGroup { name: "legs".into(), levels: levels.into() }];
+        let keypoints = Keypoints { times_s: &times_s, joints: 4, points_px: &seen, scores: None };
+        let found = unswap(&keypoints, &group, &UnswapOptions::default()).unwrap();
+        assert_eq!(found.points_px[82], truth[82]);
+        assert!(found.points_px[83][0].is_nan());
+        let flipped: Vec<usize> = (0..50).filter(|&t| found.groups[0].verdicts[t].flipped).collect();
+        assert_eq!(flipped, [20]);
+        let reason = &found.groups[0].verdicts[20].reason;
+        assert!(reason.describe(true, &group[0]).starts_with("flipped: continuity of knee, gain"));
+    }
+
+    #[test]
+    fn half_the_frames_either_way_is_no_majority() {
+        let times_s = times(60);
+        let mut seen = swing(&times_s, 50.0);
+        seen[..60].chunks_mut(2).for_each(|pair| pair.swap(0, 1));
+        let found = solve(&times_s, &seen, None);
+        let group = &found.groups[0];
+        assert!((group.global_probability - 0.5).abs() < 0.1, "{}", group.global_probability);
+        assert!(group.verdicts.iter().all(|v| !v.decided));
+        let flips = group.verdicts.windows(2).filter(|v| v[0].flipped != v[1].flipped).count();
+        assert_eq!(flips, 1);
+    }
+
+    #[test]
+    fn nothing_seen_and_coinciding_joints_are_named() {
+        let times_s = times(30);
+        let found = solve(&times_s, &[[f64::NAN; 2]; 60], None);
+        assert!(found.groups[0].verdicts.iter().all(|v| v.reason == Reason::NothingSeen));
+        let mut random = Random::new(1);
+        let same: Vec<[f64; 2]> = (0..60).map(|_| random.normal_pair().map(f64::from)).collect();
+        let found = solve(&times_s, &same, None);
+        let verdicts = &found.groups[0].verdicts;
+        let named = verdicts.iter().filter(|v| matches!(v.reason, Reason::Coincide { .. })).count();
+        assert!(named > 20, "{named}");
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_its_values() {
+        let points = swing(&times(4), 1.0);
+        let options = UnswapOptions::default();
+        let given = |times_s: &[f64], points_px: &[[f64; 2]], scores: Option<&[f64]>| {
+            let keypoints = Keypoints { times_s, joints: 2, points_px, scores };
+            unswap(&keypoints, &one_pair(), &options).unwrap_err().to_string()
+        };
+        assert!(given(&times(5), &points, None).contains("5 frames x 2 joints = 10 points, got 8"));
+        assert!(given(&[0.0, 0.1, 0.1, 0.2], &points, None).contains("at frame 2"));
+        assert!(given(&[f64::NAN, 0.1, 0.2, 0.3], &points, None).contains("NaN s at frame 0"));
+        assert!(given(&times(4), &points, Some(&[1.0; 7])).contains("8 points, got 7"));
+        let mut scores = [1.0; 8];
+        scores[5] = 1.5;
+        assert!(given(&times(4), &points, Some(&scores)).contains("got 1.5 at frame 2, joint 1"));
+        let mut far = points.clone();
+        far[3] = [f64::INFINITY, 0.0];
+        assert!(given(&times(4), &far, None).contains("got (inf, 0) at frame 1, joint 1"));
+        let keypoints = Keypoints { times_s: &times(4), joints: 2, points_px: &points, scores: None };
+        let with = |pairs: Vec<[usize; 2]>| {
+            let levels = vec![Level { name: "knee".into(), pairs }];
+            let group = LimbGroup { name: "legs".into(), levels };
+            unswap(&keypoints, &[group], &options).unwrap_err().to_string()
+        };
+        assert!(with(vec![[0, 2]]).contains("got 2 in group \"legs\""));
+        assert!(with(vec![[0, 0]]).contains("got 0 a second time"));
+        assert!(with(vec![]).contains("got none in level \"knee\""));
+    }
+
+    #[test]
+    fn no_frames_give_no_verdicts() {
+        assert!(solve(&[], &[], None).groups[0].verdicts.is_empty());
+    }
 }

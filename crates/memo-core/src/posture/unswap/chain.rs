@@ -65,8 +65,8 @@ impl<'a> Chain<'a> {
                 let mut bits = seen;
                 loop {
                     let now = kept | bits;
-                    let cost = step.motion[turn | ((last ^ now) & seen)]
-                        + self.prior[(seen * n + last) * n + now];
+                    let cost =
+                        step.motion[turn | ((last ^ now) & seen)] + self.prior[(seen * n + last) * n + now];
                     f((before << l) | last, (next_before << l) | now, cost);
                     if bits == 0 {
                         break;

@@ -34,14 +34,14 @@ pub(super) struct Scale {
 /// Degrees of freedom of the residuals' Student distribution: heavy tails for heel strikes and bad detections.
 const NU: f64 = 4.0;
 /// One triple of samples says no more than this, nats: anything can happen once in e^12.
-const MOST_NATS: f64 = 12.0;
+const MOST_NATS: f64 = 6.0;
 /// Residuals of neighbouring triples share two of three samples; the factor on the noise's variance keeps
 /// them from counting as independent (measured on noise alone: variance of the log ratio twice its mean's).
 const SHARED: f64 = 2.0;
 /// Over this lag walking accelerates evenly enough and noise no longer hides it.
 const LAG_S: f64 = 0.1;
 /// An outlier's distance from its neighbours' line, in medians of that distance.
-const OUTLIER_MEDIANS: f64 = 8.0;
+const OUTLIER_MEDIANS: f64 = 4.5;
 /// Median of |r|^2 over the variance of a coordinate, for two Gaussian coordinates: 2 ln 2.
 const MEDIAN_CHI2: f64 = 2.0 * std::f64::consts::LN_2;
 
@@ -79,9 +79,8 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
         let (Some(typical), Some(length)) = (median(off.clone()), median(lengths.collect())) else { break };
         let limit = (OUTLIER_MEDIANS * typical).max(0.3 * length);
         let at = |i: usize| off.get(i).copied().unwrap_or(0.0);
-        let worst = (0..off.len()).filter(|&i| {
-            at(i) > limit && (i == 0 || at(i) > at(i - 1)) && at(i) >= at(i + 1)
-        });
+        let worst =
+            (0..off.len()).filter(|&i| at(i) > limit && (i == 0 || at(i) > at(i - 1)) && at(i) >= at(i + 1));
         let worst: Vec<usize> = worst.map(|i| seen[i + 1]).collect();
         if worst.is_empty() {
             break;
