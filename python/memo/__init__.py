@@ -18,6 +18,7 @@ from memo._memo import (
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.scene import DemoScene, demo_scene
+from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "DemoScene",
     "Keypoints",
     "KeypointsError",
+    "SideRepair",
     "Track",
     "Tracker",
     "__version__",
@@ -39,5 +41,6 @@ __all__ = [
     "similarity",
     "stick_joints",
     "track",
+    "unswap",
     "velocity_field",
 ]

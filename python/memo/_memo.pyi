@@ -26,6 +26,7 @@ __all__ = [
     "silhouettes",
     "similarity",
     "stick_joints",
+    "unswap",
     "velocity_field",
 ]
 
@@ -182,3 +183,14 @@ def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int
 def follow_person(
     frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
 ) -> list[bool]: ...
+def unswap(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64] | None = None,
+    *,
+    groups: dict[str, dict[str, list[tuple[int, int]]]],
+    as_is_nats: float | None = None,
+    partial_begin_nats: float | None = None,
+    partial_stay_nats: float | None = None,
+    decided_at: float | None = None,
+) -> dict[str, Any]: ...

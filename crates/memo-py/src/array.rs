@@ -200,3 +200,35 @@ pub fn numpy_from_track(
         .into_pyarray(py)
         .reshape([frames, joints, 2])
 }
+
+/// Times of shape (T,), s.
+pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let wanted = "wanted times: numpy array of shape (T,), dtype float64";
+    let Ok(array) = times.cast::<PyArray1<f64>>() else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(times)?)));
+    };
+    Ok(array.readonly().as_array().iter().copied().collect())
+}
+
+/// Joints over time of shape (T, K, 2), px, frame after frame; T and K.
+pub fn joints_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<(Vec<[f64; 2]>, [usize; 2])> {
+    let wanted = "wanted joints over time: numpy array of shape (T, K, 2), dtype float64";
+    let array = points.cast::<PyArray3<f64>>().ok().filter(|array| array.shape()[2] == 2);
+    let Some(array) = array else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    let array = array.readonly();
+    let view = array.as_array();
+    let (frames, joints, _) = view.dim();
+    let at = |i: usize| [0, 1].map(|axis| view[[i / joints, i % joints, axis]]);
+    Ok(((0..frames * joints).map(at).collect(), [frames, joints]))
+}
+
+/// Scores of joints over time, shape (T, K), frame after frame.
+pub fn joint_scores_from_numpy(scores: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let wanted = "wanted scores: numpy array of shape (T, K), dtype float64";
+    let Ok(array) = scores.cast::<PyArray2<f64>>() else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(scores)?)));
+    };
+    Ok(array.readonly().as_array().iter().copied().collect())
+}

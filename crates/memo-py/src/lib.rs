@@ -8,6 +8,7 @@ mod keypoints;
 mod score;
 mod synth;
 mod tracker;
+mod unswap;
 
 use pyo3::prelude::*;
 
@@ -31,6 +32,8 @@ mod _memo {
     use super::synth::PyScene;
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
+    #[pymodule_export]
+    use super::unswap::unswap;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,4 +1,5 @@
-//! One view, known lengths: three-dimensional postures from the image points of a detector or of marks.
+//! Joints of one view and what they say about posture.
 
 pub mod detector;
 pub mod person;
+pub mod unswap;
