@@ -115,3 +115,30 @@ def test_mistakes_are_told_in_one_line(confused, tmp_path, monkeypatch, memo_uns
     assert code == 1 and out == "" and len(err.splitlines()) == 1
     assert message in err and err.startswith("memo: ")
     assert confused[0].read_bytes() == before
+
+
+def test_the_command_writes_an_openpose_folder(tmp_path, monkeypatch, memo_unswap):
+    points = walk()
+    joints = memo.layouts()["COCO_18"]
+    at = [joints.index(name) if name in joints else None for name in NAMES]
+    folder = tmp_path / "json"
+    folder.mkdir()
+    for t, frame in enumerate(points.round(2)):
+        values = np.zeros((18, 3))
+        for place, point in zip(at, frame, strict=True):
+            if place is not None:
+                values[place] = [*point, 0.9]
+        if t in EXCHANGED:
+            values[[8, 9, 10, 11, 12, 13]] = values[[11, 12, 13, 8, 9, 10]]
+        people = [{"pose_keypoints_2d": values.ravel().tolist(), "hand_left_keypoints_2d": [t]}]
+        (folder / f"walk_{t:012d}_keypoints.json").write_text(json.dumps({"people": people}))
+    monkeypatch.chdir(folder)
+    code, out, err = memo_unswap(".", "--fps", 25, "--out", tmp_path / "out")
+    assert (code, err) == (0, "") and "legs in 5" in out
+    written = sorted((tmp_path / "out" / "json").iterdir())
+    assert [file.name for file in written] == sorted(file.name for file in folder.iterdir())
+    for t, file in enumerate(written):
+        data = json.loads(file.read_text())
+        assert data["people"][0]["hand_left_keypoints_2d"] == [t]
+        values = np.array(data["people"][0]["pose_keypoints_2d"]).reshape(18, 3)
+        np.testing.assert_array_equal(values[[8, 11], :2], points[t, :2].round(2))

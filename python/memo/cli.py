@@ -171,7 +171,7 @@ def _add_unswap(app: "typer.Typer") -> None:
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Exchanges right and left in KEYPOINTS where a detector confused them."""
-        delivery = Delivery(out or Path("memo-out") / keypoints.stem, as_json=as_json, quiet=quiet)
+        delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
         options = {"fps": fps, "layout": layout, "person": person}
         raise typer.Exit(_guarded(lambda: _unswap(keypoints, options, delivery)))
 
@@ -228,7 +228,7 @@ def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
     silent = delivery.quiet or not console.is_terminal
     with contextlib.nullcontext() if silent else console.status("looking at right and left"):
         repair = memo.unswap(memo.read_keypoints(path, **options))
-        written = [delivery.out / path.name, delivery.out / "flips.csv"]
+        written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
         if written[0].name == written[1].name:
             raise InputError(f"{path}: is called as the table of changes; rename it")
         repair.keypoints.write(written[0])
