@@ -433,6 +433,8 @@ def test_tables_of_several_people(tmp_path):
         ("\x00,\x01", "needs a column"),
         ("\n\nx", "row 3 has 1 cells"),
         ("   \n", "is empty"),
+        ('frame,"a\nb",x\n1,2,3\n', r"got the columns frame, a\?b, x"),
+        ('frame,"right\nkne_x","b"\n1,2,3\n', r"unknown joint `right\?kne`"),
     ],
 )
 def test_broken_tables_are_refused(tmp_path, text, message):

@@ -45,6 +45,7 @@ _MAX_FILE_BYTES = 512 << 20
 _MAX_FRAME_FILES = 1_000_000
 _MAX_FRAME = 10**9
 _MAX_COORDINATE_PX = 1e6
+_LONGEST_NAME = 60
 # A sequence may have gaps, but frame numbers that are mostly gaps are not those of a video.
 _MAX_FRAMES_PER_SEEN = 20
 _MAX_GAP = 1000
@@ -58,6 +59,10 @@ _PERSON_COLUMNS = ("person", "person_id", "track_id")
 
 class KeypointsError(ValueError):
     """Keypoints that cannot be read or written; the message says which file and why, in one line."""
+
+    def __init__(self, message: str) -> None:
+        # Names and cells of damaged files may hold anything.
+        super().__init__("".join(character if character.isprintable() else "?" for character in message))
 
 
 @dataclass(frozen=True)
@@ -637,6 +642,8 @@ def _wide_columns(path: Path, header: list[str]) -> tuple[tuple[str, ...], list[
 
 def _joint(path: Path, text: str) -> str | None:
     """The joint a table names, None for what is none; a misspelt one is refused."""
+    if len(text) > _LONGEST_NAME:
+        return None
     try:
         return _memo.joint_name(text)
     except ValueError as error:
@@ -808,4 +815,4 @@ def _short(value: Any) -> str:
         if isinstance(value, dict | list)
         else repr(value)
     )
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 3]}..."
