@@ -71,12 +71,12 @@ pub struct LimbGroup {
 /// Priors, in nats (natural log of odds), and when to be sure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnswapOptions {
-    /// Per frame, against its labels being exchanged. 0.25: a run of 15 exchanged frames costs 4, far less than
-    /// two broken motions (10 to 30), and 9 more frames one way than the other decide a label with 0.9. Larger
+    /// Per frame, against its labels being exchanged. 0.2: a run of 15 exchanged frames costs 3, far less than
+    /// two broken motions (10 to 30), and 11 more frames one way than the other decide a label with 0.9. Larger
     /// values harm long runs. Frames count as independent: a detector that errs in runs longer than half a
     /// step makes the probability of a run's label too sure.
     pub as_is_nats: f64,
-    /// Against neighbouring levels beginning to differ (once in a hundred and fifty frames).
+    /// Against neighbouring levels beginning to differ (once in ninety frames).
     pub partial_begin_nats: f64,
     /// Against their differing for a further frame.
     pub partial_stay_nats: f64,
@@ -86,7 +86,7 @@ pub struct UnswapOptions {
 
 impl Default for UnswapOptions {
     fn default() -> Self {
-        Self { as_is_nats: 0.25, partial_begin_nats: 5.0, partial_stay_nats: 0.3, decided_at: 0.9 }
+        Self { as_is_nats: 0.2, partial_begin_nats: 4.5, partial_stay_nats: 0.3, decided_at: 0.9 }
     }
 }
 

@@ -33,8 +33,9 @@ pub(super) struct Scale {
 
 /// Degrees of freedom of the residuals' Student distribution: heavy tails for heel strikes and bad detections.
 const NU: f64 = 4.0;
-/// One triple of samples says no more than this, nats: anything can happen once in e^12.
-const MOST_NATS: f64 = 6.0;
+/// One triple of samples says no more than this, nats: anything can happen once in e^8. Less and
+/// an exchange of knee and ankle alone is lost, more and single bad detections turn a whole run.
+const MOST_NATS: f64 = 8.0;
 /// Residuals of neighbouring triples share two of three samples; the factor on the noise's variance keeps
 /// them from counting as independent (measured on noise alone: variance of the log ratio twice its mean's).
 const SHARED: f64 = 2.0;
