@@ -114,7 +114,9 @@ pub enum UnswapError {
         got: usize,
     },
     /// A time that is not finite, or not later than the one before.
-    #[error("wanted finite times at least 1e-6 s apart, got {time_s} s at frame {frame} after {before_s} s")]
+    #[error(
+        "wanted times within +-1e12 s at least 1e-6 s apart, got {time_s} s at frame {frame} after {before_s} s"
+    )]
     Time {
         /// Frame of the bad time.
         frame: usize,
@@ -452,7 +454,9 @@ impl<'a> Limb<'a> {
                     |(l, c): (usize, &[f64; 4])| c[2 * (turned_before >> l & 1) + (turned_now >> l & 1)];
                 costs.iter().enumerate().map(of_level).sum()
             };
-            Step { seen, motion: (0..n * n).map(cost).collect() }
+            let motion: Vec<f64> = (0..n * n).map(cost).collect();
+            let least = motion.iter().copied().fold(f64::INFINITY, f64::min);
+            Step { seen, motion: motion.into_iter().map(|cost| cost - least).collect() }
         };
         self.shown.iter().zip(costs).map(step).collect()
     }
@@ -573,7 +577,8 @@ impl<'a> Limb<'a> {
     /// Per step and level: by how much exchanging that sample alone makes the motion dearer, nats.
     fn gains(&self, solution: &Solution) -> Vec<Vec<f64>> {
         let mut gains = vec![vec![0.0; self.levels]; self.shown.len()];
-        for level in 0..self.levels {
+        let levels = 0..self.levels;
+        for level in levels {
             let steps: Vec<usize> =
                 (0..self.shown.len()).filter(|&k| self.shown[k].1 >> level & 1 == 1).collect();
             for w in steps.windows(3) {
@@ -629,7 +634,8 @@ fn check_keypoints(keypoints: &Keypoints) -> Result<(), UnswapError> {
     }
     for (frame, &time_s) in times_s.iter().enumerate() {
         let before_s = times_s[frame.saturating_sub(1)];
-        if !(time_s.abs() < 1e12) || (frame > 0 && !(time_s - before_s >= MIN_STEP_S)) {
+        let finite = time_s.is_finite() && time_s.abs() < 1e12;
+        if !finite || (frame > 0 && time_s - before_s < MIN_STEP_S) {
             return Err(UnswapError::Time { frame, time_s, before_s });
         }
     }

@@ -148,11 +148,11 @@ impl<'a> Chain<'a> {
             }
             let mut next = vec![0.0; states];
             let mut doubt = None;
-            for k in start + 1..path.len() {
+            for (k, &bits) in path.iter().enumerate().skip(start + 1) {
                 self.forward(&self.steps[k], &now, &mut next);
                 std::mem::swap(&mut now, &mut next);
                 let beta = &posterior.beta[k * states..][..states];
-                let known = self.agreement(&now, beta, self.steps[k].seen, path[k]);
+                let known = self.agreement(&now, beta, self.steps[k].seen, bits);
                 if known >= sure {
                     doubt = None;
                 } else if k - *doubt.get_or_insert(k) + 1 >= patience {
