@@ -353,7 +353,7 @@ struct Limb<'a> {
 /// Everything found about the bits of a group.
 struct Solution {
     scales: Vec<Scale>,
-    /// Per step and level, the costs of the four sign patterns, and the steps of the last two samples.
+    /// Per step and level, the costs of the four sign patterns.
     costs: Vec<Vec<[f64; 4]>>,
     path: Vec<usize>,
     posterior: Posterior,
