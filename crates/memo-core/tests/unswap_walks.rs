@@ -194,6 +194,16 @@ impl Count {
         }
     }
 
+    fn join(&mut self, other: &Self) {
+        self.planted += other.planted;
+        self.found += other.found;
+        self.frames += other.frames;
+        self.wrong_flips += other.wrong_flips;
+        self.decided_right += other.decided_right;
+        self.decided_wrong += other.decided_wrong;
+        self.unseen += other.unseen;
+    }
+
     fn found_percent(&self) -> f64 {
         100.0 * self.found as f64 / self.planted.max(1) as f64
     }
@@ -335,7 +345,7 @@ fn unseen_crossings_are_undecided_rather_than_wrong() {
             let mut wrong_of_decided = Count::default();
             let (mut runs, mut reasons) = (0, 0);
             for (w, walk) in walks.iter().enumerate() {
-                for ((_, azimuth), seed) in VIEWS.into_iter().zip(0..).flat_map(|v| [v; 2]) {
+                for ((_, azimuth), seed) in VIEWS.into_iter().zip(0..) {
                     for (v, view) in views(azimuth).enumerate() {
                         for (share, length) in [(0.0, 1), (0.2, 1), (0.3, 5), (0.4, 15)] {
                             let mut random = Random::new(
@@ -363,7 +373,7 @@ fn unseen_crossings_are_undecided_rather_than_wrong() {
             count.print(&format!("gap {gap_s} s {rate} fps"));
             wrong_of_decided.print("    of these side view");
             println!("    {runs} runs, {reasons} frames named an unseen crossing");
-            assert!(count.decided_wrong as f64 <= 0.02 * count.frames as f64, "{}", count.decided_wrong);
+            assert!(count.decided_wrong as f64 <= 0.005 * count.frames as f64, "{}", count.decided_wrong);
         }
     }
     calibration.print();
@@ -372,6 +382,7 @@ fn unseen_crossings_are_undecided_rather_than_wrong() {
 #[test]
 fn knee_and_ankle_alone_are_found() {
     let Some(walks) = walks() else { return };
+    let mut all = [Count::default(); 2];
     let outer = LimbGroup { name: "legs".into(), levels: legs().levels[1..].to_vec() };
     for (name, azimuth) in VIEWS {
         for rate in RATES {
@@ -398,7 +409,13 @@ fn knee_and_ankle_alone_are_found() {
             with_hips.print(&format!("knee+ankle {name} {rate} fps"));
             println!("    hips exchanged wrongly {:.2} %", 100.0 * hips[0] as f64 / hips[1].max(1) as f64);
             without_hips.print("    no hips given");
+            all.iter_mut().zip([with_hips, without_hips]).for_each(|(all, count)| all.join(&count));
         }
+    }
+    for (all, what) in all.iter().zip(["knee+ankle, hips right, all", "knee+ankle, no hips, all"]) {
+        all.print(what);
+        assert!(all.found_percent() >= 99.5, "{}", all.found_percent());
+        assert!(all.false_percent() <= 0.2, "{}", all.false_percent());
     }
 }
 
@@ -424,6 +441,8 @@ fn exchanged_arms_are_found() {
         }
     }
     all.print("arms, all");
+    assert!(all.found_percent() >= 99.5, "{}", all.found_percent());
+    assert!(all.false_percent() <= 0.2, "{}", all.false_percent());
 }
 
 #[test]
@@ -457,6 +476,11 @@ fn missing_joints_and_bad_detections_cost_little() {
     }
     all[0].print("10 % missing, all");
     all[1].print("5 % outliers, all");
+    assert!(all[0].found_percent() >= 99.5, "{}", all[0].found_percent());
+    assert!(all[0].false_percent() <= 0.2, "{}", all[0].false_percent());
+    // Bad detections within 150 px hide in walking at 8 and 12.5 fps: 99.5 and 0.2 % are not reached there.
+    assert!(all[1].found_percent() >= 98.5, "{}", all[1].found_percent());
+    assert!(all[1].false_percent() <= 1.0, "{}", all[1].false_percent());
 }
 
 #[test]
@@ -470,6 +494,7 @@ fn nothing_is_exchanged_where_nothing_was() {
                     let times_s = motion.times_s(rate);
                     let points = project(&motion, &times_s, view, &mut Random::new(v as u64));
                     let answer = repair(&times_s, &points, &[legs(), arms()]);
+                    assert!(answer.groups.iter().flat_map(|g| &g.verdicts).all(|v| !v.flipped));
                     for (count, group) in counts.iter_mut().zip(&answer.groups) {
                         count.add(&vec![false; times_s.len()], &group.verdicts);
                     }
@@ -478,6 +503,7 @@ fn nothing_is_exchanged_where_nothing_was() {
         }
         counts[0].print(&format!("{name} legs as they are"));
         counts[1].print(&format!("{name} arms as they are"));
+        assert_eq!(counts.map(|count| count.wrong_flips), [0, 0]);
     }
 }
 
@@ -487,7 +513,7 @@ fn punching_while_standing() {
     for group in [legs(), arms()] {
         for (name, azimuth) in VIEWS {
             let mut count = Count::default();
-            for rate in RATES {
+            for rate in [8.0, 25.0] {
                 let walks = std::slice::from_ref(&punch);
                 planted_cases(
                     walks,
@@ -501,6 +527,9 @@ fn punching_while_standing() {
                 );
             }
             count.print(&format!("punch, {} {name}", group.name));
+            // Arms seen from the side coincide while both hang or both guard.
+            assert!(count.found_percent() >= 98.0, "{}", count.found_percent());
+            assert!(count.false_percent() <= 0.5, "{}", count.false_percent());
         }
     }
 }

@@ -224,10 +224,11 @@ pub fn joints_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<(Vec<[f64; 2]>, 
     Ok(((0..frames * joints).map(at).collect(), [frames, joints]))
 }
 
-/// Scores of joints over time, shape (T, K), frame after frame.
-pub fn joint_scores_from_numpy(scores: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let wanted = "wanted scores: numpy array of shape (T, K), dtype float64";
-    let Ok(array) = scores.cast::<PyArray2<f64>>() else {
+/// Scores of joints over time, of the joints' shape (T, K), frame after frame.
+pub fn joint_scores_from_numpy(scores: &Bound<'_, PyAny>, shape: [usize; 2]) -> PyResult<Vec<f64>> {
+    let array = scores.cast::<PyArray2<f64>>().ok().filter(|array| array.shape() == shape);
+    let Some(array) = array else {
+        let wanted = format!("wanted scores: numpy array of shape {shape:?}, dtype float64");
         return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(scores)?)));
     };
     Ok(array.readonly().as_array().iter().copied().collect())

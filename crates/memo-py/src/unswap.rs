@@ -31,7 +31,7 @@ pub fn unswap<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let times_s = times_from_numpy(times_s)?;
     let (points_px, shape) = joints_from_numpy(points)?;
-    let scores = scores.map(joint_scores_from_numpy).transpose()?;
+    let scores = scores.map(|scores| joint_scores_from_numpy(scores, shape)).transpose()?;
     let groups = groups_from_dict(groups)?;
     let default = UnswapOptions::default();
     let options = UnswapOptions {

@@ -71,12 +71,12 @@ pub struct LimbGroup {
 /// Priors, in nats (natural log of odds), and when to be sure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnswapOptions {
-    /// Per frame, against its labels being exchanged. 0.25: a run of 15 exchanged frames costs 4, far less than
-    /// two broken motions (10 to 30), and 9 more frames one way than the other decide a label with 0.9. Larger
+    /// Per frame, against its labels being exchanged. 0.2: a run of 15 exchanged frames costs 3, far less than
+    /// two broken motions (10 to 30), and 11 more frames one way than the other decide a label with 0.9. Larger
     /// values harm long runs. Frames count as independent: a detector that errs in runs longer than half a
     /// step makes the probability of a run's label too sure.
     pub as_is_nats: f64,
-    /// Against neighbouring levels beginning to differ (once in a hundred and fifty frames).
+    /// Against neighbouring levels beginning to differ (once in ninety frames).
     pub partial_begin_nats: f64,
     /// Against their differing for a further frame.
     pub partial_stay_nats: f64,
@@ -86,7 +86,7 @@ pub struct UnswapOptions {
 
 impl Default for UnswapOptions {
     fn default() -> Self {
-        Self { as_is_nats: 0.25, partial_begin_nats: 5.0, partial_stay_nats: 0.3, decided_at: 0.9 }
+        Self { as_is_nats: 0.2, partial_begin_nats: 4.5, partial_stay_nats: 0.3, decided_at: 0.9 }
     }
 }
 
@@ -114,7 +114,9 @@ pub enum UnswapError {
         got: usize,
     },
     /// A time that is not finite, or not later than the one before.
-    #[error("wanted finite times at least 1e-6 s apart, got {time_s} s at frame {frame} after {before_s} s")]
+    #[error(
+        "wanted times within +-1e12 s at least 1e-6 s apart, got {time_s} s at frame {frame} after {before_s} s"
+    )]
     Time {
         /// Frame of the bad time.
         frame: usize,
@@ -351,7 +353,7 @@ struct Limb<'a> {
 /// Everything found about the bits of a group.
 struct Solution {
     scales: Vec<Scale>,
-    /// Per step and level, the costs of the four sign patterns, and the steps of the last two samples.
+    /// Per step and level, the costs of the four sign patterns.
     costs: Vec<Vec<[f64; 4]>>,
     path: Vec<usize>,
     posterior: Posterior,
@@ -452,7 +454,9 @@ impl<'a> Limb<'a> {
                     |(l, c): (usize, &[f64; 4])| c[2 * (turned_before >> l & 1) + (turned_now >> l & 1)];
                 costs.iter().enumerate().map(of_level).sum()
             };
-            Step { seen, motion: (0..n * n).map(cost).collect() }
+            let motion: Vec<f64> = (0..n * n).map(cost).collect();
+            let least = motion.iter().copied().fold(f64::INFINITY, f64::min);
+            Step { seen, motion: motion.into_iter().map(|cost| cost - least).collect() }
         };
         self.shown.iter().zip(costs).map(step).collect()
     }
@@ -573,7 +577,8 @@ impl<'a> Limb<'a> {
     /// Per step and level: by how much exchanging that sample alone makes the motion dearer, nats.
     fn gains(&self, solution: &Solution) -> Vec<Vec<f64>> {
         let mut gains = vec![vec![0.0; self.levels]; self.shown.len()];
-        for level in 0..self.levels {
+        let levels = 0..self.levels;
+        for level in levels {
             let steps: Vec<usize> =
                 (0..self.shown.len()).filter(|&k| self.shown[k].1 >> level & 1 == 1).collect();
             for w in steps.windows(3) {
@@ -629,7 +634,8 @@ fn check_keypoints(keypoints: &Keypoints) -> Result<(), UnswapError> {
     }
     for (frame, &time_s) in times_s.iter().enumerate() {
         let before_s = times_s[frame.saturating_sub(1)];
-        if !(time_s.abs() < 1e12) || (frame > 0 && !(time_s - before_s >= MIN_STEP_S)) {
+        let finite = time_s.is_finite() && time_s.abs() < 1e12;
+        if !finite || (frame > 0 && time_s - before_s < MIN_STEP_S) {
             return Err(UnswapError::Time { frame, time_s, before_s });
         }
     }

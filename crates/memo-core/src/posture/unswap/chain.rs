@@ -31,6 +31,8 @@ pub(super) struct Chain<'a> {
     steps: &'a [Step],
     /// Prior cost per (seen, last, now), shared by all frames.
     prior: Vec<f64>,
+    /// e^-cost of each.
+    prior_weight: Vec<f64>,
 }
 
 /// Scaled forward and backward variables, `[step][state]`.
@@ -46,17 +48,17 @@ impl<'a> Chain<'a> {
             let (seen, last, now) = (i / (n * n), i / n % n, i % n);
             prior_cost(levels, seen, last, now, prior)
         });
-        Self { levels, steps, prior: table.collect() }
+        let prior: Vec<f64> = table.collect();
+        Self { levels, steps, prior_weight: weights(&prior), prior }
     }
 
     fn states(&self) -> usize {
         1 << (2 * self.levels)
     }
 
-    /// Calls `f(state, next_state, cost)` for every way through a step.
-    fn each_way(&self, step: &Step, mut f: impl FnMut(usize, usize, f64)) {
+    /// Calls `f(state, next_state, index of the motion's cost, index of the prior's)` for every way on.
+    fn each_way(&self, seen: usize, mut f: impl FnMut(usize, usize, usize, usize)) {
         let (l, n) = (self.levels, 1 << self.levels);
-        let seen = step.seen;
         for before in 0..n {
             for last in 0..n {
                 let kept = last & !seen;
@@ -65,9 +67,8 @@ impl<'a> Chain<'a> {
                 let mut bits = seen;
                 loop {
                     let now = kept | bits;
-                    let cost =
-                        step.motion[turn | ((last ^ now) & seen)] + self.prior[(seen * n + last) * n + now];
-                    f((before << l) | last, (next_before << l) | now, cost);
+                    let motion = turn | ((last ^ now) & seen);
+                    f((before << l) | last, (next_before << l) | now, motion, (seen * n + last) * n + now);
                     if bits == 0 {
                         break;
                     }
@@ -85,7 +86,8 @@ impl<'a> Chain<'a> {
         let mut from = vec![0u16; states * self.steps.len()];
         for (step, from) in self.steps.iter().zip(from.chunks_mut(states)) {
             let mut next = vec![f64::INFINITY; states];
-            self.each_way(step, |state, to, c| {
+            self.each_way(step.seen, |state, to, motion, prior| {
+                let c = step.motion[motion] + self.prior[prior];
                 if cost[state] + c < next[to] {
                     next[to] = cost[state] + c;
                     from[to] = state as u16;
@@ -118,7 +120,11 @@ impl<'a> Chain<'a> {
             let row = &mut earlier[(k - 1) * states..];
             let later = &later[..states];
             row.fill(0.0);
-            self.each_way(&self.steps[k], |state, to, cost| row[state] += (-cost).exp() * later[to]);
+            let step = &self.steps[k];
+            let motion_weight = weights(&step.motion);
+            self.each_way(step.seen, |state, to, motion, prior| {
+                row[state] += motion_weight[motion] * self.prior_weight[prior] * later[to];
+            });
             scale(row);
         }
         Posterior { alpha, beta }
@@ -126,7 +132,10 @@ impl<'a> Chain<'a> {
 
     fn forward(&self, step: &Step, now: &[f64], next: &mut [f64]) {
         next.fill(0.0);
-        self.each_way(step, |state, to, cost| next[to] += now[state] * (-cost).exp());
+        let motion_weight = weights(&step.motion);
+        self.each_way(step.seen, |state, to, motion, prior| {
+            next[to] += now[state] * motion_weight[motion] * self.prior_weight[prior];
+        });
         scale(next);
     }
 
@@ -148,11 +157,11 @@ impl<'a> Chain<'a> {
             }
             let mut next = vec![0.0; states];
             let mut doubt = None;
-            for k in start + 1..path.len() {
+            for (k, &bits) in path.iter().enumerate().skip(start + 1) {
                 self.forward(&self.steps[k], &now, &mut next);
                 std::mem::swap(&mut now, &mut next);
                 let beta = &posterior.beta[k * states..][..states];
-                let known = self.agreement(&now, beta, self.steps[k].seen, path[k]);
+                let known = self.agreement(&now, beta, self.steps[k].seen, bits);
                 if known >= sure {
                     doubt = None;
                 } else if k - *doubt.get_or_insert(k) + 1 >= patience {
@@ -194,6 +203,10 @@ fn probability_set(alpha: &[f64], beta: &[f64], level: usize) -> f64 {
         }
     }
     if all > 0.0 { set / all } else { 0.5 }
+}
+
+fn weights(costs: &[f64]) -> Vec<f64> {
+    costs.iter().map(|cost| (-cost).exp()).collect()
 }
 
 fn scale(row: &mut [f64]) {

@@ -33,10 +33,12 @@ pub(super) struct Scale {
 
 /// Degrees of freedom of the residuals' Student distribution: heavy tails for heel strikes and bad detections.
 const NU: f64 = 4.0;
-/// One triple of samples says no more than this, nats: anything can happen once in e^12.
-const MOST_NATS: f64 = 6.0;
-/// Residuals of neighbouring triples share two of three samples; the factor on the noise's variance keeps
-/// them from counting as independent (measured on noise alone: variance of the log ratio twice its mean's).
+/// One triple of samples says no more than this, nats: anything can happen once in e^8. Less and
+/// an exchange of knee and ankle alone is lost, more and single bad detections turn a whole run.
+const MOST_NATS: f64 = 8.0;
+/// Residuals of neighbouring triples share two of three samples: for white noise the log odds of a single
+/// exchange vary by 7.8 (d / sd)^2 where independent residuals of that mean would vary by 4. Doubling the
+/// noise's variance keeps the odds from being too sure.
 const SHARED: f64 = 2.0;
 /// Over this lag walking accelerates evenly enough and noise no longer hides it.
 const LAG_S: f64 = 0.1;
