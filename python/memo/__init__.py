@@ -9,26 +9,38 @@ from memo._memo import (
     __version__,
     change_mask,
     edge_segments,
+    head_points,
     moving_regions,
     silhouettes,
     similarity,
+    stick_joints,
     velocity_field,
 )
+from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.scene import DemoScene, demo_scene
+from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
     "Camera",
     "DemoScene",
+    "Keypoints",
+    "KeypointsError",
+    "SideRepair",
     "Track",
     "Tracker",
     "__version__",
     "change_mask",
     "demo_scene",
     "edge_segments",
+    "head_points",
+    "layouts",
     "moving_regions",
+    "read_keypoints",
     "silhouettes",
     "similarity",
+    "stick_joints",
     "track",
+    "unswap",
     "velocity_field",
 ]

@@ -15,9 +15,18 @@ __all__ = [
     "__version__",
     "change_mask",
     "edge_segments",
+    "follow_person",
+    "guess_layout",
+    "head_points",
+    "joint_name",
+    "keypoint_layout",
+    "keypoint_layouts",
     "moving_regions",
+    "side_pairs",
     "silhouettes",
     "similarity",
+    "stick_joints",
+    "unswap",
     "velocity_field",
 ]
 
@@ -156,3 +165,32 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+def keypoint_layouts() -> list[str]: ...
+def keypoint_layout(name: str) -> tuple[str, list[str]]: ...
+def guess_layout(points: npt.NDArray[np.float64]) -> str: ...
+def joint_name(name: str) -> str | None: ...
+def stick_joints(
+    layout_or_names: str | Sequence[str],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def head_points(
+    layout_or_names: str | Sequence[str],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int, int]]: ...
+def follow_person(
+    frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
+) -> list[bool]: ...
+def unswap(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64] | None = None,
+    *,
+    groups: dict[str, dict[str, list[tuple[int, int]]]],
+    as_is_nats: float | None = None,
+    partial_begin_nats: float | None = None,
+    partial_stay_nats: float | None = None,
+    decided_at: float | None = None,
+) -> dict[str, Any]: ...

@@ -4,9 +4,11 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod keypoints;
 mod score;
 mod synth;
 mod tracker;
+mod unswap;
 
 use pyo3::prelude::*;
 
@@ -20,11 +22,18 @@ mod _memo {
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
     #[pymodule_export]
+    use super::keypoints::{
+        follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
+        stick_joints,
+    };
+    #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
     use super::synth::PyScene;
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
+    #[pymodule_export]
+    use super::unswap::unswap;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

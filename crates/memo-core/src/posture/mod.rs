@@ -12,3 +12,8 @@ pub mod viterbi;
 pub mod head;
 
 pub use head::{HeadError, HeadModel, HeadPose, HeadSolution};
+//! Joints of one view and what they say about posture.
+
+pub mod detector;
+pub mod person;
+pub mod unswap;
