@@ -79,7 +79,7 @@ pub struct LengthEstimate {
     pub sd_m: f64,
     /// What it rests on.
     pub basis: LengthBasis,
-    /// The largest extent seen (90 %, less the noise, both sides), metres; NaN if not seen.
+    /// The largest extent seen (80 %, less the noise, both sides), metres; NaN if not seen.
     pub seen_m: f64,
 }
 
@@ -134,7 +134,7 @@ pub enum LengthFitError {
 /// Frames that are needed at least.
 pub const MIN_FRAMES: usize = 5;
 /// Of a longer sequence so many frames, evenly spaced, are used to find distances.
-const MOST_FRAMES: usize = 48;
+const MOST_FRAMES: usize = 32;
 /// Rounds of lengths and anchors.
 const ROUNDS: usize = 3;
 
@@ -149,11 +149,12 @@ struct Group {
     tells_scale: bool,
 }
 
-/// The relative spreads of limbs and trunk, forearm, and widths between persons of the same height.
+/// The relative spreads of limbs, of trunk and forearm, and of widths between persons of the same height.
 ///
-/// Measured against Drillis and Contini's means on four walkers: thigh 5 %, shank 6-12 %, upper arm 7 %, trunk
-/// 9 %, forearm 11-20 % (two walkers have hinges instead of wrists), widths of shoulders 20 %, of hips 30 %.
-pub const SPREAD: [f64; 3] = [0.06, 0.12, 0.20];
+/// Root mean square deviations of four walkers from Drillis and Contini's means: thigh 5 %, shank 12 %, upper
+/// arm 7 %; forearm 23 % (two walkers have hinges instead of wrists) and neck to pelvis 24 % (the pelvis joint
+/// is a convention); width of the shoulders 21 %, of the hips 24 %.
+pub const SPREAD: [f64; 3] = [0.08, 0.20, 0.22];
 
 const GROUPS: [Group; 10] = {
     use Joint::*;
@@ -162,22 +163,22 @@ const GROUPS: [Group; 10] = {
     }
     [
         group(&[[Neck, RightShoulder], [Neck, LeftShoulder]], SPREAD[2], 0.5, false),
-        group(&[[Neck, Pelvis]], SPREAD[0], 0.05, true),
+        group(&[[Neck, Pelvis]], SPREAD[1], 0.1, false),
         group(&[[Pelvis, RightHip], [Pelvis, LeftHip]], SPREAD[2], 0.5, false),
         group(&[[RightShoulder, RightElbow], [LeftShoulder, LeftElbow]], SPREAD[0], 0.1, true),
         group(&[[RightElbow, RightWrist], [LeftElbow, LeftWrist]], SPREAD[1], 0.4, false),
         group(&[[RightHip, RightKnee], [LeftHip, LeftKnee]], SPREAD[0], 0.05, true),
         group(&[[RightKnee, RightAnkle], [LeftKnee, LeftAnkle]], SPREAD[0], 0.05, true),
         group(&[[RightShoulder, LeftShoulder]], SPREAD[2], 0.5, false),
-        group(&[[RightShoulder, Pelvis], [LeftShoulder, Pelvis]], SPREAD[0], 0.3, false),
+        group(&[[RightShoulder, Pelvis], [LeftShoulder, Pelvis]], SPREAD[1], 0.3, false),
         group(&[[RightHip, LeftHip]], SPREAD[2], 0.5, false),
     ]
 };
 
-/// Mean shortening of a segment in its best views: 90 % of the extents, tilts of up to 10 degrees.
-const SHORTENING: f64 = 0.015;
+/// Mean shortening of a segment in its best views, tilts of up to 10 degrees.
+const SHORTENING: f64 = 0.01;
 /// Relative standard deviation of an extent through the segment's own depth, a few centimetres off the neck's.
-const DEPTH_SD: f64 = 0.02;
+const DEPTH_SD: f64 = 0.03;
 
 /// Lengths from rays and distances of the neck.
 ///
@@ -203,23 +204,21 @@ pub fn estimate(
     if frames.len() < MIN_FRAMES {
         return Err(LengthFitError::TooFewFrames { frames: frames.len() });
     }
+    let scatter = frame_scatter(&frames);
     let seen: Vec<Vec<f64>> = GROUPS
         .iter()
-        .map(|group| group.pairs.iter().map(|&pair| envelope(&frames, pair, up)).collect())
+        .map(|group| group.pairs.iter().map(|&pair| envelope(&frames, pair, up, scatter)).collect())
         .collect();
     let pooled: Vec<f64> = seen.iter().map(|sides| mean_of_seen(sides)).collect();
-    let (scale, scale_sd) = if is_scale_seen {
-        scale_seen(&pooled, prior, relative_sd(&frames))
-    } else {
-        (1.0, prior.scale_sd)
-    };
+    let (scale, scale_sd) =
+        if is_scale_seen { scale_seen(&pooled, prior, relative_sd(&frames)) } else { (1.0, prior.scale_sd) };
     let mut fit = LengthFit {
         lengths: prior.lengths,
         estimates: Vec::new(),
         sd_m: PerJoint::default(),
         scale,
         scale_sd,
-        scale_from: if is_scale_seen && scale_sd < 0.7 * prior.scale_sd {
+        scale_from: if is_scale_seen && scale_sd < 0.8 * prior.scale_sd {
             ScaleFrom::Distance
         } else {
             prior.scale_from
@@ -236,7 +235,11 @@ pub fn estimate(
                 (true, false) => LengthBasis::Pooled,
             };
             let sd_m = own_sd.hypot(scale_sd * length_m);
-            set(&mut fit, pair, LengthEstimate { segment: String::new(), length_m, sd_m, basis, seen_m: *pooled });
+            set(
+                &mut fit,
+                pair,
+                LengthEstimate { segment: String::new(), length_m, sd_m, basis, seen_m: *pooled },
+            );
         }
     }
     let order: Vec<String> = fit.lengths.named().map(|(name, _)| name).collect();
@@ -285,9 +288,13 @@ pub fn estimate_from_sequence(
     fit.ok_or(LengthFitError::TooFewFrames { frames: rays.len() })
 }
 
-/// The largest extent of a segment over the frames: their 90 % quantile, with the spread that noise adds about
-/// the median taken off. NaN if seen in fewer than [`MIN_FRAMES`].
-fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVec3>) -> f64 {
+/// The largest extent of a segment over the frames: their 80 % quantile without what noise adds to it. NaN if
+/// seen in fewer than [`MIN_FRAMES`].
+///
+/// Extents pile up at their upper end, so the spread is taken above the median alone: with u = (q80 - q50)/0.84
+/// and the noise e of an extent, q50 + 0.84 sqrt(u² - e²). `scatter` is that of the distances from frame to
+/// frame, relative.
+fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVec3>, scatter: f64) -> f64 {
     let mut noise_sq = 0.0;
     let mut extents: Vec<f64> = Vec::with_capacity(frames.len());
     for (rays, anchor) in frames {
@@ -302,7 +309,7 @@ fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVe
         let extent = on_plane(a).distance(on_plane(b));
         if extent.is_finite() {
             extents.push(extent);
-            noise_sq += 2.0 * (rays.noise_rad * anchor.distance_m).powi(2);
+            noise_sq += 2.0 * (rays.noise_rad * anchor.distance_m).powi(2) + (scatter * extent).powi(2);
         }
     }
     if extents.len() < MIN_FRAMES {
@@ -312,13 +319,21 @@ fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVe
     noise_sq /= count;
     extents.sort_by(f64::total_cmp);
     let quantile = |q: f64| extents[((count - 1.0) * q).round() as usize];
-    let (middle, high) = (quantile(0.5), quantile(0.9));
-    let mean = extents.iter().sum::<f64>() / count;
-    let variance = extents.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / count;
-    let kept = if variance > 0.0 { (1.0 - noise_sq / variance).max(0.0).sqrt() } else { 1.0 };
-    // Noise across a segment lengthens it in the mean: |e + n|² has mean e² + noise².
-    let corrected = middle + (high - middle) * kept;
-    (corrected * corrected - 0.5 * noise_sq).max(0.0).sqrt()
+    let (middle, high) = (quantile(0.5), quantile(0.8));
+    let spread = (high - middle) / 0.84;
+    middle + 0.84 * (spread * spread - noise_sq).max(0.0).sqrt()
+}
+
+/// Relative standard deviation of the distances from frame to frame, without steady motion.
+fn frame_scatter(frames: &[(&JointRays, &Anchor)]) -> f64 {
+    let steps: Vec<f64> = frames.windows(2).map(|w| (w[1].1.distance_m / w[0].1.distance_m).ln()).collect();
+    let drift = median(steps.clone());
+    median(steps.iter().map(|s| (s - drift).abs()).collect()) * 1.4826 / std::f64::consts::SQRT_2
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn mean_of_seen(sides: &[f64]) -> f64 {
@@ -446,10 +461,7 @@ mod tests {
     #[test]
     fn too_little_is_refused() {
         let prior = LengthPrior::from_height(Some(1.75)).unwrap();
-        assert_eq!(
-            estimate(&[], &[], None, &prior, true),
-            Err(LengthFitError::TooFewFrames { frames: 0 })
-        );
+        assert_eq!(estimate(&[], &[], None, &prior, true), Err(LengthFitError::TooFewFrames { frames: 0 }));
         let options = AnchorOptions::default();
         assert!(matches!(
             estimate_from_sequence(&[], None, &prior, &options),

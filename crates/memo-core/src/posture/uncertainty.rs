@@ -173,7 +173,8 @@ fn joint_effects(
     let v = place - figure[start];
     let (length, h) = (v.length(), v.dot(r));
     let w = v - h * r;
-    let of_start = |c: usize| DVec3::from_array([0, 1, 2].map(|axis| effects[(3 * start as usize + axis, c)]));
+    let of_start =
+        |c: usize| DVec3::from_array([0, 1, 2].map(|axis| effects[(3 * start as usize + axis, c)]));
     let mut q: [f64; CAUSES] = std::array::from_fn(|c| w.dot(of_start(c)) - w.dot(across[c]));
     q[0] += length * length * causes.scale_sd;
     q[2 + 2 * JOINT_COUNT + joint as usize] += length * causes.length_sd_m[joint];
@@ -314,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn the_anchors_error_moves_the_figure_nearly_rigidly() {
+    fn the_anchors_error_moves_the_figure_along_and_turns_it_little() {
         let truth = figure();
         let rays = JointRays::from_points(&truth);
         let only = Causes {

@@ -187,21 +187,24 @@ impl Scene<'_> {
 
     /// All ways to end one trunk's chains on the ground, as costs.
     fn close(&self, neck: DVec3, cost: f64, ankles: &[Vec<Link>], chains: &mut Vec<f64>) {
+        let roles = |a: &Link| (a.cost + self.support(a), a.cost + self.swing(a));
         if let [right, left] = ankles {
+            let left: Vec<_> = left.iter().map(|l| (l, roles(l))).collect();
             for r in right {
-                for l in left {
+                let (r_support, r_swing) = roles(r);
+                for (l, (l_support, l_swing)) in &left {
                     let balance =
                         self.balance(neck, 0.5 * (r.point + l.point), 0.25 * (r.variance + l.variance));
-                    let both = cost + r.cost + l.cost + balance;
-                    chains.push(both + self.support(r) + self.swing(l));
-                    chains.push(both + self.support(l) + self.swing(r));
+                    chains.push(cost + balance + r_support + l_swing);
+                    chains.push(cost + balance + r_swing + l_support);
                 }
             }
         } else if let [one] = ankles {
             for a in one {
+                let (support, swing) = roles(a);
                 let balance = self.balance(neck, a.point, a.variance);
-                chains.push(cost + a.cost + balance + self.support(a));
-                chains.push(cost + a.cost + balance + self.swing(a));
+                chains.push(cost + balance + support);
+                chains.push(cost + balance + swing);
             }
         }
     }

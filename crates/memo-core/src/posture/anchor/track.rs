@@ -173,3 +173,64 @@ fn neighbour_correlation(seen: &[usize], residuals: &[f64], most: f64) -> f64 {
     }
     (pairs.iter().sum::<f64>() / pairs.len() as f64 / square).clamp(0.0, MOST_CORRELATION)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Anchor, AnchorSource};
+    use super::*;
+    use crate::synth::Random;
+
+    fn anchor(distance_m: f64, sd_m: f64) -> Anchor {
+        Anchor::single(DVec3::Z, distance_m, sd_m, 0.0, AnchorSource::Given)
+    }
+
+    /// A walk away from the camera at uneven times, a third of the frames missing, two far off.
+    #[test]
+    fn a_planted_walk_is_followed() {
+        let mut random = Random::new(2);
+        let times_s: Vec<f64> = (0..90).map(|i| f64::from(i) / 25.0 + 0.01 * f64::from(i % 3)).collect();
+        let truth = |t: f64| 4.0 + 1.2 * t;
+        let anchors: Vec<Option<Anchor>> = times_s
+            .iter()
+            .enumerate()
+            .map(|(i, &t)| {
+                let noise = 0.1 * f64::from(random.normal_pair()[0]);
+                let off = if [20, 50].contains(&i) { 2.0 } else { 0.0 };
+                (i % 3 != 1).then(|| anchor(truth(t) + noise + off, 0.1))
+            })
+            .collect();
+        let track = smooth(&times_s, &anchors, &SmoothOptions::default()).unwrap();
+        let errors: Vec<f64> = times_s.iter().zip(&track.distance_m).map(|(&t, d)| d - truth(t)).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!(rms < 0.06, "{rms}");
+        let inside = errors.iter().zip(&track.sd_m).filter(|(e, sd)| e.abs() < 2.0 * **sd).count();
+        assert!(inside > 80, "{inside}");
+        assert_eq!(track.outliers(5.0), [20, 50]);
+        assert!((track.scatter_m - 0.1).abs() < 0.03, "{}", track.scatter_m);
+        let again = smooth(&times_s, &anchors, &SmoothOptions::default()).unwrap();
+        assert_eq!(track.distance_m, again.distance_m);
+    }
+
+    /// Frames that agree far better than they state share an error: it stays.
+    #[test]
+    fn a_common_error_does_not_average_out() {
+        let times_s: Vec<f64> = (0..50).map(|i| f64::from(i) / 25.0).collect();
+        let anchors: Vec<Option<Anchor>> =
+            times_s.iter().map(|t| Some(anchor(5.0 + 0.01 * (t * 40.0).sin(), 0.2))).collect();
+        let track = smooth(&times_s, &anchors, &SmoothOptions::default()).unwrap();
+        assert!(track.common_sd_m > 0.19 && track.sd_m.iter().all(|sd| *sd > 0.19));
+    }
+
+    #[test]
+    fn sequences_that_make_no_sense_are_refused() {
+        let options = SmoothOptions::default();
+        assert_eq!(smooth(&[0.0], &[None], &options), Err(AnchorError::Empty));
+        assert_eq!(smooth(&[], &[], &options), Err(AnchorError::Empty));
+        assert_eq!(smooth(&[0.0], &[], &options), Err(AnchorError::Counts { times: 1, anchors: 0 }));
+        let two = [Some(anchor(4.0, 0.1)), Some(anchor(4.0, 0.1))];
+        assert!(matches!(smooth(&[1.0, 1.0], &two, &options), Err(AnchorError::Times { frame: 1, .. })));
+        assert!(smooth(&[0.0, f64::NAN], &two, &options).is_err());
+        let alone = smooth(&[0.0], &[Some(anchor(4.0, 0.1))], &options).unwrap();
+        assert!((alone.distance_m[0] - 4.0).abs() < 1e-9 && (alone.sd_m[0] - 0.1).abs() < 0.01);
+    }
+}
