@@ -379,7 +379,7 @@ pub fn combine(anchors: &[Anchor]) -> Result<Combination, AnchorError> {
         positive("distance_m", anchor.distance_m)?;
         positive("sd_depth_m", anchor.sd_depth_m)?;
         let angle_deg = ray.angle_between(anchor.neck).to_degrees();
-        if !(angle_deg < 0.01) {
+        if angle_deg.is_nan() || angle_deg >= 0.01 {
             return Err(AnchorError::DifferentRays { angle_deg });
         }
     }
