@@ -520,7 +520,7 @@ mod tests {
         /// All facings, the trunk square on and edge on included.
         #[test]
         fn a_planted_distance_is_found(
-            distance in 2.0..9.0_f64, azimuth in 0.0..6.28_f64, stride in 0.0..0.4_f64, height in 1.4..2.0_f64,
+            distance in 2.0..9.0_f64, azimuth in 0.0..std::f64::consts::TAU, stride in 0.0..0.4_f64, height in 1.4..2.0_f64,
         ) {
             let lengths = SegmentLengths::from_height(height).unwrap();
             let (figure, ground) = standing(&lengths, distance, azimuth, stride);
