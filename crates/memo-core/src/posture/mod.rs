@@ -1,6 +1,8 @@
 //! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985).
 
+pub mod anchor;
 pub mod angles;
+pub mod length;
 pub mod lift;
 pub mod link;
 pub mod prior;
@@ -17,3 +19,4 @@ pub use head::{HeadError, HeadModel, HeadPose, HeadSolution};
 pub mod detector;
 pub mod person;
 pub mod unswap;
+pub mod uncertainty;
