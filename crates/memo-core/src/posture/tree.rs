@@ -197,7 +197,7 @@ impl Path {
 
 /// A posture that the tree leads to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Posture {
+pub struct Interpretation {
     /// The joints, camera axes, metres; NaN where unknown.
     pub figure: StickFigure,
     /// Its way down the tree.
@@ -212,7 +212,7 @@ pub struct Posture {
     pub depth_sd_m: PerJoint<f64>,
 }
 
-impl Posture {
+impl Interpretation {
     /// Segments without a real root and by how much their joint's ray passes too far, metres.
     pub fn gaps_m(&self) -> impl Iterator<Item = (Joint, f64)> + '_ {
         Joint::ALL.into_iter().filter_map(|joint| match self.kinds[joint] {
@@ -259,7 +259,7 @@ pub struct Cut {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastViolating {
     /// The posture.
-    pub posture: Posture,
+    pub interpretation: Interpretation,
     /// What it breaks.
     pub violations: Vec<Violation>,
     /// Sum of the squares of their severities ([`Violation::severity`]); no posture has less.
@@ -289,8 +289,8 @@ pub struct Interpretations {
 
 impl Interpretations {
     /// The surviving postures.
-    pub fn postures(&self) -> impl ExactSizeIterator<Item = Posture> + '_ {
-        self.survivors.iter().map(|&path| self.view.posture(path))
+    pub fn interpretations(&self) -> impl ExactSizeIterator<Item = Interpretation> + '_ {
+        self.survivors.iter().map(|&path| self.view.interpretation(path))
     }
 
     /// The figures of the surviving postures.
@@ -316,7 +316,7 @@ impl View {
     }
 
     /// The posture at the end of a path.
-    pub fn posture(&self, path: Path) -> Posture {
+    pub fn interpretation(&self, path: Path) -> Interpretation {
         let placed = self.place(path);
         let mut kinds = PerJoint([None; JOINT_COUNT]);
         let mut depth_sd_m = PerJoint([self.neck_sd_m; JOINT_COUNT]);
@@ -326,7 +326,7 @@ impl View {
             depth_sd_m[joint] = depth_sd_m[start].hypot(placed[joint].sd_m);
         }
         let segment_sd_m = PerJoint(placed.0.map(|joint| joint.sd_m));
-        Posture { figure: placed.points(), path, kinds, segment_sd_m, depth_sd_m }
+        Interpretation { figure: placed.points(), path, kinds, segment_sd_m, depth_sd_m }
     }
 
     /// The path to the posture nearest to a figure: at every segment the root whose segment vector is nearer
@@ -757,7 +757,7 @@ impl<'a> Walk<'a> {
         self.bound(1, Path::default(), 0.0, &mut costs, &mut best);
         let (total, path) = best;
         let violations = self.view.violations(path, self.options);
-        LeastViolating { posture: self.view.posture(path), violations, total }
+        LeastViolating { interpretation: self.view.interpretation(path), violations, total }
     }
 
     fn bound(
