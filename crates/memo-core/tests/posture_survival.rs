@@ -62,7 +62,8 @@ fn tally(motions: &[Motion], setting: &Setting) -> Tally {
             let seen = view(figure, motion.heading, setting.azimuth_deg, setting.noise_px, i as u64);
             let truth = seen.figure_in_camera;
             let neck = truth.0[0];
-            let view = View::new(seen.rays, neck, lengths);
+            let mut view = View::new(seen.rays, neck, lengths);
+            view.length_sd_m = std::env::var("LSD").map_or(0.005, |v| v.parse().unwrap());
             let bearings = Bearings { up: Some(seen.up), heading: Some(seen.heading), head: None };
             let options = setting.options.clone().with_bearings(bearings);
             let path = view.nearest_path(&truth);
@@ -93,12 +94,22 @@ fn motions(names: &[&str]) -> Option<Vec<Motion>> {
 fn survey() {
     let Some(walks) = motions(&WALKS) else { return };
     let Some(others) = motions(&["CMU_02_04_jump", "CMU_02_05_punch"]) else { return };
+    let env = |name: &str, default: f64| std::env::var(name).map_or(default, |v| v.parse().unwrap());
+    let sweep = |mut o: TreeOptions| {
+        let l = o.limits.as_mut().unwrap();
+        l.noise_factor = env("K", 2.0);
+        l.distance_m = env("D", 0.02);
+        l.shoulder_pelvis_m = env("SP", 0.02);
+        if let Some(m) = o.motion.as_mut() { m.noise_factor = env("KM", 2.0); }
+        o
+    };
     let physical = TreeOptions::physical();
     let general = TreeOptions::physical().with_motion(MotionModel::walking_general());
     let walking = TreeOptions::physical().with_motion(MotionModel::walking());
     let paper = TreeOptions::physical_paper();
     let paper12 = TreeOptions::physical_paper().with_motion(MotionModel::walking_general_paper());
     let paper15 = TreeOptions::physical_paper().with_motion(MotionModel::walking_paper());
+    let [physical, general, walking] = [physical, general, walking].map(sweep);
     for noise_px in [0.0, 3.0] {
         for (name, azimuth_deg) in VIEWS {
             for (what, options) in [

@@ -99,8 +99,10 @@ pub struct Limits {
     pub neck_rotation_rad: f64,
     /// Bending of the head to either side, radians.
     pub neck_bending_rad: f64,
-    /// Deviation of a distance within torso or hip part, metres.
+    /// Deviation of the distances between shoulders and between hips, metres.
     pub distance_m: f64,
+    /// Deviation of the distances from shoulders to pelvis, metres: spine and shoulder girdle are not rigid.
+    pub shoulder_pelvis_m: f64,
     /// Every limit grows by this many standard deviations of the propagated noise.
     pub noise_factor: f64,
 }
@@ -129,6 +131,7 @@ impl Limits {
             neck_rotation_rad: deg(70.0),
             neck_bending_rad: deg(40.0),
             distance_m: 0.02,
+            shoulder_pelvis_m: 0.02,
             noise_factor: 0.0,
         }
     }
@@ -153,6 +156,7 @@ impl Limits {
             neck_rotation_rad: paper.neck_rotation_rad + deg(5.0),
             neck_bending_rad: paper.neck_bending_rad + deg(5.0),
             distance_m: 0.02,
+            shoulder_pelvis_m: 0.02,
             noise_factor: 2.0,
             ..paper
         }
@@ -218,7 +222,10 @@ impl Limits {
         let between = b.point - a.point;
         let length = between.length();
         let deviation = (length - lengths.rigid[distance as usize]).abs();
-        let mut tolerance = self.distance_m;
+        let mut tolerance = match distance {
+            RigidDistance::Shoulders | RigidDistance::Hips => self.distance_m,
+            RigidDistance::RightShoulderPelvis | RigidDistance::LeftShoulderPelvis => self.shoulder_pelvis_m,
+        };
         if self.noise_factor > 0.0 {
             let unit = between / length.max(1e-9);
             let along = a.along(unit).hypot(b.along(unit));
