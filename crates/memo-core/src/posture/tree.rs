@@ -819,7 +819,12 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     /// Someone upright in camera axes, 4 m away, every segment turned at random by up to `spread_rad`.
-    fn figure(lengths: &SegmentLengths, facing_rad: f64, spread_rad: f64, random: &mut Random) -> StickFigure {
+    fn figure(
+        lengths: &SegmentLengths,
+        facing_rad: f64,
+        spread_rad: f64,
+        random: &mut Random,
+    ) -> StickFigure {
         let turn = glam::DQuat::from_rotation_y(facing_rad);
         let rest = |joint: Joint| match joint {
             Joint::RightShoulder => DVec3::new(-1.0, 0.0, 0.1),
@@ -997,9 +1002,8 @@ mod tests {
                 continue;
             };
             tried += 1;
-            let total = |path| {
-                view.violations(path, &options).iter().map(|v| v.severity().powi(2)).sum::<f64>()
-            };
+            let total =
+                |path| view.violations(path, &options).iter().map(|v| v.severity().powi(2)).sum::<f64>();
             let exhaustive = (0..1u16 << 13).map(|bits| total(Path(bits << 1))).fold(f64::MAX, f64::min);
             assert!((least.total - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
             assert!((total(least.interpretation.path) - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
@@ -1046,7 +1050,8 @@ mod tests {
         assert!(refused(&|view| view.rays.noise_rad = f64::NAN).contains("noise_rad"));
         assert!(refused(&|view| view.merge_m = -0.1).contains("merge_m"));
         assert!(refused(&|view| view.lengths.to[Joint::LeftKnee] = 38.0).contains("metres"));
-        let options = options.clone().with_bearings(Bearings { up: Some(DVec3::ZERO), ..Bearings::default() });
+        let options =
+            options.clone().with_bearings(Bearings { up: Some(DVec3::ZERO), ..Bearings::default() });
         assert!(view.interpret(&options).unwrap_err().to_string().contains("up"));
     }
 
