@@ -6,8 +6,7 @@
 //! negative: minus the shortest way out, over the border or by an end.
 //!
 //! The paper gives no radii. With those of flesh (forearm 4 cm, thigh 7 cm) true postures would collide, for
-//! joints and segments are not the middles of limbs and a mirrored limb seldom stops within another: radii
-//! are those of the bones, half of the 3 cm at which true arms and legs of walkers were never cut (their
+//! joints and segments are not the middles of limbs: radii are half of the 3 cm at which true arms and legs of walkers were never cut (their
 //! least distance is 10 cm). Without noise no true forearm passes the quadrilateral.
 
 use glam::DVec3;

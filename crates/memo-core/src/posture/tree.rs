@@ -849,7 +849,7 @@ mod tests {
         let lengths = SegmentLengths::lee_chen();
         let mut random = Random::new(seed);
         let facing_rad = random.uniform(-3.0, 3.0);
-        let spread_rad = random.uniform(0.1, 0.9);
+        let spread_rad = random.uniform(0.05, 0.5);
         let figure = figure(&lengths, facing_rad, spread_rad, &mut random);
         let mut rays = JointRays::from_points(&figure);
         for ray in &mut rays.ray.0 {
