@@ -5,9 +5,9 @@
 //! triangles. A clearance is the distance of the two axes; where a limb passes through the torso it is
 //! negative: minus the shortest way out, over the border or by an end.
 //!
-//! The paper gives no radii. With those of flesh (forearm 4 cm, thigh 7 cm) true postures would collide, for
-//! joints and segments are not the middles of limbs: radii are half of the 3 cm at which true arms and legs of walkers were never cut (their
-//! least distance is 10 cm). Without noise no true forearm passes the quadrilateral.
+//! The paper gives no radii. The default ones are half of the 3 cm at which no true arm and leg of four walks,
+//! a jump and a bout of punching collide (the least true distance of arm and leg in walking is 10 cm);
+//! without noise no true forearm there passes the quadrilateral. Radii of flesh were not tried.
 
 use glam::DVec3;
 
