@@ -244,7 +244,7 @@ mod tests {
         let mut step = 0.5;
         let mut least = distance(&best);
         // A coarse grid finds the basin (the distance is convex), then it is narrowed.
-        for _ in 0..120 {
+        for _ in 0..300 {
             let centre = best.clone();
             for index in 0..5usize.pow(dimensions as u32) {
                 let mut at = centre.clone();
@@ -257,7 +257,7 @@ mod tests {
                     (least, best) = (d, at);
                 }
             }
-            step *= 0.88;
+            step *= 0.95;
         }
         least
     }
