@@ -243,21 +243,24 @@ mod tests {
         let mut best = vec![0.5; dimensions];
         let mut step = 0.5;
         let mut least = distance(&best);
-        // A coarse grid finds the basin (the distance is convex), then it is narrowed.
-        for _ in 0..300 {
+        // The distance is convex: random steps that shrink only when none of them helps.
+        let mut random = crate::synth::Random::new(1);
+        while step > 1e-6 {
             let centre = best.clone();
-            for index in 0..5usize.pow(dimensions as u32) {
+            let before = least;
+            for _ in 0..100 {
                 let mut at = centre.clone();
-                for (k, value) in at.iter_mut().enumerate() {
-                    let offset = (index / 5usize.pow(k as u32) % 5) as f64 / 2.0 - 1.0;
-                    *value = (*value + offset * step).clamp(0.0, 1.0);
+                for value in &mut at {
+                    *value = (*value + random.uniform(-step, step)).clamp(0.0, 1.0);
                 }
                 let d = distance(&at);
                 if d < least {
                     (least, best) = (d, at);
                 }
             }
-            step *= 0.95;
+            if least == before {
+                step *= 0.7;
+            }
         }
         least
     }
