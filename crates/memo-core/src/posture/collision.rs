@@ -286,9 +286,13 @@ mod tests {
                                              e in point(), f in point()) {
             let clearance = quadrilateral_clearance(&[a, b, c, d], e, f);
             let triangle = |t: &[DVec3; 3]| {
-                let on = |p: &[f64]| t[0] + p[1] * (t[1] - t[0]) + p[2] * (t[2] - t[0]);
-                let apart = |p: &[f64]| on(p).distance(e.lerp(f, p[0]));
-                sampled(|p| if p[1] + p[2] <= 1.0 { apart(p) } else { f64::MAX }, 3)
+                // Places beyond the third edge are moved to the nearest on it.
+                let on = |p: &[f64]| {
+                    let over = (0.5 * (p[1] + p[2] - 1.0)).max(0.0);
+                    let [v, w] = [p[1] - over, p[2] - over].map(|x| x.clamp(0.0, 1.0));
+                    t[0] + v * (t[1] - t[0]) + w * (t[2] - t[0])
+                };
+                sampled(|p| on(p).distance(e.lerp(f, p[0])), 3)
             };
             let oracle = triangles(&[a, b, c, d]).iter().map(triangle).fold(f64::MAX, f64::min);
             prop_assert!((clearance.max(0.0) - oracle).abs() < 2e-3, "{clearance} {oracle}");
