@@ -1,6 +1,6 @@
 //! Where the neck is, from each source, against motion capture and against triangulated joints.
 
-mod mocap;
+mod recorded;
 
 use memo_core::model::Camera;
 use memo_core::posture::anchor::{
@@ -10,7 +10,7 @@ use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::synth::Random;
 
-use mocap::{camera, detected, shared, triangulated, view, walks};
+use recorded::{camera, detected, shared, triangulated, view, walks};
 
 /// Errors of one source with what it stated.
 #[derive(Default)]

@@ -1,6 +1,6 @@
 //! Segment lengths from a sequence against motion capture and against triangulated joints.
 
-mod mocap;
+mod recorded;
 
 use glam::DVec3;
 use memo_core::model::Camera;
@@ -10,7 +10,7 @@ use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths};
 use memo_core::synth::Random;
 
-use mocap::{Walk, camera, detected, shared, triangulated, view, walks};
+use recorded::{Walk, camera, detected, shared, triangulated, view, walks};
 
 /// One of each kind of segment.
 const KINDS: [&str; 10] = [

@@ -1,22 +1,26 @@
-//! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985).
+//! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985), and one of
+//! them a frame for a sequence.
 
 pub mod anchor;
 pub mod angles;
+pub mod collision;
+pub mod constraint;
+pub mod detector;
+pub mod group;
+pub mod head;
 pub mod length;
 pub mod lift;
+pub mod limits;
 pub mod link;
+pub mod person;
+pub(crate) mod placed;
 pub mod prior;
+pub mod rules;
 pub mod skeleton;
 pub mod smooth;
-pub mod viterbi;
-//! One view, known lengths: 3D postures from the image points of one frame (Lee and Chen 1985).
-
-pub mod head;
-
-pub use head::{HeadError, HeadModel, HeadPose, HeadSolution};
-//! Joints of one view and what they say about posture.
-
-pub mod detector;
-pub mod person;
-pub mod unswap;
+pub mod tree;
 pub mod uncertainty;
+pub mod unswap;
+pub mod viterbi;
+
+pub use placed::{Bearings, HeadingSource};
