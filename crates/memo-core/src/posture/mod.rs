@@ -1,5 +1,14 @@
 //! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985).
 
 pub mod angles;
+pub mod collision;
+pub mod constraint;
+pub mod group;
 pub mod lift;
+pub mod limits;
+pub(crate) mod placed;
+pub mod rules;
 pub mod skeleton;
+pub mod tree;
+
+pub use placed::{Bearings, HeadingSource};

@@ -1,0 +1,298 @@
+//! Parts of the body cannot be in one place (Lee and Chen 1985, section 3.2 C: arms and torso, arms and legs;
+//! here also leg and leg).
+//!
+//! Limbs are capsules about their segments, the torso is the quadrilateral of shoulders and hips, two
+//! triangles. A clearance is the distance of the two axes; where a limb passes through the torso it is
+//! negative: minus the shortest way out, over the border or by an end.
+//!
+//! The paper gives no radii. With those of flesh (forearm 4 cm, thigh 7 cm) true postures would collide, for
+//! joints and segments are not the middles of limbs and a mirrored limb seldom stops within another: radii
+//! are those of the bones, half of the 3 cm at which true arms and legs of walkers were never cut (their
+//! least distance is 10 cm). Without noise no true forearm passes the quadrilateral.
+
+use glam::DVec3;
+
+use super::constraint::{Constraint, Violation};
+use super::placed::{Placed, PlacedFigure};
+use super::skeleton::{Joint, Side};
+
+/// Radii of the parts of the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Collisions {
+    /// Radius of upper arm and forearm, metres.
+    pub arm_m: f64,
+    /// Radius of thigh and shank, metres.
+    pub leg_m: f64,
+    /// Least clearance of arm and torso quadrilateral, metres; 0: the forearm must not pass through it.
+    pub torso_m: f64,
+    /// The part of the upper arm next to its shoulder, a corner of the torso, that is not looked at.
+    pub shoulder_part: f64,
+    /// Every clearance may fall short by this many standard deviations of the propagated noise.
+    pub noise_factor: f64,
+}
+
+impl Collisions {
+    /// Stick figures whatever the noise: the forearm must not pass through the torso, arms and legs stay 3 cm
+    /// apart.
+    pub fn paper() -> Self {
+        Self { noise_factor: 0.0, ..Self::measured() }
+    }
+
+    /// The same with room for noise.
+    pub fn measured() -> Self {
+        Self { arm_m: 0.015, leg_m: 0.015, torso_m: 0.0, shoulder_part: 1.0 / 3.0, noise_factor: 2.0 }
+    }
+
+    /// Checks one constraint; None where it holds or is no collision.
+    pub(crate) fn check(&self, constraint: Constraint, figure: &PlacedFigure) -> Option<Violation> {
+        use Constraint as C;
+        match constraint {
+            C::UpperArmTorso(s) => {
+                let elbow = &figure[s.elbow()];
+                let shoulder = figure[s.shoulder()].point;
+                let start = shoulder.lerp(elbow.point, self.shoulder_part);
+                self.check_torso(constraint, figure, start, elbow.point, self.spread(elbow, None))
+            }
+            C::ForearmTorso(s) => {
+                let [elbow, wrist] = [&figure[s.elbow()], &figure[s.wrist()]];
+                let spread = self.spread(elbow, Some(wrist));
+                self.check_torso(constraint, figure, elbow.point, wrist.point, spread)
+            }
+            C::ThighThigh => {
+                let pairs = [(Side::Right.knee(), Side::Left.knee())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ShankThigh(s) => {
+                let pairs = [(s.ankle(), s.other().knee())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ShankShank => {
+                let pairs = [(Side::Right.ankle(), Side::Left.ankle())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ArmThigh { arm, leg } => {
+                let pairs = [(arm.elbow(), leg.knee()), (arm.wrist(), leg.knee())];
+                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
+            }
+            C::ArmShank { arm, leg } => {
+                let pairs = [(arm.elbow(), leg.ankle()), (arm.wrist(), leg.ankle())];
+                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
+            }
+            _ => None,
+        }
+    }
+
+    /// Standard deviation of a limb's place against the body's, metres: that of its outer end.
+    fn spread(&self, upper: &Placed, lower: Option<&Placed>) -> f64 {
+        let lower = lower.map_or(0.0, |placed| placed.sd_m);
+        self.noise_factor * upper.sd_m.hypot(lower).hypot(upper.lateral_m)
+    }
+
+    fn check_torso(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        start: DVec3,
+        end: DVec3,
+        slack: f64,
+    ) -> Option<Violation> {
+        use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
+        let corners = [RightShoulder, LeftShoulder, LeftHip, RightHip].map(|joint| figure[joint].point);
+        let required = if self.noise_factor > 0.0 { self.torso_m - slack } else { self.torso_m };
+        if required <= 0.0 && passes_beside(&corners, start, end) {
+            return None;
+        }
+        Violation::under(constraint, quadrilateral_clearance(&corners, start, end), required)
+    }
+
+    fn check_limbs(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        pairs: &[(Joint, Joint)],
+        radii_m: f64,
+    ) -> Option<Violation> {
+        let worst = |&(a, b): &(Joint, Joint)| {
+            let [a, b] = [self.limb(figure, a), self.limb(figure, b)];
+            let slack = if self.noise_factor > 0.0 { a.2.hypot(b.2) } else { 0.0 };
+            let required = radii_m - slack;
+            let apart = 0.5 * (a.0 + a.1 - b.0 - b.1).length();
+            let reach = 0.5 * (a.0.distance(a.1) + b.0.distance(b.1));
+            if required <= 0.0 || apart - reach > required {
+                return None;
+            }
+            Violation::under(constraint, segment_distance(a.0, a.1, b.0, b.1), required)
+        };
+        pairs.iter().filter_map(worst).max_by(|a, b| a.excess.total_cmp(&b.excess))
+    }
+
+    /// Ends and spread of the segment that ends at a joint.
+    fn limb(&self, figure: &PlacedFigure, end: Joint) -> (DVec3, DVec3, f64) {
+        let start = end.start().unwrap_or(end);
+        let upper = &figure[start];
+        let spread = match end {
+            Joint::RightElbow | Joint::LeftElbow | Joint::RightKnee | Joint::LeftKnee => {
+                self.spread(&figure[end], None)
+            }
+            _ => self.spread(upper, Some(&figure[end])),
+        };
+        (upper.point, figure[end].point, spread)
+    }
+}
+
+impl Default for Collisions {
+    fn default() -> Self {
+        Self::measured()
+    }
+}
+
+/// Distance of two segments in space (Ericson 2005, Real-Time Collision Detection, 5.1.9). Either may be a
+/// point.
+pub fn segment_distance(a0: DVec3, a1: DVec3, b0: DVec3, b1: DVec3) -> f64 {
+    let (u, v, r) = (a1 - a0, b1 - b0, a0 - b0);
+    let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
+    let (ur, vr) = (u.dot(r), v.dot(r));
+    let fraction = |top: f64, bottom: f64| if bottom > 0.0 { (top / bottom).clamp(0.0, 1.0) } else { 0.0 };
+    let mut s = fraction(uv * vr - ur * vv, uu * vv - uv * uv);
+    let mut t = if vv > 0.0 { (uv * s + vr) / vv } else { 0.0 };
+    if !(0.0..=1.0).contains(&t) || vv == 0.0 {
+        t = t.clamp(0.0, 1.0);
+        s = fraction(uv * t - ur, uu);
+    }
+    (r + s * u - t * v).length()
+}
+
+/// Whether a segment lies wholly on one side of the planes of both triangles, so that it passes neither.
+fn passes_beside(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> bool {
+    triangles(corners).iter().all(|[a, b, c]| {
+        let normal = (b - a).cross(c - a);
+        normal.dot(start - a) * normal.dot(end - a) > 0.0
+    })
+}
+
+fn triangles(corners: &[DVec3; 4]) -> [[DVec3; 3]; 2] {
+    [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]
+}
+
+/// Clearance of a segment and a quadrilateral in space, metres: their distance, or minus the shortest way
+/// out where the segment passes through it.
+///
+/// The quadrilateral is that of two triangles that share the diagonal from its first to its third corner.
+pub fn quadrilateral_clearance(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> f64 {
+    let border = |p: DVec3| {
+        (0..4).map(|i| segment_distance(p, p, corners[i], corners[(i + 1) % 4])).fold(f64::MAX, f64::min)
+    };
+    let mut clearance = f64::MAX;
+    for triangle in triangles(corners) {
+        match crossing(&triangle, start, end) {
+            Some((point, to_ends)) => clearance = clearance.min(-to_ends.min(border(point))),
+            None => clearance = clearance.min(triangle_distance(&triangle, start, end)),
+        }
+    }
+    clearance
+}
+
+/// Where a segment crosses a triangle, and the shorter distance of its ends from the triangle's plane.
+fn crossing([a, b, c]: &[DVec3; 3], start: DVec3, end: DVec3) -> Option<(DVec3, f64)> {
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let [from, to] = [start, end].map(|p| normal.dot(p - a));
+    if from * to >= 0.0 {
+        return None;
+    }
+    let point = start.lerp(end, from / (from - to));
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).cross(point - *p).dot(normal) >= 0.0);
+    inside.then_some((point, from.abs().min(to.abs())))
+}
+
+/// Distance of a segment and a triangle that it does not cross.
+fn triangle_distance([a, b, c]: &[DVec3; 3], start: DVec3, end: DVec3) -> f64 {
+    let edges = [(a, b), (b, c), (c, a)];
+    let beside = edges.iter().map(|(p, q)| segment_distance(start, end, **p, **q)).fold(f64::MAX, f64::min);
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return beside };
+    let above = |p: DVec3| {
+        let over = edges.iter().all(|(e, f)| (**f - **e).cross(p - **e).dot(normal) >= 0.0);
+        if over { normal.dot(p - *a).abs() } else { f64::MAX }
+    };
+    beside.min(above(start)).min(above(end))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0_f64, -1.0..1.0_f64, -1.0..1.0_f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    /// Least distance of points sampled on two sets of parameters, refined about the best.
+    fn sampled(distance: impl Fn(&[f64]) -> f64, dimensions: usize) -> f64 {
+        let mut best = vec![0.5; dimensions];
+        let mut step = 0.5;
+        let mut least = distance(&best);
+        // A coarse grid finds the basin (the distance is convex), then it is narrowed.
+        for _ in 0..60 {
+            let centre = best.clone();
+            for index in 0..5usize.pow(dimensions as u32) {
+                let mut at = centre.clone();
+                for (k, value) in at.iter_mut().enumerate() {
+                    let offset = (index / 5usize.pow(k as u32) % 5) as f64 / 2.0 - 1.0;
+                    *value = (*value + offset * step).clamp(0.0, 1.0);
+                }
+                let d = distance(&at);
+                if d < least {
+                    (least, best) = (d, at);
+                }
+            }
+            step *= 0.75;
+        }
+        least
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn segment_distance_is_the_least_of_samples(a in point(), b in point(), c in point(), d in point(),
+                                                     degenerate in 0..4) {
+            let (b, d) = match degenerate {
+                1 => (a, d),
+                2 => (b, c + (b - a)),
+                3 => (b, c),
+                _ => (b, d),
+            };
+            let oracle = sampled(|p| a.lerp(b, p[0]).distance(c.lerp(d, p[1])), 2);
+            prop_assert!((segment_distance(a, b, c, d) - oracle).abs() < 1e-5);
+        }
+
+        #[test]
+        fn clearance_is_the_least_of_samples(a in point(), b in point(), c in point(), d in point(),
+                                             e in point(), f in point()) {
+            let clearance = quadrilateral_clearance(&[a, b, c, d], e, f);
+            let triangle = |t: &[DVec3; 3]| {
+                let on = |p: &[f64]| t[0] + p[1] * (t[1] - t[0]) + p[1] * p[2] * (t[2] - t[1]);
+                sampled(|p| on(p).distance(e.lerp(f, p[0])), 3)
+            };
+            let oracle = triangles(&[a, b, c, d]).iter().map(triangle).fold(f64::MAX, f64::min);
+            prop_assert!((clearance.max(0.0) - oracle).abs() < 2e-3, "{clearance} {oracle}");
+        }
+    }
+
+    #[test]
+    fn a_forearm_through_the_torso_has_a_negative_clearance() {
+        let corners = [
+            DVec3::new(0.2, 0.0, 0.0),
+            DVec3::new(-0.2, 0.0, 0.0),
+            DVec3::new(-0.2, 0.5, 0.0),
+            DVec3::new(0.2, 0.5, 0.0),
+        ];
+        let through =
+            quadrilateral_clearance(&corners, DVec3::new(0.1, 0.2, -0.06), DVec3::new(0.1, 0.2, 0.2));
+        assert!((through + 0.06).abs() < 1e-12, "{through}");
+        let over_the_border =
+            quadrilateral_clearance(&corners, DVec3::new(0.17, 0.2, -0.3), DVec3::new(0.17, 0.2, 0.2));
+        assert!((over_the_border + 0.03).abs() < 1e-12, "{over_the_border}");
+        let before = quadrilateral_clearance(&corners, DVec3::new(0.1, 0.2, 0.05), DVec3::new(0.1, 0.4, 0.2));
+        assert!((before - 0.05).abs() < 1e-12);
+    }
+}
