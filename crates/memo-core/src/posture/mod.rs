@@ -4,6 +4,7 @@ pub mod angles;
 pub mod collision;
 pub mod constraint;
 pub mod group;
+pub mod head;
 pub mod lift;
 pub mod limits;
 pub(crate) mod placed;
@@ -11,4 +12,5 @@ pub mod rules;
 pub mod skeleton;
 pub mod tree;
 
+pub use head::{HeadError, HeadModel, HeadPose, HeadSolution};
 pub use placed::{Bearings, HeadingSource};
