@@ -15,6 +15,11 @@ __all__ = [
     "__version__",
     "change_mask",
     "edge_segments",
+    "joint_names",
+    "lee_chen_counts",
+    "lee_chen_figures",
+    "lee_chen_head",
+    "lee_chen_last_stage",
     "moving_regions",
     "silhouettes",
     "similarity",
@@ -156,3 +161,8 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+def joint_names() -> list[str]: ...
+def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
+def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
+def lee_chen_head() -> list[dict[str, Any]]: ...
+def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = 0.04) -> list[dict[str, Any]]: ...

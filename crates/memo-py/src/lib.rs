@@ -4,6 +4,7 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod reproduce;
 mod score;
 mod synth;
 mod tracker;
@@ -19,6 +20,10 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::reproduce::{
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
+    };
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]

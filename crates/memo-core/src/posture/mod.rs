@@ -3,6 +3,7 @@
 pub mod angles;
 pub mod collision;
 pub mod constraint;
+pub mod experiment;
 pub mod group;
 pub mod head;
 pub mod lift;

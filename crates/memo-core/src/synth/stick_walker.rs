@@ -16,20 +16,9 @@ use thiserror::Error;
 use crate::model::camera::Camera;
 use crate::model::distortion::Distortion;
 use crate::model::gait::{Gait, GaitStyle, SideAngles};
+use crate::posture::head::HeadModel;
 use crate::posture::lift::JointRays;
 use crate::posture::skeleton::{Joint, RigidDistance, SegmentLengths, Side, StickFigure};
-
-/// The head of Table A.2 (a), metres: neck, nose, right eye, left eye, right ear, left ear.
-///
-/// The right eye's x is printed as -32.168 cm; depths and projections printed beside it hold for -31.168.
-pub const HEAD_POINTS: [DVec3; 6] = [
-    DVec3::new(-0.34168, 0.52103, 0.0),
-    DVec3::new(-0.29168, 0.61603, 0.0),
-    DVec3::new(-0.31168, 0.65103, 0.055),
-    DVec3::new(-0.31168, 0.65103, -0.055),
-    DVec3::new(-0.35168, 0.60103, 0.085),
-    DVec3::new(-0.35168, 0.60103, -0.085),
-];
 
 /// Seconds between two frames of the paper.
 pub const FRAME_S: f64 = 0.2;
@@ -119,6 +108,11 @@ impl StickWalker {
         })
     }
 
+    /// The same walker with another phase in frame 0 and another cadence, cycles a second.
+    pub fn in_rhythm(self, phase0: f64, cadence_hz: f64) -> Self {
+        Self { phase0, cadence_hz, ..self }
+    }
+
     /// The lengths.
     pub fn lengths(&self) -> &SegmentLengths {
         &self.lengths
@@ -131,12 +125,14 @@ impl StickWalker {
 
     /// The neck in a frame, head axes of frame 0.
     fn neck(&self, frame: usize) -> DVec3 {
-        HEAD_POINTS[0] + self.speed_mps * FRAME_S * frame as f64 * DVec3::X
+        HeadModel::lee_chen().points_m[0] + self.speed_mps * FRAME_S * frame as f64 * DVec3::X
     }
 
-    /// The six head points in a frame, head axes of frame 0.
+    /// The six head points in a frame, head axes of frame 0, in the order of
+    /// [`HeadPoint::ALL`](crate::posture::head::HeadPoint::ALL).
     pub fn head(&self, frame: usize) -> [DVec3; 6] {
-        HEAD_POINTS.map(|point| point - HEAD_POINTS[0] + self.neck(frame))
+        let points = HeadModel::lee_chen().points_m;
+        points.map(|point| point - points[0] + self.neck(frame))
     }
 
     /// The joints in a frame, head axes of frame 0.
@@ -244,7 +240,7 @@ pub struct StickView {
     pub figure: StickFigure,
     /// Rays to the joints, exact.
     pub rays: JointRays,
-    /// The six head points, camera axes, metres, in the order of [`HEAD_POINTS`].
+    /// The six head points, camera axes, metres.
     pub head: [DVec3; 6],
     /// Projections of the head points as in Table A.2 (b): image plane coordinates, x to the right and y up,
     /// centimetres.
@@ -334,7 +330,7 @@ mod tests {
     fn all_seventeen_lengths_are_exact() {
         let walker = StickWalker::lee_chen();
         for k in 0..100 {
-            let figure = walker.posed(f64::from(k) / 100.0, HEAD_POINTS[0]);
+            let figure = walker.posed(f64::from(k) / 100.0, DVec3::ZERO);
             assert!(worst_length(&figure, walker.lengths()) < 1e-12);
         }
     }
@@ -361,7 +357,7 @@ mod tests {
         // The anatomical sense of the axes (x forward, y down, z left) from the paper's (y up, z right).
         for k in 0..100 {
             let phase = f64::from(k) / 100.0;
-            let figure = walker.posed(phase, HEAD_POINTS[0]);
+            let figure = walker.posed(phase, DVec3::ONE);
             let axes = trunk_axes(&figure).unwrap();
             assert!(axes.x_axis.x > 0.99 && axes.y_axis.y < -0.999 && axes.z_axis.z < -0.99);
             let gait = walker.gait.posture(phase, &walker.style);

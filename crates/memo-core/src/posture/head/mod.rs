@@ -223,7 +223,8 @@ fn shape_of(points: &[DVec3]) -> Result<Shape, HeadError> {
     if radius <= MIN_SPREAD {
         return Err(HeadError::Duplicate { first: 0, second: 1 });
     }
-    let matrix = DMatrix::from_fn(points.len().max(3), 3, |i, j| centred.get(i).map_or(0.0, |p| p[j] / radius));
+    let matrix =
+        DMatrix::from_fn(points.len().max(3), 3, |i, j| centred.get(i).map_or(0.0, |p| p[j] / radius));
     let (sigma, v_t) = right_svd(matrix).ok_or(HeadError::Collinear { ratio: 0.0 })?;
     let ratios = [sigma[1] / sigma[0], sigma[2] / sigma[0]];
     let thin_axis = DVec3::new(v_t[(2, 0)], v_t[(2, 1)], v_t[(2, 2)]);

@@ -185,8 +185,7 @@ fn starting_poses(problem: &Problem, points_in_head: &[DVec3], focal: Focal) -> 
         Focal::Known(focal) => vec![focal],
         Focal::Free => [5.0, 15.0, 45.0].map(|radii| DVec2::splat(radii * problem.spread)).to_vec(),
     };
-    let grid =
-        focals.iter().flat_map(|f| cube_rotations().into_iter().filter_map(|r| problem.start(r, *f)));
+    let grid = focals.iter().flat_map(|f| cube_rotations().into_iter().filter_map(|r| problem.start(r, *f)));
     linear_start.into_iter().chain(grid).collect()
 }
 
@@ -299,7 +298,8 @@ impl Problem<'_> {
             let (turned, plane) = (rotation * *point, *image / focal);
             for (row, axis) in [(0, DVec3::X), (1, DVec3::Y)] {
                 let equation = axis - plane[row] * DVec3::Z;
-                normal += DMat3::from_cols(equation * equation.x, equation * equation.y, equation * equation.z);
+                normal +=
+                    DMat3::from_cols(equation * equation.x, equation * equation.y, equation * equation.z);
                 right -= equation * equation.dot(turned);
             }
         }
@@ -345,9 +345,8 @@ impl Problem<'_> {
             let normal = jacobian.tr_mul(&jacobian);
             let gradient = jacobian.tr_mul(&residuals);
             let diagonal = normal.diagonal();
-            let is_flat = (0..diagonal.len()).all(|k| {
-                gradient[k].powi(2) <= diagonal[k] * (1e-16 * sum_sq).max(still_sq)
-            });
+            let is_flat = (0..diagonal.len())
+                .all(|k| gradient[k].powi(2) <= diagonal[k] * (1e-16 * sum_sq).max(still_sq));
             loop {
                 let mut damped = normal.clone();
                 for k in 0..diagonal.len() {
@@ -531,8 +530,15 @@ mod tests {
         let solution = head_pose_in_image(&camera, &points, &pixels, &HeadOptions::default()).unwrap();
         let pose = solution.best();
         let rotation = DMat3::from_cols_array(&[
-            -0.647780056, -0.0967699595, -0.7556563862, 0.1148307223, -0.9929697399, 0.0287228298, //
-            -0.7531234323, -0.0681664923, 0.654338158,
+            -0.647780056,
+            -0.0967699595,
+            -0.7556563862,
+            0.1148307223,
+            -0.9929697399,
+            0.0287228298, //
+            -0.7531234323,
+            -0.0681664923,
+            0.654338158,
         ])
         .transpose();
         assert!(angle(pose.rotation, rotation) < 1e-6, "{}", angle(pose.rotation, rotation));
@@ -630,9 +636,11 @@ mod tests {
                     let truth = turned(degrees.to_radians(), 0.0, 4.0);
                     let error = |pose: &HeadPose| pose.rotation.x_axis.angle_between(truth.0.x_axis);
                     errors.push(error(solution.best()).to_degrees());
-                    let depth = solution.best().point_in_camera(neck).position.z - (truth.0 * neck + truth.1).z;
+                    let depth =
+                        solution.best().point_in_camera(neck).position.z - (truth.0 * neck + truth.1).z;
                     depth_sq += depth * depth / 100.0;
-                    probable += usize::from(solution.poses.iter().any(|p| error(p) < 5.0 * p.facing().sd_rad()));
+                    probable +=
+                        usize::from(solution.poses.iter().any(|p| error(p) < 5.0 * p.facing().sd_rad()));
                     two += usize::from(solution.is_ambiguous());
                 }
                 errors.sort_by(f64::total_cmp);
@@ -640,7 +648,10 @@ mod tests {
                 let sd = best.best().point_in_camera(neck).sd().z;
                 eprintln!(
                     "{sd_px} px {degrees}: depth sd {:.1} cm (empirical {:.1}), facing sd {:.1} deg, median error {:.1}, two poses {two}, right among them {probable}",
-                    100.0 * sd, 100.0 * depth_sq.sqrt(), best.best().facing().sd_rad().to_degrees(), errors[50]
+                    100.0 * sd,
+                    100.0 * depth_sq.sqrt(),
+                    best.best().facing().sd_rad().to_degrees(),
+                    errors[50]
                 );
                 assert!((0.04..0.08).contains(&(sd / sd_px)), "{sd}");
             }
@@ -664,9 +675,10 @@ mod tests {
                 continue;
             }
             ambiguous += 1.0;
-            let nearest = solution.poses.iter().min_by(|a, b| {
-                angle(a.rotation, truth.0).total_cmp(&angle(b.rotation, truth.0))
-            });
+            let nearest = solution
+                .poses
+                .iter()
+                .min_by(|a, b| angle(a.rotation, truth.0).total_cmp(&angle(b.rotation, truth.0)));
             promised += solution.best().probability;
             right += f64::from(u8::from(nearest == Some(solution.best())));
         }

@@ -177,7 +177,9 @@ mod tests {
         assert!(is_close(free.camera_position, scipy, DVec3::splat(2e-6)), "{}", free.camera_position);
         let scipy_sd = DVec3::new(0.610_131, 0.096_328, 0.022_301);
         assert!(is_close(free.camera_position_sd.unwrap(), scipy_sd, DVec3::splat(1e-6)));
-        assert!((free.focal_sd.unwrap() - 0.007_231).abs() < 1e-6 && (free.focal - 4.996_380_27).abs() < 1e-7);
+        assert!(
+            (free.focal_sd.unwrap() - 0.007_231).abs() < 1e-6 && (free.focal - 4.996_380_27).abs() < 1e-7
+        );
         let scipy = DVec3::new(399.997_694, -0.009_070_6, -0.023_296_6);
         assert!(is_close(known.camera_position, scipy, DVec3::splat(1e-6)));
         let scipy_sd = DVec3::new(0.006_359, 0.022_802, 0.022_317);
