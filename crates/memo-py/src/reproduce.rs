@@ -79,8 +79,8 @@ pub fn lee_chen_last_stage<'py>(
 }
 
 /// The postures of frame 1 that physical constraints and rules 1 and 2 leave: `figures` (N, 14, 3) and `truth`
-/// (14, 3) in camera axes, metres; `representatives`, one figure of each group; `passes`, whether a figure
-/// passes rules 3 to 5 too.
+/// (14, 3) in camera axes, metres; `groups` of figures that look alike, each its representative and members;
+/// `passes`, whether a figure passes rules 3 to 5 too; `true_one`, which figure takes the true roots, or None.
 #[pyfunction]
 pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
@@ -90,8 +90,10 @@ pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<
     let dict = PyDict::new(py);
     dict.set_item("figures", figures_array(py, &left.figures)?)?;
     dict.set_item("truth", figures_array(py, &[left.truth])?.reshape([JOINT_COUNT, 3])?)?;
-    let representatives: Vec<usize> = left.groups.iter().map(|group| group.representative).collect();
-    dict.set_item("representatives", representatives)?;
+    let groups: Vec<(usize, Vec<usize>)> =
+        left.groups.into_iter().map(|group| (group.representative, group.members)).collect();
+    dict.set_item("groups", groups)?;
+    dict.set_item("true_one", left.true_one)?;
     dict.set_item("passes", left.passes)?;
     Ok(dict)
 }
