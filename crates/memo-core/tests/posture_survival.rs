@@ -89,36 +89,70 @@ fn motions(names: &[&str]) -> Option<Vec<Motion>> {
     names.iter().map(|name| load(name)).collect()
 }
 
+const NOT_WALKING: [&str; 2] = ["CMU_02_04_jump", "CMU_02_05_punch"];
+
+/// The true leaf's survival under options in the three views; printed, and at least so many percent.
+fn assert_kept(motions: &[Motion], what: &str, noise_px: f64, options: &TreeOptions, percent: f64) {
+    for (name, azimuth_deg) in VIEWS {
+        let found = tally(motions, &Setting { azimuth_deg, noise_px, options, count_groups: false });
+        found.print(&format!("{what}, {name}, {noise_px} px"));
+        assert!(found.percent() >= percent, "{what}, {name}: {:.1} % < {percent} %", found.percent());
+    }
+}
+
 #[test]
+fn true_walking_survives_without_noise() {
+    let Some(walks) = motions(&WALKS) else { return };
+    assert_kept(&walks, "walks, physical", 0.0, &TreeOptions::physical(), 99.0);
+    assert_kept(&walks, "walks, rules 1-5", 0.0, &walking(), 97.0);
+}
+
+#[test]
+fn true_walking_survives_three_pixels_of_noise() {
+    let Some(walks) = motions(&WALKS) else { return };
+    assert_kept(&walks, "walks, rules 1-5", 3.0, &walking(), 95.0);
+}
+
+/// What is no walk keeps the physical constraints; the rules of walking refuse much of it.
+#[test]
+fn true_jumping_and_punching_survive_the_physical_constraints() {
+    let Some(others) = motions(&NOT_WALKING) else { return };
+    for motion in &others {
+        let motion = std::slice::from_ref(motion);
+        let name = &motion[0].name;
+        assert_kept(motion, &format!("{name}, physical"), 0.0, &TreeOptions::physical(), 99.0);
+        assert_kept(motion, &format!("{name}, physical"), 3.0, &TreeOptions::physical(), 95.0);
+        for (view, azimuth_deg) in VIEWS {
+            let setting = Setting { azimuth_deg, noise_px: 0.0, options: &walking(), count_groups: false };
+            let found = tally(motion, &setting);
+            found.print(&format!("{name}, rules of walking, {view}, 0 px"));
+            assert!(found.percent() < 70.0, "walking rules kept {:.1} % of {name}", found.percent());
+        }
+    }
+}
+
+fn walking() -> TreeOptions {
+    TreeOptions::physical().with_motion(MotionModel::walking())
+}
+
+/// Prints what the paper's strength and the measured one leave; with `--ignored --nocapture`.
+#[test]
+#[ignore = "a survey to be read"]
 fn survey() {
     let Some(walks) = motions(&WALKS) else { return };
-    let Some(others) = motions(&["CMU_02_04_jump", "CMU_02_05_punch"]) else { return };
-    let physical = TreeOptions::physical();
-    let general = TreeOptions::physical().with_motion(MotionModel::walking_general());
-    let walking = TreeOptions::physical().with_motion(MotionModel::walking());
-    let paper = TreeOptions::physical_paper();
-    let paper12 = TreeOptions::physical_paper().with_motion(MotionModel::walking_general_paper());
-    let paper15 = TreeOptions::physical_paper().with_motion(MotionModel::walking_paper());
+    let settings = [
+        ("physical", TreeOptions::physical()),
+        ("rules 1-2", TreeOptions::physical().with_motion(MotionModel::walking_general())),
+        ("rules 1-5", walking()),
+        ("paper physical", TreeOptions::physical_paper()),
+        ("paper rules 1-2", TreeOptions::physical_paper().with_motion(MotionModel::walking_general_paper())),
+        ("paper rules 1-5", TreeOptions::physical_paper().with_motion(MotionModel::walking_paper())),
+    ];
     for noise_px in [0.0, 3.0] {
         for (name, azimuth_deg) in VIEWS {
-            for (what, options) in [
-                ("physical", &physical),
-                ("rules 1-2", &general),
-                ("rules 1-5", &walking),
-                ("paper physical", &paper),
-                ("paper rules 1-2", &paper12),
-                ("paper rules 1-5", &paper15),
-            ] {
-                let count_groups = what == "rules 1-5";
-                let setting = Setting { azimuth_deg, noise_px, options, count_groups };
+            for (what, options) in &settings {
+                let setting = Setting { azimuth_deg, noise_px, options, count_groups: *what == "rules 1-5" };
                 tally(&walks, &setting).print(&format!("walks {name} {noise_px} px {what}"));
-            }
-            for (what, options) in [("physical", &physical), ("rules 1-5", &walking)] {
-                let setting = Setting { azimuth_deg, noise_px, options, count_groups: false };
-                for other in &others {
-                    tally(std::slice::from_ref(other), &setting)
-                        .print(&format!("{} {name} {noise_px} px {what}", other.name));
-                }
             }
         }
     }

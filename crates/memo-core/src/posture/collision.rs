@@ -40,7 +40,7 @@ impl Collisions {
 
     /// The same with room for noise.
     pub fn measured() -> Self {
-        Self { arm_m: 0.015, leg_m: 0.015, torso_m: 0.0, shoulder_part: 1.0 / 3.0, noise_factor: 2.0 }
+        Self { arm_m: 0.015, leg_m: 0.015, torso_m: 0.0, shoulder_part: 1.0 / 3.0, noise_factor: 1.5 }
     }
 
     /// Checks one constraint; None where it holds or is no collision.
@@ -51,12 +51,11 @@ impl Collisions {
                 let elbow = &figure[s.elbow()];
                 let shoulder = figure[s.shoulder()].point;
                 let start = shoulder.lerp(elbow.point, self.shoulder_part);
-                self.check_torso(constraint, figure, start, elbow.point, self.spread(elbow, None))
+                self.check_torso(constraint, figure, start, elbow.point, elbow, None)
             }
             C::ForearmTorso(s) => {
                 let [elbow, wrist] = [&figure[s.elbow()], &figure[s.wrist()]];
-                let spread = self.spread(elbow, Some(wrist));
-                self.check_torso(constraint, figure, elbow.point, wrist.point, spread)
+                self.check_torso(constraint, figure, elbow.point, wrist.point, elbow, Some(wrist))
             }
             C::ThighThigh => {
                 let pairs = [(Side::Right.knee(), Side::Left.knee())];
@@ -94,15 +93,20 @@ impl Collisions {
         figure: &PlacedFigure,
         start: DVec3,
         end: DVec3,
-        slack: f64,
+        upper: &Placed,
+        lower: Option<&Placed>,
     ) -> Option<Violation> {
         use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
         let corners = [RightShoulder, LeftShoulder, LeftHip, RightHip].map(|joint| figure[joint].point);
-        let required = if self.noise_factor > 0.0 { self.torso_m - slack } else { self.torso_m };
-        if required <= 0.0 && passes_beside(&corners, start, end) {
+        if self.torso_m <= 0.0 && passes_beside(&corners, start, end) {
             return None;
         }
-        Violation::under(constraint, quadrilateral_clearance(&corners, start, end), required)
+        let clearance = quadrilateral_clearance(&corners, start, end);
+        if clearance >= self.torso_m {
+            return None;
+        }
+        let slack = if self.noise_factor > 0.0 { self.spread(upper, lower) } else { 0.0 };
+        Violation::under(constraint, clearance, self.torso_m - slack)
     }
 
     fn check_limbs(
@@ -113,31 +117,41 @@ impl Collisions {
         radii_m: f64,
     ) -> Option<Violation> {
         let worst = |&(a, b): &(Joint, Joint)| {
-            let [a, b] = [self.limb(figure, a), self.limb(figure, b)];
-            let slack = if self.noise_factor > 0.0 { a.2.hypot(b.2) } else { 0.0 };
-            let required = radii_m - slack;
-            let apart = 0.5 * (a.0 + a.1 - b.0 - b.1).length();
-            let reach = 0.5 * (a.0.distance(a.1) + b.0.distance(b.1));
-            if required <= 0.0 || apart - reach > required {
+            let [[a0, a1], [b0, b1]] = [a, b].map(|end| ends(figure, end));
+            // Spheres about the segments first: most pairs are far apart.
+            let apart_sq = 0.25 * (a0 + a1 - b0 - b1).length_squared();
+            let reach = radii_m + 0.5 * (figure[a].length_m + figure[b].length_m);
+            if apart_sq > reach * reach {
                 return None;
             }
-            Violation::under(constraint, segment_distance(a.0, a.1, b.0, b.1), required)
+            let distance = segment_distance(a0, a1, b0, b1);
+            if distance >= radii_m {
+                return None;
+            }
+            let slack = if self.noise_factor > 0.0 {
+                self.limb_spread(figure, a).hypot(self.limb_spread(figure, b))
+            } else {
+                0.0
+            };
+            Violation::under(constraint, distance, radii_m - slack)
         };
         pairs.iter().filter_map(worst).max_by(|a, b| a.excess.total_cmp(&b.excess))
     }
 
-    /// Ends and spread of the segment that ends at a joint.
-    fn limb(&self, figure: &PlacedFigure, end: Joint) -> (DVec3, DVec3, f64) {
-        let start = end.start().unwrap_or(end);
-        let upper = &figure[start];
-        let spread = match end {
+    /// Spread of the segment that ends at a joint.
+    fn limb_spread(&self, figure: &PlacedFigure, end: Joint) -> f64 {
+        match end {
             Joint::RightElbow | Joint::LeftElbow | Joint::RightKnee | Joint::LeftKnee => {
                 self.spread(&figure[end], None)
             }
-            _ => self.spread(upper, Some(&figure[end])),
-        };
-        (upper.point, figure[end].point, spread)
+            _ => self.spread(&figure[end.start().unwrap_or(end)], Some(&figure[end])),
+        }
     }
+}
+
+/// The two ends of the segment that ends at a joint.
+fn ends(figure: &PlacedFigure, end: Joint) -> [DVec3; 2] {
+    [figure[end.start().unwrap_or(end)].point, figure[end].point]
 }
 
 impl Default for Collisions {
@@ -231,7 +245,7 @@ mod tests {
         let mut step = 0.5;
         let mut least = distance(&best);
         // A coarse grid finds the basin (the distance is convex), then it is narrowed.
-        for _ in 0..60 {
+        for _ in 0..120 {
             let centre = best.clone();
             for index in 0..5usize.pow(dimensions as u32) {
                 let mut at = centre.clone();
@@ -244,7 +258,7 @@ mod tests {
                     (least, best) = (d, at);
                 }
             }
-            step *= 0.75;
+            step *= 0.88;
         }
         least
     }
@@ -270,8 +284,9 @@ mod tests {
                                              e in point(), f in point()) {
             let clearance = quadrilateral_clearance(&[a, b, c, d], e, f);
             let triangle = |t: &[DVec3; 3]| {
-                let on = |p: &[f64]| t[0] + p[1] * (t[1] - t[0]) + p[1] * p[2] * (t[2] - t[1]);
-                sampled(|p| on(p).distance(e.lerp(f, p[0])), 3)
+                let on = |p: &[f64]| t[0] + p[1] * (t[1] - t[0]) + p[2] * (t[2] - t[0]);
+                let apart = |p: &[f64]| on(p).distance(e.lerp(f, p[0]));
+                sampled(|p| if p[1] + p[2] <= 1.0 { apart(p) } else { f64::MAX }, 3)
             };
             let oracle = triangles(&[a, b, c, d]).iter().map(triangle).fold(f64::MAX, f64::min);
             prop_assert!((clearance.max(0.0) - oracle).abs() < 2e-3, "{clearance} {oracle}");

@@ -87,3 +87,66 @@ fn complete_linkage(mut apart: Vec<f64>, n: usize, within_m: f64) -> Vec<Vec<usi
     members.iter_mut().for_each(|cluster| cluster.sort_unstable());
     members.into_iter().filter(|cluster| !cluster.is_empty()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    fn at(x: f64) -> StickFigure {
+        let mut figure = StickFigure::UNKNOWN;
+        figure[Joint::Neck] = DVec3::ZERO;
+        figure[Joint::LeftWrist] = DVec3::new(x, 0.0, 0.0);
+        figure
+    }
+
+    #[test]
+    fn a_chain_is_not_drawn_into_one_group() {
+        let figures: Vec<StickFigure> = [0.0, 0.06, 0.12, 0.18, 0.5].map(at).to_vec();
+        let groups = group(&figures, 0.10);
+        let members: Vec<_> = groups.iter().map(|g| g.members.clone()).collect();
+        assert_eq!(members, [vec![0, 1], vec![2, 3], vec![4]]);
+        let groups = group(&[0.0, 0.02, 0.05].map(at), 0.10);
+        assert_eq!(groups.len(), 1);
+        assert_eq!(groups[0].representative, 1);
+        assert!((groups[0].diameter_m - 0.05).abs() < 1e-12);
+        assert!(group(&[], 0.1).is_empty());
+        assert_eq!(group(&[at(0.0), at(0.0)], f64::NAN).len(), 2);
+    }
+
+    proptest! {
+        /// The plain algorithm: look through all pairs of groups for the nearest.
+        #[test]
+        fn groups_are_those_of_the_plain_algorithm(
+            places in prop::collection::vec((0.0..0.5_f64, 0.0..0.3_f64), 1..24), within_m in 0.02..0.3_f64
+        ) {
+            let figures: Vec<StickFigure> = places.iter().map(|&(x, y)| {
+                let mut figure = at(x);
+                figure[Joint::RightKnee] = DVec3::new(0.0, y, 0.0);
+                figure
+            }).collect();
+            let mut plain: Vec<Vec<usize>> = (0..figures.len()).map(|i| vec![i]).collect();
+            let apart = |a: &[usize], b: &[usize]| {
+                let pairs = a.iter().flat_map(|&i| b.iter().map(move |&j| (i, j)));
+                pairs.map(|(i, j)| figure_distance(&figures[i], &figures[j])).fold(0.0, f64::max)
+            };
+            loop {
+                let pairs = (0..plain.len()).flat_map(|i| (i + 1..plain.len()).map(move |j| (i, j)));
+                let best = pairs.map(|(i, j)| (apart(&plain[i], &plain[j]), i, j))
+                    .min_by(|a, b| a.0.total_cmp(&b.0));
+                let Some((_, i, j)) = best.filter(|b| b.0 <= within_m) else { break };
+                let joined = plain.remove(j);
+                plain[i].extend(joined);
+                plain[i].sort_unstable();
+                plain.sort();
+            }
+            let groups = group(&figures, within_m);
+            let members: Vec<_> = groups.iter().map(|g| g.members.clone()).collect();
+            prop_assert_eq!(members, plain);
+            for group in groups {
+                prop_assert!(group.diameter_m <= within_m && group.members.contains(&group.representative));
+            }
+        }
+    }
+}

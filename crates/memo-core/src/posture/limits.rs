@@ -99,8 +99,10 @@ pub struct Limits {
     pub neck_rotation_rad: f64,
     /// Bending of the head to either side, radians.
     pub neck_bending_rad: f64,
-    /// Deviation of a distance within torso or hip part, metres.
+    /// Deviation of the distances between shoulders and between hips, metres.
     pub distance_m: f64,
+    /// Deviation of the distances from shoulders to pelvis, metres: spine and shoulder girdle are not rigid.
+    pub shoulder_pelvis_m: f64,
     /// Every limit grows by this many standard deviations of the propagated noise.
     pub noise_factor: f64,
 }
@@ -129,11 +131,19 @@ impl Limits {
             neck_rotation_rad: deg(70.0),
             neck_bending_rad: deg(40.0),
             distance_m: 0.02,
+            shoulder_pelvis_m: 0.02,
             noise_factor: 0.0,
         }
     }
 
     /// Limits that real people keep.
+    ///
+    /// Table 1 widened by 5 degrees (elbow and knee flexion by 5 and 10); the knee may be extended by 8, for
+    /// true walkers reach 6.3. Chosen on four walks, seen from the front, at 45 degrees and from the side,
+    /// without noise and at 3 px of 480 px/m, as were the noise factor and the uncertainty of the lengths.
+    /// The tolerance from shoulders to pelvis was chosen on a jump and a bout of punching, whose true
+    /// distances change by up to 4 cm and whose trunks shorten by as much, which the wrong length of the
+    /// trunk then magnifies along the ray; walking alone would need 2 cm.
     pub fn measured() -> Self {
         let paper = Self::paper();
         let deg = |angle: f64| angle.to_radians();
@@ -153,7 +163,8 @@ impl Limits {
             neck_rotation_rad: paper.neck_rotation_rad + deg(5.0),
             neck_bending_rad: paper.neck_bending_rad + deg(5.0),
             distance_m: 0.02,
-            noise_factor: 2.0,
+            shoulder_pelvis_m: 0.10,
+            noise_factor: 1.5,
             ..paper
         }
     }
@@ -218,7 +229,13 @@ impl Limits {
         let between = b.point - a.point;
         let length = between.length();
         let deviation = (length - lengths.rigid[distance as usize]).abs();
-        let mut tolerance = self.distance_m;
+        let mut tolerance = match distance {
+            RigidDistance::Shoulders | RigidDistance::Hips => self.distance_m,
+            RigidDistance::RightShoulderPelvis | RigidDistance::LeftShoulderPelvis => self.shoulder_pelvis_m,
+        };
+        if deviation <= tolerance {
+            return None;
+        }
         if self.noise_factor > 0.0 {
             let unit = between / length.max(1e-9);
             let along = a.along(unit).hypot(b.along(unit));
@@ -316,6 +333,9 @@ impl Limits {
             AngleReading::Literal => u.unit.angle_between(v.unit),
             AngleReading::Turn => w_z.abs().min(1.0).asin(),
         };
+        if angle <= -range.min_rad {
+            return None;
+        }
         let sd = v.along(hinge) / v.length_m;
         let sd = sd.hypot(u.along(axes.z_axis.cross(v.unit)) / u.length_m);
         self.beyond(constraint, -range.min_rad, angle + range.min_rad, sd)

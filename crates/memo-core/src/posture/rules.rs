@@ -172,7 +172,7 @@ impl MotionModel {
             name: name.to_owned(),
             tolerances: [None; RULE_COUNT],
             knee_flexed_rad: 40f64.to_radians(),
-            noise_factor: 2.0,
+            noise_factor: 1.0,
         }
     }
 
@@ -278,12 +278,12 @@ impl MotionModel {
             C::ThighPlane(s) => self.out_of_plane(constraint, angle, &figure[s.knee()], trunk),
             C::ShankPlane(s) => self.out_of_plane(constraint, angle, &figure[s.ankle()], trunk),
             C::OneKneeFlexed => {
-                let [a, b] = Side::BOTH.map(|side| self.sure_flexion(figure, trunk, side));
+                let [a, b] = Side::BOTH.map(|side| self.sure_flexion(figure, trunk, side, angle));
                 self.over(constraint, a.min(b), angle)
             }
             C::OtherLegUpright => self.other_leg(constraint, angle, figure, trunk),
             C::LegUpright(s) => self.upright(constraint, angle, figure, trunk, s),
-            C::KneeStraight(s) => self.over(constraint, self.sure_flexion(figure, trunk, s), angle),
+            C::KneeStraight(s) => self.over(constraint, self.sure_flexion(figure, trunk, s, angle), angle),
             _ => None,
         }
     }
@@ -306,10 +306,14 @@ impl MotionModel {
         self.sure(swing_rad(axes, limb.unit), limb.direction_sd(towards).hypot(trunk.torso_sd.z))
     }
 
-    fn sure_flexion(&self, figure: &PlacedFigure, trunk: &Trunk, side: Side) -> f64 {
+    /// A knee's flexion drawn towards 0 by its noise; as it is where that does not pass a tolerance anyway.
+    fn sure_flexion(&self, figure: &PlacedFigure, trunk: &Trunk, side: Side, tolerance: f64) -> f64 {
         let [thigh, shank] = [&figure[side.knee()], &figure[side.ankle()]];
-        let sd = thigh.worst_direction_sd().hypot(shank.worst_direction_sd());
-        self.sure(knee_rad(&trunk.torso, thigh.unit, shank.unit), sd)
+        let flexion = knee_rad(&trunk.torso, thigh.unit, shank.unit);
+        if flexion <= tolerance {
+            return flexion;
+        }
+        self.sure(flexion, thigh.worst_direction_sd().hypot(shank.worst_direction_sd()))
     }
 
     /// Rules 1 and 2: the smaller of two swings to one side.
@@ -322,10 +326,12 @@ impl MotionModel {
         a: Joint,
         b: Joint,
     ) -> Option<Violation> {
-        let [a, b] = [a, b].map(|joint| self.sure_swing(&figure[joint], trunk));
-        if a * b <= 0.0 {
+        let limbs = [a, b].map(|joint| &figure[joint]);
+        let [a, b] = limbs.map(|limb| swing_rad(&trunk.torso, limb.unit));
+        if a * b <= 0.0 || a.abs().min(b.abs()) <= tolerance {
             return None;
         }
+        let [a, b] = limbs.map(|limb| self.sure_swing(limb, trunk));
         self.over(constraint, a.abs().min(b.abs()), tolerance)
     }
 
@@ -338,10 +344,12 @@ impl MotionModel {
         trunk: &Trunk,
         joints: [Joint; 2],
     ) -> Option<Violation> {
-        let [a, b] = joints.map(|joint| self.sure_swing(&figure[joint], trunk));
-        if a * b >= 0.0 {
+        let limbs = joints.map(|joint| &figure[joint]);
+        let [a, b] = limbs.map(|limb| swing_rad(&trunk.torso, limb.unit));
+        if a * b >= 0.0 || a.abs().min(b.abs()) <= tolerance {
             return None;
         }
+        let [a, b] = limbs.map(|limb| self.sure_swing(limb, trunk));
         self.over(constraint, a.abs().min(b.abs()), tolerance)
     }
 
@@ -358,6 +366,9 @@ impl MotionModel {
         let start = &figure[end.start()?];
         let normal = trunk.body_normal;
         let ahead = (start.unit * start.length_m).dot(normal);
+        if ahead.abs() <= tolerance.distance_m {
+            return None;
+        }
         let slack = if self.noise_factor > 0.0 { self.noise_factor * start.along(normal) } else { 0.0 };
         if ahead.abs() <= tolerance.distance_m + slack {
             return None;
@@ -381,6 +392,9 @@ impl MotionModel {
         trunk: &Trunk,
     ) -> Option<Violation> {
         let out = limb.unit.dot(trunk.lateral).clamp(-1.0, 1.0).asin();
+        if out.abs() <= tolerance {
+            return None;
+        }
         let sd = limb.direction_sd(trunk.lateral).hypot(trunk.lateral_sd);
         self.over(constraint, self.sure(out, sd).abs(), tolerance)
     }
@@ -393,8 +407,8 @@ impl MotionModel {
         figure: &PlacedFigure,
         trunk: &Trunk,
     ) -> Option<Violation> {
-        let [right, left] = Side::BOTH.map(|side| self.sure_flexion(figure, trunk, side));
         let flexed = self.knee_flexed_rad;
+        let [right, left] = Side::BOTH.map(|side| self.sure_flexion(figure, trunk, side, flexed));
         let other = match (right > flexed, left > flexed) {
             (true, false) => Side::Left,
             (false, true) => Side::Right,
