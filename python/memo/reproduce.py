@@ -97,7 +97,7 @@ def _head_numbers(column: dict[str, Any]) -> dict[str, float]:
 def _head_rows(head: Sequence[dict[str, Any]]) -> tuple[list[str], list[list[Any]]]:
     columns = [_head_numbers(column) for column in head]
     header = ["quantity", *(column["method"] for column in head)]
-    rows = [[name, *(f"{column[name]:.5f}" for column in columns)] for name in columns[0]]
+    rows = [[name, *(f"{column[name]:z.5f}" for column in columns)] for name in columns[0]]
     return header, rows
 
 
@@ -285,7 +285,7 @@ def _draw_panels(figure: Figure, left: dict[str, Any]) -> None:
         plot_posture(ax, left["figures"][left["true_one"] if is_true else representative])
         marks = ["rules 3-5"] * any(left["passes"][i] for i in members) + ["true"] * is_true
         ax.set_title(f"({chr(ord('a') + number)}) {', '.join(marks)}", fontsize=8)
-    figure.suptitle("camera to the left; right limbs solid, left dashed; named: what passes", fontsize=8)
+    figure.suptitle("camera to the left; right limbs solid, left dashed; within 5 cm one posture", fontsize=8)
 
 
 def _save(path: Path, size_in: tuple[float, float], draw: Callable[[Figure], None]) -> Path:

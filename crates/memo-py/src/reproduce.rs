@@ -47,7 +47,7 @@ fn set_counts(dict: &Bound<'_, PyDict>, prefix: &str, counts: &Counts) -> PyResu
 }
 
 /// What rules 1 to 5 and grouping leave, over ten phases and three frames: a list of dicts with `phase`,
-/// `postures`, `groups`, `truth_kept` and `broken`, the names of the constraints that the true posture breaks.
+/// `postures`, `groups`, `truth_kept` and `broken`, names of the constraints that the true posture breaks.
 ///
 /// `reading` is "as_printed" or "rigid_torso".
 #[pyfunction]
@@ -78,9 +78,9 @@ pub fn lee_chen_last_stage<'py>(
     stages.into_iter().map(dict_of).collect()
 }
 
-/// The postures of frame 1 that physical constraints and rules 1 and 2 leave: `figures` (N, 14, 3) and `truth`
-/// (14, 3) in camera axes, metres; `groups` of figures that look alike, each its representative and members;
-/// `passes`, whether a figure passes rules 3 to 5 too; `true_one`, which figure takes the true roots, or None.
+/// The postures of frame 1 that physical constraints and rules 1 and 2 leave: `figures` (N, 14, 3) and
+/// `truth` (14, 3) in camera axes, metres; `groups` of figures within 5 cm, each its representative and
+/// members; `passes`, whether a figure passes rules 3 to 5 too; `true_one`, which takes the true roots.
 #[pyfunction]
 pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;

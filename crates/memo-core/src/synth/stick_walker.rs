@@ -2,8 +2,8 @@
 //!
 //! What is theirs: the 17 lengths (Table A.1), the head (Table A.2), the cameras, 0.2 s a frame. Their joint
 //! coordinates are not printed and the program that drew them (Cutting 1978) is not public, so the joint
-//! angles are the project's average gait curves, and the rotations of shoulders and pelvis are those stated at
-//! [`StickWalker`]. Numbers printed for single frames can therefore be approached, not met.
+//! angles are the project's average gait curves, and the rotations of shoulders and pelvis are those stated
+//! at [`StickWalker`]. Numbers printed for single frames can therefore be approached, not met.
 //!
 //! Axes are the paper's head-centred ones, in metres: x the moving direction, y up, z to the right of the
 //! walker. Trunk and limbs are upright and swing in planes parallel to the moving direction. The head does
@@ -63,8 +63,8 @@ pub struct StickWalker {
     /// Amplitude of the shoulders' turn about the line from neck to pelvis, radians: the right shoulder is
     /// farthest ahead at the left heel strike, with the right arm. 4 degrees.
     pub shoulder_turn_rad: f64,
-    /// Amplitude of the pelvis' turn about the same line, radians: the right hip is farthest ahead at the right
-    /// heel strike, with the right leg. 6 degrees.
+    /// Amplitude of the pelvis' turn about the same line, radians: the right hip is farthest ahead at the
+    /// right heel strike, with the right leg. 6 degrees.
     pub pelvis_turn_rad: f64,
     /// Gait phase of frame 0.
     pub phase0: f64,
@@ -173,8 +173,8 @@ impl StickWalker {
 }
 
 impl Trunk {
-    /// Shoulders from three distances each, to neck, pelvis and each other, behind the neck; hips from theirs,
-    /// below the pelvis and level.
+    /// Shoulders from three distances each, to neck, pelvis and each other, behind the neck; hips from
+    /// theirs, below the pelvis and level.
     ///
     /// Of Table A.1: shoulders 3.74 cm behind and 0.47 cm below the neck, hips 10.09 cm below the pelvis.
     fn new(lengths: &SegmentLengths) -> Result<Self, StickWalkerError> {
@@ -258,7 +258,7 @@ impl StickCamera {
         Self::aimed_from(3.0, 3.0)
     }
 
-    /// Image plane at (x, 0, z) in head axes, metres, looking at their origin. At the origin itself, along -x.
+    /// Image plane at (x, 0, z) in head axes, metres, looking at their origin.
     fn aimed_from(x: f64, z: f64) -> Self {
         let plane = DVec3::new(x, 0.0, z);
         let back = plane.normalize_or(DVec3::X);
@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// The angles the project reads in the trunk's axes are those of the gait curves: the elbow and the knee
-    /// to rounding, for they lie between two segments, the swing up to the tangent's share of the trunk's turn.
+    /// to rounding, for they lie between two segments, the swing up to the share of the trunk's turn.
     #[test]
     fn the_angles_read_back_are_those_of_the_gait() {
         let walker = StickWalker::lee_chen();

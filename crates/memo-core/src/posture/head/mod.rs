@@ -1,15 +1,15 @@
-//! Where the head is and where it faces, from its feature points in one image (Lee and Chen 1985, section 2.1).
+//! Where the head is and faces, from its feature points in one image (Lee and Chen 1985, section 2.1).
 //!
 //! | function | needs | gives |
 //! |---|---|---|
-//! | [`linear_head`] | 6 points, not coplanar | eqs. (1)-(5): `[T]`, `[R]`, f and camera position, no uncertainty |
+//! | [`linear_head`] | 6 points, not coplanar | eqs. (1)-(5): `[T]`, `[R]`, f and position, no uncertainty |
 //! | [`head_pose`] | 4 points with f known, 6 with f free | every least-squares pose, with covariance |
-//! | [`head_pose_in_image`] | a [`Camera`](crate::model::Camera) and 4 pixels | the same in pixels, through its lens |
+//! | [`head_pose_in_image`] | a [`Camera`](crate::model::Camera), 4 pixels | the same, through its lens |
 //!
 //! # Frames
 //!
-//! Head: right-handed; x forward, y up, z to the head's right (Table A.2). The *head plane* is spanned by y and
-//! z, so its normal, the facing direction, is x: the paper uses the normal without defining the plane.
+//! Head: right-handed; x forward, y up, z to the head's right (Table A.2). The *head plane* is spanned by y
+//! and z, so its normal, the facing direction, is x: the paper uses the normal without defining the plane.
 //!
 //! Camera: OpenCV axes (x right, y down, z forward) with the origin in the centre of projection. The paper's
 //! camera is left-handed (y up) with its origin on the image plane, f in front of the centre of projection:
@@ -23,9 +23,10 @@
 //!
 //! # What it cannot do
 //!
-//! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 4 to 6 cm for each pixel of noise;
-//! with f free the depth is next to undetermined. Points are taken as matched and independent, with
-//! one standard deviation: outliers are not searched for, but show in [`HeadPose::chi_squared`].
+//! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 5 to 7 cm for each pixel of
+//! noise and its facing by 1 to 3 degrees; with f free the depth is next to undetermined. Points are taken as
+//! matched and independent, with one standard deviation: outliers are not searched for, but show in
+//! [`HeadPose::chi_squared`] if that is given.
 
 mod linear;
 mod model;
@@ -34,7 +35,7 @@ mod search;
 mod table;
 
 pub use linear::{Conditioning, LinearHead, PaperView, linear_head};
-pub use model::{HeadModel, HeadPoint};
+pub use model::{HeadModel, HeadPoint, LEE_CHEN_BODY_HEIGHT_M};
 pub use pose::{Facing, HeadPose, PointEstimate};
 pub use search::{Focal, HeadOptions, HeadSolution, head_pose, head_pose_in_image};
 pub use table::{HeadTable, HeadTableColumn, exact_projections, table_2};

@@ -42,8 +42,9 @@ pub(super) const TABLE_A2_POINTS_CM: [DVec3; 6] = [
 
 /// Body height of the person of Tables A.1 and A.2, metres.
 ///
-/// Not printed. The eyes are 13.0 cm above the neck (A.2), the ankles 131.2 cm below it (A.1: neck to hips 56.2,
-/// hips to ankles 75). Eyes at 0.936 and ankles at 0.039 of body height (Drillis and Contini 1966) make it 1.608.
+/// Not printed. The eyes are 13.0 cm above the neck (A.2), the ankles 131.2 cm below it (A.1: neck to hips
+/// 56.2, hips to ankles 75). Eyes at 0.936 and ankles at 0.039 of body height (Drillis and Contini 1966) make
+/// it 1.608.
 pub const LEE_CHEN_BODY_HEIGHT_M: f64 = 1.608;
 
 /// A rigid head: where its feature points are.

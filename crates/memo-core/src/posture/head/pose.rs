@@ -2,10 +2,11 @@
 
 use super::PaperView;
 use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{Matrix3x6, Matrix6, SMatrix};
+use nalgebra::{Matrix3x6, Matrix6, SMatrix, SVector};
 
 /// Rotation vector (3), translation (3), focal length (1).
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
+pub(super) type Vector7 = SVector<f64, 7>;
 type Matrix3x7 = SMatrix<f64, 3, 7>;
 
 /// A point with its first-order covariance.
@@ -60,7 +61,8 @@ pub struct HeadPose {
     pub residuals: Vec<DVec2>,
     /// Standard deviation of an image coordinate, given or estimated, image units.
     pub image_sd: f64,
-    /// Sum of the squared residuals over `image_sd`²; about `degrees_of_freedom` if model and noise are right.
+    /// Sum of the squared residuals over `image_sd`²; about `degrees_of_freedom` if model and noise hold.
+    /// Says nothing if `image_sd` was estimated.
     pub chi_squared: f64,
     /// Image coordinates less parameters.
     pub degrees_of_freedom: usize,

@@ -1,25 +1,25 @@
 //! Every pose of the head that explains its image points: reprojection least squares over true rotations.
 //!
 //! ```text
-//! q_i = R (p_i - c) + t_c,   u_i = fx q_x / q_z,   v_i = fy q_y / q_z,   least sum of |(u_i, v_i) - measured|²
+//! q_i = R (p_i - c) + t_c,   u_i = fx q_x / q_z,   v_i = fy q_y / q_z,   least sum |(u_i, v_i) - measured|²
 //! ```
 //!
 //! with c the centroid of the head points, R -> R exp(w), by Levenberg and Marquardt's method (Moré 1978's
-//! scaling). The sum has several minima: the flatter the head is and the farther away, the more alike are the
+//! scaling). The sum has several minima: the flatter the head and the farther away, the more alike are the
 //! pose and its mirror (Necker's reversal). So the search starts from the linear solution, from 24 rotations
-//! that leave none farther than 63 degrees away, and from the mirror of each minimum found, and keeps all minima that the
-//! noise cannot tell apart.
+//! that leave none farther than 63 degrees away, and from the mirror of each minimum found, and keeps all
+//! minima that the noise cannot tell apart.
 //!
 //! Covariance: image_sd² (JᵀJ)⁻¹ at the minimum. It is first-order: where the depth's standard deviation is
 //! more than a tenth of the depth, the true distribution is skewed towards the far side.
 
 use super::linear::LINEAR_POINTS;
-use super::pose::{Matrix7, point_jacobian};
+use super::pose::{Matrix7, Vector7, point_jacobian};
 use super::{Conditioning, HeadError, HeadPose, MAX_COORDINATE, Shape, checked_shape, linear_head};
 use super::{centroid_and_spread, right_svd};
 use crate::model::Camera;
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Points needed with the focal length known: three leave up to four poses, the fourth leaves two equations
 /// to spare.
@@ -46,8 +46,8 @@ pub enum Focal {
 /// How certain the image points are and which poses are returned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadOptions {
-    /// Standard deviation of each image coordinate, image units; `None` estimates it from the residuals, which
-    /// with six points leaves it uncertain by a third.
+    /// Standard deviation of each image coordinate, image units; `None` estimates it from the residuals,
+    /// which with six points leaves it uncertain by a third.
     pub image_sd: Option<f64>,
     /// Poses less probable than this are left out, in (0, 1).
     pub min_probability: f64,
@@ -105,8 +105,8 @@ pub fn head_pose_in_image(
 
 /// Every pose of the head with its covariance.
 ///
-/// `points_in_head` in any unit; `image_points` (u right, v **down**) relative to the principal point, in the unit of
-/// the focal length.
+/// `points_in_head` in any unit; `image_points` (u right, v **down**) relative to the principal point, in the
+/// unit of the focal length.
 ///
 /// # Errors
 ///
@@ -214,13 +214,12 @@ struct State {
 
 impl State {
     /// The state after the step (w, dt, df).
-    fn moved(&self, step: &DVector<f64>) -> Self {
+    fn moved(&self, step: &Vector7) -> Self {
         let turn = DQuat::from_scaled_axis(DVec3::new(step[0], step[1], step[2]));
-        let focal_step = if step.len() > 6 { step[6] } else { 0.0 };
         Self {
             rotation: self.rotation * DMat3::from_quat(turn),
             centre: self.centre + DVec3::new(step[3], step[4], step[5]),
-            focal: self.focal + focal_step,
+            focal: self.focal + step[6],
         }
     }
 
@@ -236,6 +235,13 @@ impl State {
 struct Minimum {
     state: State,
     sum_sq: f64,
+}
+
+/// A step downhill.
+struct Descent {
+    to: Minimum,
+    /// How far the image points moved, the parameters taken one by one, image units squared.
+    moved_sq: f64,
 }
 
 struct Problem<'a> {
@@ -270,24 +276,35 @@ impl Problem<'_> {
         sum.filter(|sum| sum.is_finite()).unwrap_or(f64::INFINITY)
     }
 
+    /// The two rows of J of a point, by (w, t, f); the last column is zero if f is known.
+    ///
     /// d(u, v) = diag(fx, fy) [1/qz, 0, -qx/qz²; 0, 1/qz, -qy/qz²] dq + (qx, qy)/qz df.
-    fn jacobian(&self, state: &State) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(2 * self.centred.len(), self.parameters());
-        for (i, point) in self.centred.iter().enumerate() {
-            let q = state.rotation * *point + state.centre;
-            let plane = q.truncate() / q.z;
-            let moved = point_jacobian(state.rotation, *point);
-            for row in 0..2 {
-                for column in 0..6 {
-                    let slope = (moved[(row, column)] - plane[row] * moved[(2, column)]) / q.z;
-                    jacobian[(2 * i + row, column)] = state.focal[row] * slope;
-                }
-                if self.is_focal_free {
-                    jacobian[(2 * i + row, 6)] = plane[row];
-                }
+    fn jacobian_rows(&self, state: &State, point: DVec3) -> [Vector7; 2] {
+        let q = state.rotation * point + state.centre;
+        let plane = q.truncate() / q.z;
+        let moved = point_jacobian(state.rotation, point);
+        [0, 1].map(|row| {
+            let mut slopes = Vector7::zeros();
+            for column in 0..6 {
+                let slope = (moved[(row, column)] - plane[row] * moved[(2, column)]) / q.z;
+                slopes[column] = state.focal[row] * slope;
+            }
+            slopes[6] = if self.is_focal_free { plane[row] } else { 0.0 };
+            slopes
+        })
+    }
+
+    /// JᵀJ and Jᵀr. With f known an equation 1 df = 0 keeps JᵀJ regular.
+    fn normal_equations(&self, state: &State, residuals: &[DVec2]) -> (Matrix7, Vector7) {
+        let (mut normal, mut gradient) = (Matrix7::zeros(), Vector7::zeros());
+        normal[(6, 6)] = if self.is_focal_free { 0.0 } else { 1.0 };
+        for (point, residual) in self.centred.iter().zip(residuals) {
+            for (row, error) in self.jacobian_rows(state, *point).iter().zip(residual.to_array()) {
+                normal += row * row.transpose();
+                gradient += row * error;
             }
         }
-        jacobian
+        (normal, gradient)
     }
 
     /// A rotation and the translation that suits it best: linear in t,
@@ -334,42 +351,51 @@ impl Problem<'_> {
 
     /// Levenberg and Marquardt's method; `None` if it does not settle.
     fn minimum(&self, start: State) -> Option<Minimum> {
-        let mut state = start;
-        let mut sum_sq = self.sum_sq(&state);
+        let mut current = Minimum { state: start, sum_sq: self.sum_sq(&start) };
         let mut damping = 1e-3;
-        // A step that moves the image by less than this is rounding.
-        let still_sq = (1e-12 * self.spread).powi(2);
         for _ in 0..MAX_ITERATIONS {
-            let jacobian = self.jacobian(&state);
-            let residuals = flattened(&self.residuals(&state)?);
-            let normal = jacobian.tr_mul(&jacobian);
-            let gradient = jacobian.tr_mul(&residuals);
-            let diagonal = normal.diagonal();
-            let is_flat = (0..diagonal.len())
-                .all(|k| gradient[k].powi(2) <= diagonal[k] * (1e-16 * sum_sq).max(still_sq));
-            loop {
-                let mut damped = normal.clone();
-                for k in 0..diagonal.len() {
-                    damped[(k, k)] += damping * diagonal[k];
-                }
-                if let Some(step) = damped.cholesky().map(|factor| -factor.solve(&gradient)) {
-                    let moved = state.moved(&step);
-                    let moved_sum_sq = self.sum_sq(&moved);
-                    let moved_sq: f64 = (0..step.len()).map(|k| diagonal[k] * step[k] * step[k]).sum();
-                    if moved_sum_sq <= sum_sq {
-                        (state, sum_sq) = (moved, moved_sum_sq);
-                        damping = (damping * 0.1).max(1e-15);
-                        if moved_sq <= still_sq.max(1e-20 * sum_sq) {
-                            return Some(Minimum { state, sum_sq });
-                        }
-                        break;
-                    }
-                }
-                damping *= 10.0;
-                if damping > 1e8 {
-                    return is_flat.then_some(Minimum { state, sum_sq });
+            let residuals = self.residuals(&current.state)?;
+            let (normal, gradient) = self.normal_equations(&current.state, &residuals);
+            // What moves the image by less than this is rounding.
+            let still_sq = (1e-12 * self.spread).powi(2).max(1e-20 * current.sum_sq);
+            let Some(descent) = self.descent(&current, &normal, &gradient, &mut damping) else {
+                // No step helps: at a minimum if the slope is nil.
+                let diagonal = normal.diagonal();
+                let flat = |(slope, square): (&f64, &f64)| slope * slope <= square * 1e4 * still_sq;
+                return gradient.iter().zip(&diagonal).all(flat).then_some(current);
+            };
+            current = descent.to;
+            if descent.moved_sq <= still_sq {
+                return Some(current);
+            }
+        }
+        None
+    }
+
+    /// The first step (JᵀJ + damping diag JᵀJ) s = -Jᵀr that does not go up, with ever more damping.
+    fn descent(
+        &self,
+        from: &Minimum,
+        normal: &Matrix7,
+        gradient: &Vector7,
+        damping: &mut f64,
+    ) -> Option<Descent> {
+        while *damping < 1e8 {
+            let mut damped = *normal;
+            for k in 0..7 {
+                damped[(k, k)] *= 1.0 + *damping;
+            }
+            if let Some(factor) = damped.cholesky() {
+                let step = -factor.solve(gradient);
+                let state = from.state.moved(&step);
+                let sum_sq = self.sum_sq(&state);
+                if sum_sq <= from.sum_sq {
+                    *damping = (*damping * 0.1).max(1e-15);
+                    let moved_sq = step.iter().zip(&normal.diagonal()).map(|(s, n)| n * s * s).sum();
+                    return Some(Descent { to: Minimum { state, sum_sq }, moved_sq });
                 }
             }
+            *damping *= 10.0;
         }
         None
     }
@@ -397,11 +423,7 @@ impl Problem<'_> {
             if probability < options.min_probability && !poses.is_empty() {
                 continue;
             }
-            match self.pose(minimum, image_sd, degrees_of_freedom, probability) {
-                Ok(pose) => poses.push(pose),
-                Err(error) if poses.is_empty() => return Err(error),
-                Err(_) => {}
-            }
+            poses.push(self.pose(minimum, image_sd, degrees_of_freedom, probability)?);
         }
         Ok(HeadSolution { poses, minima: minima.len() })
     }
@@ -433,10 +455,13 @@ impl Problem<'_> {
         })
     }
 
-    /// (JᵀJ)⁻¹ by the singular values of J with columns of unit length: (J D⁻¹ = U S Vᵀ) gives D⁻¹ V S⁻² Vᵀ D⁻¹.
+    /// (JᵀJ)⁻¹ by the singular values of J with columns of unit length: J D⁻¹ = U S Vᵀ gives
+    /// D⁻¹ V S⁻² Vᵀ D⁻¹.
     fn inverse_normal(&self, state: &State) -> Result<Matrix7, HeadError> {
         let undetermined = |ratio| HeadError::Undetermined { ratio, needed: MIN_RATIO };
-        let mut jacobian = self.jacobian(state);
+        let rows: Vec<Vector7> =
+            self.centred.iter().flat_map(|point| self.jacobian_rows(state, *point)).collect();
+        let mut jacobian = DMatrix::from_fn(rows.len(), self.parameters(), |i, j| rows[i][j]);
         let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         for (mut column, length) in jacobian.column_iter_mut().zip(&lengths) {
             column /= *length;
@@ -455,10 +480,6 @@ impl Problem<'_> {
         }
         Ok(inverse)
     }
-}
-
-fn flattened(residuals: &[DVec2]) -> DVector<f64> {
-    DVector::from_iterator(2 * residuals.len(), residuals.iter().flat_map(|r| r.to_array()))
 }
 
 #[cfg(test)]
@@ -548,7 +569,7 @@ mod tests {
         assert!((sum_sq - 2.6307387068724575).abs() < 1e-8, "{sum_sq}");
     }
 
-    /// Predicted and empirical standard deviations over 400 noise draws, 1 px, 4 m, head turned by 30 degrees.
+    /// Predicted and empirical standard deviations over 400 noise draws, 1 px, 4 m, turned by 30 degrees.
     #[test]
     fn covariance_is_what_noise_does() {
         let points = HeadModel::lee_chen().points_m;
@@ -595,7 +616,7 @@ mod tests {
         assert!((chi_squared - 6.0).abs() < 0.6, "{chi_squared}");
     }
 
-    /// With the focal length free: standard deviations of f and of the camera, at a noise that leaves f known to 2 %.
+    /// With the focal length free, at a noise that leaves it known to 3 %.
     #[test]
     fn covariance_holds_with_a_free_focal_length() {
         let points = HeadModel::lee_chen().points_m;
@@ -619,42 +640,41 @@ mod tests {
         }
     }
 
-    /// The depth of a neck 4 m away is uncertain by 4 to 8 cm a pixel, the facing by 2 to 6 degrees a pixel.
+    /// At 4 m and 480 px/m a pixel of noise makes the neck's depth uncertain by 4.6 to 7.1 cm and the facing
+    /// wrong by 1.3 to 3 degrees in the median; three pixels, three times that. Found first by other code.
     #[test]
     fn what_a_head_tells_at_four_metres() {
         let points = HeadModel::lee_chen().points_m;
         let neck = HeadModel::lee_chen().point_m(HeadPoint::Neck);
-        for sd_px in [1.0, 3.0] {
-            for degrees in [0.0_f64, 30.0, 60.0, 90.0, 135.0, 180.0] {
-                let exact = projected(&points, turned(degrees.to_radians(), 0.0, 4.0), FOCAL_PX);
-                let mut random = Random::new(degrees as u64);
-                let mut errors = Vec::new();
-                let (mut depth_sq, mut probable, mut two) = (0.0, 0, 0);
-                for _ in 0..100 {
-                    let image = noisy(&exact, sd_px, &mut random);
-                    let solution = head_pose(&points, &image, known(FOCAL_PX), &with_sd(sd_px)).unwrap();
-                    let truth = turned(degrees.to_radians(), 0.0, 4.0);
-                    let error = |pose: &HeadPose| pose.rotation.x_axis.angle_between(truth.0.x_axis);
-                    errors.push(error(solution.best()).to_degrees());
-                    let depth =
-                        solution.best().point_in_camera(neck).position.z - (truth.0 * neck + truth.1).z;
-                    depth_sq += depth * depth / 100.0;
-                    probable +=
-                        usize::from(solution.poses.iter().any(|p| error(p) < 5.0 * p.facing().sd_rad()));
-                    two += usize::from(solution.is_ambiguous());
-                }
-                errors.sort_by(f64::total_cmp);
-                let best = head_pose(&points, &exact, known(FOCAL_PX), &with_sd(sd_px)).unwrap();
-                let sd = best.best().point_in_camera(neck).sd().z;
-                eprintln!(
-                    "{sd_px} px {degrees}: depth sd {:.1} cm (empirical {:.1}), facing sd {:.1} deg, median error {:.1}, two poses {two}, right among them {probable}",
-                    100.0 * sd,
-                    100.0 * depth_sq.sqrt(),
-                    best.best().facing().sd_rad().to_degrees(),
-                    errors[50]
-                );
-                assert!((0.04..0.08).contains(&(sd / sd_px)), "{sd}");
+        for (sd_px, turn_deg) in
+            [1.0, 3.0].into_iter().flat_map(|sd| [0.0, 45.0, 90.0, 180.0].map(|t| (sd, t)))
+        {
+            let truth = turned(f64::to_radians(turn_deg), 0.0, 4.0);
+            let exact = projected(&points, truth, FOCAL_PX);
+            let solve =
+                |image: &[DVec2]| head_pose(&points, image, known(FOCAL_PX), &with_sd(sd_px)).unwrap();
+            let facing_error = |pose: &HeadPose| pose.rotation.x_axis.angle_between(truth.0.x_axis);
+            let predicted = solve(&exact).best().clone();
+            let depth_sd_m = predicted.point_in_camera(neck).sd().z;
+            let mut random = Random::new(turn_deg as u64);
+            let (mut errors_deg, mut depth_sq) = (Vec::new(), 0.0);
+            for _ in 0..100 {
+                let pose = solve(&noisy(&exact, sd_px, &mut random)).best().clone();
+                errors_deg.push(facing_error(&pose).to_degrees());
+                depth_sq +=
+                    (pose.point_in_camera(neck).position.z - (truth.0 * neck + truth.1).z).powi(2) / 100.0;
             }
+            errors_deg.sort_by(f64::total_cmp);
+            eprintln!(
+                "{sd_px} px, {turn_deg} deg: depth {:.1} cm (found {:.1}), facing {:.1} deg (median {:.1})",
+                100.0 * depth_sd_m,
+                100.0 * f64::sqrt(depth_sq),
+                predicted.facing().sd_rad().to_degrees(),
+                errors_deg[50]
+            );
+            assert!((0.046..0.071).contains(&(depth_sd_m / sd_px)), "{depth_sd_m}");
+            assert!((depth_sq.sqrt() / depth_sd_m - 1.0).abs() < 0.2, "{}", depth_sq.sqrt());
+            assert!((1.2..3.1).contains(&(errors_deg[50] / sd_px)), "{}", errors_deg[50]);
         }
     }
 
@@ -667,10 +687,10 @@ mod tests {
         let mut random = Random::new(11);
         let (mut right, mut promised, mut ambiguous) = (0.0, 0.0, 0.0);
         for _ in 0..400 {
-            let truth = turned(random.uniform(0.4, 0.9), random.uniform(-0.6, 0.6), 2.0);
-            let truth = (truth.0, DVec3::new(0.1, 0.0, 2.0));
-            let image = noisy(&projected(&points, truth, 1000.0), 0.7, &mut random);
-            let solution = head_pose(&points, &image, known(1000.0), &with_sd(0.7)).unwrap();
+            let truth = turned(random.uniform(0.4, 0.9), random.uniform(-0.6, 0.6), 1.0);
+            let truth = (truth.0, DVec3::new(0.2, 0.0, 6.0));
+            let image = noisy(&projected(&points, truth, 1500.0), 0.5, &mut random);
+            let solution = head_pose(&points, &image, known(1500.0), &with_sd(0.5)).unwrap();
             if !solution.is_ambiguous() {
                 continue;
             }
@@ -682,10 +702,29 @@ mod tests {
             promised += solution.best().probability;
             right += f64::from(u8::from(nearest == Some(solution.best())));
         }
-        eprintln!("ambiguous {ambiguous} right {} promised {}", right / ambiguous, promised / ambiguous);
         assert!(ambiguous > 100.0);
         assert!((right - promised).abs() < 0.07 * ambiguous, "{right} of {ambiguous}, promised {promised}");
         assert!(promised < 0.95 * ambiguous, "no test of probabilities near one");
+    }
+
+    /// Why the linear solution is not for images: 1 px of noise, 4 m, seen from the front.
+    #[test]
+    fn the_linear_solution_breaks_where_least_squares_hold() {
+        let points = HeadModel::lee_chen().points_m;
+        let exact = projected(&points, turned(0.0, 0.0, 4.0), FOCAL_PX);
+        let mut random = Random::new(3);
+        let mut depth_errors_m = Vec::new();
+        for _ in 0..100 {
+            let upright = noisy(&exact, 1.0, &mut random).into_iter().map(|q| DVec2::new(q.x, -q.y));
+            if let Ok(linear) = linear_head(&points, &upright.collect::<Vec<_>>(), Conditioning::Normalised) {
+                let (rotation, translation) = linear.camera_from_head();
+                depth_errors_m.push(((rotation * points[0] + translation).z - 4.0).abs());
+            }
+        }
+        depth_errors_m.sort_by(f64::total_cmp);
+        assert!((30..75).contains(&depth_errors_m.len()), "{} answers", depth_errors_m.len());
+        let median_m = depth_errors_m[depth_errors_m.len() / 2];
+        assert!((2.5..4.0).contains(&median_m), "{median_m}");
     }
 
     #[test]
@@ -751,7 +790,7 @@ mod tests {
     }
 
     fn unit_vectors() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0_f64, -3.2..3.2_f64).prop_map(|(z, angle)| {
+        (-1.0..1.0_f64, -3.1..3.2_f64).prop_map(|(z, angle)| {
             let radius = (1.0 - z * z).sqrt();
             DVec3::new(radius * angle.cos(), radius * angle.sin(), z)
         })
@@ -763,22 +802,23 @@ mod tests {
         /// Any shape, down to a ten-thousandth of flatness, any rotation, from close by to far away.
         #[test]
         fn a_planted_pose_is_among_the_poses(
-            shape in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 5..9),
+            shape in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 4..9),
             flatness in -4.0..0.0_f64,
-            (axis, turn) in (unit_vectors(), 0.0..3.14_f64),
+            (axis, turn) in (unit_vectors(), 0.0..3.1_f64),
             (x, y, log_depth) in (-0.4..0.4_f64, -0.4..0.4_f64, 0.45..1.5_f64),
             size in -2.0..2.0_f64,
         ) {
             let size = 10_f64.powf(size);
-            let points: Vec<DVec3> =
-                shape.iter().map(|p| DVec3::from(*p) * DVec3::new(1.0, 1.0, 10_f64.powf(flatness)) * size).collect();
+            let stretch = DVec3::new(1.0, 1.0, 10_f64.powf(flatness)) * size;
+            let points: Vec<DVec3> = shape.iter().map(|p| DVec3::from(*p) * stretch).collect();
             let depth = 10_f64.powf(log_depth) * size;
             let truth = (DMat3::from_axis_angle(axis, turn), DVec3::new(x, y, 1.0) * depth);
             prop_assume!(points.iter().all(|p| (truth.0 * *p + truth.1).z > 0.2 * size));
             prop_assume!(shape_of_ratio(&points) > 0.1);
             let image = projected(&points, truth, 800.0);
             let solution = head_pose(&points, &image, known(800.0), &with_sd(1e-3)).unwrap();
-            let nearest = solution.poses.iter().map(|p| angle(p.rotation, truth.0)).fold(f64::INFINITY, f64::min);
+            let angles = solution.poses.iter().map(|p| angle(p.rotation, truth.0));
+            let nearest = angles.fold(f64::INFINITY, f64::min);
             prop_assert!(nearest < 1e-5, "{} {:?}", nearest, solution.minima);
             let best = solution.best();
             prop_assert!(best.residual_rms() < 1e-6, "{}", best.residual_rms());
@@ -786,7 +826,7 @@ mod tests {
 
         #[test]
         fn a_planted_focal_length_is_found(
-            (axis, turn) in (unit_vectors(), 0.0..3.14_f64),
+            (axis, turn) in (unit_vectors(), 0.0..3.1_f64),
             depth in 0.6..3.0_f64, focal in 300.0..3000.0_f64,
         ) {
             let points = HeadModel::lee_chen().points_m;
@@ -809,7 +849,8 @@ mod tests {
         ) {
             let wild: Vec<DVec3> = points.iter().map(|p| DVec3::from(*p)).collect();
             let image: Vec<DVec2> = image.iter().map(|q| DVec2::from(*q) * 10_f64.powf(-scale)).collect();
-            let tame: Vec<DVec3> = points.iter().map(|p| DVec3::from(p.map(|x| x.to_bits() as f64 / 1.8e19)) * 10_f64.powf(scale)).collect();
+            let unit = |p: &[f64; 3]| DVec3::from(p.map(|x| x.to_bits() as f64 / 1.8e19));
+            let tame: Vec<DVec3> = points.iter().map(|p| unit(p) * 10_f64.powf(scale)).collect();
             for points in [wild, tame] {
                 for focal in [Focal::Free, known(10_f64.powf(scale))] {
                     if let Ok(solution) = head_pose(&points, &image, focal, &HeadOptions::default()) {

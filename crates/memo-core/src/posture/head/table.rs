@@ -186,7 +186,7 @@ mod tests {
         assert!(is_close(known.camera_position_sd.unwrap(), scipy_sd, DVec3::splat(1e-6)));
     }
 
-    /// Table 2(d) is itself off the geometry of A.2 by up to (0.0051, 0.0237, 0.0085) cm, its camera by 0.016 cm.
+    /// Table 2(d) is itself off the geometry of A.2 by up to (0.0051, 0.0237, 0.0085) cm.
     #[test]
     fn exact_projections_give_table_2_to_its_digits() {
         let table = table_2().unwrap();
