@@ -462,7 +462,7 @@ impl Violation {
     pub(crate) fn under(constraint: Constraint, value: f64, limit: f64) -> Option<Self> {
         let excess = limit - value;
         let joint = constraint.level();
-        (excess > 0.0).then(|| Self { constraint, joint, value, limit, excess, unit: Unit::Metres })
+        (excess > 0.0).then_some(Self { constraint, joint, value, limit, excess, unit: Unit::Metres })
     }
 
     /// The excess in units at which it starts to be serious: 10 degrees, 2 cm.

@@ -78,9 +78,9 @@ fn complete_linkage(mut apart: Vec<f64>, n: usize, within_m: f64) -> Vec<Vec<usi
                 nearest[k] = nearest_of(&apart, &members, k);
             }
         }
-        for k in i + 1..n {
-            if nearest[k].is_some_and(|(_, to)| to == j) {
-                nearest[k] = nearest_of(&apart, &members, k);
+        for (k, to) in nearest.iter_mut().enumerate().skip(i + 1) {
+            if to.is_some_and(|(_, to)| to == j) {
+                *to = nearest_of(&apart, &members, k);
             }
         }
     }

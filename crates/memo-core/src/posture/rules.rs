@@ -9,7 +9,8 @@
 //! does not hold for arms. Rules are of straight-line walking: who turns or stands breaks them.
 //!
 //! Tolerances of the measured strength were chosen on four walks of motion capture (two Plug-in-Gait, two
-//! CMU) as the least multiples of 5 degrees at which no more than about one true frame in a hundred is cut.
+//! CMU) as the least multiples of 5 degrees at which no more than about one true frame in a hundred is cut;
+//! the noise factor on the same walks in three views at 3 px.
 
 use glam::DVec3;
 

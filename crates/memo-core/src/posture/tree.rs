@@ -365,7 +365,7 @@ impl View {
         }
         for joint in Joint::ALL {
             let ray = self.rays.ray[joint];
-            if self.rays.sees(joint) && !((ray.length() - 1.0).abs() < 1e-6) {
+            if self.rays.sees(joint) && !(1.0 - 1e-6..1.0 + 1e-6).contains(&ray.length()) {
                 return Err(TreeError::Ray { joint, ray });
             }
         }
@@ -799,9 +799,9 @@ impl<'a> Walk<'a> {
             return of(self.trunk_ranges[level]);
         }
         let mut total = 0.0;
-        for g in 0..usize::from(self.group_counts[level]) {
-            let group = &self.groups[level][g];
-            let known = &mut costs[level][g][group.key(path)];
+        let count = usize::from(self.group_counts[level]);
+        for (group, costs) in self.groups[level].iter().zip(&mut costs[level]).take(count) {
+            let known = &mut costs[group.key(path)];
             if known.is_nan() {
                 *known = of(group.range);
             }
@@ -849,7 +849,7 @@ mod tests {
         let lengths = SegmentLengths::lee_chen();
         let mut random = Random::new(seed);
         let facing_rad = random.uniform(-3.0, 3.0);
-        let spread_rad = random.uniform(0.1, 0.9);
+        let spread_rad = random.uniform(0.05, 0.5);
         let figure = figure(&lengths, facing_rad, spread_rad, &mut random);
         let mut rays = JointRays::from_points(&figure);
         for ray in &mut rays.ray.0 {
