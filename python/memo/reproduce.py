@@ -7,6 +7,7 @@ name starts with `plot_` draws into the Axes it is given and returns them; nothi
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -186,15 +187,20 @@ def _stage_lines(stages: Stages) -> list[str]:
             f"  {sequence} {reading.replace('_', ' '):<12} groups: median {median(groups):g},"
             f" {min(groups)} to {max(groups)}; true posture kept in {kept} of {len(frames)} frames"
         )
-        broken = sorted({name for frame in frames for name in frame["broken"]})
+        broken = Counter(cause for frame in frames for cause in {_without_side(b) for b in frame["broken"]})
         if broken:
-            lines.append("    true posture refused for: " + ", ".join(broken))
+            causes = ", ".join(f"{cause} ({count})" for cause, count in sorted(broken.items()))
+            lines.append(f"    it breaks, in so many frames: {causes}")
     lines += [
         "  As printed, rule 3 refuses arms that swing forward, since the lengths put both shoulders 3.7 cm",
         "  behind the neck. Rigid torso: instead of rule 3 at the shoulder, the neck must lie ahead of the",
         "  line of the shoulders (a rigid torso is not its mirror image); knees are flexed from 25 degrees.",
     ]
     return lines
+
+
+def _without_side(constraint: str) -> str:
+    return constraint.removeprefix("left_").removeprefix("right_").replace("_", " ")
 
 
 def _stage_rows(stages: Stages) -> tuple[list[str], list[list[Any]]]:
