@@ -190,7 +190,7 @@ def _stage_lines(stages: Stages) -> list[str]:
         broken = Counter(cause for frame in frames for cause in {_without_side(b) for b in frame["broken"]})
         if broken:
             causes = ", ".join(f"{cause} ({count})" for cause, count in sorted(broken.items()))
-            lines.append(f"    it breaks, in so many frames: {causes}")
+            lines.append(f"    it breaks (in frames): {causes}")
     lines += [
         "  As printed, rule 3 refuses arms that swing forward, since the lengths put both shoulders 3.7 cm",
         "  behind the neck. Rigid torso: instead of rule 3 at the shoulder, the neck must lie ahead of the",
@@ -291,7 +291,9 @@ def _draw_panels(figure: Figure, left: dict[str, Any]) -> None:
         plot_posture(ax, left["figures"][left["true_one"] if is_true else representative])
         marks = ["rules 3-5"] * any(left["passes"][i] for i in members) + ["true"] * is_true
         ax.set_title(f"({chr(ord('a') + number)}) {', '.join(marks)}", fontsize=8)
-    figure.suptitle("camera to the left; right limbs solid, left dashed; within 5 cm one posture", fontsize=8)
+    figure.suptitle(
+        "camera to the left; right limbs solid, left dashed; marked: what rules 3-5 leave", fontsize=8
+    )
 
 
 def _save(path: Path, size_in: tuple[float, float], draw: Callable[[Figure], None]) -> Path:
