@@ -528,6 +528,18 @@ mod tests {
     }
 
     #[test]
+    fn a_walker_or_a_distance_that_is_no_number_is_an_error() {
+        let walker = table_walker();
+        assert!(matches!(
+            count_table(Sequence::Seq1, &walker, f64::NAN),
+            Err(TreeError::Quantity { name: "merge_m", .. })
+        ));
+        let mut lost = walker;
+        lost.speed_mps = f64::NAN;
+        assert!(matches!(frame_survivors(Sequence::Seq2, &lost, 0), Err(TreeError::Neck { .. })));
+    }
+
+    #[test]
     fn names_are_found_again() {
         assert!(Sequence::ALL.into_iter().all(|s| Sequence::from_name(s.name()) == Some(s)));
         assert!(Reading::ALL.into_iter().all(|r| Reading::from_name(r.name()) == Some(r)));

@@ -53,7 +53,7 @@ pub enum StickWalkerError {
     },
 }
 
-/// A walker of given lengths.
+/// A walker of given lengths. A field that is not finite gives joints that are NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StickWalker {
     /// Joint curves.
