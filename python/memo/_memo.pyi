@@ -21,6 +21,11 @@ __all__ = [
     "joint_name",
     "keypoint_layout",
     "keypoint_layouts",
+    "joint_names",
+    "lee_chen_counts",
+    "lee_chen_figures",
+    "lee_chen_head",
+    "lee_chen_last_stage",
     "moving_regions",
     "side_pairs",
     "silhouettes",
@@ -194,3 +199,8 @@ def unswap(
     partial_stay_nats: float | None = None,
     decided_at: float | None = None,
 ) -> dict[str, Any]: ...
+def joint_names() -> list[str]: ...
+def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
+def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
+def lee_chen_head() -> list[dict[str, Any]]: ...
+def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = 0.04) -> list[dict[str, Any]]: ...

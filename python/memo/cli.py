@@ -1,4 +1,4 @@
-"""The command line: `memo track VIDEO`, `memo unswap KEYPOINTS`, `memo demo`.
+"""The command line: `memo track`, `memo unswap`, `memo reproduce`, `memo demo`.
 
 This file alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. The base install has numpy alone, so everything from the `app`
@@ -16,7 +16,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -50,11 +50,17 @@ class Exit(IntEnum):
     """What the exit codes mean."""
 
     TRACKED = 0
-    WRITTEN = 0
+    DONE = 0  # where nobody is to be tracked
     BAD_INPUT = 1
     NOBODY = 3
     NO_EXTRA = 4
     INTERRUPTED = 130
+
+
+class Experiment(StrEnum):
+    """What can be reproduced: the names of `memo.reproduce.EXPERIMENTS`."""
+
+    LEE_CHEN = "lee-chen"
 
 
 class InputError(ValueError):
@@ -114,6 +120,7 @@ def _app() -> "typer.Typer":
     _add_track(app)
     _add_unswap(app)
     _add_demo(app)
+    _add_reproduce(app)
     return app
 
 
@@ -188,6 +195,21 @@ def _add_demo(app: "typer.Typer") -> None:
         raise typer.Exit(_guarded(lambda: _demo(out, seed)))
 
 
+def _add_reproduce(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command()
+    def reproduce(
+        experiment: Annotated[Experiment, typer.Argument(help="lee-chen: Lee and Chen 1985, postures.")],
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for tables and figures; memo-out/EXPERIMENT.")
+        ] = None,
+    ) -> None:
+        """Computes a paper's tables and figures again, beside the printed numbers."""
+        folder = out or Path("memo-out") / experiment.value
+        raise typer.Exit(_guarded(lambda: _reproduce(experiment, folder)))
+
+
 def _track_video(
     video: Path,
     frame_range: tuple[int, int | None],
@@ -234,7 +256,7 @@ def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
         repair.keypoints.write(written[0])
         write_flips_csv(written[1], repair.flips)
     _report_sides(repair, written, delivery)
-    return Exit.WRITTEN
+    return Exit.DONE
 
 
 def _report_sides(repair: Any, written: list[Path], delivery: Delivery) -> None:
@@ -269,6 +291,16 @@ def _demo(out: Path, seed: int) -> Exit:
     print("Next, your own video of one person walking across the picture, camera on a tripod:")
     print("  memo track VIDEO --height 1.75")
     return _exit_code(track)
+
+
+def _reproduce(experiment: Experiment, out: Path) -> Exit:
+    from memo.reproduce import EXPERIMENTS
+
+    _check_writable(out)
+    reproduction = EXPERIMENTS[experiment.value](out)
+    print("\n".join(reproduction.lines))
+    print(f"Written to {out}: {', '.join(path.name for path in reproduction.written)}.")
+    return Exit.DONE
 
 
 # The core is called here and nowhere else in this file.

@@ -5,6 +5,7 @@ mod camera;
 mod error;
 mod image;
 mod keypoints;
+mod reproduce;
 mod score;
 mod synth;
 mod tracker;
@@ -25,6 +26,10 @@ mod _memo {
     use super::keypoints::{
         follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
         stick_joints,
+    };
+    #[pymodule_export]
+    use super::reproduce::{
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
     };
     #[pymodule_export]
     use super::score::similarity;

@@ -6,6 +6,7 @@ pub mod angles;
 pub mod collision;
 pub mod constraint;
 pub mod detector;
+pub mod experiment;
 pub mod group;
 pub mod head;
 pub mod length;

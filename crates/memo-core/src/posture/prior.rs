@@ -28,6 +28,9 @@ pub fn chi_sq(deviation: f64) -> f64 {
 }
 
 impl Soft {
+    /// Anything goes.
+    pub const FREE: Self = Self { mean_rad: 0.0, sd_rad: f64::INFINITY };
+
     /// From degrees.
     pub fn degrees(mean_deg: f64, sd_deg: f64) -> Self {
         Self { mean_rad: mean_deg.to_radians(), sd_rad: sd_deg.to_radians() }
@@ -127,6 +130,28 @@ impl MotionPrior {
             independence_s: 0.08,
         }
     }
+    /// Anybody doing anything: what joints allow, a trunk more upright than not, and inertia.
+    pub fn any() -> Self {
+        let segment = |acceleration_mps2| SegmentPrior {
+            swing: Soft::FREE,
+            outward: Soft::FREE,
+            outward_per_swing: 0.0,
+            acceleration_mps2,
+            length_sd: 0.025,
+        };
+        Self {
+            segments: [8.0, 15.0, 8.0, 15.0].map(segment),
+            least_bend: [Soft::degrees(0.0, 15.0), Soft::degrees(0.0, 10.0)],
+            opposition: [Soft::FREE; 2],
+            same_side: Soft::FREE,
+            trunk_lean: Soft::degrees(0.0, 25.0),
+            trunk_roll: Soft::degrees(0.0, 15.0),
+            shoulder_turn: Soft::FREE,
+            hip_turn: Soft::FREE,
+            ..Self::walking()
+        }
+    }
+
     /// Standard deviation of the apparent length of the segment that ends at a joint, as a fraction.
     pub(crate) fn length_sd(&self, end: Joint) -> f64 {
         match end {

@@ -2,6 +2,8 @@
 
 pub mod random;
 pub mod scene;
+pub mod stick_walker;
 
 pub use random::Random;
 pub use scene::{SceneOptions, SynthScene, Truth};
+pub use stick_walker::{StickCamera, StickView, StickWalker};

@@ -185,9 +185,9 @@ fn pair_costs(
                 cost +=
                     weight * prior.opposition[pair].cost(right.value + left.value, right.sd.hypot(left.sd));
                 if let Some(other) = other {
-                    for side in 0..2 {
+                    for (side, swing) in swings.into_iter().enumerate() {
                         let theirs = pairs[1 - pair].frames[side][t].swing[limb_bits(other[t], side)];
-                        let [a, b] = [(pair, swings[side]), (1 - pair, theirs)].map(|(pair, swing)| {
+                        let [a, b] = [(pair, swing), (1 - pair, theirs)].map(|(pair, swing)| {
                             let usual = prior.segments[2 * pair].swing;
                             ((swing.value - usual.mean_rad) / usual.sd_rad, swing.sd / usual.sd_rad)
                         });

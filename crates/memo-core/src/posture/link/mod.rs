@@ -166,7 +166,7 @@ fn check(frames: &[LinkFrame], options: &LinkOptions) -> Result<(), LinkError> {
         }
     }
     for (frame, &LinkFrame { neck, .. }) in frames.iter().enumerate() {
-        if !neck.is_nan() && !(neck.is_finite() && neck.z > 0.0) {
+        if !(neck.is_nan() || neck.is_finite() && neck.z > 0.0) {
             return Err(LinkError::Neck { frame, neck });
         }
     }
