@@ -6,6 +6,8 @@
 //! costed by a Kalman filter run over it, and the mirrored one kept where it costs less. What the others
 //! would cost is the margin of the choice.
 
+use rayon::prelude::*;
+
 use super::super::prior::chi_sq;
 use super::super::smooth::{Measured, filter_step};
 
@@ -26,10 +28,12 @@ pub(super) struct Chain<'a> {
     pub acceleration_mps2: &'a [f64],
     /// Sets of bits that may be mirrored together.
     pub masks: &'a [usize],
+    /// The bits whose extents change with those of a mask.
+    pub affected: fn(usize) -> usize,
     /// `(bit, frame, state)`: signed extent of the bit's segment along the ray.
-    pub extent: &'a dyn Fn(usize, usize, usize) -> Measured,
+    pub extent: &'a (dyn Fn(usize, usize, usize) -> Measured + Sync),
     /// `(frame, state)`: cost of a state by itself, nats.
-    pub cost: &'a dyn Fn(usize, usize) -> f64,
+    pub cost: &'a (dyn Fn(usize, usize) -> f64 + Sync),
 }
 
 /// One stretch mirrored.
@@ -46,41 +50,49 @@ pub(super) struct Flip {
 }
 
 impl Chain<'_> {
-    /// Mirrors what is better mirrored; returns what the remaining mirrorings would cost, cheapest first.
-    pub fn refine(&self, states: &mut [usize]) -> Vec<Flip> {
+    /// Mirrors what is better mirrored.
+    pub fn refine(&self, states: &mut [usize]) {
+        let everywhere = vec![[0, states.len()]];
+        let mut changed = everywhere;
         for _ in 0..ROUNDS {
-            let mut changed: Vec<[usize; 2]> = Vec::new();
-            for flip in self.flips(states).into_iter().take_while(|flip| flip.delta < -1e-9) {
+            let flips = self.flips_near(states, &changed);
+            changed = Vec::new();
+            for flip in flips.into_iter().take_while(|flip| flip.delta < -1e-9) {
                 let reach = self.around(flip.from, flip.to);
-                if changed.iter().any(|done| done[0] < reach[1] && reach[0] < done[1]) {
-                    continue;
+                if !overlaps(&changed, reach) {
+                    states[flip.from..flip.to].iter_mut().for_each(|state| *state ^= flip.mask);
+                    changed.push(reach);
                 }
-                states[flip.from..flip.to].iter_mut().for_each(|state| *state ^= flip.mask);
-                changed.push(reach);
             }
             if changed.is_empty() {
                 break;
             }
         }
-        self.flips(states)
     }
 
-    /// All mirrorings, cheapest first; of equal ones the earlier.
+    /// All mirrorings of a path, cheapest first; of equal ones the earlier.
     pub fn flips(&self, states: &[usize]) -> Vec<Flip> {
-        let mut flips = Vec::new();
+        self.flips_near(states, &[[0, states.len()]])
+    }
+
+    /// The mirrorings whose cost depends on any of some stretches, cheapest first.
+    fn flips_near(&self, states: &[usize], stretches: &[[usize; 2]]) -> Vec<Flip> {
+        let mut spans: Vec<[usize; 3]> = Vec::new();
         for &mask in self.masks {
-            let bit = mask.trailing_zeros() as usize;
-            let bounds = self.bounds(states, bit);
+            let bounds = self.bounds(states, mask.trailing_zeros() as usize);
             for (i, &from) in bounds.iter().enumerate() {
-                for &to in bounds[i + 1..].iter().take(LONGEST) {
-                    flips.push(Flip { mask, from, to, delta: self.delta(states, mask, from, to) });
-                }
+                let ends = bounds[i + 1..].iter().take(LONGEST);
+                spans.extend(ends.map(|&to| [mask, from, to]));
             }
             if bounds.len() > LONGEST + 1 {
-                let to = states.len();
-                flips.push(Flip { mask, from: 0, to, delta: self.delta(states, mask, 0, to) });
+                spans.push([mask, 0, states.len()]);
             }
         }
+        let mut flips: Vec<Flip> = spans
+            .into_par_iter()
+            .filter(|&[_, from, to]| overlaps(stretches, self.around(from, to)))
+            .map(|[mask, from, to]| Flip { mask, from, to, delta: self.delta(states, mask, from, to) })
+            .collect();
         flips.sort_by(|a, b| a.delta.total_cmp(&b.delta));
         flips
     }
@@ -97,10 +109,6 @@ impl Chain<'_> {
             let unseen = extents[t].value.is_nan() != extents[t - 1].value.is_nan();
             if crossing || unseen || (least && size(t) <= 2.0 * extents[t].sd) {
                 bounds.push(t);
-                // The least extent itself may belong to either side.
-                if least && !crossing && t + 1 < states.len() {
-                    bounds.push(t + 1);
-                }
             }
         }
         bounds.push(states.len());
@@ -119,14 +127,14 @@ impl Chain<'_> {
         let reach = self.around(from, to);
         let mirrored = |t: usize| if (from..to).contains(&t) { states[t] ^ mask } else { states[t] };
         let own: f64 = (from..to).map(|t| (self.cost)(t, states[t] ^ mask) - (self.cost)(t, states[t])).sum();
-        own + self.motion(reach, mirrored) - self.motion(reach, |t| states[t])
+        let affected = (self.affected)(mask);
+        own + self.motion(affected, reach, mirrored) - self.motion(affected, reach, |t| states[t])
     }
 
-    /// Negative log likelihood of the segments' motion over a stretch.
-    fn motion(&self, [from, to]: [usize; 2], state: impl Fn(usize) -> usize) -> f64 {
-        self.acceleration_mps2
-            .iter()
-            .enumerate()
+    /// Negative log likelihood of some segments' motion over a stretch.
+    fn motion(&self, bits: usize, [from, to]: [usize; 2], state: impl Fn(usize) -> usize) -> f64 {
+        let moving = self.acceleration_mps2.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 == 1);
+        moving
             .map(|(bit, &acceleration)| {
                 let track = (from..to).map(|t| (self.times_s[t], (self.extent)(bit, t, state(t))));
                 motion_cost(track, acceleration)
@@ -135,9 +143,13 @@ impl Chain<'_> {
     }
 }
 
+fn overlaps(stretches: &[[usize; 2]], [from, to]: [usize; 2]) -> bool {
+    stretches.iter().any(|stretch| stretch[0] < to && from < stretch[1])
+}
+
 /// Negative log likelihood of a track, (time in seconds, measurement) after the other, under a motion of that
 /// acceleration.
-pub(super) fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f64) -> f64 {
+fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f64) -> f64 {
     let mut cost = 0.0;
     let mut filter = None;
     let mut before_s = None;

@@ -73,22 +73,28 @@ impl Limbs {
     pub fn link(problem: &Problem, trunk: &Trunk) -> Self {
         let pairs = [0, 1].map(|pair| Pair::new(problem, trunk, pair));
         let mut states: [Option<Vec<usize>>; 2] = [None, None];
-        let mut flips = [vec![], vec![]];
         // The legs first: knees bend one way only, which tells more.
         for _ in 0..ROUNDS {
             let before = states.clone();
             for pair in [1, 0] {
                 let cost = pair_costs(problem, &pairs, pair, states[1 - pair].as_deref());
-                let (path, others) = pairs[pair].link(problem, &cost);
-                states[pair] = Some(path);
-                flips[pair] = others;
+                states[pair] = Some(pairs[pair].path(&cost));
             }
             if before == states {
                 break;
             }
         }
+        let mut states = states.map(Option::unwrap_or_default);
+        let times_s = problem.times_s();
+        let mut flips = [vec![], vec![]];
+        for last in [false, true] {
+            for pair in [1, 0] {
+                let cost = pair_costs(problem, &pairs, pair, Some(&states[1 - pair]));
+                flips[pair] = pairs[pair].refine(&times_s, &cost, &mut states[pair], last);
+            }
+        }
         let mut limbs = Self { smoothed: trunk.smoothed.clone(), sd_m: trunk.sd_m.clone(), flips };
-        for (pair, states) in states.into_iter().flatten().enumerate() {
+        for (pair, states) in states.into_iter().enumerate() {
             limbs.smooth(problem, pair, &pairs[pair], &states);
         }
         limbs
@@ -139,26 +145,37 @@ impl Pair {
         self.frames[side][t].extents[limb_bits(state, side)][bit % 2]
     }
 
-    /// The pair's path, and what its stretches mirrored would cost.
-    fn link(&self, problem: &Problem, cost: &[[f64; READINGS]]) -> (Vec<usize>, Vec<Flip>) {
+    /// The pair's least-cost path.
+    fn path(&self, cost: &[[f64; READINGS]]) -> Vec<usize> {
         let step = |side: usize, t: usize, [k, i, j]: [usize; 3]| {
             let [k, i, j] = [k, i, j].map(|state| limb_bits(state, side));
             self.transitions[side][t][k * 16 + i * 4 + j]
         };
-        let mut states = least_path(
+        least_path(
             &vec![READINGS; cost.len()],
             |t, s| cost[t][s],
             |t, k, i, j| step(0, t, [k, i, j]) + step(1, t, [k, i, j]),
-        );
+        )
+    }
+
+    /// Mirrors what is better mirrored of a path; returns what the rest would cost if asked.
+    fn refine(
+        &self,
+        times_s: &[f64],
+        cost: &[[f64; READINGS]],
+        states: &mut [usize],
+        rest: bool,
+    ) -> Vec<Flip> {
         let chain = Chain {
-            times_s: &problem.times_s(),
+            times_s,
             acceleration_mps2: &self.acceleration_mps2,
             masks: &MASKS,
+            affected: |mask| mask | (mask & 0b0101) << 1,
             extent: &|bit, t, state| self.extent(bit, t, state),
             cost: &|t, state| cost[t][state],
         };
-        let flips = chain.refine(&mut states);
-        (states, flips)
+        chain.refine(states);
+        if rest { chain.flips(states) } else { vec![] }
     }
 }
 

@@ -71,6 +71,7 @@ impl Trunk {
             times_s: &problem.times_s(),
             acceleration_mps2: &[acceleration; 5],
             masks: &MASKS,
+            affected: |mask| if mask & 4 == 4 { 4 | 8 | 16 } else { mask },
             extent: &|bit, t, state| readings[t][state].extents[bit],
             cost: &|t, state| readings[t][state].cost,
         };
