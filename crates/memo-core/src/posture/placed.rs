@@ -180,7 +180,9 @@ pub(crate) struct Trunk {
 struct Memo([Cell<f64>; MOST_PLACES]);
 
 impl Memo {
-    const EMPTY: Self = Self([const { Cell::new(f64::NAN) }; MOST_PLACES]);
+    fn empty() -> Self {
+        Self([const { Cell::new(f64::NAN) }; MOST_PLACES])
+    }
 
     fn get(&self, place: &Placed, compute: impl FnOnce() -> f64) -> f64 {
         let known = &self.0[usize::from(place.number) % MOST_PLACES];
@@ -192,18 +194,20 @@ impl Memo {
 }
 
 impl Trunk {
-    pub const UNKNOWN: Self = Self {
-        torso: DMat3::NAN,
-        torso_sd: DVec3::NAN,
-        hips: DMat3::NAN,
-        hip_angles: PartAngles::UNKNOWN,
-        up: DVec3::NAN,
-        lateral: DVec3::NAN,
-        lateral_sd: f64::NAN,
-        body_normal: DVec3::NAN,
-        swings: Memo::EMPTY,
-        knees: Memo::EMPTY,
-    };
+    pub fn unknown() -> Self {
+        Self {
+            torso: DMat3::NAN,
+            torso_sd: DVec3::NAN,
+            hips: DMat3::NAN,
+            hip_angles: PartAngles::UNKNOWN,
+            up: DVec3::NAN,
+            lateral: DVec3::NAN,
+            lateral_sd: f64::NAN,
+            body_normal: DVec3::NAN,
+            swings: Memo::empty(),
+            knees: Memo::empty(),
+        }
+    }
 
     /// Of shoulders and pelvis, without the hips.
     pub fn of_torso(figure: &PlacedFigure, bearings: &Bearings) -> Self {
@@ -225,7 +229,7 @@ impl Trunk {
             lateral: up.cross(forward).try_normalize().unwrap_or(DVec3::NAN),
             lateral_sd: if source == HeadingSource::Trunk { torso_sd.y } else { 0.0 },
             body_normal: normal.try_normalize().unwrap_or(DVec3::NAN),
-            ..Self::UNKNOWN
+            ..Self::unknown()
         }
     }
 

@@ -3,8 +3,9 @@
 //!
 //! The tree has a level for each joint in the order of [`Joint::ALL`]. A node of a level has two successors,
 //! the two roots of the next segment: near (first) and far. A branch is cut as soon as the joints that
-//! a constraint needs are there; of several the first in the order of [`Constraint::ALL`] is the reason. A segment without a real root has one successor, the nearest point on
-//! its ray; so has a joint that is not seen, which is left open together with all that hangs on it.
+//! a constraint needs are there; of several the first in the order of [`Constraint::ALL`] is the reason.
+//! A segment without a real root has one successor, the nearest point on its ray; so has a joint that is not
+//! seen, which is left open together with all that hangs on it.
 //!
 //! What is left and cut is what a walk down every branch leaves and cuts; but the levels are grown whole, and
 //! a constraint is asked once for all nodes at which its joints stand in the same places.

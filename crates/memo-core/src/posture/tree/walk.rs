@@ -76,7 +76,7 @@ impl<'a> Tree<'a> {
             view,
             options,
             places,
-            torsos: [const { Trunk::UNKNOWN }; TORSO + 1],
+            torsos: std::array::from_fn(|_| Trunk::unknown()),
             asked: wanted().filter(|asked| is_known(asked) && can_break(asked)).copied().collect(),
             open: open.iter().map(|asked| asked.constraint).collect(),
         };
