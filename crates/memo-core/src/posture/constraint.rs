@@ -405,7 +405,7 @@ impl Constraint {
 }
 
 /// A set of joints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct JointSet(pub u16);
 
 impl JointSet {
@@ -419,6 +419,11 @@ impl JointSet {
 
     pub fn contains(self, other: Self) -> bool {
         other.0 & !self.0 == 0
+    }
+
+    /// The joints, by level.
+    pub fn iter(self) -> impl Iterator<Item = Joint> {
+        Joint::ALL.into_iter().filter(move |&joint| self.0 >> joint as u16 & 1 == 1)
     }
 
     /// The joint of the highest level; the neck for the empty set.
