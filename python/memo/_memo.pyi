@@ -27,6 +27,8 @@ __all__ = [
     "lee_chen_head",
     "lee_chen_last_stage",
     "moving_regions",
+    "posture",
+    "segment_names",
     "side_pairs",
     "silhouettes",
     "similarity",
@@ -61,6 +63,7 @@ class Camera:
     def size(self) -> tuple[int, int]: ...
     @property
     def position(self) -> tuple[float, float, float]: ...
+    def camera_from_world(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
     def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
     def ground_points(
         self, pixels: Sequence[tuple[float, float]], z_m: float = 0.0
@@ -188,6 +191,25 @@ def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int
 def follow_person(
     frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
 ) -> list[bool]: ...
+def posture(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    weights: npt.NDArray[np.float64],
+    camera: Camera,
+    *,
+    lengths: dict[str, float] | None = None,
+    height_m: float | None = None,
+    noise_px: float = 2.0,
+    rules: str = "walking",
+    strength: str = "measured",
+    anchor: str = "auto",
+    distance_m: float | npt.ArrayLike | None = None,
+    distance_sd_m: float | None = None,
+    moving_direction: Sequence[float] | None = None,
+    head_points: npt.NDArray[np.float64] | None = None,
+    group_m: float = 0.10,
+    max_groups: int = 64,
+) -> dict[str, Any]: ...
 def unswap(
     times_s: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -200,6 +222,7 @@ def unswap(
     decided_at: float | None = None,
 ) -> dict[str, Any]: ...
 def joint_names() -> list[str]: ...
+def segment_names() -> list[str]: ...
 def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
 def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
 def lee_chen_head() -> list[dict[str, Any]]: ...

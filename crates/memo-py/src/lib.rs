@@ -29,7 +29,7 @@ mod _memo {
     };
     #[pymodule_export]
     use super::reproduce::{
-        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage, segment_names,
     };
     #[pymodule_export]
     use super::score::similarity;

@@ -3,7 +3,7 @@
 use crate::error::value_error;
 use memo_core::posture::experiment::{self, Counts, LevelCounts, Reading, Sequence};
 use memo_core::posture::head::{HeadPoint, HeadTableColumn, table_2};
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, StickFigure};
+use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,6 +18,12 @@ fn sequence_of(name: &str) -> PyResult<Sequence> {
 #[pyfunction]
 pub fn joint_names() -> Vec<&'static str> {
     Joint::ALL.map(Joint::name).to_vec()
+}
+
+/// Names of the 17 segment lengths, such as `right_hip_to_right_knee`.
+#[pyfunction]
+pub fn segment_names() -> Vec<String> {
+    SegmentLengths::lee_chen().named().map(|(name, _)| name).collect()
 }
 
 /// Table 3 (SEQ1) or 4 (SEQ2) on the walker made anew, beside the printed one: `phases`, and for each of

@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `memo unswap`, `memo reproduce`, `memo demo`.
+"""The command line: `memo track`, `memo unswap`, `memo posture`, `memo reproduce`, `memo demo`.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import memo
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
+from memo.cli.posture import add_posture
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import EXIT_CODES, add_track
 from memo.cli.unswap import add_unswap
@@ -58,6 +59,7 @@ def _app() -> "typer.Typer":
 
     add_track(app)
     add_unswap(app)
+    add_posture(app)
     add_demo(app)
     add_reproduce(app)
     return app
