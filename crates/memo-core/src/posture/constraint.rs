@@ -342,6 +342,20 @@ impl Constraint {
         Self::ALL.into_iter().find(|constraint| constraint.name() == name)
     }
 
+    /// What breaks it, as one plain sentence without numbers.
+    pub fn description(self) -> String {
+        let sentence = self.sentence();
+        let what = sentence.trim_end_matches(" by").trim_end_matches(": clearance");
+        match self.kind() {
+            ConstraintKind::Distance => {
+                format!("{} is not that of the rigid body", what.trim_end_matches(" wrong"))
+            }
+            ConstraintKind::Angle => format!("{what} farther than a body can"),
+            ConstraintKind::Collision => what.to_owned(),
+            ConstraintKind::Rule => format!("{what} more than the rules of the motion allow"),
+        }
+    }
+
     /// What is measured, as the start of a sentence that a value follows.
     fn sentence(self) -> String {
         match self {
