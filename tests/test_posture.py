@@ -14,21 +14,11 @@ from conftest import SHARED_DATA
 from memo import cli
 from scipy.spatial.transform import Rotation
 
+SIDES = ("right", "left")
+#: The levels of the tree.
 JOINTS = [
-    "neck",
-    "right_shoulder",
-    "left_shoulder",
-    "pelvis",
-    "right_hip",
-    "left_hip",
-    "right_elbow",
-    "left_elbow",
-    "right_wrist",
-    "left_wrist",
-    "right_knee",
-    "left_knee",
-    "right_ankle",
-    "left_ankle",
+    *("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip"),
+    *(f"{side}_{joint}" for joint in ("elbow", "wrist", "knee", "ankle") for side in SIDES),
 ]
 AT = {name: place for place, name in enumerate(JOINTS)}
 LIMB_JOINTS = [name for name in JOINTS if name not in ("neck", "pelvis")]
@@ -36,16 +26,8 @@ RATE_HZ, FRAMES = 25, 40
 NOISE_PX = 1.0
 
 #: Metres. Neck and pelvis lie on the middle line, as a detector's do.
-SHOULDER, HIP, TRUNK, UPPER_ARM, FOREARM, THIGH, SHANK, ANKLE_HEIGHT = (
-    0.19,
-    0.09,
-    0.50,
-    0.3,
-    0.25,
-    0.43,
-    0.42,
-    0.08,
-)
+SHOULDER, HIP, TRUNK, UPPER_ARM, FOREARM, THIGH, SHANK = 0.19, 0.09, 0.50, 0.3, 0.25, 0.43, 0.42
+ANKLE_HEIGHT = 0.08
 PELVIS_ON_TRUNK = 45.98 / (45.98 + 10.09)
 
 SIZE, FOCAL_PX = (1280, 720), 1100.0
@@ -209,14 +191,8 @@ def test_a_given_distance_is_kept(scene):
     folder, truth = scene
     camera = memo.Camera.from_toml(folder / "camera.toml")
     distance_m = np.linalg.norm(truth[:, 0] - CAMERA_AT, axis=1)
-    found = memo.posture(
-        folder / "walk.csv",
-        camera,
-        true_lengths(truth),
-        distance_m=distance_m,
-        fps=RATE_HZ,
-        noise_px=NOISE_PX,
-    )
+    known = {"lengths": true_lengths(truth), "distance_m": distance_m, "noise_px": NOISE_PX}
+    found = memo.posture(folder / "walk.csv", camera, **known, fps=RATE_HZ)
     np.testing.assert_allclose(
         np.linalg.norm(found.linked_m[:, 0] - CAMERA_AT, axis=1), distance_m, atol=1e-6
     )
@@ -261,7 +237,7 @@ def test_the_command_says_what_the_call_says(found, scene, tmp_path, memo_postur
 
 
 def test_tables_and_document_agree(scene, tmp_path, memo_posture):
-    folder, truth = scene
+    folder, _ = scene
     arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--height", "1.75", "--no-plots")
     code, said, _ = memo_posture(*arguments, "--fps", RATE_HZ, "--out", tmp_path, "--json")
     summary, document = json.loads(said), json.loads((tmp_path / "postures.json").read_text())
@@ -324,7 +300,7 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["legless.csv"], "no point for right_knee, left_knee"),
         (["walk.csv", "--camera", "absent.toml"], "absent.toml: no such camera file"),
         (["walk.csv", "--camera", "walk.csv"], "walk.csv"),
-        (["walk.csv", "--camera-name", "top"], "no camera named 'top'"),
+        (["walk.csv", "--camera-name", "top"], "no camera `top` in the file"),
         (["walk.csv", "--height", "175"], "looks like centimetres: give --height 1.75"),
         (["walk.csv", "--height", "-1"], "not the height of a person"),
         (["walk.csv", "--height", "nan"], "not the height of a person"),
@@ -393,7 +369,7 @@ def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
         ({"lengths": {}, "height_m": 1.8}, "either lengths or a height"),
         ({"lengths": {"neck_to_pelvis": 0.4}}, "16 of 17 lengths missing"),
         ({"height_m": 180.0}, "centimetres"),
-        ({"height_m": math.nan}, ""),
+        ({"height_m": math.nan}, "height"),
         ({"noise_px": -1.0}, "noise_px"),
         ({"group_m": math.nan}, "group_m"),
         ({"moving_direction": (0.0, 0.0, 1.0)}, "moving_direction"),
