@@ -98,9 +98,9 @@ def write_posture_plot(postures: Postures, path: str | PathLike[str], row: int |
     """Writes a frame's postures from the side and from above, and the motion below, as PNG."""
     path = Path(path)
     row = postures.typical_row() if row is None else row
-    figure = Figure(figsize=(9, 8), dpi=120, layout="constrained")
+    figure = Figure(figsize=(9, 7.5), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.5, 1))
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.8, 1))
     side, above, strip = (figure.add_subplot(part) for part in (grid[0, 0], grid[0, 1], grid[1, :]))
     for ax in (side, above, strip):
         ax.spines[["top", "right"]].set_visible(False)
@@ -119,6 +119,8 @@ def write_posture_plot(postures: Postures, path: str | PathLike[str], row: int |
 def _headline(postures: Postures, row: int) -> str:
     survivors, drawn = int(postures.survivors[row]), len(postures.group_sizes[row])
     groups = "one group" if drawn == 1 else f"{drawn} groups"
+    if not postures.all_groups_given[row]:
+        groups = f"the {drawn} largest groups"
     left = f"{survivors} postures left, {groups} drawn thin" if survivors else "no posture left"
     return f"frame {postures.frames[row]}, {postures.times_s[row]:.2f} s: {left}; strong: the motion"
 

@@ -33,6 +33,8 @@ ANCHORS = ("auto", "ground", "trunk", "extent", "head", "combined")
 
 _MAX_LENGTHS_FILE_BYTES = 64 << 20
 
+_UNDECIDED_NATS = math.log(4)  # probabilities 0.8 and 0.2
+
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
 
@@ -52,7 +54,7 @@ class ReasonTotal(NamedTuple):
 
     constraint: str
     kind: str
-    """What sort of constraint: of the body, of the motion, ..."""
+    """What sort of constraint: an angle, a distance, a collision or a rule."""
     joint: str
     branches: int
     frames: int
@@ -66,6 +68,7 @@ class SecondBest:
     """The likeliest other motion: where it differs, and how much less likely it is."""
 
     joints: tuple[str, ...]
+    """The joints at the ends of the segments mirrored in depth."""
     first_frame: int
     last_frame: int
     """Frame numbers, both included."""
@@ -109,11 +112,11 @@ class Postures:
     anchor_conflicts: tuple[str, ...]
     """Where sources of the distance contradict each other, in sentences."""
     level_reached: Whole
-    """(T, 14) nodes of the tree made at each level."""
+    """(T, 14) nodes of the tree at each level that no constraint cut."""
     level_survived: Whole
-    """(T, 14) nodes that satisfied all constraints of the level."""
+    """(T, 14) those of them that lead to a posture left."""
     level_without_root: Whole
-    """(T, 14) times that a segment was too short to reach the joint's ray: the nearest point is taken."""
+    """(T, 14) nodes whose segment is too short to reach the joint's ray: the nearest point is taken."""
     reasons: tuple[tuple[Reason, ...], ...]
     """(T,) what was cut in each frame, and by what."""
     reason_totals: tuple[ReasonTotal, ...]
@@ -135,7 +138,7 @@ class Postures:
     gap_m: Array
     """(T, 14) by how much a segment was too short to reach the joint's ray, metres."""
     margin_nats: Array
-    """(T,) how much likelier the motion is than the best that is another in this frame."""
+    """(T,) how much likelier the motion is than the best other one in this frame; infinite without one."""
     second: SecondBest | None
     """The likeliest other motion, if there is one to speak of."""
     heading_source: str
@@ -155,6 +158,17 @@ class Postures:
     def group_counts(self) -> Whole:
         """(T,) how many groups are given in each frame."""
         return np.array([len(sizes) for sizes in self.group_sizes], np.int64)
+
+    @property
+    def all_groups_given(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether there are no more groups than those given."""
+        members = np.array([sizes.sum() for sizes in self.group_sizes], np.int64)
+        return np.asarray(members == self.survivors, np.bool_)
+
+    @property
+    def undecided(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether some joint may well be elsewhere: another motion has a probability over 0.2."""
+        return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
 
     def in_camera(self, points_m: Array) -> Array:
         """World points (..., 3) in the camera's axes: x right, y down, z forward, metres."""
@@ -184,6 +198,7 @@ class Postures:
             "survivors_median": float(np.median(left)) if len(left) else 0.0,
             "scale_from": self.scale_from,
             "heading_source": self.heading_source,
+            "undecided_frames": int(self.undecided.sum()),
             "most_cut": None if most is None else most._asdict(),
             "second": None
             if second is None
@@ -360,7 +375,7 @@ def _named(
         else SecondBest(
             joints=tuple(second["joints"]),
             first_frame=int(keypoints.frames[second["from"]]),
-            last_frame=int(keypoints.frames[second["to"]]),
+            last_frame=int(keypoints.frames[second["from"] + len(second["postures"]) - 1]),
             postures_m=second["postures"],
             margin_nats=second["margin"],
             p=second["p"],

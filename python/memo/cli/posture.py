@@ -24,6 +24,22 @@ POSTURE_EXIT_CODES = """Exit codes: 0 postures were written; 1 the input cannot 
 
 _DRAWN = "postures.png"
 
+_SCALES = {
+    "lengths": "the lengths given",
+    "height": "the height given",
+    "distance": "the distance from the camera",
+    "assumed": "the height of an average adult, assumed",
+}
+_SOURCES = {
+    "given": "as given",
+    "ground": "by the ground",
+    "trunk": "by the trunk",
+    "extent": "by the whole figure",
+    "head": "by the head",
+    "combined": "by several sources together",
+    "neighbours": "by the frames around",
+}
+
 
 class Rules(StrEnum):
     """What a posture must satisfy beside the body: `memo.postures.RULES`."""
@@ -77,6 +93,9 @@ def add_posture(app: "typer.Typer") -> None:
         distance: Annotated[
             float | None, typer.Option(help="Distance of the neck from the camera, metres, where known.")
         ] = None,
+        noise_px: Annotated[
+            float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
+        ] = 2.0,
         fps: Annotated[
             float | None, typer.Option(help="Frame rate; needed where no times are given.")
         ] = None,
@@ -101,7 +120,13 @@ def add_posture(app: "typer.Typer") -> None:
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
         reading = {"fps": fps, "layout": layout, "person": person}
-        options = {"rules": rules.value, "strength": strength.value, "anchor": anchor.value, "unswap": unswap}
+        options = {
+            "rules": rules.value,
+            "strength": strength.value,
+            "anchor": anchor.value,
+            "unswap": unswap,
+            "noise_px": noise_px,
+        }
 
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
@@ -173,7 +198,8 @@ def _frames_line(postures: memo.Postures) -> str:
     line = f"{count} frames, postures left in {left.sum()}"
     if left.any():
         survivors, groups = np.median(postures.survivors[left]), np.median(postures.group_counts[left])
-        line += f", median {survivors:.0f} in {groups:.0f} {'group' if groups == 1 else 'groups'}"
+        more = "" if np.median(postures.all_groups_given[left]) else " or more"
+        line += f", median {survivors:.0f} in {groups:.0f}{more} {'group' if groups == 1 else 'groups'}"
     elif postures.frames.size:
         line += _why_none(postures)
     if postures.repair is not None and any(postures.repair.exchanged.values()):
@@ -196,21 +222,22 @@ def _reason_line(postures: memo.Postures) -> list[str]:
 
 def _scale_line(postures: memo.Postures) -> str:
     known = np.isfinite(postures.anchor_m)
-    line = f"Sizes rest on {postures.scale_from}"
+    line = f"Sizes rest on {_SCALES.get(postures.scale_from, postures.scale_from)}"
     if known.any():
         sources = [source for source, there in zip(postures.anchor_source, known, strict=True) if there]
         usual = max(dict.fromkeys(sources), key=sources.count)
         distance_m, sd_m = np.median(postures.anchor_m[known]), np.median(postures.anchor_sd_m[known])
-        line += f"; the neck is {distance_m:.2f} ± {sd_m:.2f} m from the camera, by {usual}"
+        line += f"; the neck is {distance_m:.2f} ± {sd_m:.2f} m away, {_SOURCES.get(usual, usual)}"
     return f"{line}."
 
 
 def _second_line(postures: memo.Postures) -> str:
     second = postures.second
     if second is None:
-        return "No other motion is nearly as likely: which way the limbs point in depth is decided."
-    joints = ", ".join(joint.replace("_", " ") for joint in second.joints)
+        return "No other motion is there: which way the limbs point in depth is decided."
+    joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
     return (
-        f"One view cannot tell near from far: {joints} mirrored in depth in frames {second.first_frame} to"
-        f" {second.last_frame} has probability {second.p:.0%} (margin {second.margin_nats:.1f} nats)."
+        f"Near and far: {joints} mirrored in depth in frames {second.first_frame} to {second.last_frame} has"
+        f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
+        f" at this noise some joint is undecided in {postures.undecided.sum()} of {len(postures.frames)} frames."
     )
