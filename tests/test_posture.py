@@ -275,6 +275,19 @@ def test_a_chosen_frame_is_drawn_and_quiet_is_quiet(scene, tmp_path, memo_postur
     assert pictures[0] != pictures[1] and pictures[0][:4] == b"\x89PNG"
 
 
+def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
+    """In mid-stride nobody stands."""
+    folder, truth = scene
+    spread = np.linalg.norm(truth[:, AT["right_ankle"]] - truth[:, AT["left_ankle"]], axis=1)
+    path = write_table(tmp_path / "strides.csv", truth[spread > 0.65])
+    arguments = (path, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
+    code, said, _ = memo_posture(*arguments, "--rules", "standing", "--out", tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "postures.json").read_text())
+    assert code == 3 and "postures left in 0: what is nearest to one" in said
+    assert all(frame["cut_all"] and not frame["groups_m"] for frame in document["per_frame"])
+    assert document["frames_in_motion"] == len(document["per_frame"]) > 3
+
+
 def test_exchanged_sides_are_put_right_first(scene, tmp_path):
     folder, truth = scene
     camera = memo.Camera.from_toml(folder / "camera.toml")

@@ -34,6 +34,7 @@ ARM, LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 
 STRIP_FIGURES = 12
 _STRIP_STEP_M = 0.75
+_NEAR_GROUND_M = 0.6
 _TRAVELS_M = 0.8  # who moves less stands; the direction would be that of the noise
 
 Array = npt.NDArray[np.float64]
@@ -60,6 +61,7 @@ def plot_from_the_side(ax: Axes, postures: Postures, row: int) -> Axes:
         return np.stack([(points - camera) @ away, points[..., 2]], axis=-1)
 
     _draw_choice(ax, postures, row, plane)
+    _draw_ground(ax, postures)
     ax.set(xlabel="away from the camera, m", ylabel="height, m")
     ax.set_title("from the side", loc="left", fontsize=9)
     return ax
@@ -87,6 +89,7 @@ def plot_strip(ax: Axes, postures: Postures) -> Axes:
         joints = postures.smoothed_m[row]
         across = joints @ along
         draw_figure(ax, np.column_stack([across - np.nanmean(across) + _STRIP_STEP_M * place, joints[:, 2]]))
+    _draw_ground(ax, postures)
     ax.set_xticks(_STRIP_STEP_M * np.arange(len(rows)), [f"{postures.times_s[row]:.2f}" for row in rows])
     ax.set(xlabel="time, s", ylabel="height, m")
     ax.set_title(f"the motion from the side; rightwards: {name}", loc="left", fontsize=9)
@@ -132,6 +135,12 @@ def _draw_choice(ax: Axes, postures: Postures, row: int, plane: Callable[[Array]
         draw_figure(ax, joints, width=0.6, alpha=alpha)
     draw_figure(ax, plane(postures.smoothed_m[row]), width=1.7)
     ax.set_aspect("equal", adjustable="datalim")
+
+
+def _draw_ground(ax: Axes, postures: Postures) -> None:
+    """The line z = 0, where somebody stands near it (some worlds have their origin elsewhere)."""
+    if abs(np.nanmin(postures.smoothed_m[..., 2])) < _NEAR_GROUND_M:
+        ax.axhline(0, color=NEUTRAL, linewidth=0.6, linestyle=":")
 
 
 def _view(postures: Postures, *shown: Array) -> tuple[Array, Array, Array]:

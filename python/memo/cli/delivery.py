@@ -31,7 +31,7 @@ class Exit(IntEnum):
     TRACKED = 0
     DONE = 0  # where nobody is to be tracked
     BAD_INPUT = 1
-    NOBODY = 3
+    NOBODY = 3  # or no posture of anybody
     NO_EXTRA = 4
     INTERRUPTED = 130
 

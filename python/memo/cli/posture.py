@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import typer
 
 POSTURE_EXIT_CODES = """Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage;
-3 the keypoints were read but no frame has a posture (the tables say why); 4 the app extra is not installed;
+3 no posture is left in any frame (the tables say why); 4 the app extra is not installed;
 130 interrupted (nothing is written)."""
 
 _DRAWN = "postures.png"
@@ -156,7 +156,7 @@ def _posture(
 
             written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
     delivery.tell(postures.summary, _lines(postures), written)
-    return Exit.DONE if postures.found.any() else Exit.NOBODY
+    return Exit.DONE if (postures.survivors > 0).any() else Exit.NOBODY
 
 
 # What the user gave, checked before any work.
@@ -200,7 +200,7 @@ def _frames_line(postures: memo.Postures) -> str:
         survivors, groups = np.median(postures.survivors[left]), np.median(postures.group_counts[left])
         more = "" if np.median(postures.all_groups_given[left]) else " or more"
         line += f", median {survivors:.0f} in {groups:.0f}{more} {'group' if groups == 1 else 'groups'}"
-    elif postures.frames.size:
+    else:
         line += _why_none(postures)
     if postures.repair is not None and any(postures.repair.exchanged.values()):
         line += f"; right and left exchanged: {exchanges(postures.repair)}"
@@ -209,7 +209,7 @@ def _frames_line(postures: memo.Postures) -> str:
 
 def _why_none(postures: memo.Postures) -> str:
     why = next((why for why in postures.cut_all if why), None)
-    return "" if why is None else f": the least bad one of the first breaks {', '.join(why)}"
+    return "" if why is None else f": what is nearest to one, in the first, breaks {', '.join(why)}"
 
 
 def _reason_line(postures: memo.Postures) -> list[str]:
@@ -236,8 +236,9 @@ def _second_line(postures: memo.Postures) -> str:
     if second is None:
         return "No other motion is there: which way the limbs point in depth is decided."
     joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
+    undecided = f"{postures.undecided.sum()} of {len(postures.frames)} frames"
     return (
         f"Near and far: {joints} mirrored in depth in frames {second.first_frame} to {second.last_frame} has"
         f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
-        f" at this noise some joint is undecided in {postures.undecided.sum()} of {len(postures.frames)} frames."
+        f" at this noise some joint is undecided in {undecided}."
     )
