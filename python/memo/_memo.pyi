@@ -199,6 +199,25 @@ def unswap(
     partial_stay_nats: float | None = None,
     decided_at: float | None = None,
 ) -> dict[str, Any]: ...
+def posture(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    weights: npt.NDArray[np.float64],
+    camera: Camera,
+    *,
+    lengths: dict[str, float] | None = None,
+    height_m: float | None = None,
+    noise_px: float = 2.0,
+    rules: str = "walking",
+    strength: str = "measured",
+    anchor: str = "auto",
+    distance_m: float | Sequence[float] | npt.NDArray[np.float64] | None = None,
+    distance_sd_m: float | None = None,
+    moving_direction: Sequence[float] | None = None,
+    head_points: npt.NDArray[np.float64] | None = None,
+    group_m: float = 0.10,
+    max_groups: int = 64,
+) -> dict[str, Any]: ...
 def joint_names() -> list[str]: ...
 def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
 def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
