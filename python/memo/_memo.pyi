@@ -191,6 +191,17 @@ def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int
 def follow_person(
     frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
 ) -> list[bool]: ...
+def unswap(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64] | None = None,
+    *,
+    groups: dict[str, dict[str, list[tuple[int, int]]]],
+    as_is_nats: float | None = None,
+    partial_begin_nats: float | None = None,
+    partial_stay_nats: float | None = None,
+    decided_at: float | None = None,
+) -> dict[str, Any]: ...
 def posture(
     times_s: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -203,23 +214,12 @@ def posture(
     rules: str = "walking",
     strength: str = "measured",
     anchor: str = "auto",
-    distance_m: float | npt.ArrayLike | None = None,
+    distance_m: float | Sequence[float] | npt.NDArray[np.float64] | None = None,
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
     head_points: npt.NDArray[np.float64] | None = None,
     group_m: float = 0.10,
     max_groups: int = 64,
-) -> dict[str, Any]: ...
-def unswap(
-    times_s: npt.NDArray[np.float64],
-    points: npt.NDArray[np.float64],
-    scores: npt.NDArray[np.float64] | None = None,
-    *,
-    groups: dict[str, dict[str, list[tuple[int, int]]]],
-    as_is_nats: float | None = None,
-    partial_begin_nats: float | None = None,
-    partial_stay_nats: float | None = None,
-    decided_at: float | None = None,
 ) -> dict[str, Any]: ...
 def joint_names() -> list[str]: ...
 def segment_names() -> list[str]: ...

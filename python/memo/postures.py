@@ -223,7 +223,7 @@ def posture(
     rules: str = "walking",
     strength: str = "measured",
     anchor: str = "auto",
-    distance_m: float | npt.ArrayLike | None = None,
+    distance_m: float | Sequence[float] | Array | None = None,
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
     unswap: bool = True,

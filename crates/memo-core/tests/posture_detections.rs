@@ -46,7 +46,11 @@ fn recording(name: &str) -> Option<Recording> {
     };
     for t in 0..found.times_s.len() {
         let seen = keypoints(&read(&format!("{short}_json/{short}.{t:04}.json")));
-        let points: Vec<DVec2> = seen.iter().map(|[u, v, _]| DVec2::new(*u, *v)).collect();
+        // What is not detected is written as (0, 0) with score 0.
+        let points: Vec<DVec2> = seen
+            .iter()
+            .map(|&[u, v, score]| if score > 0.0 { DVec2::new(u, v) } else { DVec2::NAN })
+            .collect();
         let scores: Vec<f64> = seen.iter().map(|[.., score]| *score).collect();
         let joints = detector.stick_joints(&points, &scores).unwrap();
         found.points_px.push(PerJoint(joints.points_px));
@@ -129,14 +133,139 @@ fn explore() {
                 let [raw, aligned] = medians_cm(&found.linked.figures, &recording.truth);
                 let [sraw, saligned] = medians_cm(&found.linked.smoothed, &recording.truth);
                 let [fraw, faligned] = medians_cm(&flat, &recording.truth);
-                let true_d: f64 = recording.truth.iter().map(|f| recording.camera.camera_from_world(f[Joint::Neck]).length()).sum::<f64>()/100.0;
-                let d: f64 = found.neck.distance_m.iter().sum::<f64>()/found.frames.len() as f64;
+                let true_d: f64 = recording
+                    .truth
+                    .iter()
+                    .map(|f| recording.camera.camera_from_world(f[Joint::Neck]).length())
+                    .sum::<f64>()
+                    / 100.0;
+                let d: f64 = found.neck.distance_m.iter().sum::<f64>() / found.frames.len() as f64;
                 let empty = found.frames.iter().flatten().filter(|f| f.survivors() == 0).count();
                 let mut surv: Vec<usize> = found.frames.iter().flatten().map(|f| f.survivors()).collect();
                 surv.sort();
-                println!("{name} {label:6} {choice:8} raw {raw:5.1} al {aligned:5.1} smoothed {sraw:5.1} {saligned:5.1} flat {fraw:5.1} {faligned:5.1} cm; neck {d:.2} (true {true_d:.2}) sd {:.2}; thigh {:.3} (true {:.3}) empty {empty} median {} max {} time {s:.2}", found.neck.sd_m[50], found.lengths.lengths.to[Joint::RightKnee], true_lengths.to[Joint::RightKnee], surv[surv.len()/2], surv[surv.len()-1]);
-                if choice == "combined" { for w in &found.warnings { println!("    {w}"); } 
-                 for r in memo_core::posture::sequence::reason_totals(&found.frames).iter().take(6) { println!("   -- {} {} {}", r.constraint.description(), r.branches, r.frames); } }
+                println!(
+                    "{name} {label:6} {choice:8} raw {raw:5.1} al {aligned:5.1} smoothed {sraw:5.1} {saligned:5.1} flat {fraw:5.1} {faligned:5.1} cm; neck {d:.2} (true {true_d:.2}) sd {:.2}; thigh {:.3} (true {:.3}) empty {empty} median {} max {} time {s:.2}",
+                    found.neck.sd_m[50],
+                    found.lengths.lengths.to[Joint::RightKnee],
+                    true_lengths.to[Joint::RightKnee],
+                    surv[surv.len() / 2],
+                    surv[surv.len() - 1]
+                );
+                if choice == "combined" {
+                    for w in &found.warnings {
+                        println!("    {w}");
+                    }
+                    for r in memo_core::posture::sequence::reason_totals(&found.frames).iter().take(6) {
+                        println!("   -- {} {} {}", r.constraint.description(), r.branches, r.frames);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn oracle() {
+    use memo_core::posture::lift::{JointRays, roots};
+    for name in ["cam_02", "cam_04"] {
+        let Some(recording) = recording(name) else { return };
+        let true_lengths = SegmentLengths::from_figures(&recording.truth).unwrap();
+        println!("{name} focal {:?} pos {:?}", recording.camera.focal_px, recording.camera.position());
+        println!("scores {:?}", recording.weights[50].0);
+        println!("head px {:?}", recording.head_px[50]);
+        let t0 = &recording.truth[50];
+        println!("true px {:?}", t0.0.map(|p| recording.camera.project(p).unwrap().round()));
+        println!("det  px {:?}", recording.points_px[50].0.map(|p| p.round()));
+        println!("true cam {:?}", t0.0.map(|p| (recording.camera.camera_from_world(p) * 100.0).round()));
+        for noise in [3.0, 6.0, 8.0, 12.0] {
+            let d: Vec<f64> = recording
+                .truth
+                .iter()
+                .map(|f| recording.camera.camera_from_world(f[Joint::Neck]).length())
+                .collect();
+            let options = SequenceOptions {
+                lengths: Some(true_lengths),
+                noise_px: noise,
+                motion: Motion::Physical,
+                anchor: AnchorChoice::Given { distance_m: d.clone(), sd_m: 0.05 },
+                ..SequenceOptions::default()
+            };
+            let found = recording.postures(&options);
+            let mut oracle = vec![];
+            for t in 0..100 {
+                let rays = JointRays::from_pixels(
+                    &recording.camera,
+                    &recording.points_px[t],
+                    &PerJoint([1.0; 14]),
+                    noise,
+                )
+                .unwrap();
+                let tc =
+                    memo_core::posture::sequence::figure_in_camera(&recording.truth[t], &recording.camera);
+                let mut leaf = StickFigure::UNKNOWN;
+                leaf[Joint::Neck] = rays.ray[Joint::Neck] * d[t];
+                for joint in Joint::ALL.into_iter().skip(1) {
+                    let start = leaf[joint.start().unwrap()];
+                    let r = roots(start, rays.ray[joint], true_lengths.to[joint], 0.0, 0.0);
+                    let v = tc.segment(joint);
+                    leaf[joint] = if (r.near - start).distance(v) <= (r.far - start).distance(v) {
+                        r.near
+                    } else {
+                        r.far
+                    };
+                }
+                oracle.push(memo_core::posture::sequence::figure_in_world(&leaf, &recording.camera));
+            }
+            let flat: Vec<StickFigure> =
+                (0..100).map(|t| recording.flat(t, found.linked.figures[t][Joint::Neck])).collect();
+            println!("{:?}", found.heading);
+            println!(
+                "{name} noise {noise} oracle {:.1?} linked {:.1?} smoothed {:.1?} flat {:.1?}",
+                medians_cm(&oracle, &recording.truth),
+                medians_cm(&found.linked.figures, &recording.truth),
+                medians_cm(&found.linked.smoothed, &recording.truth),
+                medians_cm(&flat, &recording.truth)
+            );
+            if noise == 6.0 {
+                use std::collections::BTreeMap;
+                let mut counts: [BTreeMap<String, usize>; 2] = Default::default();
+                for t in 0..100 {
+                    let Ok(fr) = &found.frames[t] else { continue };
+                    let opts = memo_core::posture::tree::TreeOptions::physical();
+                    for (k, f) in [&oracle[t], &found.linked.figures[t]].into_iter().enumerate() {
+                        let c = memo_core::posture::sequence::figure_in_camera(f, &recording.camera);
+                        let v = fr.tree.view.violations(fr.tree.view.nearest_path(&c), &opts);
+                        if v.is_empty() {
+                            *counts[k].entry("(none)".into()).or_default() += 1;
+                        }
+                        for x in v {
+                            *counts[k].entry(x.constraint.name()).or_default() += 1;
+                        }
+                    }
+                }
+                println!("oracle breaks {:?}", counts[0]);
+                println!("linked breaks {:?}", counts[1]);
+                println!("empty {}", found.frames.iter().flatten().filter(|f| f.survivors() == 0).count());
+            }
+            println!("{:?}", found.linked.second.map(|s| (s.joints, s.from, s.to, s.margin)));
+            if noise == 6.0 {
+                for j in Joint::ALL {
+                    let e = |f: &Vec<StickFigure>| {
+                        let mut v: Vec<f64> = (0..100)
+                            .map(|t| 100.0 * (f[t][j] - recording.truth[t][j]).length())
+                            .filter(|e| e.is_finite())
+                            .collect();
+                        v.sort_by(f64::total_cmp);
+                        v[v.len() / 2]
+                    };
+                    println!(
+                        "  {:15} oracle {:.1} linked {:.1} flat {:.1}",
+                        j.name(),
+                        e(&oracle),
+                        e(&found.linked.figures),
+                        e(&flat)
+                    );
+                }
             }
         }
     }

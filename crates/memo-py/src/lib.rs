@@ -5,6 +5,7 @@ mod camera;
 mod error;
 mod image;
 mod keypoints;
+mod posture;
 mod reproduce;
 mod score;
 mod synth;
@@ -27,6 +28,8 @@ mod _memo {
         follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
         stick_joints,
     };
+    #[pymodule_export]
+    use super::posture::posture;
     #[pymodule_export]
     use super::reproduce::{
         joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage, segment_names,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 POSTURE_EXIT_CODES = """Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage;
 3 no posture is left in any frame (the tables say why); 4 the app extra is not installed;
-130 interrupted (nothing is written)."""
+130 interrupted (no file is left half written)."""
 
 _DRAWN = "postures.png"
 

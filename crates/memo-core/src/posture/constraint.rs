@@ -126,6 +126,18 @@ pub enum ConstraintKind {
     Rule,
 }
 
+impl ConstraintKind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::Distance => "distance",
+            Self::Collision => "collision",
+            Self::Rule => "rule",
+        }
+    }
+}
+
 use Constraint as C;
 use Side::{Left, Right};
 

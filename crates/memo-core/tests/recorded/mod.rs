@@ -163,7 +163,8 @@ pub fn detected(json: &str) -> PerJoint<DVec2> {
     let values = keypoints(json);
     let mut pixels = PerJoint([DVec2::NAN; 14]);
     for (joint, index, _) in BODY_25B {
-        let [u, v, score] = values[index];        if score > 0.3 {
+        let [u, v, score] = values[index];
+        if score > 0.3 {
             pixels[joint] = DVec2::new(u, v);
         }
     }

@@ -487,7 +487,11 @@ fn link_frames(
     let options = LinkOptions {
         prior: scene.options.motion.prior(),
         up: Some(scene.up()),
-        moving_direction: heading.direction.map(|direction| scene.camera.rotation * direction),
+        // Anybody may move sideways: the prior of any motion is against the trunk's own direction.
+        moving_direction: heading
+            .direction
+            .filter(|_| scene.options.motion.needs_heading())
+            .map(|direction| scene.camera.rotation * direction),
         ..LinkOptions::default()
     };
     link(&link_frames, &scene.lengths.lengths, &options)

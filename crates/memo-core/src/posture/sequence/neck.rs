@@ -1,6 +1,7 @@
 //! Distance of the neck in every frame, from the sources that were asked for, followed over time.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -82,6 +83,18 @@ pub struct SourceConflict {
     pub distances_m: [f64; 2],
     /// Median of the difference over its standard deviation.
     pub sigmas: f64,
+}
+
+impl fmt::Display for SourceConflict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [(a, a_m), (b, b_m)] = [0, 1].map(|i| (self.sources[i].name(), self.distances_m[i]));
+        write!(
+            f,
+            "the neck's distance is {a_m:.2} m by the {a} but {b_m:.2} m by the {b} ({:.1} standard deviations, \
+             {} of {} frames)",
+            self.sigmas, self.frames, self.of
+        )
+    }
 }
 
 /// The neck over the sequence.

@@ -148,15 +148,7 @@ impl fmt::Display for Warning {
                 "{segment} is taken as {length_m:.3} m, but in {frames} of {of} frames it looks at least \
                  {seen_m:.3} m long: a wrong length or wrong points"
             ),
-            Self::Conflict(SourceConflict { sources, frames, of, distances_m, sigmas }) => write!(
-                f,
-                "the neck's distance is {:.2} m by the {} but {:.2} m by the {} ({sigmas:.1} standard \
-                 deviations, {frames} of {of} frames)",
-                distances_m[0],
-                sources[0].name(),
-                distances_m[1],
-                sources[1].name()
-            ),
+            Self::Conflict(conflict) => conflict.fmt(f),
             Self::NoTravel { travelled_m, from } => write!(
                 f,
                 "the person moves by {travelled_m:.2} m, too little for a moving direction: that of the {} \
