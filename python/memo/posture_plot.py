@@ -35,7 +35,6 @@ ARM, LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 STRIP_FIGURES = 12
 _STRIP_STEP_M = 0.75
 _NEAR_GROUND_M = 0.6
-_TRAVELS_M = 0.8  # who moves less stands; the direction would be that of the noise
 
 Array = npt.NDArray[np.float64]
 
@@ -81,7 +80,7 @@ def plot_from_above(ax: Axes, postures: Postures, row: int) -> Axes:
 
 
 def plot_strip(ax: Axes, postures: Postures) -> Axes:
-    """The motion from the side at equal intervals of time, one figure beside the other."""
+    """The motion from the side, one figure beside the other, in frames spread evenly over the known ones."""
     known = np.flatnonzero(postures.found)
     rows = known[np.unique(np.linspace(0, len(known) - 1, STRIP_FIGURES).round().astype(int))]
     along, name = _strip_direction(postures, known)
@@ -159,6 +158,6 @@ def _strip_direction(postures: Postures, known: npt.NDArray[np.intp]) -> tuple[A
     quarter = max(len(known) // 4, 1)
     travel = middles[-quarter:].mean(axis=0) - middles[:quarter].mean(axis=0)
     length = np.linalg.norm(travel)
-    if length * len(known) / max(len(known) - quarter, 1) < _TRAVELS_M:
+    if postures.heading_source != "travel" or length < 1e-6:
         return _view(postures, postures.smoothed_m[known])[1], "away from the camera"
-    return travel / length, "the way of the walk"
+    return travel / length, "the way over the ground"

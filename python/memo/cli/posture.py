@@ -194,12 +194,11 @@ def _lines(postures: memo.Postures) -> list[str]:
 
 def _frames_line(postures: memo.Postures) -> str:
     left = postures.survivors > 0
-    count = len(postures.frames)
-    line = f"{count} frames, postures left in {left.sum()}"
+    line = f"{_counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
     if left.any():
-        survivors, groups = np.median(postures.survivors[left]), np.median(postures.group_counts[left])
+        groups = _counted(round(np.median(postures.group_counts[left])), "group")
         more = "" if np.median(postures.all_groups_given[left]) else " or more"
-        line += f", median {survivors:.0f} in {groups:.0f}{more} {'group' if groups == 1 else 'groups'}"
+        line += f", median {np.median(postures.survivors[left]):.0f} in {groups}{more}"
     else:
         line += _why_none(postures)
     if postures.repair is not None and any(postures.repair.exchanged.values()):
@@ -217,7 +216,8 @@ def _reason_line(postures: memo.Postures) -> list[str]:
     if most is None:
         return []
     name, sentence = most.constraint.replace("_", " "), most.sentence.rstrip(".")
-    return [f"Most is cut by {name}: {most.branches} branches in {most.frames} frames ({sentence})."]
+    cut = f"{_counted(most.branches, 'branch', 'branches')} in {_counted(most.frames, 'frame')}"
+    return [f"Most is cut by {name}: {cut} ({sentence})."]
 
 
 def _scale_line(postures: memo.Postures) -> str:
@@ -236,9 +236,16 @@ def _second_line(postures: memo.Postures) -> str:
     if second is None:
         return "No other motion is there: which way the limbs point in depth is decided."
     joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
-    undecided = f"{postures.undecided.sum()} of {len(postures.frames)} frames"
+    undecided = f"{postures.undecided.sum()} of {_counted(len(postures.frames), 'frame')}"
+    where = f"frames {second.first_frame} to {second.last_frame}"
+    if second.first_frame == second.last_frame:
+        where = f"frame {second.first_frame}"
     return (
-        f"Near and far: {joints} mirrored in depth in frames {second.first_frame} to {second.last_frame} has"
+        f"Near and far: {joints} mirrored in depth in {where} has"
         f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
         f" at this noise some joint is undecided in {undecided}."
     )
+
+
+def _counted(count: int, one: str, several: str | None = None) -> str:
+    return f"{count} {one if count == 1 else several or one + 's'}"
