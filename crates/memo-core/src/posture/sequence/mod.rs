@@ -541,3 +541,295 @@ fn to_world(linked: LinkedPath, camera: &Camera) -> LinkedPath {
         ..linked
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::constraint::ConstraintKind;
+    use crate::synth::Random;
+    use crate::synth::stick_walker::{StickWalker, world_from_head};
+    use proptest::prelude::*;
+
+    const RATE_HZ: f64 = 25.0;
+
+    /// Keypoints of a known walk.
+    struct Walk {
+        camera: Camera,
+        times_s: Vec<f64>,
+        points_px: Vec<PerJoint<DVec2>>,
+        weights: Vec<PerJoint<f64>>,
+        truth: Vec<StickFigure>,
+    }
+
+    impl Walk {
+        fn sequence(&self) -> KeypointSequence<'_> {
+            let Self { times_s, points_px, weights, .. } = self;
+            KeypointSequence { times_s, points_px, weights, head_points_px: None }
+        }
+
+        fn postures(&self, options: &SequenceOptions) -> Result<PostureSequence, SequenceError> {
+            postures(&self.sequence(), &self.camera, options)
+        }
+    }
+
+    /// The walker of the paper at 1.2 m/s past a level camera, `azimuth_deg` off the direction towards it.
+    fn walk(azimuth_deg: f64, frames: usize, noise_px: f64) -> Walk {
+        let camera = Camera::level([1920, 1920], 0.9273, 1.2, 5.0).unwrap();
+        let walker = StickWalker::lee_chen();
+        let mut random = Random::new(5);
+        let forward = glam::DMat3::from_rotation_z((azimuth_deg - 90.0).to_radians()) * DVec3::X;
+        let turn = glam::DMat3::from_rotation_z(forward.y.atan2(forward.x));
+        let posed = |t: usize| {
+            let figure = walker.posed(t as f64 / RATE_HZ, DVec3::ZERO);
+            PerJoint(figure.0.map(world_from_head))
+        };
+        let lowest = |figure: &StickFigure| figure[Joint::RightAnkle].z.min(figure[Joint::LeftAnkle].z);
+        let figures: Vec<StickFigure> = (0..frames).map(posed).collect();
+        let low = figures.iter().map(lowest).fold(f64::INFINITY, f64::min);
+        let height = 0.17 * walker.lengths().to[Joint::RightAnkle] - low;
+        let mut found = Walk { camera, times_s: vec![], points_px: vec![], weights: vec![], truth: vec![] };
+        for (t, figure) in figures.iter().enumerate() {
+            let way_m = 1.2 * (t as f64 - 0.5 * frames as f64) / RATE_HZ;
+            let figure = PerJoint(figure.0.map(|p| turn * p + way_m * forward + height * DVec3::Z));
+            let pixel = |p: DVec3| {
+                let [a, b] = random.normal_pair().map(f64::from);
+                found.camera.project(p).unwrap() + noise_px * DVec2::new(a, b)
+            };
+            found.points_px.push(PerJoint(figure.0.map(pixel)));
+            found.times_s.push(t as f64 / RATE_HZ);
+            found.weights.push(PerJoint([1.0; JOINT_COUNT]));
+            found.truth.push(figure);
+        }
+        found
+    }
+
+    fn with_lengths() -> SequenceOptions {
+        SequenceOptions {
+            lengths: Some(SegmentLengths::lee_chen()),
+            noise_px: 1.0,
+            ..SequenceOptions::default()
+        }
+    }
+
+    /// Median and 90 % quantile of the distances from the truth, necks on each other, cm.
+    fn errors_cm(found: &[StickFigure], truth: &[StickFigure]) -> [f64; 2] {
+        let mut errors: Vec<f64> = found
+            .iter()
+            .zip(truth)
+            .flat_map(|(found, truth)| {
+                let shift = truth[Joint::Neck] - found[Joint::Neck];
+                Joint::ALL.map(|joint| 100.0 * (found[joint] + shift).distance(truth[joint]))
+            })
+            .filter(|error| error.is_finite())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        [0.5, 0.9].map(|q| errors[(q * (errors.len() - 1) as f64) as usize])
+    }
+
+    #[test]
+    fn a_walk_is_recovered_in_the_world() {
+        for azimuth_deg in [45.0, 90.0] {
+            let walk = walk(azimuth_deg, 40, 1.0);
+            let found = walk.postures(&with_lengths()).unwrap();
+            let [median, worst] = errors_cm(&found.linked.smoothed, &walk.truth);
+            println!("{azimuth_deg} deg: {median:.1} cm, 90 % {worst:.1} cm; {:?}", found.heading);
+            for warning in &found.warnings {
+                println!("{warning}");
+            }
+            assert!(median < 4.0 && worst < 12.0, "{azimuth_deg} deg: {median:.1} cm, 90 % {worst:.1} cm");
+            let off =
+                |t: &usize| (found.linked.figures[*t][Joint::Neck] - walk.truth[*t][Joint::Neck]).length();
+            let inside = (0..40).filter(|t| off(t) < 3.0 * found.neck.sd_m[*t]).count();
+            assert!(inside >= 36, "{inside} necks within 3 standard deviations");
+            let forward = walk.truth[39][Joint::Neck] - walk.truth[0][Joint::Neck];
+            let heading = found.heading.direction.unwrap();
+            assert_eq!(found.heading.from, HeadingFrom::Travel);
+            assert!(heading.angle_between(forward).to_degrees() < 10.0, "{heading} for {forward}");
+            assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+        }
+    }
+
+    /// Survivors by count, reasons by the constraint's kind: rules cut only where they are asked for.
+    #[test]
+    fn rules_cut_what_bodies_allow() {
+        let walk = walk(45.0, 10, 1.0);
+        let physical =
+            walk.postures(&SequenceOptions { motion: Motion::Physical, ..with_lengths() }).unwrap();
+        let walking = walk.postures(&with_lengths()).unwrap();
+        for (physical, walking) in physical.frames.iter().zip(&walking.frames) {
+            let [physical, walking] = [physical, walking].map(|frame| frame.as_ref().unwrap());
+            assert!(walking.survivors() <= physical.survivors() && walking.survivors() > 0);
+            assert!(
+                walking.groups.len() <= 64 && walking.groups[0].size >= walking.groups.last().unwrap().size
+            );
+        }
+        let has_rule = |found: &PostureSequence| {
+            reason_totals(&found.frames).iter().any(|total| total.constraint.kind() == ConstraintKind::Rule)
+        };
+        assert!(!has_rule(&physical) && has_rule(&walking));
+        let few = walk.postures(&SequenceOptions { max_groups: 2, ..with_lengths() }).unwrap();
+        assert!(few.frames.iter().flatten().all(|frame| frame.groups.len() <= 2));
+    }
+
+    #[test]
+    fn missing_joints_cost_what_hangs_on_them() {
+        let mut walk = walk(45.0, 20, 0.5);
+        walk.points_px[7][Joint::RightKnee] = DVec2::NAN;
+        walk.weights[8][Joint::LeftElbow] = 0.0;
+        walk.points_px[9][Joint::Neck] = DVec2::NAN;
+        walk.points_px[10] = PerJoint([DVec2::NAN; JOINT_COUNT]);
+        walk.points_px[11][Joint::LeftWrist] = DVec2::INFINITY;
+        let found = walk.postures(&with_lengths()).unwrap();
+        let unknown = |t: usize| -> Vec<Joint> {
+            let figure = &found.linked.figures[t];
+            Joint::ALL.into_iter().filter(|&joint| figure[joint].is_nan()).collect()
+        };
+        assert_eq!(unknown(7), [Joint::RightKnee, Joint::RightAnkle]);
+        assert_eq!(unknown(8), [Joint::LeftElbow, Joint::LeftWrist]);
+        assert_eq!(unknown(11), [Joint::LeftWrist]);
+        assert_eq!(found.frames[9], Err(FrameProblem::NeckNotSeen));
+        assert_eq!(found.frames[10], Err(FrameProblem::NeckNotSeen));
+        assert_eq!([unknown(9).len(), unknown(10).len()], [JOINT_COUNT; 2]);
+        assert!((0..20).filter(|t| ![7, 8, 9, 10, 11].contains(t)).all(|t| unknown(t).is_empty()));
+        let counts = &found.frames[7].as_ref().unwrap().tree.counts;
+        assert_eq!(counts[Joint::RightKnee].reached, counts[Joint::LeftWrist].reached);
+        let open = &found.frames[7].as_ref().unwrap().tree.open;
+        assert!(open.iter().all(|constraint| constraint.name().contains("right")
+            || constraint.kind() == ConstraintKind::Rule
+            || constraint.kind() == ConstraintKind::Collision));
+        assert!(found.warnings.contains(&Warning::LightJoints {
+            light: 1,
+            all: 20 * 14 - 16,
+            min_weight: 0.2
+        }));
+        assert!(found.warnings.iter().any(|w| matches!(w, Warning::OutsideLens { outside: 1, .. })));
+        assert!(found.warnings.iter().any(|w| matches!(w, Warning::SilentFrames { silent: 2, of: 20, .. })));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_with_its_values() {
+        let good = walk(45.0, 6, 0.5);
+        let refused = |change: &dyn Fn(&mut Walk, &mut SequenceOptions)| {
+            let mut walk = walk(45.0, 6, 0.5);
+            let mut options = with_lengths();
+            change(&mut walk, &mut options);
+            walk.postures(&options).unwrap_err().to_string()
+        };
+        assert!(good.postures(&with_lengths()).is_ok());
+        assert_eq!(refused(&|walk, _| walk.times_s.clear()), "there are no frames");
+        assert_eq!(
+            refused(&|walk, _| walk.points_px.truncate(3)),
+            "6 times need as many frames of points, got 3"
+        );
+        assert_eq!(
+            refused(&|walk, _| walk.times_s[3] = walk.times_s[2]),
+            "times must be finite and increase: frame 3 is at 0.08 s, the one before at 0.08 s"
+        );
+        assert!(refused(&|walk, _| walk.times_s[2] = f64::NAN).starts_with("times must be finite"));
+        assert_eq!(
+            refused(&|_, o| o.noise_px = f64::NAN),
+            "noise_px must be finite and not negative, got NaN"
+        );
+        assert!(refused(&|_, o| o.lengths.as_mut().unwrap().to[Joint::Pelvis] = 0.0).contains("got 0"));
+        assert!(refused(&|_, o| (o.lengths, o.height_m) = (None, Some(17.0))).contains("17"));
+        assert!(refused(&|_, o| o.moving_direction = Some(DVec3::Z)).contains("vertical"));
+        assert!(refused(&|_, o| o.anchor = AnchorChoice::Source(AnchorSource::Head)).contains("six points"));
+        assert!(
+            refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0, 5.0], sd_m: 0.1 })
+                .contains("distances (or one), got 2")
+        );
+        assert!(
+            refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![-4.0], sd_m: 0.1 })
+                .contains("-4")
+        );
+        assert!(
+            refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0], sd_m: 0.0 })
+                .contains("sd")
+        );
+        let nothing = |walk: &mut Walk| walk.points_px.fill(PerJoint([DVec2::NAN; JOINT_COUNT]));
+        assert!(refused(&|walk, _| nothing(walk)).contains("no frame gives the neck's distance"));
+        assert!(refused(&|walk, o| (nothing(walk), o.lengths = None).1).contains("no frame gives"));
+        assert!(refused(&|walk, _| walk.camera.focal_px.x = 0.0).contains("focal"));
+    }
+
+    #[test]
+    fn a_segment_longer_than_can_be_is_reported() {
+        let walk = walk(90.0, 20, 0.5);
+        let mut lengths = SegmentLengths::lee_chen();
+        lengths.to[Joint::RightAnkle] *= 0.5;
+        let options = SequenceOptions { lengths: Some(lengths), motion: Motion::Physical, ..with_lengths() };
+        let necks = walk.truth.iter().map(|f| walk.camera.camera_from_world(f[Joint::Neck]).length());
+        let anchor = AnchorChoice::Given { distance_m: necks.collect(), sd_m: 0.05 };
+        let found = walk.postures(&SequenceOptions { anchor, ..options.clone() }).unwrap();
+        let is_short = |warning: &Warning| match warning {
+            Warning::SegmentTooShort { segment, frames, .. } => {
+                segment == "right_knee-right_ankle" && *frames == 20
+            }
+            _ => false,
+        };
+        assert!(found.warnings.iter().any(is_short), "{:?}", found.warnings);
+        let gaps: Vec<f64> = found.linked.gap_m.iter().map(|gap| gap[Joint::RightAnkle]).collect();
+        assert!(gaps.iter().all(|gap| *gap > 0.05), "{gaps:?}");
+        // Without a distance the ground takes the short leg for a nearer one, against the trunk.
+        let found = walk.postures(&options).unwrap();
+        let is_conflict = |c: &SourceConflict| c.sources == [AnchorSource::Ground, AnchorSource::Trunk];
+        assert!(found.neck.conflicts.iter().any(is_conflict), "{:?}", found.neck.conflicts);
+        assert!(
+            found.warnings.iter().any(|warning| matches!(warning, Warning::Conflict(c) if is_conflict(c)))
+        );
+    }
+
+    #[test]
+    fn threads_change_nothing() {
+        let walk = walk(45.0, 12, 2.0);
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            format!("{:?}", pool.install(|| walk.postures(&with_lengths()).unwrap()))
+        };
+        assert!(with(1) == with(2));
+    }
+
+    #[test]
+    fn figures_go_to_the_camera_and_back() {
+        let walk = walk(30.0, 1, 0.0);
+        let camera_figure = figure_in_camera(&walk.truth[0], &walk.camera);
+        let again = figure_in_world(&camera_figure, &walk.camera);
+        for joint in Joint::ALL {
+            assert!(camera_figure[joint].z > 0.0 && again[joint].distance(walk.truth[0][joint]) < 1e-12);
+        }
+    }
+
+    fn any_pixel() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => 0.0..1920.0,
+            1 => prop::sample::select(vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, 1e300, -1e9]),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Whatever the points: an answer of the right size, or an error.
+        #[test]
+        fn no_points_break_it(
+            pixels in prop::collection::vec((any_pixel(), any_pixel()), 3 * JOINT_COUNT),
+            weights in prop::collection::vec(prop_oneof![4 => 0.0..1.0, 1 => Just(f64::NAN)], 3 * JOINT_COUNT),
+            motion in prop::sample::select(Motion::ALL.to_vec()),
+            known in any::<bool>(),
+            noise_px in 0.0..20.0,
+        ) {
+            let mut walk = walk(45.0, 3, 0.0);
+            for (i, &(u, v)) in pixels.iter().enumerate() {
+                walk.points_px[i / JOINT_COUNT].0[i % JOINT_COUNT] = DVec2::new(u, v);
+                walk.weights[i / JOINT_COUNT].0[i % JOINT_COUNT] = weights[i];
+            }
+            let lengths = known.then(SegmentLengths::lee_chen);
+            let options = SequenceOptions { lengths, motion, noise_px, ..SequenceOptions::default() };
+            if let Ok(found) = walk.postures(&options) {
+                prop_assert_eq!(found.frames.len(), 3);
+                prop_assert_eq!(found.linked.figures.len(), 3);
+                prop_assert!(found.warnings.iter().all(|warning| !warning.to_string().is_empty()));
+            }
+        }
+    }
+}
