@@ -105,7 +105,7 @@ fn dict_from_group<'py>(
     result.set_item("decided", flags(|v| v.decided))?;
     let probability = verdicts.iter().map(|v| v.probability).collect();
     result.set_item("p_flipped", numpy_from_column(py, probability))?;
-    let reasons: Vec<String> = verdicts.iter().map(|v| v.reason.describe(v.flipped, group)).collect();
+    let reasons: Vec<String> = verdicts.iter().map(|v| v.describe(group)).collect();
     result.set_item("reason", reasons)?;
     let levels: Vec<&str> = group.levels.iter().map(|level| level.name.as_str()).collect();
     result.set_item("levels", levels)?;
