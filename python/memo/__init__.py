@@ -17,6 +17,7 @@ from memo._memo import (
     velocity_field,
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
+from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
 from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
@@ -26,6 +27,7 @@ __all__ = [
     "DemoScene",
     "Keypoints",
     "KeypointsError",
+    "Postures",
     "SideRepair",
     "Track",
     "Tracker",
@@ -36,7 +38,9 @@ __all__ = [
     "head_points",
     "layouts",
     "moving_regions",
+    "posture",
     "read_keypoints",
+    "read_lengths",
     "silhouettes",
     "similarity",
     "stick_joints",

@@ -5,6 +5,7 @@ mod camera;
 mod error;
 mod image;
 mod keypoints;
+mod posture;
 mod reproduce;
 mod score;
 mod synth;
@@ -28,8 +29,10 @@ mod _memo {
         stick_joints,
     };
     #[pymodule_export]
+    use super::posture::posture;
+    #[pymodule_export]
     use super::reproduce::{
-        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage, segment_names,
     };
     #[pymodule_export]
     use super::score::similarity;

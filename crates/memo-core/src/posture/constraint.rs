@@ -126,6 +126,18 @@ pub enum ConstraintKind {
     Rule,
 }
 
+impl ConstraintKind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::Distance => "distance",
+            Self::Collision => "collision",
+            Self::Rule => "rule",
+        }
+    }
+}
+
 use Constraint as C;
 use Side::{Left, Right};
 
@@ -340,6 +352,20 @@ impl Constraint {
     /// The constraint of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|constraint| constraint.name() == name)
+    }
+
+    /// What breaks it, as one plain sentence without numbers.
+    pub fn description(self) -> String {
+        let sentence = self.sentence();
+        let what = sentence.trim_end_matches(" by").trim_end_matches(": clearance");
+        match self.kind() {
+            ConstraintKind::Distance => {
+                format!("{} is not that of the rigid body", what.trim_end_matches(" wrong"))
+            }
+            ConstraintKind::Angle => format!("{what} farther than a body can"),
+            ConstraintKind::Collision => what.to_owned(),
+            ConstraintKind::Rule => format!("{what} more than the rules of the motion allow"),
+        }
     }
 
     /// What is measured, as the start of a sentence that a value follows.

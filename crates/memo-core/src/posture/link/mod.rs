@@ -114,6 +114,13 @@ pub struct Alternative {
     pub margin: f64,
 }
 
+impl Alternative {
+    /// Its probability where it and the best are all there is, 0 to 0.5.
+    pub fn probability(&self) -> f64 {
+        1.0 / (1.0 + self.margin.exp())
+    }
+}
+
 /// A linked sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkedPath {
