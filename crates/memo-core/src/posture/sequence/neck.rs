@@ -197,7 +197,7 @@ struct FrameAnchor {
 /// The neck's distance over the sequence.
 pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, SequenceError> {
     if let AnchorChoice::Given { distance_m, sd_m } = &scene.options.anchor {
-        return Ok(given(scene.rays, distance_m, *sd_m)?);
+        return given(scene.rays, distance_m, *sd_m);
     }
     let options = scene.lengths.anchor_options(&scene.options.anchor_options);
     let times_s = scene.sequence.times_s;
