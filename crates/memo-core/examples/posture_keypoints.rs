@@ -19,13 +19,12 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut options = SequenceOptions::default();
-    let (times_s, points_px, camera) = match arguments.as_slice() {
+    let ((times_s, points_px), camera) = match arguments.as_slice() {
         [walker, frames] if walker == "--walker" => synthetic(frames.parse()?)?,
         [csv, camera, height_m @ ..] if height_m.len() < 2 => {
             options.height_m = height_m.first().map(|height_m| height_m.parse()).transpose()?;
             let camera = Camera::from_toml_str(&std::fs::read_to_string(camera)?, None)?;
-            let (times_s, points_px) = read(&std::fs::read_to_string(csv)?)?;
-            (times_s, points_px, camera)
+            (read(&std::fs::read_to_string(csv)?)?, camera)
         }
         _ => {
             return Err(
@@ -83,7 +82,7 @@ fn read(csv: &str) -> Result<Keypoints, Box<dyn Error>> {
 }
 
 /// The walker of Lee and Chen at 25 Hz and 1 px of noise, to and fro 2 m before a level camera 6 m away.
-fn synthetic(frames: usize) -> Result<(Vec<f64>, Vec<PerJoint<DVec2>>, Camera), Box<dyn Error>> {
+fn synthetic(frames: usize) -> Result<(Keypoints, Camera), Box<dyn Error>> {
     let camera = Camera::level([1920, 1920], 0.9273, 1.2, 6.0)?;
     let walker = StickWalker::lee_chen();
     let mut random = Random::new(1);
@@ -102,5 +101,5 @@ fn synthetic(frames: usize) -> Result<(Vec<f64>, Vec<PerJoint<DVec2>>, Camera), 
         times_s.push(time_s);
         points_px.push(pixels);
     }
-    Ok((times_s, points_px, camera))
+    Ok(((times_s, points_px), camera))
 }

@@ -195,3 +195,64 @@ fn rules_of_walking_on_a_man_who_balances() {
         assert!(found.warnings.iter().any(is_against), "{:?}", found.warnings);
     }
 }
+
+/// Four walks of motion capture, three views at 1 px, the neck by all sources: rules of walking leave postures,
+/// and no warning says that this is no walk.
+#[test]
+fn real_walks_look_like_walking() {
+    let Some(walks) = recorded::walks() else { return };
+    let mut rejected = [0; 2];
+    for azimuth_deg in [0.0, 45.0, 90.0] {
+        for walk in &walks {
+            let middle = walk.figures[walk.figures.len() / 2][Joint::Pelvis];
+            let camera = recorded::camera(middle, walk.forward, azimuth_deg, 6.0);
+            let mut random = memo_core::synth::Random::new(3);
+            let pixel = |p: DVec3, noise: [f32; 2]| {
+                let [a, b] = noise.map(f64::from);
+                camera.project(p).unwrap_or(DVec2::NAN) + DVec2::new(a, b)
+            };
+            let points_px: Vec<PerJoint<DVec2>> = walk
+                .figures
+                .iter()
+                .map(|figure| PerJoint(figure.0.map(|p| pixel(p, random.normal_pair()))))
+                .collect();
+            let times_s: Vec<f64> = (0..points_px.len()).map(|t| t as f64 / walk.rate_hz).collect();
+            let weights = vec![PerJoint([1.0; 14]); times_s.len()];
+            let recording = Recording {
+                camera,
+                times_s,
+                points_px,
+                weights,
+                head_px: vec![],
+                truth: walk.figures.clone(),
+            };
+            let sequence = KeypointSequence {
+                times_s: &recording.times_s,
+                points_px: &recording.points_px,
+                weights: &recording.weights,
+                head_points_px: None,
+            };
+            for (label, lengths) in [("known", Some(walk.lengths)), ("estimated", None)] {
+                let options = SequenceOptions { lengths, noise_px: 1.0, ..SequenceOptions::default() };
+                let found = postures(&sequence, &recording.camera, &options).unwrap();
+                let empty = found.frames.iter().flatten().filter(|frame| frame.survivors() == 0).count();
+                let [raw, aligned] = medians_cm(&found.linked.smoothed, &recording.truth);
+                println!(
+                    "{azimuth_deg:2} deg {} {label:9}: {raw:.1} cm, necks on each other {aligned:.1} cm, \
+                     nothing left in {empty} of {} frames, {}",
+                    walk.name,
+                    found.frames.len(),
+                    found.heading.from.name()
+                );
+                found.warnings.iter().for_each(|warning| println!("    {warning}"));
+                let is_against = |warning: &Warning| matches!(warning, Warning::AgainstRules { .. });
+                if label == "known" {
+                    rejected[0] += usize::from(found.warnings.iter().any(is_against));
+                    rejected[1] += 1;
+                }
+            }
+        }
+    }
+    println!("said not to look like walking, lengths known: {} of {} walks", rejected[0], rejected[1]);
+    assert!(rejected[0] == 0, "{rejected:?}");
+}

@@ -182,8 +182,7 @@ pub(super) fn impossible(
             seen += 1;
             let angle = rays.ray[start].angle_between(rays.ray[joint]);
             let noise = 3.0 * std::f64::consts::SQRT_2 * rays.noise_rad;
-            let least_m =
-                nearest_m.max(0.0) * (angle - noise).max(0.0).min(std::f64::consts::FRAC_PI_2).sin();
+            let least_m = nearest_m.max(0.0) * (angle - noise).clamp(0.0, std::f64::consts::FRAC_PI_2).sin();
             if least_m > to[joint] {
                 too_long.push(least_m);
             }

@@ -763,7 +763,7 @@ mod tests {
         let found = walk.postures(&SequenceOptions { anchor, ..options.clone() }).unwrap();
         let is_short = |warning: &Warning| match warning {
             Warning::SegmentTooShort { segment, frames, .. } => {
-                segment == "right_knee-right_ankle" && *frames == 20
+                segment == "right_knee_to_right_ankle" && *frames == 20
             }
             _ => false,
         };

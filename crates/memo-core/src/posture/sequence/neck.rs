@@ -53,7 +53,7 @@ impl Scene<'_> {
 pub enum NeckFrom {
     /// Its own image, by this source, and its neighbours.
     Source(AnchorSource),
-    /// Its neighbours alone.
+    /// Its neighbours alone: it gives none, or was not asked, as most frames of long sequences.
     Neighbours,
     /// There is none.
     Nothing,
@@ -197,14 +197,14 @@ struct FrameAnchor {
 /// The neck's distance over the sequence.
 pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, SequenceError> {
     if let AnchorChoice::Given { distance_m, sd_m } = &scene.options.anchor {
-        return Ok(given(scene.rays, distance_m, *sd_m)?);
+        return given(scene.rays, distance_m, *sd_m);
     }
     let options = scene.lengths.anchor_options(&scene.options.anchor_options);
+    let times_s = scene.sequence.times_s;
     // 1. Each frame alone.
-    let found: Vec<FrameAnchor> = (0..scene.rays.len())
-        .into_par_iter()
-        .map(|t| frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref()))
-        .collect();
+    let asked = asked(times_s);
+    let found: Vec<FrameAnchor> =
+        asked.par_iter().map(|&t| frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref())).collect();
     let conflicts = conflicts(&found);
     let mut error = AnchorError::Empty;
     let anchors: Vec<Option<Anchor>> =
@@ -216,20 +216,55 @@ pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, 
         });
     }
     // 2. All together.
-    let track = smooth(scene.sequence.times_s, &anchors, &scene.options.smooth_options)?;
-    let from = |anchor: &Option<Anchor>| {
-        anchor.as_ref().map_or(NeckFrom::Neighbours, |anchor| NeckFrom::Source(anchor.source))
-    };
+    let asked_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
+    let track = smooth(&asked_s, &anchors, &scene.options.smooth_options)?;
+    let mut from = vec![NeckFrom::Neighbours; times_s.len()];
+    for (&t, anchor) in asked.iter().zip(&anchors) {
+        from[t] = anchor.as_ref().map_or(NeckFrom::Neighbours, |anchor| NeckFrom::Source(anchor.source));
+    }
     let mut of_scale: Vec<f64> = anchors.iter().flatten().map(|a| a.sd_scale_m / a.distance_m).collect();
     of_scale.sort_by(f64::total_cmp);
     Ok(NeckTrack {
-        from: anchors.iter().map(from).collect(),
-        distance_m: track.distance_m,
-        sd_m: track.sd_m,
+        from,
+        distance_m: interpolated(times_s, &asked_s, &track.distance_m),
+        sd_m: interpolated(times_s, &asked_s, &track.sd_m),
         conflicts,
         common_sd_m: track.common_sd_m,
         scale_sd: of_scale[of_scale.len() / 2],
     })
+}
+
+/// Up to so many frames each one is asked; of longer sequences one each [`ANCHOR_INTERVAL_S`].
+const ALL_ASKED: usize = 500;
+/// Postures, and with them the errors of the sources, are alike within a fraction of a step, seconds.
+const ANCHOR_INTERVAL_S: f64 = 0.2;
+
+/// Frames whose images are asked for the neck's distance, ascending, the first and the last among them.
+fn asked(times_s: &[f64]) -> Vec<usize> {
+    if times_s.len() <= ALL_ASKED {
+        return (0..times_s.len()).collect();
+    }
+    let mut asked = vec![0];
+    let mut last_s = times_s[0];
+    for (t, &time_s) in times_s.iter().enumerate() {
+        if time_s - last_s >= ANCHOR_INTERVAL_S - 1e-9 || t + 1 == times_s.len() {
+            asked.push(t);
+            last_s = time_s;
+        }
+    }
+    asked
+}
+
+/// Values at all times from those at some, ascending, the first and the last among them; linear between.
+fn interpolated(times_s: &[f64], known_s: &[f64], known: &[f64]) -> Vec<f64> {
+    let at = |&time_s: &f64| {
+        let after = known_s.partition_point(|&s| s < time_s).min(known_s.len() - 1);
+        let before = after.saturating_sub(usize::from(known_s[after] > time_s));
+        let span_s = known_s[after] - known_s[before];
+        let share = if span_s > 0.0 { (time_s - known_s[before]) / span_s } else { 0.0 };
+        known[before] + share * (known[after] - known[before])
+    };
+    times_s.iter().map(at).collect()
 }
 
 /// Known distances are taken as they are.
@@ -341,4 +376,22 @@ fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
         sigmas: median(list.iter().map(|c| c.sigmas).collect()),
     };
     pairs.into_iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sequences_are_asked_now_and_then() {
+        let times_s: Vec<f64> = (0..1001).map(|t| f64::from(t) / 50.0).collect();
+        let asked = asked(&times_s);
+        assert_eq!(asked.len(), 101);
+        assert_eq!([asked[0], asked[1], asked[100]], [0, 10, 1000]);
+        let known_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
+        let line: Vec<f64> = known_s.iter().map(|s| 3.0 + 2.0 * s).collect();
+        let all = interpolated(&times_s, &known_s, &line);
+        assert!(all.iter().zip(&times_s).all(|(value, s)| (value - 3.0 - 2.0 * s).abs() < 1e-9));
+        assert_eq!(super::asked(&times_s[..500]).len(), 500);
+    }
 }

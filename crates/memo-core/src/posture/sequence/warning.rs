@@ -151,8 +151,8 @@ impl fmt::Display for Warning {
             Self::Conflict(conflict) => conflict.fmt(f),
             Self::NoTravel { travelled_m, from } => write!(
                 f,
-                "the person moves by {travelled_m:.2} m, too little for a moving direction: that of the {} \
-                 stands for it",
+                "the person begins and ends {travelled_m:.2} m apart, too little for a moving direction: that \
+                 of the {} stands for it",
                 from.name()
             ),
             Self::Turns { turn_deg } => {
