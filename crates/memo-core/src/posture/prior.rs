@@ -91,6 +91,9 @@ pub struct MotionPrior {
     pub hips_against_torso: f64,
     /// Acceleration of a joint of the trunk against its starting joint, m/s².
     pub trunk_acceleration_mps2: f64,
+    /// Height of the lower ankle above that of a foot on the ground, standard deviation, metres: the heel
+    /// lifted, and the error of the neck's distance.
+    pub support_sd_m: f64,
     /// Time after which another frame is new evidence, seconds.
     pub independence_s: f64,
 }
@@ -127,6 +130,7 @@ impl MotionPrior {
             trunk_length_sd: 0.025,
             hips_against_torso: 25.0,
             trunk_acceleration_mps2: 3.0,
+            support_sd_m: 0.10,
             independence_s: 0.08,
         }
     }

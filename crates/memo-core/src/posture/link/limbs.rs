@@ -44,6 +44,8 @@ struct LimbFrame {
     cost: [f64; 4],
     /// Swing of the inner segment with its noise, radians.
     swing: [Measured; 4],
+    /// Height of the end above that of a standing foot, metres; NaN for arms and where it is not known.
+    lift_m: [f64; 4],
 }
 
 /// A reading of one limb of a pair's reading.
@@ -198,6 +200,8 @@ fn pair_costs(
                     cost += limbs[side].cost[bits];
                     limbs[side].swing[bits]
                 });
+                let lift_m = [0, 1].map(|side| limbs[side].lift_m[limb_bits(state, side)]);
+                cost += weight * problem.support_cost(lift_m);
                 let [right, left] = swings;
                 cost +=
                     weight * prior.opposition[pair].cost(right.value + left.value, right.sd.hypot(left.sd));
@@ -225,10 +229,15 @@ impl Problem<'_> {
             extents: [[Measured::NOTHING; 2]; 4],
             cost: [0.0; 4],
             swing: [Measured { value: f64::NAN, sd: 0.0 }; 4],
+            lift_m: [f64::NAN; 4],
         };
+        let [hung, _, end] = PAIRS[pair][side];
         for bits in 0..4 {
             let [(inner, u), (outer, v)] = self.limb_extents(t, trunk, pair, side, bits);
             limb.extents[bits] = [inner, outer];
+            if pair == 1 {
+                limb.lift_m[bits] = self.lift_m(end, trunk.smoothed[t][hung] + u + v);
+            }
             if let Some(axes) = reference {
                 let noise = inner.sd * axes.x_axis.dot(self.ray(t, middle)).abs() / self.lengths.to[middle];
                 limb.swing[bits] = Measured { value: swing_rad(&axes, u), sd: noise };

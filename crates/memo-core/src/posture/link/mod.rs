@@ -18,6 +18,7 @@ mod trunk;
 use glam::{DMat3, DVec3};
 use thiserror::Error;
 
+use super::anchor::{AnchorOptions, Ground};
 use super::angles::trunk_axes;
 use super::lift::{JointRays, RootKind, Roots, extent_sd, roots};
 use super::prior::{MotionPrior, chi_sq};
@@ -79,6 +80,8 @@ pub struct LinkOptions {
     pub prior: MotionPrior,
     /// The world's upward direction in camera axes; without it the trunk's own axis stands for it.
     pub up: Option<DVec3>,
+    /// The ground the person stands on; without it feet may be at any height.
+    pub ground: Option<Ground>,
     /// The moving direction in camera axes; without it the trunk's forward axis stands for it.
     pub moving_direction: Option<DVec3>,
     /// Gaps of a joint's track up to this long are bridged for the decision, seconds: a quarter of a step.
@@ -92,6 +95,7 @@ impl Default for LinkOptions {
         Self {
             prior: MotionPrior::walking(),
             up: None,
+            ground: None,
             moving_direction: None,
             bridge_s: 0.12,
             distinct_m: 0.10,
@@ -258,6 +262,20 @@ impl Problem<'_> {
         }
         let dt = (self.frames[after].time_s - self.frames[before].time_s) / (after - before) as f64;
         (dt / self.options.prior.independence_s).min(1.0)
+    }
+
+    /// Height of an ankle above that of a foot on the ground, metres; NaN without a ground.
+    fn lift_m(&self, ankle: Joint, point: DVec3) -> f64 {
+        let standing = AnchorOptions::default().ankle_height_over_shank * self.lengths.to[ankle];
+        self.options.ground.map_or(f64::NAN, |ground| ground.height_m(point) - standing)
+    }
+
+    /// Twice the cost of the ankles' heights: one of both stands. Where one is not known, the other may be in
+    /// the air, but not below the ground.
+    fn support_cost(&self, lift_m: [f64; 2]) -> f64 {
+        let lower = lift_m[0].min(lift_m[1]);
+        let both = !lift_m[0].is_nan() && !lift_m[1].is_nan();
+        chi_sq(if both { lower } else { lower.min(0.0) } / self.options.prior.support_sd_m)
     }
 
     /// Half the square of a change of velocity in its standard deviations; 0 where an extent is not known.
@@ -530,6 +548,30 @@ mod tests {
         let mut short = lengths;
         short.to[Joint::LeftKnee] = -0.4;
         assert!(matches!(link(&frames, &short, &options), Err(LinkError::Lengths(_))));
+    }
+
+    /// Nothing expected of the motion: seen from above, many mirrored legs would leave the ground.
+    #[test]
+    fn somebody_stands_on_the_ground() {
+        let mut shares = [0.0; 2];
+        for yaw_deg in [150.0, 165.0, 180.0, 195.0, 210.0_f64] {
+            let (mut truth, mut frames, lengths, options) = sequence(yaw_deg.to_radians());
+            for (figure, frame) in truth.iter_mut().zip(&mut frames) {
+                figure.0.iter_mut().for_each(|p| p.y += 2.0);
+                frame.rays = JointRays::from_points(figure);
+                frame.neck = figure[Joint::Neck];
+            }
+            let feet = truth.iter().map(|figure| figure[Joint::RightAnkle].y.max(figure[Joint::LeftAnkle].y));
+            let ground_y = feet.fold(f64::NEG_INFINITY, f64::max) + 0.17 * lengths.to[Joint::RightAnkle];
+            let anything = LinkOptions { prior: MotionPrior::any(), ..options };
+            let ground = Ground { up_in_camera: -DVec3::Y, camera_height_m: ground_y };
+            for (share_sum, ground) in shares.iter_mut().zip([None, Some(ground)]) {
+                let path = link(&frames, &lengths, &LinkOptions { ground, ..anything.clone() }).unwrap();
+                *share_sum += share(&path.smoothed, &truth) / 5.0;
+            }
+        }
+        let [floating, standing] = shares;
+        assert!(standing > floating + 0.02, "{floating} without ground, {standing} with");
     }
 
     #[test]

@@ -487,6 +487,7 @@ fn link_frames(
     let options = LinkOptions {
         prior: scene.options.motion.prior(),
         up: Some(scene.up()),
+        ground: scene.ground,
         // Anybody may move sideways: the prior of any motion is against the trunk's own direction.
         moving_direction: heading
             .direction
