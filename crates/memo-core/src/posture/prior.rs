@@ -23,7 +23,11 @@ const CAP: f64 = 25.0;
 
 /// A squared deviation in standard deviations; 0 for what is not known (NaN).
 pub fn chi_sq(deviation: f64) -> f64 {
-    let square = deviation * deviation;
+    capped(deviation * deviation)
+}
+
+/// The same of a square.
+pub fn capped(square: f64) -> f64 {
     if square.is_nan() { 0.0 } else { square.min(CAP) }
 }
 

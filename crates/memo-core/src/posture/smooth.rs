@@ -27,6 +27,15 @@ impl Measured {
     }
 }
 
+/// How far a measurement is from its prediction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Measurement less prediction, unit.
+    pub value: f64,
+    /// Its variance, unit².
+    pub variance: f64,
+}
+
 /// Time over which an acceleration lasts, seconds: the velocity gains acceleration² times this a second.
 const ACCELERATION_LASTS_S: f64 = 0.1;
 
@@ -45,14 +54,14 @@ fn noise(acceleration_sd: f64, measurement_sd: f64) -> Noise {
 
 /// One step of the filter: predicts over `step_s` and takes a measurement in.
 ///
-/// The filter is none before the first measurement. The second value is the innovation and its standard
-/// deviation, where there is a prediction and a measurement.
+/// The filter is none before the first measurement. The second value is the innovation, where there is
+/// a prediction and a measurement.
 pub fn filter_step(
     filter: Option<ConstantVelocity>,
     step_s: f64,
     measured: Measured,
     acceleration_sd: f64,
-) -> (Option<ConstantVelocity>, Option<Measured>) {
+) -> (Option<ConstantVelocity>, Option<Innovation>) {
     let seen = measured.value.is_finite();
     let sd = measured.sd.max(LEAST_SD);
     let noise = noise(acceleration_sd, sd);
@@ -63,8 +72,10 @@ pub fn filter_step(
             (Some(start), None)
         }
         Some(state) if seen => {
-            let innovation =
-                Measured { value: measured.value - state.position, sd: state.position_sd().hypot(sd) };
+            let innovation = Innovation {
+                value: measured.value - state.position,
+                variance: state.covariance[0].max(0.0) + sd * sd,
+            };
             (Some(state.update(measured.value, &noise)), Some(innovation))
         }
         waiting => (waiting, None),

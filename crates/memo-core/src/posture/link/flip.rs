@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 
-use super::super::prior::chi_sq;
-use super::super::smooth::{Measured, filter_step};
+use super::super::prior::capped;
+use super::super::smooth::{Innovation, Measured, filter_step};
 
 /// Time before and after a stretch over which it is judged, seconds.
 const AROUND_S: f64 = 0.5;
@@ -19,6 +19,9 @@ const LONGEST: usize = 4;
 
 /// Rounds of mirroring; each takes every mirroring that helps and does not touch a better one.
 const ROUNDS: usize = 8;
+
+/// Innovations whose variances are multiplied before a logarithm is taken: far from where floats end.
+const LOG_EVERY: usize = 8;
 
 /// Something that is read in one of several states a frame; each bit of a state is the root of a segment.
 pub(super) struct Chain<'a> {
@@ -148,9 +151,11 @@ fn overlaps(stretches: &[[usize; 2]], [from, to]: [usize; 2]) -> bool {
 }
 
 /// Negative log likelihood of a track, (time in seconds, measurement) after the other, under a motion of that
-/// acceleration.
+/// acceleration: Σ ½ min(ν²/S, cap) + ½ ln S over innovations ν of variance S.
 fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f64) -> f64 {
     let mut cost = 0.0;
+    // Logarithms of products: one for several frames.
+    let (mut variances, mut factors) = (1.0, 0);
     let mut filter = None;
     let mut before_s = None;
     for (time_s, measured) in track {
@@ -158,9 +163,15 @@ fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f6
         before_s = Some(time_s);
         let (next, innovation) = filter_step(filter, step_s, measured, acceleration_sd);
         filter = next;
-        if let Some(innovation) = innovation {
-            cost += 0.5 * chi_sq(innovation.value / innovation.sd) + innovation.sd.ln();
+        if let Some(Innovation { value, variance }) = innovation {
+            cost += capped(value * value / variance);
+            variances *= variance;
+            factors += 1;
+            if factors == LOG_EVERY {
+                cost += f64::ln(std::mem::replace(&mut variances, 1.0));
+                factors = 0;
+            }
         }
     }
-    cost
+    0.5 * (cost + variances.ln())
 }
