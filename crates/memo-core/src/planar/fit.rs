@@ -514,7 +514,7 @@ impl Moments {
         for _ in 0..4 {
             v = (inverse * (self.n * v)).try_normalize()?;
         }
-        slope_from_form(v).filter(|g| g.length() <= slope_limit)
+        slope_from_form(v, v.x * v.z - v.y * v.y).filter(|g| g.length() <= slope_limit)
     }
 }
 
@@ -524,14 +524,16 @@ pub(super) fn form(g: DVec2) -> DVec3 {
 }
 
 /// Slope of a quadratic form (A, B, C) proportional to that of a plane; p >= 0. None if indefinite.
-pub(super) fn slope_from_form(v: DVec3) -> Option<DVec2> {
+///
+/// The determinant A C - B^2 is asked for as its differences may cancel.
+pub(super) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
     let half_difference = 0.5 * (v.x - v.z);
     let spread = half_difference.hypot(v.y);
     let mean = 0.5 * (v.x + v.z);
     // Sign of the form is free; the smaller eigenvalue belongs to the rod's full length.
     let (mean, half_difference, b) =
         if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
-    let least = (v.x * v.z - v.y * v.y) / (mean + spread);
+    let least = determinant / (mean + spread);
     if !(least > 0.0) {
         return None;
     }

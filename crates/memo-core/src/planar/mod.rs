@@ -12,6 +12,6 @@ pub mod plane;
 pub mod rod;
 
 pub use fit::{FitError, FitOptions};
-pub use hinge::{HingeFit, fit_hinge};
+pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
 pub use plane::Plane;
-pub use rod::{RodFit, fit_rod};
+pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
