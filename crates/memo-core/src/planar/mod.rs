@@ -6,11 +6,15 @@
 //! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
 //! (p, q) is (-p, -q).
 
+pub mod evidence;
 mod fit;
 pub mod hinge;
 pub mod plane;
 pub mod rod;
 
+pub use evidence::{
+    Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
+};
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
 pub use plane::Plane;
