@@ -12,5 +12,6 @@
 
 pub mod image;
 pub mod model;
+pub mod planar;
 pub mod synth;
 pub mod track;

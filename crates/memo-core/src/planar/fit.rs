@@ -1,0 +1,555 @@
+//! Least squares for one plane shared by one or two rods, over any number of views.
+//!
+//! Hoffman and Flinchbaugh 1982 prove what the fewest views determine; this is the same constraint with more
+//! views and noise. A rod's image vector d_i = (x_i, y_i), from its pivot, has depth g . d_i with g = (p, q), so
+//!
+//! ```text
+//! h_i(g) = |d_i|^2 + (g . d_i)^2 = d_i' M d_i = c,    M = I + g g',  c = length^2
+//! ```
+//!
+//! The residual is the error of h_i over the length of its gradient in the image, 2 |M d_i|: a distance in the
+//! image (Sampson). Two rods share g and each has its c. The pivot's noise is in both of a hinge's rods:
+//! their residuals correlate by (M a . M b) / (2 |M a| |M b|), which the fit takes into account.
+//!
+//! Starts come from moments of (x^2, 2 x y, y^2), in which the cost of a plane takes a constant time: a coarse
+//! grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
+//!
+//! What it cannot do: tell a rod from its mirror; see depth from a plane parallel to the image (the slope's
+//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit).
+
+use super::Plane;
+use glam::{DMat3, DVec2, DVec3};
+use nalgebra::{Matrix4, Vector4};
+use thiserror::Error;
+
+/// Why points in several views could not be fitted.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FitError {
+    /// Every point needs one position a view.
+    #[error("the points have {pivot} and {end} views; they must be as many")]
+    Lengths {
+        /// Views of the pivot.
+        pivot: usize,
+        /// Views of the other point.
+        end: usize,
+    },
+    /// A position is infinite.
+    #[error("a position in view {view} is infinite; mark missing points with NaN")]
+    Infinite {
+        /// First such view.
+        view: usize,
+    },
+    /// Too few views show all points.
+    #[error("{found} views show the points, {needed} are needed")]
+    TooFewViews {
+        /// Views found.
+        found: usize,
+        /// Views needed.
+        needed: usize,
+    },
+    /// The points do not move relative to each other: every plane fits.
+    #[error("the points do not move relative to each other (motion {motion})")]
+    NoMotion {
+        /// RMS motion of the least moving rod.
+        motion: f64,
+    },
+    /// An option makes no sense.
+    #[error("{option} must be {demand}, got {value}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// What it must be.
+        demand: &'static str,
+        /// What it was.
+        value: f64,
+    },
+}
+
+/// Options of the fits over many views.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitOptions {
+    /// Standard deviation of each image coordinate of each point, in the unit of the points. 0 is allowed:
+    /// the covariance then comes from the residuals alone.
+    pub noise_sd: f64,
+    /// Largest tilt of the plane against the image, degrees. 80: nearer to edge-on the slope is noise.
+    pub max_tilt_deg: f64,
+    /// A view is an outlier when a residual exceeds this many robust standard deviations (1.4826 median
+    /// |residual|, at least that of the noise).
+    pub outlier_sd: f64,
+    /// Largest fraction of the views that may be left out as outliers; 0 = keep all.
+    pub max_outlier_fraction: f64,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self { noise_sd: 0.0, max_tilt_deg: 80.0, outlier_sd: 4.5, max_outlier_fraction: 0.2 }
+    }
+}
+
+impl FitOptions {
+    fn check(&self) -> Result<(), FitError> {
+        let positive = "positive and finite";
+        let checks = [
+            ("noise_sd", "finite and not negative", self.noise_sd, self.noise_sd >= 0.0),
+            (
+                "max_tilt_deg",
+                "in (0, 90)",
+                self.max_tilt_deg,
+                self.max_tilt_deg > 0.0 && self.max_tilt_deg < 90.0,
+            ),
+            ("outlier_sd", positive, self.outlier_sd, self.outlier_sd > 0.0),
+            (
+                "max_outlier_fraction",
+                "in [0, 0.5]",
+                self.max_outlier_fraction,
+                (0.0..=0.5).contains(&self.max_outlier_fraction),
+            ),
+        ];
+        for (option, demand, value, good) in checks {
+            if !good || !value.is_finite() {
+                return Err(FitError::Option { option, demand, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One view of K rods that share a pivot: image vectors, NaN where missing.
+pub(super) type View<const K: usize> = [DVec2; K];
+
+/// What a fit of K rods found.
+#[derive(Debug, Clone)]
+pub(super) struct Fit<const K: usize> {
+    pub plane: Plane,
+    pub lengths: [f64; K],
+    /// Of (p, q, length 1, length 2).
+    pub covariance: Matrix4<f64>,
+    pub residuals: Vec<[f64; K]>,
+    pub outliers: Vec<bool>,
+    pub residual_rms: f64,
+    pub motion: [f64; K],
+    pub redundancy: usize,
+    pub at_tilt_limit: bool,
+}
+
+/// Image vectors from the pivot, checked.
+pub(super) fn views<const K: usize>(pivot: &[DVec2], ends: [&[DVec2]; K]) -> Result<Vec<View<K>>, FitError> {
+    for end in ends {
+        if end.len() != pivot.len() {
+            return Err(FitError::Lengths { pivot: pivot.len(), end: end.len() });
+        }
+    }
+    for view in 0..pivot.len() {
+        let infinite = |v: DVec2| v.x.is_infinite() || v.y.is_infinite();
+        if infinite(pivot[view]) || ends.iter().any(|end| infinite(end[view])) {
+            return Err(FitError::Infinite { view });
+        }
+    }
+    let difference = |view: usize| {
+        ends.map(|end| {
+            let d = end[view] - pivot[view];
+            if d.is_finite() { d } else { DVec2::NAN }
+        })
+    };
+    Ok((0..pivot.len()).map(difference).collect())
+}
+
+/// Fits one plane to K rods: moments, starts, refinement, then outliers left out.
+pub(super) fn fit<const K: usize>(views: &[View<K>], options: &FitOptions) -> Result<Fit<K>, FitError> {
+    options.check()?;
+    let needed = if K == 1 { 3 } else { 2 };
+    for k in 0..K {
+        let found = count(views, k);
+        if found < needed {
+            return Err(FitError::TooFewViews { found, needed });
+        }
+    }
+    let motion = motion_of(views);
+    let least = motion.iter().copied().fold(f64::INFINITY, f64::min);
+    let size = largest(views);
+    if least <= 1e-12 * size {
+        return Err(FitError::NoMotion { motion: least });
+    }
+    let mut kept = views.to_vec();
+    let mut outliers = vec![false; views.len()];
+    let mut solution = Problem::new(&kept, size, options).solve();
+    let most = (options.max_outlier_fraction * views.len() as f64) as usize;
+    for _ in 0..if most > 0 { 5 } else { 0 } {
+        let found = find_outliers(views, &solution, size, options);
+        let left_out = found.iter().filter(|&&o| o).count();
+        if found == outliers || left_out > most {
+            break;
+        }
+        kept = views.iter().zip(&found).filter(|(_, o)| !**o).map(|(v, _)| *v).collect();
+        if (0..K).any(|k| count(&kept, k) <= needed) {
+            break;
+        }
+        outliers = found;
+        solution = Problem::new(&kept, size, options).solve();
+    }
+    Ok(Problem::new(views, size, options).report(solution, outliers, motion))
+}
+
+/// Views that show rod k.
+fn count<const K: usize>(views: &[View<K>], k: usize) -> usize {
+    views.iter().filter(|v| !v[k].x.is_nan()).count()
+}
+
+/// Longest image vector.
+fn largest<const K: usize>(views: &[View<K>]) -> f64 {
+    views.iter().flatten().filter(|d| !d.x.is_nan()).fold(0.0, |most, d| d.length().max(most))
+}
+
+/// RMS distance of each rod's image vectors from their mean.
+fn motion_of<const K: usize>(views: &[View<K>]) -> [f64; K] {
+    std::array::from_fn(|k| {
+        let seen = || views.iter().map(|v| v[k]).filter(|d| !d.x.is_nan());
+        let n = seen().count().max(1) as f64;
+        let mean = seen().sum::<DVec2>() / n;
+        (seen().map(|d| (d - mean).length_squared()).sum::<f64>() / n).sqrt()
+    })
+}
+
+fn find_outliers<const K: usize>(
+    views: &[View<K>],
+    solution: &Solution<K>,
+    size: f64,
+    options: &FitOptions,
+) -> Vec<bool> {
+    let problem = Problem::new(views, size, options);
+    let residuals: Vec<[f64; K]> = views.iter().map(|v| problem.terms(v, solution).map(|t| t.r)).collect();
+    let mut sizes: Vec<f64> = residuals.iter().flatten().map(|r| r.abs()).filter(|r| !r.is_nan()).collect();
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    let limit = options.outlier_sd * (1.4826 * *median).max(problem.noise_sq.sqrt()).max(1e-12 * size);
+    residuals.iter().map(|rs| rs.iter().any(|r| r.abs() > limit)).collect()
+}
+
+/// Slope and squared lengths under way.
+#[derive(Debug, Clone, Copy)]
+struct Solution<const K: usize> {
+    g: DVec2,
+    c: [f64; K],
+    cost: f64,
+}
+
+/// One rod in one view: residual, its derivatives by p, q and c, and M d.
+#[derive(Clone, Copy)]
+struct Term {
+    r: f64,
+    by_p: f64,
+    by_q: f64,
+    by_c: f64,
+    m_d: DVec2,
+}
+
+struct Problem<'a, const K: usize> {
+    views: &'a [View<K>],
+    /// Variance of an image coordinate of a rod's vector: both ends are noisy.
+    noise_sq: f64,
+    /// Added to |M d|^2: a vector of no length in the image has no gradient.
+    floor_sq: f64,
+    slope_limit: f64,
+}
+
+impl<'a, const K: usize> Problem<'a, K> {
+    fn new(views: &'a [View<K>], size: f64, options: &FitOptions) -> Self {
+        let noise_sq = 2.0 * options.noise_sd * options.noise_sd;
+        Self {
+            views,
+            noise_sq,
+            floor_sq: noise_sq.max(1e-16 * size * size),
+            slope_limit: options.max_tilt_deg.to_radians().tan(),
+        }
+    }
+
+    /// r = (h - c) / w, w^2 = 4 (|M d|^2 + floor); NaN where missing.
+    fn term(&self, d: DVec2, g: DVec2, c: f64) -> Term {
+        let depth = g.dot(d);
+        let m_d = d + depth * g;
+        let w = 2.0 * (m_d.length_squared() + self.floor_sq).sqrt();
+        let r = (d.length_squared() + depth * depth - c) / w;
+        // dw/dp = 4 (M d) . (x g + depth e_x) / w
+        let w_by = 4.0 / w * (m_d.dot(g) * d + depth * m_d);
+        let by = (2.0 * depth * d - r * w_by) / w;
+        Term { r, by_p: by.x, by_q: by.y, by_c: -1.0 / w, m_d }
+    }
+
+    fn terms(&self, view: &View<K>, s: &Solution<K>) -> [Term; K] {
+        std::array::from_fn(|k| self.term(view[k], s.g, s.c[k]))
+    }
+
+    /// Cost, normal matrix and right side at a solution; residuals of a hinge whitened.
+    fn normal_equations(&self, s: &Solution<K>) -> (f64, Matrix4<f64>, Vector4<f64>) {
+        let (mut cost, mut normal, mut right) = (0.0, Matrix4::zeros(), Vector4::zeros());
+        let mut add = |r: f64, row: [f64; 4]| {
+            cost += r * r;
+            for i in 0..4 {
+                for j in 0..=i {
+                    normal[(i, j)] += row[i] * row[j];
+                }
+                right[i] -= row[i] * r;
+            }
+        };
+        for view in self.views {
+            let terms = self.terms(view, s);
+            let first = terms[0];
+            let first_row = [first.by_p, first.by_q, first.by_c, 0.0];
+            if !first.r.is_nan() {
+                add(first.r, first_row);
+            }
+            let Some(second) = terms.get(1).filter(|t| !t.r.is_nan()) else { continue };
+            let row = [second.by_p, second.by_q, 0.0, second.by_c];
+            if first.r.is_nan() {
+                add(second.r, row);
+                continue;
+            }
+            let correlation = self.correlation(&first, second);
+            let sharpen = 1.0 / (1.0 - correlation * correlation).sqrt();
+            let whitened = |second: f64, first: f64| (second - correlation * first) * sharpen;
+            add(whitened(second.r, first.r), std::array::from_fn(|i| whitened(row[i], first_row[i])));
+        }
+        if K == 1 {
+            normal[(3, 3)] = 1.0;
+        }
+        normal.fill_upper_triangle_with_lower_triangle();
+        (cost, normal, right)
+    }
+
+    /// Of the residuals of a hinge's rods, through the noise of the pivot; in [-1/2, 1/2].
+    fn correlation(&self, a: &Term, b: &Term) -> f64 {
+        let sizes = (a.m_d.length_squared() + self.floor_sq) * (b.m_d.length_squared() + self.floor_sq);
+        0.5 * a.m_d.dot(b.m_d) / sizes.sqrt()
+    }
+
+    /// Squared lengths that fit a slope best, rod by rod.
+    fn at_slope(&self, g: DVec2) -> Solution<K> {
+        let c = std::array::from_fn(|k| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for d in self.views.iter().map(|v| v[k]).filter(|d| !d.x.is_nan()) {
+                let depth = g.dot(d);
+                let w = 1.0 / ((d + depth * g).length_squared() + self.floor_sq);
+                sum += w * (d.length_squared() + depth * depth);
+                weight += w;
+            }
+            sum / weight
+        });
+        let mut solution = Solution { g, c, cost: 0.0 };
+        solution.cost = self.normal_equations(&solution).0;
+        solution
+    }
+
+    fn solve(&self) -> Solution<K> {
+        let starts = Moments::new(self.views).starts(self.slope_limit);
+        let refined = starts.into_iter().flatten().map(|g| self.refine(self.at_slope(g)));
+        refined.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("there is always one start")
+    }
+
+    /// Levenberg-Marquardt on (p, q, c), the slope kept within its limit.
+    fn refine(&self, start: Solution<K>) -> Solution<K> {
+        let mut best = start;
+        let mut damping = 1e-4;
+        let (mut cost, mut normal, mut right) = self.normal_equations(&best);
+        best.cost = cost;
+        for _ in 0..40 {
+            let mut damped = normal;
+            for i in 0..4 {
+                damped[(i, i)] += damping * normal[(i, i)].max(1e-30);
+            }
+            let Some(step) = damped.cholesky().map(|c| c.solve(&right)) else {
+                damping = 10.0 * damping.max(1e-12);
+                if damping > 1e12 {
+                    break;
+                }
+                continue;
+            };
+            let mut g = best.g + DVec2::new(step[0], step[1]);
+            let limited = g.length() > self.slope_limit;
+            let next = if limited {
+                g = g.clamp_length_max(self.slope_limit);
+                self.at_slope(g)
+            } else {
+                Solution { g, c: std::array::from_fn(|k| best.c[k] + step[2 + k]), cost: 0.0 }
+            };
+            let (next_cost, next_normal, next_right) = self.normal_equations(&next);
+            if next_cost < cost {
+                let gain = (cost - next_cost) / cost;
+                (cost, normal, right) = (next_cost, next_normal, next_right);
+                best = Solution { cost, ..next };
+                damping = (0.1 * damping).max(1e-15);
+                if gain < 1e-9 {
+                    break;
+                }
+            } else {
+                damping *= 10.0;
+                if damping > 1e8 {
+                    break;
+                }
+            }
+        }
+        best
+    }
+
+    /// Lengths, covariance and residuals at a solution; `self` holds all views.
+    ///
+    /// The noise adds noise^2 trace(M) to every h, so c is too large by that.
+    fn report(&self, s: Solution<K>, outliers: Vec<bool>, motion: [f64; K]) -> Fit<K> {
+        let residuals: Vec<[f64; K]> = self.views.iter().map(|v| self.terms(v, &s).map(|t| t.r)).collect();
+        let kept: Vec<View<K>> =
+            self.views.iter().zip(&outliers).filter(|(_, o)| !**o).map(|(v, _)| *v).collect();
+        let (_, normal, _) = Problem { views: &kept, ..*self }.normal_equations(&s);
+        let inside = residuals.iter().zip(&outliers).filter(|(_, o)| !**o).flat_map(|(r, _)| r);
+        let (mut squares, mut used) = (0.0, 0);
+        for r in inside.filter(|r| !r.is_nan()) {
+            squares += r * r;
+            used += 1;
+        }
+        let redundancy = used - (2 + K).min(used);
+        let bias = self.noise_sq * (2.0 + s.g.length_squared());
+        let lengths = s.c.map(|c| if c > 2.0 * bias { (c - bias).sqrt() } else { c.max(0.0).sqrt() });
+        let variance = self.noise_sq.max(if redundancy > 0 { squares / redundancy as f64 } else { 0.0 });
+        let mut covariance = normal.try_inverse().map_or(Matrix4::repeat(f64::INFINITY), |c| c * variance);
+        // From c to length: d length = d c / (2 length).
+        for k in 0..K {
+            for i in 0..4 {
+                covariance[(i, 2 + k)] /= 2.0 * lengths[k];
+                covariance[(2 + k, i)] /= 2.0 * lengths[k];
+            }
+        }
+        Fit {
+            plane: Plane::from_slope(s.g),
+            lengths,
+            covariance,
+            residual_rms: (squares / used.max(1) as f64).sqrt(),
+            residuals,
+            outliers,
+            motion,
+            redundancy,
+            at_tilt_limit: s.g.length() > 0.999 * self.slope_limit,
+        }
+    }
+}
+
+/// Moments of u = (x^2, 2 x y, y^2) about each rod's mean, and second moments of the image vectors.
+///
+/// With v = (1 + p^2, p q, 1 + q^2): h = u . v, and a plane's cost is about v' S v / v' N v.
+struct Moments {
+    s: DMat3,
+    n: DMat3,
+}
+
+impl Moments {
+    fn new<const K: usize>(views: &[View<K>]) -> Self {
+        let (mut s, mut n) = (DMat3::ZERO, DMat3::ZERO);
+        for k in 0..K {
+            let seen = || views.iter().map(|v| v[k]).filter(|d| !d.x.is_nan());
+            let powers = |d: DVec2| DVec3::new(d.x * d.x, 2.0 * d.x * d.y, d.y * d.y);
+            let (total, number) = seen().fold((DVec3::ZERO, 0.0), |(t, m), d| (t + powers(d), m + 1.0));
+            let mean = total / number;
+            for d in seen() {
+                let u = powers(d) - mean;
+                s += DMat3::from_cols(u.x * u, u.y * u, u.z * u);
+            }
+            // |M d|^2 summed, as a quadratic form in v.
+            let (xx, xy, yy) = (total.x, 0.5 * total.y, total.z);
+            n += DMat3::from_cols(
+                DVec3::new(xx, xy, 0.0),
+                DVec3::new(xy, xx + yy, xy),
+                DVec3::new(0.0, xy, yy),
+            );
+        }
+        Self { s, n }
+    }
+
+    fn cost(&self, g: DVec2) -> f64 {
+        let v = form(g);
+        v.dot(self.s * v) / v.dot(self.n * v)
+    }
+
+    /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a grid.
+    fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 3] {
+        const DIRECTIONS: usize = 12;
+        const TILTS: usize = 7;
+        let limit = slope_limit.atan();
+        let at = |direction: usize, tilt: usize| {
+            let angle = std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
+            (limit * (tilt as f64 + 0.7) / TILTS as f64).tan() * DVec2::from_angle(angle)
+        };
+        let mut costs = [[0.0; TILTS]; DIRECTIONS];
+        for (direction, row) in costs.iter_mut().enumerate() {
+            for (tilt, cost) in row.iter_mut().enumerate() {
+                *cost = self.cost(at(direction, tilt));
+            }
+        }
+        let mut best: [Option<(f64, DVec2)>; 2] = [None; 2];
+        for direction in 0..DIRECTIONS {
+            for tilt in 0..TILTS {
+                let cost = costs[direction][tilt];
+                let turned = |by: usize| costs[(direction + by) % DIRECTIONS][tilt];
+                let lower_tilt = tilt == 0 || costs[direction][tilt - 1] >= cost;
+                let higher_tilt = tilt + 1 == TILTS || costs[direction][tilt + 1] >= cost;
+                if turned(1) < cost || turned(DIRECTIONS - 1) < cost || !lower_tilt || !higher_tilt {
+                    continue;
+                }
+                let found = Some((cost, at(direction, tilt)));
+                if best[0].is_none_or(|(least, _)| cost < least) {
+                    best = [found, best[0]];
+                } else if best[1].is_none_or(|(least, _)| cost < least) {
+                    best[1] = found;
+                }
+            }
+        }
+        let [first, second] = best.map(|b| b.map(|(_, g)| g));
+        let fallback = DVec2::new(0.5, 0.5).clamp_length_max(0.5 * slope_limit);
+        let first = Some(first.unwrap_or(fallback));
+        [self.ellipse(form(first.unwrap_or(fallback)), slope_limit), first, second]
+    }
+
+    /// The ellipse of least v' S v / v' N v by inverse iteration; none if it is no rod's.
+    fn ellipse(&self, start: DVec3, slope_limit: f64) -> Option<DVec2> {
+        let trace = self.s.x_axis.x + self.s.y_axis.y + self.s.z_axis.z;
+        let norm = self.n.x_axis.x + self.n.y_axis.y + self.n.z_axis.z;
+        let inverse = (self.s + self.n * (1e-14 * trace / norm)).inverse();
+        let mut v = start;
+        for _ in 0..4 {
+            v = (inverse * (self.n * v)).try_normalize()?;
+        }
+        slope_from_form(v, v.x * v.z - v.y * v.y).filter(|g| g.length() <= slope_limit)
+    }
+}
+
+/// (1 + p^2, p q, 1 + q^2), the entries of M.
+pub(super) fn form(g: DVec2) -> DVec3 {
+    DVec3::new(1.0 + g.x * g.x, g.x * g.y, 1.0 + g.y * g.y)
+}
+
+/// Slope of a quadratic form (A, B, C) proportional to that of a plane; p >= 0. None if indefinite.
+///
+/// The determinant A C - B^2 is asked for as its differences may cancel.
+pub(super) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
+    let half_difference = 0.5 * (v.x - v.z);
+    let spread = half_difference.hypot(v.y);
+    let mean = 0.5 * (v.x + v.z);
+    // Sign of the form is free; the smaller eigenvalue belongs to the rod's full length.
+    let (mean, half_difference, b) =
+        if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
+    let least = determinant / (mean + spread);
+    if !(least > 0.0) {
+        return None;
+    }
+    // |g|^2 = largest/least - 1; 2 angle of g = angle of (A - C, 2 B).
+    let size = (2.0 * spread / least).sqrt();
+    if spread == 0.0 {
+        return Some(DVec2::ZERO);
+    }
+    let cos_sq = 0.5 * (1.0 + half_difference / spread);
+    let (cosine, sine) = if half_difference >= 0.0 {
+        let cosine = cos_sq.sqrt();
+        (cosine, 0.5 * b / (spread * cosine))
+    } else {
+        let sine = (0.5 * (1.0 - half_difference / spread)).sqrt();
+        let signed = 0.5 * b / (spread * sine);
+        if signed >= 0.0 { (signed, sine) } else { (-signed, -sine) }
+    };
+    Some(size * DVec2::new(cosine, sine))
+}

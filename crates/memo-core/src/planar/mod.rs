@@ -1,0 +1,21 @@
+//! Structure from planar motion: limbs that swing in one plane, seen as points under parallel projection.
+//!
+//! Source: Hoffman and Flinchbaugh 1982 ("The interpretation of biological motion", Biological Cybernetics 42).
+//! Image coordinates are metres (or pixels: every length then is in pixels), x right, y down; depth z points
+//! away from the camera. Only differences of points are used, so neither the figure's nor the pivot's
+//! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
+//! (p, q) is (-p, -q).
+
+pub mod evidence;
+mod fit;
+pub mod hinge;
+pub mod plane;
+pub mod rod;
+
+pub use evidence::{
+    Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
+};
+pub use fit::{FitError, FitOptions};
+pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
+pub use plane::Plane;
+pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
