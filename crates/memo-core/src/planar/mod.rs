@@ -6,7 +6,9 @@
 //! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
 //! (p, q) is (-p, -q).
 
+mod cover;
 pub mod evidence;
+pub mod figure;
 mod fit;
 pub mod hinge;
 pub mod plane;
@@ -14,6 +16,10 @@ pub mod rod;
 
 pub use evidence::{
     Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
+};
+pub use figure::{
+    Chain, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation, Joint, Link, Method,
+    Status, interpret_figure, reflection_by_bend,
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
