@@ -16,9 +16,12 @@ __all__ = [
     "change_mask",
     "edge_segments",
     "moving_regions",
+    "planar",
+    "pointlight",
     "silhouettes",
     "similarity",
     "velocity_field",
+    "walker_motion",
 ]
 
 __version__: str
@@ -156,3 +159,52 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+def walker_motion(
+    frames: int = 60,
+    *,
+    rate_hz: float = 60.0,
+    speed_mps: float = 1.3,
+    heading_deg: float = 0.0,
+    phase: float = 0.0,
+    height_m: float = 1.75,
+) -> dict[str, Any]: ...
+def pointlight(
+    positions: npt.NDArray[np.float64],
+    times_s: Sequence[float] | npt.NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    azimuth_deg: float = 0.0,
+    elevation_deg: float = 0.0,
+    px_per_m: float = 200.0,
+    camera: Camera | None = None,
+    locomotion: str = "treadmill",
+    inverted: bool = False,
+    mirrored: bool = False,
+    reversed: bool = False,
+    scramble_position: bool = False,
+    scramble_phase: str | None = None,
+    period_s: float | None = None,
+    max_shift_s: float = 0.5,
+    lifetime_frames: int | None = None,
+    life_dots: int = 8,
+    life_sites: str = "limbs",
+    limbs: Sequence[tuple[int, int]] | None = None,
+    synchronous: bool = False,
+    noise_dots: int = 0,
+    noise_kind: str = "scrambled",
+    noise_area: float = 1.5,
+    noise_speed_px_s: float = 60.0,
+    noise_sd_px: float = 0.0,
+    seed: int = 0,
+) -> dict[str, npt.NDArray[Any]]: ...
+def planar(
+    tracks: npt.NDArray[np.float64],
+    times_s: Sequence[float] | npt.NDArray[np.float64],
+    noise_px: float = 0.0,
+    *,
+    window_s: float = 1.2,
+    size_px: float | None = None,
+    carry: bool = False,
+    false_target_rate: float = 0.01,
+    max_tilt_deg: float = 80.0,
+) -> dict[str, Any]: ...

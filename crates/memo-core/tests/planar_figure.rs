@@ -9,9 +9,7 @@
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
-use memo_core::planar::{
-    DepthSource, Figure, FigureOptions, FitOptions, Method, Status, interpret_figure,
-};
+use memo_core::planar::{DepthSource, Figure, FigureOptions, FitOptions, Method, Status, interpret_figure};
 use memo_core::synth::Random;
 
 const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
@@ -60,7 +58,8 @@ fn walk(name: &str) -> Option<Walk> {
     let forward = (pelvis(frames.last()?) - pelvis(&frames[0])).with_z(0.0).normalize();
     let apart: Vec<f64> = frames.iter().map(|f| (f[8] - f[11]).dot(forward)).collect();
     let change = |p: usize| {
-        (0..apart.len() - p).map(|i| (apart[i + p] - apart[i]).powi(2)).sum::<f64>() / (apart.len() - p) as f64
+        (0..apart.len() - p).map(|i| (apart[i + p] - apart[i]).powi(2)).sum::<f64>()
+            / (apart.len() - p) as f64
     };
     let strides = (0.8 * rate_hz) as usize..((1.5 * rate_hz) as usize).min(apart.len() - 10);
     let stride = strides.min_by(|&a, &b| change(a).total_cmp(&change(b)))?;
@@ -76,7 +75,14 @@ fn seen(walk: &Walk, off_deg: f64) -> impl Fn(DVec3) -> DVec2 + '_ {
 }
 
 /// One window: 12 joints, head, a joint of another walk, a wandering point; noise added.
-fn window(walks: &[Walk], index: usize, off_deg: f64, start: usize, noise_px: f64, seed: u64) -> Vec<Vec<DVec2>> {
+fn window(
+    walks: &[Walk],
+    index: usize,
+    off_deg: f64,
+    start: usize,
+    noise_px: f64,
+    seed: u64,
+) -> Vec<Vec<DVec2>> {
     let walk = &walks[index];
     let (project, mut random) = (seen(walk, off_deg), Random::new(seed));
     let frames = &walk.frames[start..start + walk.stride];
@@ -88,9 +94,8 @@ fn window(walks: &[Walk], index: usize, off_deg: f64, start: usize, noise_px: f6
     };
     tracks.push(frames.iter().map(head).collect());
     let hips = |f: &[DVec3; 12]| project(0.5 * (f[6] + f[9]));
-    let somewhere = |random: &mut Random| {
-        DVec2::new(random.uniform(-0.35, 0.35), random.uniform(-0.7, 0.7)) * PX_PER_M
-    };
+    let somewhere =
+        |random: &mut Random| DVec2::new(random.uniform(-0.35, 0.35), random.uniform(-0.7, 0.7)) * PX_PER_M;
     let other = &walks[(index + 1 + random.uniform(0.0, 3.0) as usize) % 4];
     let limb_joints = [1, 2, 4, 5, 7, 8, 10, 11];
     let joint = limb_joints[random.uniform(0.0, 8.0) as usize];
@@ -186,10 +191,10 @@ fn scenes() -> Vec<(&'static str, Vec<Vec<usize>>)> {
 fn limbs_of_real_walks_are_linked() {
     let Some(walks) = walks() else { return };
     let is_full = std::env::var_os("MEMO_FULL").is_some();
-    let shift_deg = std::env::var("MEMO_SHIFT_DEG").map_or(0.0, |s| s.parse().unwrap());
     println!("precision / recall / windows without an error");
     println!("{:34} {:>22} {:>22} {:>22}", "", "0 px", "1 px", "2 px");
     let mut confidences: Vec<(f64, bool)> = Vec::new();
+    let mut reached = Vec::new();
     for (row, (name, sets)) in scenes().into_iter().enumerate() {
         let mut line = format!("{name:34}");
         for noise in 0..3 {
@@ -198,18 +203,23 @@ fn limbs_of_real_walks_are_linked() {
                 for off_deg in [15.0, 30.0, 45.0, 60.0] {
                     for late in 0..2 {
                         turn += 1;
-                        if !is_full && (if row == 0 { turn % 2 } else { turn % 4 + index % 2 }) != 0 {
+                        if !is_full && turn % (if row == 0 { 4 } else { 8 }) != 0 {
                             continue;
                         }
-                        let start = ((walk.frames.len() - walk.stride - 1) as f64 * (0.1 + 0.7 * late as f64)) as usize;
+                        let start = ((walk.frames.len() - walk.stride - 1) as f64 * (0.1 + 0.7 * late as f64))
+                            as usize;
                         let seed = (index * 1000 + off_deg as usize * 10 + late) as u64;
                         let noise_px = noise as f64;
-                        let tracks = window(&walks, index, off_deg + shift_deg, start, noise_px, seed);
+                        let tracks = window(&walks, index, off_deg, start, noise_px, seed);
                         for shown in &sets {
                             let figure = figure(&tracks, shown, walk, noise_px);
                             let links = links(&figure, shown);
                             let sure = figure.links().map(|l| l.confidence);
-                            confidences.extend(sure.zip(&links).filter(|(_, l)| !l.iter().all(|p| TRUNK.contains(p))).map(|(c, l)| (c, LIMBS.contains(l))));
+                            confidences.extend(
+                                sure.zip(&links)
+                                    .filter(|(_, l)| !l.iter().all(|p| TRUNK.contains(p)))
+                                    .map(|(c, l)| (c, LIMBS.contains(l))),
+                            );
                             count.add(&links, shown);
                         }
                     }
@@ -218,23 +228,31 @@ fn limbs_of_real_walks_are_linked() {
             let clean = format!("{}/{}", count.perfect, count.windows);
             line += &format!("    {:.3} / {:.3} / {clean:>7}", count.precision(), count.recall());
             let wanted = if row == 0 { [0.99, 0.98, 0.97][noise] } else { 0.93 };
-            assert!(
-                count.precision().min(count.recall()) >= wanted || shift_deg != 0.0,
-                "{name}, {noise} px: precision {:.3}, recall {:.3}, wanted {wanted}",
-                count.precision(),
-                count.recall()
-            );
+            reached.push((format!("{name}, {noise} px"), count, wanted));
         }
         println!("{line}");
     }
     print_reliability(&confidences);
+    for (what, count, wanted) in reached {
+        let (precision, recall) = (count.precision(), count.recall());
+        assert!(
+            precision.min(recall) >= wanted,
+            "{what}: precision {precision:.3}, recall {recall:.3}, wanted {wanted}"
+        );
+    }
 }
 
 fn print_reliability(confidences: &[(f64, bool)]) {
-    for (low, high) in [(0.0, 0.5), (0.5, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)] {
+    for (low, high) in
+        [(0.0, 0.5), (0.5, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)]
+    {
         let inside: Vec<_> = confidences.iter().filter(|(c, _)| (low..high).contains(c)).collect();
         let right = inside.iter().filter(|(_, is_right)| *is_right).count();
         let mean = inside.iter().map(|(c, _)| c).sum::<f64>() / inside.len().max(1) as f64;
-        println!("confidence {low:.2}-{high:.2}: {:5} links, mean {mean:.3}, right {:.3}", inside.len(), right as f64 / inside.len().max(1) as f64);
+        println!(
+            "confidence {low:.2}-{high:.2}: {:5} links, mean {mean:.3}, right {:.3}",
+            inside.len(),
+            right as f64 / inside.len().max(1) as f64
+        );
     }
 }

@@ -143,3 +143,34 @@ pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2
     let at = |s: usize, e: usize, k: usize| view[[s, e, k]] as f32;
     Ok((0..view.dim().0).map(|s| [0, 1].map(|e| [at(s, e, 0), at(s, e, 1)])).collect())
 }
+
+/// Points over time of shape (T, K, D): the flat values with T and K.
+pub fn motion_from_numpy<const D: usize>(
+    points: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<[f64; D]>, usize, usize)> {
+    let wanted = format!("wanted points over time: numpy array of shape (T, K, {D}), dtype float64");
+    let Ok(array) = points.cast::<numpy::PyArray3<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    let array = array.readonly();
+    let view = array.as_array();
+    let (frames, count, dimensions) = view.dim();
+    if dimensions != D {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    }
+    let at = |t: usize, k: usize| std::array::from_fn(|d| view[[t, k, d]]);
+    Ok((
+        (0..frames).flat_map(|t| (0..count).map(move |k| (t, k))).map(|(t, k)| at(t, k)).collect(),
+        frames,
+        count,
+    ))
+}
+
+/// Flat values as an array of a shape.
+pub fn numpy_from_flat<T: numpy::Element>(
+    py: Python<'_>,
+    flat: Vec<T>,
+    shape: Vec<usize>,
+) -> PyResult<Bound<'_, PyArrayDyn<T>>> {
+    flat.into_pyarray(py).reshape(shape)
+}

@@ -4,6 +4,8 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod planar;
+mod pointlight;
 mod score;
 mod synth;
 mod tracker;
@@ -19,6 +21,10 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
+    use super::planar::planar;
+    #[pymodule_export]
+    use super::pointlight::{pointlight, walker_motion};
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]

@@ -40,7 +40,8 @@ pub(super) struct Cover {
 /// and the least cost with p is min over S of A(S) + cost(p) + B(S \ p). Sums of weights go the same way.
 pub(super) fn best_cover(points: usize, pieces: &[Piece], temperature: f64) -> Option<Cover> {
     assert!((1..=MOST_POINTS).contains(&points), "between 1 and {MOST_POINTS} points can be covered");
-    let by_lowest = |i: usize| pieces.iter().enumerate().filter(move |(_, p)| p.mask.trailing_zeros() as usize == i);
+    let by_lowest =
+        |i: usize| pieces.iter().enumerate().filter(move |(_, p)| p.mask.trailing_zeros() as usize == i);
     let lowest: Vec<Vec<(usize, Piece)>> =
         (0..points).map(|i| by_lowest(i).map(|(index, &p)| (index, p)).collect()).collect();
     let fitting = |set: usize| {

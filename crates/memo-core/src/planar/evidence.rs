@@ -174,7 +174,8 @@ fn judge(group: &Group, calibration: &Calibration, noise_sd: f64, options: &Evid
         FalseTargetRate::FivePercent => calibration.five_percent,
     };
     let redundancy = group.redundancy as f64;
-    let residual_sq = group.residual_rms * group.residual_rms * (redundancy + group.unknowns as f64) / redundancy;
+    let residual_sq =
+        group.residual_rms * group.residual_rms * (redundancy + group.unknowns as f64) / redundancy;
     let tolerance_sq = 2.0 * noise_sd * noise_sd + (calibration.departure * group.motion).powi(2);
     let statistic = if group.redundancy == 0 { f64::INFINITY } else { residual_sq / tolerance_sq };
     let verdict = if group.redundancy == 0 {

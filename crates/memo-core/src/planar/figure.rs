@@ -17,7 +17,8 @@
 //! whose limbs leave their planes (turning, spinning): such windows are reported lost. A limb that hardly moves
 //! in the image is joined by its shortness alone; its links say so by their confidence.
 
-use super::cover::{MOST_POINTS, Piece, best_cover};
+pub use super::cover::MOST_POINTS;
+use super::cover::{Piece, best_cover};
 use super::{
     Evidence, EvidenceOptions, FitOptions, HingeFit, Plane, RodFit, Verdict, fit_hinge, fit_rod,
     hinge_evidence, rod_evidence,
@@ -90,8 +91,8 @@ pub enum FigureError {
 /// Fewest frames of a window.
 const FEWEST_FRAMES: usize = 8;
 
-/// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about half a
-/// metre for a person).
+/// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about 0.42 m for
+/// a person).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Costs {
     /// Of each unit of length, without a unit. 0.02: true links are shorter than false ones that fit as well;
@@ -111,7 +112,7 @@ pub struct Costs {
 
 impl Default for Costs {
     fn default() -> Self {
-        Self { length: 0.02, rod: 0.016, alone: 0.054, detached: 0.06, noise: 0.6, temperature: 0.004 }
+        Self { length: 0.02, rod: 0.02, alone: 0.066, detached: 0.073, noise: 0.6, temperature: 0.0045 }
     }
 }
 
@@ -124,12 +125,14 @@ pub struct FigureOptions {
     pub evidence: EvidenceOptions,
     /// Costs of the groups.
     pub costs: Costs,
-    /// Size of the figure in the unit of the tracks (RMS distance of its joints from their middle, 0.3 of a
-    /// person's height); `None` takes that of the points given.
+    /// Size of the figure in the unit of the tracks (RMS distance of its joints from their middle, about a
+    /// quarter of a person's height); `None` takes that of the points given.
     pub size: Option<f64>,
     /// Length of the windows in time, seconds. 1.2, about a stride; half a stride still does, less does not.
     /// Tracks of up to one and a half windows are read as one.
     pub window_s: f64,
+    /// Most points that are divided by exact cover, at most [`MOST_POINTS`]; more are linked by a spanning tree.
+    pub most_covered: usize,
     /// Whether a figure's lengths are carried through windows in which it is lost.
     pub carries_structure: bool,
 }
@@ -142,6 +145,7 @@ impl Default for FigureOptions {
             costs: Costs::default(),
             size: None,
             window_s: 1.2,
+            most_covered: MOST_POINTS,
             carries_structure: false,
         }
     }
@@ -335,7 +339,8 @@ fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Res
             return Err(FigureError::Position { track, frame, u: positions[frame].x, v: positions[frame].y });
         }
     }
-    let goes_on = |frame: usize| times_s[frame].is_finite() && (frame == 0 || times_s[frame] > times_s[frame - 1]);
+    let goes_on =
+        |frame: usize| times_s[frame].is_finite() && (frame == 0 || times_s[frame] > times_s[frame - 1]);
     if let Some(frame) = (0..times).find(|&frame| !goes_on(frame)) {
         return Err(FigureError::Times { frame });
     }
@@ -429,7 +434,9 @@ impl Rods {
                 let (low, high) = (i.min(j), i.max(j));
                 match &fits[low * points + high] {
                     None => f64::INFINITY,
-                    Some(fit) => (unexplained(fit.residual_rms, options) + clean_motion(fit.motion, options)) / size,
+                    Some(fit) => {
+                        (unexplained(fit.residual_rms, options) + clean_motion(fit.motion, options)) / size
+                    }
                 }
             })
             .collect();
@@ -472,7 +479,7 @@ struct Candidate {
 /// The figure of least cost in one window.
 fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Figure {
     let rods = Rods::fitted(tracks, size, options);
-    if tracks.len() > MOST_POINTS {
+    if tracks.len() > options.most_covered.min(MOST_POINTS) {
         return forest(tracks, &rods, size, options);
     }
     let candidates = candidates(tracks, &rods, size, options);
@@ -489,7 +496,8 @@ fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Figur
         others.map(|(_, &cost)| cost).fold(f64::INFINITY, f64::min)
     };
     let share = |link: [usize; 2]| {
-        let having = candidates.iter().zip(&cover.share).filter(|(c, _)| links_of(&c.points).any(|l| l == link));
+        let having =
+            candidates.iter().zip(&cover.share).filter(|(c, _)| links_of(&c.points).any(|l| l == link));
         having.map(|(_, share)| share).sum::<f64>().min(1.0)
     };
     let judge = |link: [usize; 2]| ((rival(link) - cover.cost) * size, share(link));
@@ -516,7 +524,8 @@ fn candidates(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptio
     for i in 0..points {
         for j in i + 1..points {
             let Some(fit) = rods.fit(i, j) else { continue };
-            let own = unexplained(fit.residual_rms, options) / size + costs.length * fit.length / size + costs.rod;
+            let own =
+                unexplained(fit.residual_rms, options) / size + costs.length * fit.length / size + costs.rod;
             let cost = own + rods.detachment(&[i, j], &[i, j], costs.detached);
             if cost < most {
                 found.push(Candidate { points: vec![i, j], cost });
@@ -544,7 +553,8 @@ fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions
     let mut pairs = Vec::new();
     for (a, first) in groups.iter().enumerate() {
         for (b, second) in groups.iter().enumerate().skip(a + 1) {
-            let between = ends(first).into_iter().flat_map(|i| ends(second).map(|j| (rods.apart(i, j), i, j)));
+            let between =
+                ends(first).into_iter().flat_map(|i| ends(second).map(|j| (rods.apart(i, j), i, j)));
             if let Some((apart, i, j)) = between.min_by(|x, y| x.0.total_cmp(&y.0)) {
                 pairs.push((apart, a, b, [i, j]));
             }
@@ -580,7 +590,9 @@ fn chain(
     judge: &impl Fn([usize; 2]) -> (f64, f64),
 ) -> Option<Chain> {
     let mut points = group.to_vec();
-    let sits_on = |end: usize| joints.iter().filter(|j| j.points.contains(&end)).map(|j| j.apart).fold(f64::INFINITY, f64::min);
+    let sits_on = |end: usize| {
+        joints.iter().filter(|j| j.points.contains(&end)).map(|j| j.apart).fold(f64::INFINITY, f64::min)
+    };
     if sits_on(points[points.len() - 1]) < sits_on(points[0]) {
         points.reverse();
     }
@@ -615,7 +627,9 @@ fn chain(
         residual_rms: fit.residual_rms,
         evidence: hinge_evidence(&fit, options.fit.noise_sd, &options.evidence),
         depth: fit.depth.iter().map(|[first, second]| vec![0.0, -first, second - first]).collect(),
-        angle_rad: (0..tracks[pivot].len()).map(|t| angle(&fit, [a, pivot, b].map(|p| tracks[p][t]), t)).collect(),
+        angle_rad: (0..tracks[pivot].len())
+            .map(|t| angle(&fit, [a, pivot, b].map(|p| tracks[p][t]), t))
+            .collect(),
         points,
     })
 }
@@ -638,7 +652,8 @@ fn forest(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) 
             }
         }
     }
-    let kept: Vec<[usize; 2]> = spanning_forest(points, &mut edges).into_iter().map(|(_, pair)| pair).collect();
+    let kept: Vec<[usize; 2]> =
+        spanning_forest(points, &mut edges).into_iter().map(|(_, pair)| pair).collect();
     let judge = |_: [usize; 2]| (f64::NAN, f64::NAN);
     let chains: Vec<Chain> =
         kept.iter().filter_map(|pair| chain(pair, tracks, rods, &[], options, &judge)).collect();
@@ -721,7 +736,8 @@ fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], depth: &mut [f64], sourc
                         let row = usize::try_from(t).ok().filter(|&t| t < frames)? * points;
                         Some(depth[row + pair[1]] - depth[row + pair[0]]).filter(|z| z.is_finite())
                     };
-                    let mut state = at(depth, from - step).map(|z| (z, at(depth, from - 2 * step).unwrap_or(z)));
+                    let mut state =
+                        at(depth, from - step).map(|z| (z, at(depth, from - 2 * step).unwrap_or(z)));
                     let mut t = from;
                     while t != last {
                         let image = tracks[pair[1]][t as usize] - tracks[pair[0]][t as usize];
@@ -779,4 +795,227 @@ pub fn reflection_by_bend(
     let (given, mirrored) = (bend(1.0)?, bend(-1.0)?);
     let sign = if mirrored > given { -1.0 } else { 1.0 };
     Some((sign, (given - mirrored).abs().to_degrees()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Body, Gait, GaitStyle, Walker};
+    use crate::synth::{Random, View, WalkOptions, limbs_of, sampled_walk};
+    use std::f64::consts::TAU;
+
+    /// The model walking for `frames` frames at 60 Hz, turned about its pelvis by `turn(time)`, seen 35 degrees
+    /// off the side at 200 px/m: tracks and true depths (T x 12) of the 12 joints.
+    fn walker(
+        frames: usize,
+        turn: impl Fn(f64) -> f64,
+        noise_px: f64,
+    ) -> (Vec<Vec<DVec2>>, Vec<f64>, Vec<f64>) {
+        let body = Body::from_height(1.75).unwrap();
+        let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
+        let motion = sampled_walk(&walker, &WalkOptions { frames, ..WalkOptions::default() }).unwrap();
+        let (azimuth_rad, px_per_m) = (0.6f64, 200.0);
+        let view = View::Orthographic { azimuth_rad, elevation_rad: 0.0, px_per_m };
+        let away = DVec3::new(-azimuth_rad.sin(), azimuth_rad.cos(), 0.0);
+        let (path, times_s) = (motion.pelvis_path(), motion.times_s().to_vec());
+        let mut random = Random::new(9);
+        let mut tracks = vec![Vec::new(); 12];
+        let mut depth = Vec::new();
+        for t in 0..frames {
+            let turned = glam::DMat3::from_rotation_z(turn(times_s[t]));
+            for (k, track) in tracks.iter_mut().enumerate() {
+                let p = turned * (motion.at(t, k).unwrap() - path[t]) + path[t];
+                let [du, dv] = random.normal_pair().map(|n| f64::from(n) * noise_px);
+                track.push(view.project(p).unwrap() + DVec2::new(du, dv));
+                depth.push(away.dot(p) * px_per_m);
+            }
+        }
+        (tracks, times_s, depth)
+    }
+
+    fn limbs() -> Vec<[usize; 2]> {
+        limbs_of(&crate::synth::motion::WALKER_NAMES.map(String::from))
+    }
+
+    fn sorted_links(figure: &Figure) -> Vec<[usize; 2]> {
+        let mut links: Vec<[usize; 2]> = figure.links().map(|l| l.points).collect();
+        links.sort_unstable();
+        links
+    }
+
+    #[test]
+    fn the_model_is_linked_with_its_lengths_depths_and_angles() {
+        let (tracks, times_s, truth) = walker(66, |_| 0.0, 0.0);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let [window] = &found.windows[..] else { panic!("one window") };
+        assert_eq!((window.status, window.chains), (Status::Interpreted, [4, 0, 0]));
+        assert_eq!(sorted_links(&window.figure), limbs());
+        for chain in &window.figure.chains {
+            for link in &chain.links {
+                let [a, b] = link.points;
+                let depth = truth[b] - truth[a];
+                let length = (tracks[b][0] - tracks[a][0]).extend(depth).length();
+                assert!((link.length / length - 1.0).abs() < 1e-3, "{link:?} {length}");
+                assert!(link.confidence > 0.9 && link.margin > 0.0);
+            }
+            let [a, pivot, b] = chain.points[..] else { panic!() };
+            let sign = (chain.depth[0][1] * (truth[pivot] - truth[a])).signum();
+            for t in 0..66 {
+                let at = |k: usize| truth[t * 12 + k] - truth[t * 12 + a];
+                assert!((sign * chain.depth[t][2] - at(b)).abs() < 1.0, "frame {t}");
+                let point = |k: usize| tracks[k][t].extend(truth[t * 12 + k]);
+                let angle = (point(a) - point(pivot)).angle_between(point(b) - point(pivot));
+                assert!((chain.angle_rad[t] - angle).abs() < 0.02);
+            }
+        }
+        // The four chains sit on each other by shoulders and hips.
+        assert_eq!(window.figure.joints.len(), 3);
+        assert!(window.figure.joints.iter().all(|j| j.points.iter().all(|p| p % 3 == 0)));
+    }
+
+    #[test]
+    fn threads_and_runs_do_not_change_the_figure() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 1.0);
+        let options = FigureOptions {
+            fit: FitOptions { noise_sd: 1.0, ..FitOptions::default() },
+            ..FigureOptions::default()
+        };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            format!("{:?}", pool.install(|| interpret_figure(&tracks, &times_s, &options)))
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    /// One full turn between 1.8 and 2.6 s of 4.4 s.
+    fn spin(time_s: f64) -> f64 {
+        TAU * ((time_s - 1.8) / 0.8).clamp(0.0, 1.0)
+    }
+
+    #[test]
+    fn a_spin_is_lost_and_found_again() {
+        let (tracks, times_s, _) = walker(264, spin, 0.5);
+        let fit = FitOptions { noise_sd: 0.5, ..FitOptions::default() };
+        let options = FigureOptions { fit, window_s: 0.9, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let mut seen = Vec::new();
+        for window in &found.windows {
+            let (from, to) = (times_s[window.start], times_s[window.end - 1]);
+            println!("{from:.2} to {to:.2} s: {:?} {:?}", window.status, window.chains);
+            if to < 1.8 || from > 2.6 {
+                assert_eq!(window.status, Status::Interpreted, "{from} to {to} s");
+                assert_eq!(sorted_links(&window.figure), limbs(), "{from} to {to} s");
+            }
+            if from > 1.6 && to < 2.8 || from < 2.0 && to > 2.4 {
+                assert_eq!(window.status, Status::Lost, "{from} to {to} s");
+            }
+            seen.push(window.status);
+        }
+        assert!(seen.contains(&Status::Lost));
+        let middle = (2.2 * 60.0) as usize;
+        assert_eq!(found.sources[middle], DepthSource::Unknown);
+        assert!(found.depth[middle * 12..][..12].iter().all(|z| z.is_nan()));
+        assert_eq!((found.sources[0], found.sources[263]), (DepthSource::Planar, DepthSource::Planar));
+    }
+
+    #[test]
+    fn lengths_are_carried_into_a_turn() {
+        let (tracks, times_s, truth) = walker(264, spin, 0.0);
+        let options = FigureOptions { window_s: 0.9, carries_structure: true, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let carried: Vec<usize> = (0..264).filter(|&t| found.sources[t] == DepthSource::Carried).collect();
+        assert!(carried.len() > 10, "{carried:?}");
+        let mut errors = Vec::new();
+        for &t in &carried {
+            for [a, b] in limbs() {
+                let depth = |z: &[f64]| z[t * 12 + b] - z[t * 12 + a];
+                let length = (tracks[b][t] - tracks[a][t]).extend(depth(&truth)).length();
+                // Up to the chain's reflection: the sign is open.
+                errors.push((depth(&found.depth).abs() - depth(&truth).abs()).abs() / length);
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        println!(
+            "carried depth, relative to length: median {:.4}, p90 {:.4}",
+            errors[errors.len() / 2],
+            errors[errors.len() * 9 / 10]
+        );
+        assert!(errors[errors.len() * 9 / 10] < 0.1);
+    }
+
+    #[test]
+    fn missing_points_and_still_figures_are_reported() {
+        let (mut tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        tracks[2] = vec![DVec2::NAN; 66];
+        tracks[8][20..30].fill(DVec2::NAN);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let figure = &found.windows[0].figure;
+        assert!(figure.alone.contains(&2));
+        let mut wanted = limbs();
+        wanted.retain(|l| !l.contains(&2));
+        assert_eq!(sorted_links(figure), wanted);
+        let still: Vec<Vec<DVec2>> = tracks.iter().map(|t| vec![t[0]; 66]).collect();
+        let found = interpret_figure(&still, &times_s, &FigureOptions::default()).unwrap();
+        assert_ne!(found.windows[0].status, Status::Interpreted);
+        let unseen = vec![vec![DVec2::NAN; 66]; 12];
+        assert_eq!(
+            interpret_figure(&unseen, &times_s, &FigureOptions::default()),
+            Err(FigureError::NoExtent)
+        );
+    }
+
+    #[test]
+    fn many_points_are_linked_by_a_forest() {
+        let (mut tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        let options = FigureOptions { most_covered: 4, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let links = sorted_links(&found.windows[0].figure);
+        assert_eq!(found.windows[0].figure.method, Method::Forest);
+        assert_eq!(links.len(), 11);
+        tracks.extend(
+            (0..8).map(|i| tracks[i].iter().map(|p| *p + 5.0).collect::<Vec<_>>()).collect::<Vec<_>>(),
+        );
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        assert_eq!(found.windows[0].figure.method, Method::Forest);
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_its_values() {
+        let (tracks, times_s, _) = walker(20, |_| 0.0, 0.0);
+        let fresh = FigureOptions::default;
+        let refused = |tracks: &[Vec<DVec2>], times_s: &[f64], options| {
+            interpret_figure(tracks, times_s, &options).unwrap_err()
+        };
+        assert_eq!(refused(&tracks[..1], &times_s, fresh()), FigureError::Points { points: 1 });
+        assert_eq!(refused(&tracks, &times_s[..3], fresh()), FigureError::Frames { frames: 3 });
+        assert!(matches!(refused(&tracks, &times_s[..12], fresh()), FigureError::Lengths { track: 0, .. }));
+        let backwards: Vec<f64> = times_s.iter().map(|t| -t).collect();
+        assert_eq!(refused(&tracks, &backwards, fresh()), FigureError::Times { frame: 1 });
+        let mut far = tracks.clone();
+        far[3][4].y = f64::INFINITY;
+        assert!(matches!(refused(&far, &times_s, fresh()), FigureError::Position { track: 3, frame: 4, .. }));
+        let one_place = vec![vec![DVec2::ONE; 20]; 3];
+        assert_eq!(refused(&one_place, &times_s, fresh()), FigureError::NoExtent);
+        for bad in [f64::NAN, f64::INFINITY, -1.0] {
+            let options = FigureOptions { window_s: bad, ..fresh() };
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+            let options =
+                FigureOptions { fit: FitOptions { noise_sd: bad, ..FitOptions::default() }, ..fresh() };
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+        }
+    }
+
+    #[test]
+    fn a_knee_seen_from_the_front_shows_which_way_it_bends() {
+        // Seen from the front, facing the camera: the knee towards it, the ankle back.
+        let positions = vec![[DVec2::ZERO, DVec2::new(2.0, 80.0), DVec2::new(3.0, 160.0)]; 5];
+        let depth = vec![vec![0.0, -30.0, 10.0]; 5];
+        let facing = -DVec3::Z;
+        let (sign, degrees) = reflection_by_bend(&positions, &depth, facing, false).unwrap();
+        assert!(sign == 1.0 && degrees > 20.0);
+        assert_eq!(reflection_by_bend(&positions, &depth, facing, true).unwrap().0, -1.0);
+        let (_, degrees) = reflection_by_bend(&positions, &depth, DVec3::X, false).unwrap();
+        assert!(degrees < 1e-9, "the side view cannot tell");
+        assert_eq!(reflection_by_bend(&positions, &depth, DVec3::ZERO, true), None);
+    }
 }

@@ -18,8 +18,8 @@ pub use evidence::{
     Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
 };
 pub use figure::{
-    Chain, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation, Joint, Link, Method,
-    Status, interpret_figure, reflection_by_bend,
+    Chain, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation, Joint, Link,
+    Method, Status, interpret_figure, reflection_by_bend,
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
