@@ -1,14 +1,16 @@
 //! Rates at which hinges and rods pass as planar: unrelated points, true limbs, false groups of one body.
 //!
-//! The thresholds of `planar::evidence` were chosen on the two pairs of walkers of one laboratory each and on
-//! synthetic motions; the rates here are of the four other pairs. Four walkers are few: a rate is good to about
+//! The thresholds of `planar::evidence` were chosen on other draws: strides, directions, joints and offsets of the
+//! same four walkers, all pairs. The table keeps the pairs of one laboratory each apart from the other four.
+//! Four walkers are few, so a rate is good to about
 //! one part in three. Run with `--nocapture` for the tables.
 
 mod mocap;
 
 use glam::DVec2;
 use memo_core::planar::{
-    EvidenceOptions, FalseTargetRate, FitOptions, Undecided, Verdict, fit_hinge, fit_rod, hinge_evidence, rod_evidence,
+    EvidenceOptions, FalseTargetRate, FitOptions, Undecided, Verdict, fit_hinge, fit_rod, hinge_evidence,
+    rod_evidence,
 };
 use memo_core::synth::Random;
 use mocap::{JOINTS, LIMBS, Walk, azimuth_deg, noisy};
@@ -52,7 +54,9 @@ fn shares(groups: &[Vec<Track>], noise_px: f64, random: &mut Random) -> [Shares;
     let mut shares = [Shares::default(); 2];
     for group in groups {
         let seen: Vec<Track> = group.iter().map(|track| noisy(track, noise_sd, random)).collect();
-        for (share, rate) in shares.iter_mut().zip([FalseTargetRate::OnePercent, FalseTargetRate::FivePercent]) {
+        for (share, rate) in
+            shares.iter_mut().zip([FalseTargetRate::OnePercent, FalseTargetRate::FivePercent])
+        {
             let options = EvidenceOptions { rate, ..EvidenceOptions::default() };
             let evidence = if let [first, pivot, second] = &seen[..] {
                 hinge_evidence(&fit_hinge(first, pivot, second, &fit_options).unwrap(), noise_sd, &options)
@@ -79,7 +83,13 @@ fn unrelated_joint(walk: &Walk, views: usize, random: &mut Random) -> Track {
 }
 
 /// Pivot of one walker, ends of the other.
-fn of_two_walkers(walks: &[Walk], pairs: &[[usize; 2]], size: usize, views: usize, random: &mut Random) -> Vec<Vec<Track>> {
+fn of_two_walkers(
+    walks: &[Walk],
+    pairs: &[[usize; 2]],
+    size: usize,
+    views: usize,
+    random: &mut Random,
+) -> Vec<Vec<Track>> {
     let mut group = |_| {
         let mut pair = pairs[index(random, pairs.len())];
         if random.uniform(0.0, 1.0) < 0.5 {
@@ -169,13 +179,19 @@ fn row(name: &str, views: usize, noise_px: f64, shares: [Shares; 2]) {
 
 /// Prints all rates of groups of a size; returns (unrelated, true) per number of views and noise.
 fn table(walks: &[Walk], size: usize) -> Vec<(usize, f64, Vec<[Shares; 2]>, [Shares; 2])> {
-    println!("{:<34} {:>5} {:>5} {:>9} {:>9} {:>14} {:>9}", "% planar", "views", "px", "at 1 %", "at 5 %", "little motion", "edge-on");
+    println!(
+        "{:<34} {:>5} {:>5} {:>9} {:>9} {:>14} {:>9}",
+        "% planar", "views", "px", "at 1 %", "at 5 %", "little motion", "edge-on"
+    );
     let mut results = Vec::new();
     for views in [15, 60] {
         for noise_px in [0.0, 1.0, 2.0] {
             let mut random = Random::new(100 + views as u64);
             let nulls = [
-                ("unrelated, calibration pairs", of_two_walkers(walks, &CALIBRATION_PAIRS, size, views, &mut random)),
+                (
+                    "unrelated, calibration pairs",
+                    of_two_walkers(walks, &CALIBRATION_PAIRS, size, views, &mut random),
+                ),
                 ("unrelated, test pairs", of_two_walkers(walks, &TEST_PAIRS, size, views, &mut random)),
                 ("unrelated, smooth synthetic", smooth(size, views, &mut random)),
                 ("unrelated, scattered", scattered(size, views, &mut random)),

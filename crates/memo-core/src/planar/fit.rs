@@ -267,12 +267,12 @@ impl<'a, const K: usize> Problem<'a, K> {
     fn term(&self, d: DVec2, g: DVec2, c: f64) -> Term {
         let depth = g.dot(d);
         let m_d = d + depth * g;
-        let w = 2.0 * (m_d.length_squared() + self.floor_sq).sqrt();
-        let r = (d.length_squared() + depth * depth - c) / w;
+        let by_w = 0.5 / (m_d.length_squared() + self.floor_sq).sqrt();
+        let r = (d.length_squared() + depth * depth - c) * by_w;
         // dw/dp = 4 (M d) . (x g + depth e_x) / w
-        let w_by = 4.0 / w * (m_d.dot(g) * d + depth * m_d);
-        let by = (2.0 * depth * d - r * w_by) / w;
-        Term { r, by_p: by.x, by_q: by.y, by_c: -1.0 / w, m_d }
+        let w_by = 4.0 * by_w * (m_d.dot(g) * d + depth * m_d);
+        let by = (2.0 * depth * d - r * w_by) * by_w;
+        Term { r, by_p: by.x, by_q: by.y, by_c: -by_w, m_d }
     }
 
     fn terms(&self, view: &View<K>, s: &Solution<K>) -> [Term; K] {
@@ -318,8 +318,7 @@ impl<'a, const K: usize> Problem<'a, K> {
 
     /// Of the residuals of a hinge's rods, through the noise of the pivot; in [-1/2, 1/2].
     fn correlation(&self, a: &Term, b: &Term) -> f64 {
-        let sizes = (a.m_d.length_squared() + self.floor_sq) * (b.m_d.length_squared() + self.floor_sq);
-        0.5 * a.m_d.dot(b.m_d) / sizes.sqrt()
+        2.0 * a.m_d.dot(b.m_d) * a.by_c * b.by_c
     }
 
     /// Squared lengths that fit a slope best, rod by rod.
@@ -339,37 +338,31 @@ impl<'a, const K: usize> Problem<'a, K> {
         solution
     }
 
+    /// Refines the starts a little and the best of them until it stands.
     fn solve(&self) -> Solution<K> {
         let starts = Moments::new(self.views).starts(self.slope_limit);
-        let refined = starts.into_iter().flatten().map(|g| self.refine(self.at_slope(g)));
-        refined.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("there is always one start")
+        let refined = starts.into_iter().flatten().map(|g| self.refine(self.at_slope(g), 3));
+        let best = refined.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("there is always one start");
+        self.refine(best, 12)
     }
 
     /// Levenberg-Marquardt on (p, q, c), the slope kept within its limit.
-    fn refine(&self, start: Solution<K>) -> Solution<K> {
+    fn refine(&self, start: Solution<K>, iterations: usize) -> Solution<K> {
         let mut best = start;
         let mut damping = 1e-4;
         let (mut cost, mut normal, mut right) = self.normal_equations(&best);
         best.cost = cost;
-        for _ in 0..40 {
+        for _ in 0..iterations {
             let mut damped = normal;
             for i in 0..4 {
-                damped[(i, i)] += damping * normal[(i, i)].max(1e-30);
+                damped[(i, i)] += damping * normal[(i, i)] + f64::MIN_POSITIVE;
             }
-            let Some(step) = damped.cholesky().map(|c| c.solve(&right)) else {
-                damping = 10.0 * damping.max(1e-12);
-                if damping > 1e12 {
-                    break;
-                }
-                continue;
-            };
-            let mut g = best.g + DVec2::new(step[0], step[1]);
-            let limited = g.length() > self.slope_limit;
-            let next = if limited {
-                g = g.clamp_length_max(self.slope_limit);
-                self.at_slope(g)
-            } else {
+            let step = damped.cholesky().map_or(Vector4::repeat(f64::NAN), |c| c.solve(&right));
+            let g = (best.g + DVec2::new(step[0], step[1])).clamp_length_max(self.slope_limit);
+            let next = if g.length() < 0.999 * self.slope_limit {
                 Solution { g, c: std::array::from_fn(|k| best.c[k] + step[2 + k]), cost: 0.0 }
+            } else {
+                self.at_slope(g)
             };
             let (next_cost, next_normal, next_right) = self.normal_equations(&next);
             if next_cost < cost {
@@ -377,12 +370,13 @@ impl<'a, const K: usize> Problem<'a, K> {
                 (cost, normal, right) = (next_cost, next_normal, next_right);
                 best = Solution { cost, ..next };
                 damping = (0.1 * damping).max(1e-15);
-                if gain < 1e-9 {
+                if gain < 1e-5 {
                     break;
                 }
             } else {
                 damping *= 10.0;
-                if damping > 1e8 {
+                // The step is lost in rounding, or smaller than it would matter.
+                if damping > 1e3 || !(step.rows(0, 2).norm() > 1e-13 * (1.0 + best.g.length())) {
                     break;
                 }
             }
@@ -466,8 +460,42 @@ impl Moments {
         v.dot(self.s * v) / v.dot(self.n * v)
     }
 
+    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v' N v
+    /// and near a minimum so is the Hessian.
+    fn descend(&self, mut g: DVec2, slope_limit: f64) -> (f64, DVec2) {
+        let mut cost = self.cost(g);
+        for _ in 0..10 {
+            let v = form(g);
+            let (v_p, v_q) = (DVec3::new(2.0 * g.x, g.y, 0.0), DVec3::new(0.0, g.x, 2.0 * g.y));
+            let d = self.s - self.n * cost;
+            let (d_v, d_p, d_q) = (d * v, d * v_p, d * v_q);
+            let gradient = DVec2::new(d_v.dot(v_p), d_v.dot(v_q));
+            let (pp, pq, qq) = (v_p.dot(d_p) + 2.0 * d_v.x, v_p.dot(d_q) + d_v.y, v_q.dot(d_q) + 2.0 * d_v.z);
+            // Made positive definite where it is not.
+            let least = 0.5 * (pp + qq) - (0.25 * (pp - qq) * (pp - qq) + pq * pq).sqrt();
+            let add = if least > 0.0 { 0.0 } else { -2.0 * least + 1e-3 * (pp.abs() + qq.abs()) };
+            let (pp, qq) = (pp + add, qq + add);
+            let step = DVec2::new(qq * gradient.x - pq * gradient.y, pp * gradient.y - pq * gradient.x)
+                / -(pp * qq - pq * pq);
+            if !step.is_finite() {
+                break;
+            }
+            let shrunk = [1.0, 0.3, 0.05].into_iter().map(|size| {
+                let next = (g + size * step).clamp_length_max(slope_limit);
+                (self.cost(next), next)
+            });
+            let Some((next_cost, next)) = shrunk.into_iter().find(|(next, _)| *next < cost) else { break };
+            let gain = cost - next_cost;
+            (cost, g) = (next_cost, next);
+            if gain < 1e-3 * cost {
+                break;
+            }
+        }
+        (cost, g)
+    }
+
     /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a grid.
-    fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 3] {
+    fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 2] {
         const DIRECTIONS: usize = 12;
         const TILTS: usize = 7;
         let limit = slope_limit.atan();
@@ -499,10 +527,20 @@ impl Moments {
                 }
             }
         }
-        let [first, second] = best.map(|b| b.map(|(_, g)| g));
         let fallback = DVec2::new(0.5, 0.5).clamp_length_max(0.5 * slope_limit);
-        let first = Some(first.unwrap_or(fallback));
-        [self.ellipse(form(first.unwrap_or(fallback)), slope_limit), first, second]
+        let [first, second] = best.map(|b| b.map(|(_, g)| self.descend(g, slope_limit)));
+        let first = first.unwrap_or((self.cost(fallback), fallback));
+        // A second minimum may win with the exact weights unless it is far worse with these.
+        let is_rival = |rival: DVec2, cost: f64| {
+            cost < 4.0 * first.0 && (rival - first.1).length().min((rival + first.1).length()) > 0.1
+        };
+        let second = second.filter(|(cost, g)| is_rival(*g, *cost)).map(|(_, g)| g);
+        let ellipse = self.ellipse(form(first.1), slope_limit);
+        // The exact ellipse replaces a minimum that it equals; the data may have no noise.
+        match ellipse {
+            Some(g) if self.cost(g) <= first.0 => [Some(g), second],
+            _ => [Some(first.1), second],
+        }
     }
 
     /// The ellipse of least v' S v / v' N v by inverse iteration; none if it is no rod's.

@@ -13,7 +13,8 @@ pub mod plane;
 pub mod rod;
 
 pub use evidence::{
-    Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
+    Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
+    rod_evidence,
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};

@@ -58,7 +58,8 @@ impl Walk {
     fn parse(name: &'static str, text: &str, skip: usize) -> Self {
         let mut lines = text.lines();
         let head = lines.next().unwrap();
-        let rate_hz = head.split(',').find_map(|part| part.trim().strip_suffix(" Hz")).unwrap().parse().unwrap();
+        let rate_hz =
+            head.split(',').find_map(|part| part.trim().strip_suffix(" Hz")).unwrap().parse().unwrap();
         let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
         let at = JOINTS.map(|joint| columns.iter().position(|c| *c == format!("{joint}_x")).unwrap());
         let mut frames: Vec<[DVec3; 12]> = lines
@@ -79,7 +80,8 @@ impl Walk {
         // A stride is the lag at which ankles and knees best repeat.
         let miss = |lag: usize| {
             let far = |i: usize| [7, 8, 10, 11].map(|j| frames[i][j].distance_squared(frames[i + lag][j]));
-            (0..frames.len() - lag).map(|i| far(i).iter().sum::<f64>()).sum::<f64>() / (frames.len() - lag) as f64
+            (0..frames.len() - lag).map(|i| far(i).iter().sum::<f64>()).sum::<f64>()
+                / (frames.len() - lag) as f64
         };
         let lags = (0.85 * rate_hz) as usize..((1.6 * rate_hz) as usize).min(frames.len() - 10);
         let stride = lags.min_by(|&a, &b| miss(a).total_cmp(&miss(b))).unwrap() as f64;
@@ -109,7 +111,8 @@ impl Walk {
 
     /// Mean length of a bone over the walk, metres.
     pub fn length_m(&self, joints: [usize; 2]) -> f64 {
-        self.frames.iter().map(|f| f[joints[0]].distance(f[joints[1]])).sum::<f64>() / self.frames.len() as f64
+        self.frames.iter().map(|f| f[joints[0]].distance(f[joints[1]])).sum::<f64>()
+            / self.frames.len() as f64
     }
 
     /// Seconds a stride.
