@@ -6,17 +6,21 @@
 //! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
 //! (p, q) is (-p, -q).
 
+pub mod depth_change;
 pub mod evidence;
 mod fit;
 pub mod hinge;
+pub mod motion;
 pub mod plane;
 pub mod rod;
 
+pub use depth_change::{RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px};
 pub use evidence::{
     Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
     rod_evidence,
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
+pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
 pub use plane::Plane;
 pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
