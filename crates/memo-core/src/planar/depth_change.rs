@@ -83,16 +83,18 @@ pub fn fit_hinge_in_depth(
     if let Some(view) = disorder {
         return Err(ScaleError::Value { view, value: times_s[view] });
     }
-    let span = times_s.last().zip(times_s.first()).map_or(1.0, |(last, first)| (last - first).max(f64::MIN_POSITIVE));
+    // What is wrong with the points shows before they are scaled.
+    fit_hinge(first, pivot, second, options)?;
+    let span = times_s
+        .last()
+        .zip(times_s.first())
+        .map_or(1.0, |(last, first)| (last - first).max(f64::MIN_POSITIVE));
     let at = |change: f64| {
         let middle = times_s.first().copied().unwrap_or(0.0) + 0.5 * span;
         let grow: Vec<f64> = times_s.iter().map(|t| 1.0 + change * (t - middle) / span).collect();
         let scaled = |points: &[DVec2]| points.iter().zip(&grow).map(|(p, s)| *p * *s).collect::<Vec<_>>();
         // The scale is about the pivot: a translation does not matter.
         let relative = |points: &[DVec2]| points.iter().zip(pivot).map(|(p, o)| *p - *o).collect::<Vec<_>>();
-        if first.len() != n || second.len() != n {
-            return fit_hinge(first, pivot, second, options);
-        }
         fit_hinge(&scaled(&relative(first)), &vec![DVec2::ZERO; n], &scaled(&relative(second)), options)
     };
     let cost = |fit: &Result<HingeFit, FitError>| fit.as_ref().map_or(f64::INFINITY, |fit| fit.residual_rms);
@@ -107,7 +109,9 @@ pub fn fit_hinge_in_depth(
         if cost(&at(left)) < cost(&at(right)) { high = right } else { low = left }
     }
     let distance_change = 0.5 * (low + high);
-    Ok(RecedingHinge { fit: at(distance_change)?, distance_change })
+    let mut fit = at(distance_change)?;
+    fit.redundancy = fit.redundancy.saturating_sub(1);
+    Ok(RecedingHinge { fit, distance_change })
 }
 
 /// Error of a joint's image, pixels, from taking central projection for scaled parallel projection.
@@ -176,7 +180,8 @@ mod tests {
         let points = [DVec2::X; 3];
         assert!(matches!(at_one_scale(&points, &[1.0]), Err(ScaleError::Lengths { points: 3, given: 1 })));
         assert!(matches!(at_one_scale(&points, &[1.0, 0.0, 1.0]), Err(ScaleError::Value { view: 1, .. })));
-        let fit = |times: &[f64]| fit_hinge_in_depth(&points, &points, &points, times, &FitOptions::default());
+        let fit =
+            |times: &[f64]| fit_hinge_in_depth(&points, &points, &points, times, &FitOptions::default());
         assert!(matches!(fit(&[0.0, 1.0]), Err(ScaleError::Lengths { .. })));
         assert!(matches!(fit(&[0.0, f64::NAN, 1.0]), Err(ScaleError::Value { view: 1, .. })));
         assert!(matches!(fit(&[0.0, 2.0, 1.0]), Err(ScaleError::Value { view: 2, .. })));

@@ -129,9 +129,8 @@ fn rows(motions: &[RodMotion]) -> Result<Vec<DVec3>, MotionRefusal> {
     if found < 2 {
         return Err(MotionRefusal::TooFew { found });
     }
-    let square = |m: &RodMotion| {
-        m.position.dot(m.velocity).abs() <= 1e-13 * m.position.length() * m.velocity.length()
-    };
+    let square =
+        |m: &RodMotion| m.position.dot(m.velocity).abs() <= 1e-13 * m.position.length() * m.velocity.length();
     if motions.iter().all(square) { Err(MotionRefusal::ParallelToImage) } else { Ok(rows) }
 }
 
@@ -162,7 +161,10 @@ mod tests {
         let along = slope.try_normalize().unwrap_or(DVec2::X);
         let cos_tilt = 1.0 / (1.0 + slope.length_squared()).sqrt();
         let image = |c: f64, s: f64| length * (c * cos_tilt * along + s * along.perp());
-        RodMotion { position: image(angle.cos(), angle.sin()), velocity: rate * image(-angle.sin(), angle.cos()) }
+        RodMotion {
+            position: image(angle.cos(), angle.sin()),
+            velocity: rate * image(-angle.sin(), angle.cos()),
+        }
     }
 
     proptest! {
@@ -190,7 +192,8 @@ mod tests {
     fn many_noisy_instants_of_a_rod_give_its_plane() {
         let mut random = Random::new(3);
         let slope = DVec2::new(0.8, 0.3);
-        let noise = |sd: f64, random: &mut Random| sd * DVec2::from_array(random.normal_pair().map(f64::from));
+        let noise =
+            |sd: f64, random: &mut Random| sd * DVec2::from_array(random.normal_pair().map(f64::from));
         let motions: Vec<RodMotion> = (0..200)
             .map(|i| {
                 let t = 0.05 * i as f64;
