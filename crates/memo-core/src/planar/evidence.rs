@@ -16,7 +16,8 @@
 //! `tests/planar_rates.rs` for both rates): which of several readings of a body holds is for the whole figure
 //! to say.
 
-use super::{HingeFit, RodFit};
+use super::{FitError, FitOptions, HingeFit, RodFit, fit_hinge};
+use glam::DVec2;
 
 /// Rate of unrelated points that pass as planar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,11 +111,11 @@ struct Calibration {
 
 /// From strides of pairs of walkers and 0 to 2 px of noise at 200 px/m (`tests/planar_rates.rs`).
 const HINGE: Calibration = Calibration {
-    departure: 0.1,
+    departure: 0.09,
     motion_by_noise: 2.5,
     motion_by_length: 0.05,
     redundancy: 12,
-    one_percent: 1.0,
+    one_percent: 1.08,
     five_percent: 1.4,
 };
 
@@ -152,6 +153,36 @@ pub fn rod_evidence(fit: &RodFit, noise_sd: f64, options: &EvidenceOptions) -> E
         at_tilt_limit: fit.at_tilt_limit,
     };
     judge(&group, &ROD, noise_sd, options)
+}
+
+/// Three points tried with each as the pivot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linkage {
+    /// Fit with point i as the pivot and the two others, in order, as ends.
+    pub fits: [HingeFit; 3],
+    /// Evidence for each role.
+    pub evidence: [Evidence; 3],
+    /// The pivot, if exactly one role is planar: the two other points are then not linked.
+    pub pivot: Option<usize>,
+}
+
+/// Finds which of three points is the joint of the other two ("Linking the feature points" in the paper): the
+/// links fall out of the one role that is planar.
+///
+/// # Errors
+/// Those of [`fit_hinge`].
+pub fn link_three(
+    points: [&[DVec2]; 3],
+    options: &FitOptions,
+    evidence: &EvidenceOptions,
+) -> Result<Linkage, FitError> {
+    let [a, b, c] = points;
+    let fits = [fit_hinge(b, a, c, options)?, fit_hinge(a, b, c, options)?, fit_hinge(a, c, b, options)?];
+    let evidence = [0, 1, 2].map(|i| hinge_evidence(&fits[i], options.noise_sd, evidence));
+    let is_planar = |i: &usize| evidence[*i].verdict == Verdict::Planar;
+    let mut planar = (0..3).filter(is_planar);
+    let pivot = planar.next().filter(|_| planar.next().is_none());
+    Ok(Linkage { fits, evidence, pivot })
 }
 
 /// What a verdict needs of a fit.

@@ -7,15 +7,19 @@
 //! (p, q) is (-p, -q).
 
 mod cover;
+pub mod depth_change;
 pub mod evidence;
 pub mod figure;
 mod fit;
 pub mod hinge;
+pub mod motion;
 pub mod plane;
 pub mod rod;
 
+pub use depth_change::{RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px};
 pub use evidence::{
-    Evidence, EvidenceOptions, FalseTargetRate, Undecided, Verdict, hinge_evidence, rod_evidence,
+    Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
+    rod_evidence,
 };
 pub use figure::{
     Chain, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation, Joint, Link,
@@ -23,5 +27,6 @@ pub use figure::{
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
+pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
 pub use plane::Plane;
 pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
