@@ -20,7 +20,7 @@
 pub use super::cover::MOST_POINTS;
 use super::cover::{Piece, best_cover};
 use super::{
-    Evidence, EvidenceOptions, FitOptions, HingeFit, Plane, RodFit, Verdict, fit_hinge, fit_rod,
+    Evidence, EvidenceOptions, FitError, FitOptions, HingeFit, Plane, RodFit, Verdict, fit_hinge, fit_rod,
     hinge_evidence, rod_evidence,
 };
 use glam::{DVec2, DVec3};
@@ -237,9 +237,9 @@ impl Figure {
 /// Whether a window could be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// At least as many chains move in planes as leave them, and one does.
+    /// More chains move in planes than leave them.
     Interpreted,
-    /// More chains leave their planes than move in them.
+    /// As many chains leave their planes as move in them, or more.
     Lost,
     /// Hardly anything moves: no chain speaks for or against planes.
     Still,
@@ -312,7 +312,7 @@ pub fn interpret_figure(
             let status = match (planar, refuted, silent) {
                 (0, 0, 0) => Status::Unseen,
                 (0, 0, _) => Status::Still,
-                _ if planar >= refuted => Status::Interpreted,
+                _ if planar > refuted => Status::Interpreted,
                 _ => Status::Lost,
             };
             FigureWindow { start, end, status, chains: [planar, refuted, silent], figure }
@@ -421,26 +421,26 @@ struct Rods {
 impl Rods {
     fn fitted(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Self {
         let points = tracks.len();
-        let fits: Vec<Option<RodFit>> = (0..points * points)
+        let both_ways = |index: usize| (index / points, index % points);
+        let results: Vec<Result<RodFit, FitError>> = (0..points * points)
             .into_par_iter()
-            .map(|index| {
-                let (i, j) = (index / points, index % points);
-                (i < j).then(|| fit_rod(tracks[i], tracks[j], &options.fit).ok()).flatten()
+            .map(|index| match both_ways(index) {
+                (i, j) if i < j => fit_rod(tracks[i], tracks[j], &options.fit),
+                _ => Err(FitError::TooFewViews { found: 0, needed: 0 }),
             })
             .collect();
-        let apart = (0..points * points)
-            .map(|index| {
-                let (i, j) = (index / points, index % points);
-                let (low, high) = (i.min(j), i.max(j));
-                match &fits[low * points + high] {
-                    None => f64::INFINITY,
-                    Some(fit) => {
-                        (unexplained(fit.residual_rms, options) + clean_motion(fit.motion, options)) / size
-                    }
+        let apart = (0..points * points).map(|index| {
+            let (i, j) = both_ways(index);
+            match &results[i.min(j) * points + i.max(j)] {
+                Ok(fit) => {
+                    (unexplained(fit.residual_rms, options) + clean_motion(fit.motion, options)) / size
                 }
-            })
-            .collect();
-        Self { points, fits, apart }
+                Err(FitError::NoMotion { .. }) => 0.0,
+                Err(_) => f64::INFINITY,
+            }
+        });
+        let apart = apart.collect();
+        Self { points, fits: results.into_iter().map(Result::ok).collect(), apart }
     }
 
     fn fit(&self, i: usize, j: usize) -> Option<&RodFit> {
@@ -714,7 +714,7 @@ fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
     signs
 }
 
-/// Goes on with the lengths of the chains where no plane is known, forwards from the window before, then
+/// Goes on with the lengths of the chains that did not leave their planes where no plane is known, forwards from the window before, then
 /// backwards from the window after.
 ///
 /// A link of length L and image vector d has |z| = sqrt(L² - |d|²), or 0 where the image is too long. The sign
@@ -730,7 +730,8 @@ fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], depth: &mut [f64], sourc
                 frame += step;
             }
             let last = frame;
-            for chain in &window.figure.chains {
+            let kept = window.figure.chains.iter().filter(|c| c.evidence.verdict != Verdict::NotPlanar);
+            for chain in kept {
                 for (pair, link) in chain.points.windows(2).zip(&chain.links) {
                     let at = |depth: &[f64], t: isize| {
                         let row = usize::try_from(t).ok().filter(|&t| t < frames)? * points;
