@@ -10,16 +10,20 @@ from memo._memo import (
     change_mask,
     edge_segments,
     moving_regions,
+    pointlight,
     silhouettes,
     similarity,
     velocity_field,
+    walker_motion,
 )
+from memo.figure import PlanarFigure, planar
 from memo.scene import DemoScene, demo_scene
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
     "Camera",
     "DemoScene",
+    "PlanarFigure",
     "Track",
     "Tracker",
     "__version__",
@@ -27,8 +31,11 @@ __all__ = [
     "demo_scene",
     "edge_segments",
     "moving_regions",
+    "planar",
+    "pointlight",
     "silhouettes",
     "similarity",
     "track",
     "velocity_field",
+    "walker_motion",
 ]

@@ -1,4 +1,4 @@
-"""The command line: `memo track VIDEO`, `memo demo`.
+"""The command line: `memo track VIDEO`, `memo demo`, `memo pointlight`, `memo planar TRACKS.csv`.
 
 This file alone knows how a tracked walk is delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. The base install has numpy alone, so everything from the `app`
@@ -20,17 +20,19 @@ from enum import IntEnum
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
 import memo
-from memo.files import JOINTS, read_tsai_xml, write_events_csv, write_track_csv
+from memo.files import JOINTS, complete_file, read_tsai_xml, write_events_csv, write_track_csv
 
 if TYPE_CHECKING:
     import typer
 
     from memo.video import Frame
+
+T = TypeVar("T")
 
 EXTRA = ("av", "matplotlib", "rich", "typer")
 
@@ -109,6 +111,8 @@ def _app() -> "typer.Typer":
 
     _add_track(app)
     _add_demo(app)
+    _add_pointlight(app)
+    _add_planar(app)
     return app
 
 
@@ -154,6 +158,180 @@ def _add_demo(app: "typer.Typer") -> None:
     ) -> None:
         """Draws a walker whose motion is known, tracks it and compares."""
         raise typer.Exit(_guarded(lambda: _demo(out, seed)))
+
+
+def _add_pointlight(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command()
+    def pointlight(
+        motion: Annotated[
+            Path | None,
+            typer.Argument(
+                help="CSV of NAME_x, NAME_y, NAME_z in metres, or a folder with track.csv; a walker."
+            ),
+        ] = None,
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
+        azimuth_deg: Annotated[float, typer.Option(help="Viewer about the vertical; 90 = from +x.")] = 0.0,
+        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal.")] = 0.0,
+        px_per_m: Annotated[float, typer.Option(help="Scale.")] = 200.0,
+        locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
+        inverted: Annotated[bool, typer.Option(help="Upside down.")] = False,
+        mirrored: Annotated[bool, typer.Option(help="Facing the other way.")] = False,
+        reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
+        scramble_position: Annotated[
+            bool, typer.Option(help="Every dot's motion at a random place.")
+        ] = False,
+        scramble_phase: Annotated[bool, typer.Option(help="Every dot's motion shifted in time.")] = False,
+        period: Annotated[
+            float | None, typer.Option(help="Period of the motion, seconds; all of it.")
+        ] = None,
+        lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
+        dots: Annotated[int, typer.Option(help="With --lifetime: dots shown.")] = 8,
+        on: Annotated[str, typer.Option(help="With --lifetime: limbs or joints.")] = "limbs",
+        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
+        noise_kind: Annotated[str, typer.Option(help="scrambled, linear or flicker.")] = "scrambled",
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of pixel noise.")] = 0.0,
+        seconds: Annotated[float, typer.Option(help="Without MOTION: duration.")] = 2.4,
+        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
+        seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
+    ) -> None:
+        """Makes a point-light display: dots.csv, labels.csv and display.mp4."""
+        options = {
+            "azimuth_deg": azimuth_deg,
+            "elevation_deg": elevation_deg,
+            "px_per_m": px_per_m,
+            "locomotion": locomotion,
+            "inverted": inverted,
+            "mirrored": mirrored,
+            "reversed": reversed_,
+            "scramble_position": scramble_position,
+            "scramble_phase": "periodic" if scramble_phase else None,
+            "period_s": period,
+            "lifetime_frames": lifetime,
+            "life_dots": dots,
+            "life_sites": on,
+            "noise_dots": noise_dots,
+            "noise_kind": noise_kind,
+            "noise_sd_px": noise_px,
+            "seed": seed,
+        }
+        raise typer.Exit(_guarded(lambda: _pointlight(motion, out, seconds, fps, options)))
+
+
+def _add_planar(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(
+        epilog="Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; "
+        "3 no window shows planar motion; 4 the app extra is not installed."
+    )
+    def planar(
+        tracks: Annotated[Path, typer.Argument(help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps).")],
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of the tracks' coordinates.")] = 0.5,
+        window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
+        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has no time_s.")] = None,
+        carry: Annotated[
+            bool, typer.Option(help="Carry lengths through windows in which it is lost.")
+        ] = False,
+        names: Annotated[bool, typer.Option(help="Write the points' names into the pictures.")] = True,
+        video: Annotated[bool, typer.Option(help="Write turned.mp4, the limbs from a new side.")] = True,
+    ) -> None:
+        """Links unnamed points into limbs that swing in planes, with lengths and depths."""
+        folder = out or Path("memo-out") / tracks.stem
+        options = {"window_s": window, "carry": carry}
+        raise typer.Exit(_guarded(lambda: _planar(tracks, folder, noise_px, fps, names, video, options)))
+
+
+def _pointlight(
+    motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
+) -> Exit:
+    from memo.figure import Points, read_points_csv, write_points_csv
+    from memo.figure_plot import write_display_video
+
+    if motion is None:
+        points = _walker_points(seconds, fps or 60.0)
+    else:
+        points = read_points_csv(motion / "track.csv" if motion.is_dir() else motion, 3, fps)
+    _check_writable(out)
+    display = _new_display(points, options)
+    shown, labels = display["positions_px"], display["labels"]
+    stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
+    named = [points.names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
+    write_points_csv(out / "dots.csv", Points(named, display["times_s"], shown))
+    _write_labels(out / "labels.csv", points.names, named, display)
+    write_display_video(out / "display.mp4", display["times_s"], shown)
+    print(f"{shown.shape[1]} dots in {shown.shape[0]} frames.")
+    print(f"Written to {out}: dots.csv, labels.csv, display.mp4.")
+    if stays:
+        print(f"To find the limbs in it again: memo planar {out / 'dots.csv'}")
+    return Exit.TRACKED
+
+
+def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
+    """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
+    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
+        file.write("frame,dot,shows,limb_end,fraction,visible\n")
+        for frame, row in enumerate(display["labels"]):
+            for dot, label in enumerate(row):
+                end = int(display["limb_ends"][frame, dot])
+                shows = names[label] if label >= 0 else "noise"
+                limb = f"{names[end]},{display['fractions'][frame, dot]:.4f}" if end >= 0 else ","
+                file.write(f"{frame},{dots[dot]},{shows},{limb},{int(display['visible'][frame, dot])}\n")
+
+
+def _planar(
+    tracks: Path,
+    out: Path,
+    noise_px: float,
+    fps: float | None,
+    names: bool,
+    video: bool,
+    options: dict[str, Any],
+) -> Exit:
+    from memo.figure import read_points_csv, write_figure_csv
+    from memo.figure_plot import write_linkage_png, write_turned_video
+
+    points = read_points_csv(tracks, 2, fps)
+    _check_writable(out)
+    delivery = Delivery(out)
+    print(f"{len(points.names)} points in {len(points.times_s)} frames: looking for limbs ...", flush=True)
+    figure = _new_figure(points, noise_px, options)
+    written = write_figure_csv(out, figure, points)
+    write_linkage_png(out / "linkage.png", points, figure, names=names)
+    written.append(out / "linkage.png")
+    (out / "turned.mp4").unlink(missing_ok=True)  # of an earlier run
+    if video and figure.interpreted:
+
+        def progress(frames: Iterable[int]) -> Iterable[int]:
+            return _with_progress(frames, "drawing", len(points.times_s), delivery)
+
+        write_turned_video(out / "turned.mp4", points, figure, progress=progress)
+        written.append(out / "turned.mp4")
+    for line in _about_figure(figure, points):
+        print(line)
+    print(f"Written to {out}: {', '.join(path.name for path in written)}.")
+    return Exit.TRACKED if figure.interpreted else Exit.NOBODY
+
+
+def _about_figure(figure: Any, points: Any) -> list[str]:
+    """What was found, in sentences."""
+    states = [window["status"] for window in figure.windows]
+    told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
+    lines = [f"Windows: {', '.join(told)}."]
+    if not figure.interpreted:
+        return [*lines, "No window shows planar motion: nothing is claimed. The best guess is in links.csv."]
+    for a, b, length, confidence, count in figure.links():
+        where = (
+            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
+        )
+        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
+        lines.append(f"  {points.names[a]} - {points.names[b]}: {length:.0f} px long{sure}{where}")
+    return [
+        *lines,
+        "Every chain may also be its mirror image in depth; depths of chains to each other are open.",
+    ]
 
 
 def _track_video(
@@ -211,6 +389,24 @@ def _demo(out: Path, seed: int) -> Exit:
 
 def _new_tracker(options: dict[str, Any]) -> Any:
     return memo.Tracker(**options)
+
+
+def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
+    positions = np.ascontiguousarray(points.positions, dtype=np.float64)
+    return memo.pointlight(positions, points.times_s, points.names, **options)
+
+
+def _walker_points(seconds: float, rate_hz: float) -> Any:
+    from memo.figure import Points
+
+    if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
+        raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames a second cannot be shown")
+    walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz)
+    return Points(walk["names"], walk["times_s"], walk["positions"])
+
+
+def _new_figure(points: Any, noise_px: float, options: dict[str, Any]) -> Any:
+    return memo.planar(points.positions, points.times_s, noise_px, **options)
 
 
 def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
@@ -409,9 +605,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _with_progress(
-    frames: "Iterable[Frame]", what: str, count: int | None, delivery: Delivery
-) -> "Iterator[Frame]":
+def _with_progress(frames: Iterable[T], what: str, count: int | None, delivery: Delivery) -> Iterator[T]:
     """The same frames; on a terminal, a bar with the time left."""
     from rich.console import Console
     from rich.progress import track

@@ -112,7 +112,7 @@ pub struct Costs {
 
 impl Default for Costs {
     fn default() -> Self {
-        Self { length: 0.02, rod: 0.02, alone: 0.066, detached: 0.073, noise: 0.6, temperature: 0.0045 }
+        Self { length: 0.02, rod: 0.018, alone: 0.061, detached: 0.08, noise: 0.6, temperature: 0.0045 }
     }
 }
 
