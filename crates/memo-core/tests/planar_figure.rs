@@ -242,6 +242,28 @@ fn limbs_of_real_walks_are_linked() {
     }
 }
 
+#[test]
+fn a_spanning_forest_finds_most_limbs() {
+    let Some(walks) = walks() else { return };
+    for noise_px in [0.0, 1.0, 2.0] {
+        let (mut hits, mut found) = (0, 0);
+        for (index, walk) in walks.iter().enumerate() {
+            for off_deg in [15.0, 30.0, 45.0, 60.0] {
+                let tracks = window(&walks, index, off_deg, walk.stride / 3, noise_px, off_deg as u64);
+                let times_s: Vec<f64> = (0..walk.stride).map(|t| t as f64 / walk.rate_hz).collect();
+                let options = FigureOptions { most_covered: 0, ..options(noise_px) };
+                let read = interpret_figure(&tracks[..12], &times_s, &options).unwrap();
+                let links = links(&read.windows[0].figure, &(0..12).collect::<Vec<_>>());
+                hits += links.iter().filter(|l| LIMBS.contains(l)).count();
+                found += links.iter().filter(|l| !l.iter().all(|p| TRUNK.contains(p))).count();
+            }
+        }
+        let (recall, precision) = (hits as f64 / 128.0, hits as f64 / found as f64);
+        println!("forest, {noise_px} px: precision {precision:.3}, recall {recall:.3}");
+        assert!(recall >= 0.9, "{noise_px} px: {recall}");
+    }
+}
+
 fn print_reliability(confidences: &[(f64, bool)]) {
     for (low, high) in
         [(0.0, 0.5), (0.5, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)]
