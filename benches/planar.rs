@@ -19,8 +19,8 @@ fn rods() -> Vec<[DVec2; 3]> {
     let mut random = Random::new(1);
     let mut rod = || {
         let tilt = random.uniform(0.2, 1.2);
-        let along = DVec2::from_angle(random.uniform(0.0, 6.28));
-        let start = random.uniform(0.0, 6.28);
+        let along = DVec2::from_angle(random.uniform(0.0, 6.3));
+        let start = random.uniform(0.0, 6.3);
         [0.0, 0.7, 1.2].map(|step: f64| {
             let angle = start + step;
             0.4 * (angle.cos() * tilt.cos() * along + angle.sin() * along.perp())

@@ -486,7 +486,7 @@ impl<'a, const K: usize> Problem<'a, K> {
             } else {
                 damping *= 10.0;
                 // The step is lost in rounding, or smaller than it would matter.
-                if damping > 1e3 || !(step.rows(0, 2).norm() > 1e-13 * (1.0 + u.length())) {
+                if damping > 1e3 || step.rows(0, 2).norm() <= 1e-13 * (1.0 + u.length()) {
                     break;
                 }
             }
@@ -671,7 +671,7 @@ pub(super) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
     let (mean, half_difference, b) =
         if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
     let least = determinant / (mean + spread);
-    if !(least > 0.0) {
+    if least <= 0.0 || least.is_nan() {
         return None;
     }
     // |g|^2 = largest/least - 1; 2 angle of g = angle of (A - C, 2 B).
@@ -779,7 +779,8 @@ mod tests {
     fn independent_cost(points: &[Vec<DVec2>; 3], sd: f64, g: DVec2, c: [f64; 2]) -> f64 {
         let h = |end: DVec2, o: DVec2| (end - o).length_squared() + g.dot(end - o).powi(2);
         let mut cost = 0.0;
-        for i in 0..points[0].len() {
+        let views = points[0].len();
+        for i in 0..views {
             let at = |k: usize, step: DVec2, j: usize| points[k][i] + if k == j { step } else { DVec2::ZERO };
             let errors = |step: DVec2, j: usize| {
                 let o = at(1, step, j);

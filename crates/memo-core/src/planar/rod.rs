@@ -212,8 +212,9 @@ pub(super) fn polish(pairs: [[DVec2; 2]; 2], mut g: DVec2) -> DVec2 {
         let [first, second] = pairs.map(|[a, b]| 2.0 * (g.dot(a) * a - g.dot(b) * b));
         let next = g - DMat2::from_cols(first, second).transpose().inverse() * error;
         let next_error = errors(next);
-        // Also false for NaN.
-        if !(next_error.length_squared() < 0.25 * error.length_squared()) {
+        // Not so for NaN.
+        let helps = next_error.length_squared() < 0.25 * error.length_squared();
+        if !helps {
             break;
         }
         (g, error) = (next, next_error);
