@@ -778,9 +778,7 @@ mod tests {
     /// The cost on its own: residuals by a numerical gradient, noise of the three points propagated.
     fn independent_cost(points: &[Vec<DVec2>; 3], sd: f64, g: DVec2, c: [f64; 2]) -> f64 {
         let h = |end: DVec2, o: DVec2| (end - o).length_squared() + g.dot(end - o).powi(2);
-        let mut cost = 0.0;
-        let views = points[0].len();
-        for i in 0..views {
+        let cost = |i: usize| {
             let at = |k: usize, step: DVec2, j: usize| points[k][i] + if k == j { step } else { DVec2::ZERO };
             let errors = |step: DVec2, j: usize| {
                 let o = at(1, step, j);
@@ -794,9 +792,9 @@ mod tests {
                 }
             }
             let e = errors(DVec2::ZERO, 0);
-            cost += (e.transpose() * covariance.try_inverse().unwrap() * e)[0];
-        }
-        cost
+            (e.transpose() * covariance.try_inverse().unwrap() * e)[0]
+        };
+        (0..points[0].len()).map(cost).sum()
     }
 
     #[test]
