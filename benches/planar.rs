@@ -6,8 +6,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
 use memo_core::planar::{
-    FitOptions, Rod, RodRefusal, fit_hinge, fit_rod, hinge_from_two_views, rod_by_paper, rod_from_ellipse,
-    rod_from_three_views,
+    FitOptions, Rod, RodRefusal, fit_hinge, fit_rod, hinge_from_two_views, rod_by_paper, rod_depths,
+    rod_from_ellipse, rod_from_three_views,
 };
 use memo_core::synth::Random;
 use std::hint::black_box;
@@ -19,8 +19,8 @@ fn rods() -> Vec<[DVec2; 3]> {
     let mut random = Random::new(1);
     let mut rod = || {
         let tilt = random.uniform(0.2, 1.2);
-        let along = DVec2::from_angle(random.uniform(0.0, 6.28));
-        let start = random.uniform(0.0, 6.28);
+        let along = DVec2::from_angle(random.uniform(0.0, 6.3));
+        let start = random.uniform(0.0, 6.3);
         [0.0, 0.7, 1.2].map(|step: f64| {
             let angle = start + step;
             0.4 * (angle.cos() * tilt.cos() * along + angle.sin() * along.perp())
@@ -41,6 +41,15 @@ fn closed_forms(c: &mut Criterion) {
                 *copy = [a.x, a.y, b.x, b.y, c.x, c.y, a.x, a.y, b.x, b.y, c.x];
             }
             black_box(&mut copies);
+        });
+    });
+    let mut depths = vec![[0.0f64; 3]; PROBLEMS];
+    group.bench_function("rod, bare depths", |b| {
+        b.iter(|| {
+            for (depth, rod) in depths.iter_mut().zip(black_box(&problems)) {
+                *depth = rod_depths(rod);
+            }
+            black_box(&mut depths);
         });
     });
     type Solve = fn(&[DVec2; 3]) -> Result<Rod, RodRefusal>;

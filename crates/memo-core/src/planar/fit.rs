@@ -15,7 +15,8 @@
 //! grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
 //!
 //! What it cannot do: tell a rod from its mirror; see depth from a plane parallel to the image (the slope's
-//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit).
+//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit). Far from
+//! planar the cost has several minima, and a second best may be returned (1 of 30 draws, 12 % dearer).
 
 use super::Plane;
 use glam::{DMat3, DVec2, DVec3};
@@ -486,7 +487,7 @@ impl<'a, const K: usize> Problem<'a, K> {
             } else {
                 damping *= 10.0;
                 // The step is lost in rounding, or smaller than it would matter.
-                if damping > 1e3 || !(step.rows(0, 2).norm() > 1e-13 * (1.0 + u.length())) {
+                if damping > 1e3 || step.rows(0, 2).norm() <= 1e-13 * (1.0 + u.length()) {
                     break;
                 }
             }
@@ -671,7 +672,7 @@ pub(super) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
     let (mean, half_difference, b) =
         if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
     let least = determinant / (mean + spread);
-    if !(least > 0.0) {
+    if least <= 0.0 || least.is_nan() {
         return None;
     }
     // |g|^2 = largest/least - 1; 2 angle of g = angle of (A - C, 2 B).
@@ -778,8 +779,7 @@ mod tests {
     /// The cost on its own: residuals by a numerical gradient, noise of the three points propagated.
     fn independent_cost(points: &[Vec<DVec2>; 3], sd: f64, g: DVec2, c: [f64; 2]) -> f64 {
         let h = |end: DVec2, o: DVec2| (end - o).length_squared() + g.dot(end - o).powi(2);
-        let mut cost = 0.0;
-        for i in 0..points[0].len() {
+        let cost = |i: usize| {
             let at = |k: usize, step: DVec2, j: usize| points[k][i] + if k == j { step } else { DVec2::ZERO };
             let errors = |step: DVec2, j: usize| {
                 let o = at(1, step, j);
@@ -793,9 +793,9 @@ mod tests {
                 }
             }
             let e = errors(DVec2::ZERO, 0);
-            cost += (e.transpose() * covariance.try_inverse().unwrap() * e)[0];
-        }
-        cost
+            (e.transpose() * covariance.try_inverse().unwrap() * e)[0]
+        };
+        (0..points[0].len()).map(cost).sum()
     }
 
     #[test]

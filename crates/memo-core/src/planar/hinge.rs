@@ -319,8 +319,8 @@ mod tests {
         let mut random = Random::new(31);
         let mut compared = 0;
         for _ in 0..300 {
-            let slope = random.uniform(0.2, 3.0) * DVec2::from_angle(random.uniform(0.0, 6.28));
-            let angles = [[0; 2]; 2].map(|view| view.map(|_| random.uniform(0.0, 6.28)));
+            let slope = random.uniform(0.2, 3.0) * DVec2::from_angle(random.uniform(0.0, 6.3));
+            let angles = [[0; 2]; 2].map(|view| view.map(|_| random.uniform(0.0, 6.3)));
             let [first, second] = planted_views(slope, angles, [0.8, 1.0]);
             let Ok(hinge) = hinge_from_two_views(&first, &second) else { panic!("{slope} {angles:?}") };
             if hinge.condition > 200.0 {

@@ -29,4 +29,6 @@ pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
 pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
 pub use plane::Plane;
-pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
+pub use rod::{
+    Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_depths, rod_from_ellipse, rod_from_three_views,
+};
