@@ -15,7 +15,7 @@ use super::motion::{Motion, limbs_of};
 use super::random::Random;
 use crate::model::Camera;
 use glam::{DVec2, DVec3};
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use thiserror::Error;
 
 /// More dots than this over all frames are not made.
@@ -344,14 +344,14 @@ fn checked(motion: &Motion, options: &PointLightOptions) -> Result<(), PointLigh
         if !azimuth_rad.is_finite() {
             return refuse("azimuth", "finite radians", azimuth_rad);
         }
-        if !(elevation_rad.abs() <= std::f64::consts::FRAC_PI_2) {
+        if !(-FRAC_PI_2..=FRAC_PI_2).contains(&elevation_rad) {
             return refuse("elevation", "between -pi/2 and pi/2 radians", elevation_rad);
         }
         if !(px_per_m > 0.0 && px_per_m <= 1e6) {
             return refuse("pixels per metre", "positive and at most 1,000,000", px_per_m);
         }
     }
-    if !(options.noise_sd_px >= 0.0 && options.noise_sd_px <= 1e6) {
+    if !(0.0..=1e6).contains(&options.noise_sd_px) {
         return refuse("noise_sd_px", "from 0 to 1,000,000 pixels", options.noise_sd_px);
     }
     let mut dots = motion.points();
@@ -369,7 +369,7 @@ fn checked(motion: &Motion, options: &PointLightOptions) -> Result<(), PointLigh
             return refuse("area_scale of the noise dots", "positive and at most 1000", noise.area_scale);
         }
         if let NoiseKind::Linear { speed_px_s } = noise.kind
-            && !(speed_px_s.abs() <= 1e6)
+            && !(-1e6..=1e6).contains(&speed_px_s)
         {
             return refuse("speed of the noise dots", "at most 1,000,000 pixels a second", speed_px_s);
         }
