@@ -9,33 +9,45 @@ from memo._memo import (
     __version__,
     change_mask,
     edge_segments,
+    head_points,
     moving_regions,
     pointlight,
     silhouettes,
     similarity,
+    stick_joints,
     velocity_field,
     walker_motion,
 )
 from memo.figure import PlanarFigure, planar
+from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.scene import DemoScene, demo_scene
+from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
 
 __all__ = [
     "Camera",
     "DemoScene",
+    "Keypoints",
+    "KeypointsError",
     "PlanarFigure",
+    "SideRepair",
     "Track",
     "Tracker",
     "__version__",
     "change_mask",
     "demo_scene",
     "edge_segments",
+    "head_points",
+    "layouts",
     "moving_regions",
     "planar",
     "pointlight",
+    "read_keypoints",
     "silhouettes",
     "similarity",
+    "stick_joints",
     "track",
+    "unswap",
     "velocity_field",
     "walker_motion",
 ]

@@ -15,11 +15,25 @@ __all__ = [
     "__version__",
     "change_mask",
     "edge_segments",
+    "follow_person",
+    "guess_layout",
+    "head_points",
+    "joint_name",
+    "keypoint_layout",
+    "keypoint_layouts",
+    "joint_names",
+    "lee_chen_counts",
+    "lee_chen_figures",
+    "lee_chen_head",
+    "lee_chen_last_stage",
     "moving_regions",
     "planar",
     "pointlight",
+    "side_pairs",
     "silhouettes",
     "similarity",
+    "stick_joints",
+    "unswap",
     "velocity_field",
     "walker_motion",
 ]
@@ -208,3 +222,37 @@ def planar(
     false_target_rate: float = 0.01,
     max_tilt_deg: float = 80.0,
 ) -> dict[str, Any]: ...
+def keypoint_layouts() -> list[str]: ...
+def keypoint_layout(name: str) -> tuple[str, list[str]]: ...
+def guess_layout(points: npt.NDArray[np.float64]) -> str: ...
+def joint_name(name: str) -> str | None: ...
+def stick_joints(
+    layout_or_names: str | Sequence[str],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def head_points(
+    layout_or_names: str | Sequence[str],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int, int]]: ...
+def follow_person(
+    frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
+) -> list[bool]: ...
+def unswap(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64] | None = None,
+    *,
+    groups: dict[str, dict[str, list[tuple[int, int]]]],
+    as_is_nats: float | None = None,
+    partial_begin_nats: float | None = None,
+    partial_stay_nats: float | None = None,
+    decided_at: float | None = None,
+) -> dict[str, Any]: ...
+def joint_names() -> list[str]: ...
+def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
+def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
+def lee_chen_head() -> list[dict[str, Any]]: ...
+def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = 0.04) -> list[dict[str, Any]]: ...

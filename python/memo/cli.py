@@ -1,6 +1,6 @@
-"""The command line: `memo track VIDEO`, `memo demo`, `memo pointlight`, `memo planar TRACKS.csv`.
+"""The command line: `memo track`, `unswap`, `reproduce`, `demo`, `pointlight`, `planar`.
 
-This file alone knows how a tracked walk is delivered: what is checked before work starts, what is written,
+This file alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. The base install has numpy alone, so everything from the `app`
 extra is imported inside functions, after `main` has looked for it. (Typer reads annotations where they
 stand, hence no `from __future__ import annotations` here.)
@@ -16,7 +16,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +25,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import numpy as np
 
 import memo
-from memo.files import JOINTS, complete_file, read_tsai_xml, write_events_csv, write_track_csv
+from memo.files import (
+    JOINTS,
+    complete_file,
+    read_tsai_xml,
+    write_events_csv,
+    write_flips_csv,
+    write_track_csv,
+)
 
 if TYPE_CHECKING:
     import typer
@@ -40,6 +47,9 @@ EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 
 3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
 (what was tracked until then is written)."""
 
+UNSWAP_EXIT_CODES = """Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong usage;
+4 the app extra is not installed; 130 interrupted (nothing is written)."""
+
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png")
 
 _LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at before they are used
@@ -49,10 +59,17 @@ class Exit(IntEnum):
     """What the exit codes mean."""
 
     TRACKED = 0
+    DONE = 0  # where nobody is to be tracked
     BAD_INPUT = 1
     NOBODY = 3
     NO_EXTRA = 4
     INTERRUPTED = 130
+
+
+class Experiment(StrEnum):
+    """What can be reproduced: the names of `memo.reproduce.EXPERIMENTS`."""
+
+    LEE_CHEN = "lee-chen"
 
 
 class InputError(ValueError):
@@ -110,9 +127,11 @@ def _app() -> "typer.Typer":
     ) -> None: ...
 
     _add_track(app)
+    _add_unswap(app)
     _add_demo(app)
     _add_pointlight(app)
     _add_planar(app)
+    _add_reproduce(app)
     return app
 
 
@@ -146,6 +165,33 @@ def _add_track(app: "typer.Typer") -> None:
             return _track_video(video, _frame_range(frames), fps, tracker_options, delivery)
 
         raise typer.Exit(_guarded(work))
+
+
+def _add_unswap(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=UNSWAP_EXIT_CODES)
+    def unswap(
+        keypoints: Annotated[
+            Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
+        ],
+        fps: Annotated[
+            float | None, typer.Option(help="Frame rate; needed where no times are given.")
+        ] = None,
+        layout: Annotated[
+            str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
+        ] = None,
+        person: Annotated[
+            int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
+        ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Exchanges right and left in KEYPOINTS where a detector confused them."""
+        delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
+        options = {"fps": fps, "layout": layout, "person": person}
+        raise typer.Exit(_guarded(lambda: _unswap(keypoints, options, delivery)))
 
 
 def _add_demo(app: "typer.Typer") -> None:
@@ -334,6 +380,21 @@ def _about_figure(figure: Any, points: Any) -> list[str]:
     ]
 
 
+def _add_reproduce(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command()
+    def reproduce(
+        experiment: Annotated[Experiment, typer.Argument(help="lee-chen: Lee and Chen 1985, postures.")],
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for tables and figures; memo-out/EXPERIMENT.")
+        ] = None,
+    ) -> None:
+        """Computes a paper's tables and figures again, beside the printed numbers."""
+        folder = out or Path("memo-out") / experiment.value
+        raise typer.Exit(_guarded(lambda: _reproduce(experiment, folder)))
+
+
 def _track_video(
     video: Path,
     frame_range: tuple[int, int | None],
@@ -366,6 +427,39 @@ def _track_video(
     return _exit_code(track)
 
 
+def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
+    from rich.console import Console
+
+    _check_writable(delivery.out)
+    console = Console(stderr=True)
+    silent = delivery.quiet or not console.is_terminal
+    with contextlib.nullcontext() if silent else console.status("looking at right and left"):
+        repair = memo.unswap(memo.read_keypoints(path, **options))
+        written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
+        if written[0].name == written[1].name:
+            raise InputError(f"{path}: is called as the table of changes; rename it")
+        repair.keypoints.write(written[0])
+        write_flips_csv(written[1], repair.flips)
+    _report_sides(repair, written, delivery)
+    return Exit.DONE
+
+
+def _report_sides(repair: Any, written: list[Path], delivery: Delivery) -> None:
+    count = len(repair.keypoints.frames)
+    if delivery.as_json:
+        summary = {"frames": count, "exchanged": repair.exchanged, "undecided": repair.undecided}
+        print(json.dumps({**summary, "files": [str(path) for path in written]}))
+    elif delivery.talks:
+        done = " and ".join(f"{group} in {frames}" for group, frames in repair.exchanged.items())
+        doubt = " and ".join(f"{group} in {frames}" for group, frames in repair.undecided.items() if frames)
+        undecided = f"undecided: {doubt}" if doubt else "none undecided"
+        names = ", ".join(path.name for path in written)
+        print(
+            f"Right and left exchanged, of {count} frames: {done} ({undecided}); "
+            f"written to {delivery.out}: {names}."
+        )
+
+
 def _demo(out: Path, seed: int) -> Exit:
     delivery = Delivery(out)
     _check_writable(out)
@@ -382,6 +476,16 @@ def _demo(out: Path, seed: int) -> Exit:
     print("Next, your own video of one person walking across the picture, camera on a tripod:")
     print("  memo track VIDEO --height 1.75")
     return _exit_code(track)
+
+
+def _reproduce(experiment: Experiment, out: Path) -> Exit:
+    from memo.reproduce import EXPERIMENTS
+
+    _check_writable(out)
+    reproduction = EXPERIMENTS[experiment.value](out)
+    print("\n".join(reproduction.lines))
+    print(f"Written to {out}: {', '.join(path.name for path in reproduction.written)}.")
+    return Exit.DONE
 
 
 # The core is called here and nowhere else in this file.

@@ -1,4 +1,4 @@
-"""The tables a tracked walk is written to, `track.csv` and `events.csv`, and calibrations in XML.
+"""The tables results are written to, `track.csv`, `events.csv` and `flips.csv`, and calibrations in XML.
 
 The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
 it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete.
@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 __all__ = [
     "EVENT_COLUMNS",
+    "FLIP_COLUMNS",
     "JOINTS",
     "TRACK_COLUMNS",
     "complete_file",
@@ -27,6 +28,7 @@ __all__ = [
     "read_track_csv",
     "read_tsai_xml",
     "write_events_csv",
+    "write_flips_csv",
     "write_track_csv",
 ]
 
@@ -48,6 +50,9 @@ TRACK_COLUMNS = (
 EVENT_COLUMNS = ("time_s", "frame", "event", "side")
 """Columns of `events.csv`, in order; `frame` has a fraction where the event falls between two frames."""
 
+FLIP_COLUMNS = ("frame", "time_s", "last_frame", "group", "levels", "verdict", "probability", "reason")
+"""Columns of `flips.csv`, in order: exchanges of right and left, and runs of frames without a decision."""
+
 # Digits after the point: well below what a single camera resolves, so that rounding never shows.
 _DIGITS = {
     "frame": 2,
@@ -59,6 +64,7 @@ _DIGITS = {
     "_s": 6,
     "phase": 5,
     "p_swapped": 6,
+    "probability": 6,
     "similarity": 5,
     "walk": 0,
 }
@@ -92,6 +98,12 @@ def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, An
     """Writes gait events: dicts with the keys of `EVENT_COLUMNS`."""
     rows = ([_texts(name, np.asarray([event[name]]))[0] for name in EVENT_COLUMNS] for event in events)
     _write_rows(path, EVENT_COLUMNS, rows)
+
+
+def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]]) -> None:
+    """Writes what was done to right and left: dicts with the keys of `FLIP_COLUMNS`."""
+    rows = ([_texts(name, np.asarray([flip[name]]))[0] for name in FLIP_COLUMNS] for flip in flips)
+    _write_rows(path, FLIP_COLUMNS, rows)
 
 
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:

@@ -13,5 +13,6 @@
 pub mod image;
 pub mod model;
 pub mod planar;
+pub mod posture;
 pub mod synth;
 pub mod track;

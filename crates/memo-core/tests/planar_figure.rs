@@ -6,14 +6,14 @@
 //! repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`; without it the tests say so and
 //! pass. `MEMO_FULL=1` takes all walks, views and windows instead of every fourth; `--nocapture` prints the table.
 
+mod mocap;
+
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 use memo_core::planar::{Figure, FigureOptions, FitOptions, interpret_figure};
 use memo_core::synth::Random;
 
-const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
 const PX_PER_M: f64 = 200.0;
 const LIMBS: [[usize; 2]; 8] = [[0, 1], [1, 2], [3, 4], [4, 5], [6, 7], [7, 8], [9, 10], [10, 11]];
 /// Shoulders, hips and the head, which is point 12 where it is shown.
@@ -28,33 +28,14 @@ struct Walk {
     stride: usize,
 }
 
-fn folder() -> PathBuf {
-    let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    shared.join("mocap/joints")
-}
-
 fn walks() -> Option<Vec<Walk>> {
-    let found: Option<Vec<Walk>> = WALKS.iter().map(|name| walk(name)).collect();
-    if found.is_none() {
-        println!("skipped: no motion capture in {} (set MEMO_SHARED_DATA)", folder().display());
-    }
-    found
+    mocap::WALKS.into_iter().map(walk).collect()
 }
 
 fn walk(name: &str) -> Option<Walk> {
-    let text = std::fs::read_to_string(folder().join(format!("{name}.csv"))).ok()?;
-    let rate = text.split(',').find(|part| part.contains("Hz"))?.trim().trim_end_matches(" Hz");
-    let row = |line: &str| {
-        let x: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-        std::array::from_fn(|j| DVec3::new(x[1 + 3 * j], x[2 + 3 * j], x[3 + 3 * j]))
-    };
-    // The CMU 12_01 file starts with a T-pose.
-    let skipped = if name == "CMU_12_01" { 12 } else { 2 };
-    let frames: Vec<[DVec3; 12]> = text.lines().skip(skipped).step_by(2).map(row).collect();
-    let rate_hz = rate.parse::<f64>().ok()? / 2.0;
+    let (rate_hz, frames) = mocap::joints(name)?;
+    let frames: Vec<[DVec3; 12]> = frames.into_iter().step_by(2).collect();
+    let rate_hz = rate_hz / 2.0;
     let pelvis = |f: &[DVec3; 12]| 0.5 * (f[6] + f[9]);
     let forward = (pelvis(frames.last()?) - pelvis(&frames[0])).with_z(0.0).normalize();
     let apart: Vec<f64> = frames.iter().map(|f| (f[8] - f[11]).dot(forward)).collect();

@@ -7,7 +7,7 @@ mod mocap;
 use glam::DVec2;
 use memo_core::planar::{EvidenceOptions, FalseTargetRate, FitOptions, Verdict, fit_hinge, link_three};
 use memo_core::synth::Random;
-use mocap::{LIMBS, noisy, quantile};
+use mocap::stride::{LIMBS, noisy, quantile, walks};
 
 /// 200 px/m.
 const PIXEL_M: f64 = 0.005;
@@ -24,7 +24,7 @@ fn depth_rms(found: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
 /// 90th percentiles of the relative error of length and of depth over length: thigh and shank, or upper and
 /// forearm.
 fn limb_errors(limbs: [usize; 2], noise_px: f64) -> Option<[f64; 2]> {
-    let walks = mocap::walks()?;
+    let walks = walks()?;
     let mut random = Random::new(11);
     let noise_sd = noise_px * PIXEL_M;
     let options = FitOptions { noise_sd, ..FitOptions::default() };
@@ -76,7 +76,7 @@ fn arms_have_their_lengths_roughly() {
 
 #[test]
 fn the_knee_is_the_pivot_of_a_mocap_leg() {
-    let Some(walks) = mocap::walks() else { return };
+    let Some(walks) = walks() else { return };
     let mut random = Random::new(12);
     for noise_px in [0.0, 1.0] {
         let noise_sd = noise_px * PIXEL_M;

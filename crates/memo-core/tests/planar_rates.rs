@@ -12,7 +12,8 @@ use memo_core::planar::{
     rod_evidence,
 };
 use memo_core::synth::Random;
-use mocap::{JOINTS, LIMBS, Walk, azimuth_deg, noisy};
+use mocap::JOINTS;
+use mocap::stride::{LIMBS, Walk, azimuth_deg, noisy, walks};
 
 /// 200 px/m.
 const PIXEL_M: f64 = 0.005;
@@ -251,7 +252,7 @@ fn assert_rates(results: &[Cell]) {
 
 #[test]
 fn hinges_keep_the_stated_rates() {
-    let Some(walks) = mocap::walks() else { return };
+    let Some(walks) = walks() else { return };
     let results = table(&walks, 3);
     assert_rates(&results);
     for Cell { views, noise_px, limbs, .. } in results {
@@ -264,7 +265,7 @@ fn hinges_keep_the_stated_rates() {
 
 #[test]
 fn rods_keep_the_stated_rates() {
-    let Some(walks) = mocap::walks() else { return };
+    let Some(walks) = walks() else { return };
     let results = table(&walks, 2);
     assert_rates(&results);
     // A rod is weaker evidence than a hinge: at 1 % and with noise few true ones pass.

@@ -1,9 +1,10 @@
 //! All traffic with numpy.
 
 use crate::error::value_error;
+use glam::DVec2;
 use memo_core::image::{Frame, Image, Mask};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -132,7 +133,7 @@ pub fn points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
 /// Line segments of shape (N, 2, 2).
 pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2]; 2]>> {
     let wanted = "wanted segments: numpy array of shape (N, 2, 2), dtype float64";
-    let Ok(array) = segments.cast::<numpy::PyArray3<f64>>() else {
+    let Ok(array) = segments.cast::<PyArray3<f64>>() else {
         return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(segments)?)));
     };
     let array = array.readonly();
@@ -173,4 +174,93 @@ pub fn numpy_from_flat<T: numpy::Element>(
     shape: Vec<usize>,
 ) -> PyResult<Bound<'_, PyArrayDyn<T>>> {
     flat.into_pyarray(py).reshape(shape)
+}
+
+/// Image points over time.
+pub struct Track {
+    /// Number of frames T.
+    pub frames: usize,
+    /// Number of points in a frame K.
+    pub joints: usize,
+    /// Frame after frame, T * K points in pixels, NaN where missing.
+    pub points_px: Vec<DVec2>,
+}
+
+/// Image points of shape (T, K, 2).
+pub fn track_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Track> {
+    let wanted = "wanted image points: numpy array of shape (T, K, 2), dtype float64";
+    let Ok(array) = points.cast::<PyArray3<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    let array = array.try_readonly()?;
+    let view = array.as_array();
+    let (frames, joints, axes) = view.dim();
+    if axes != 2 {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    }
+    let points_px = view.rows().into_iter().map(|row| DVec2::new(row[0], row[1])).collect();
+    Ok(Track { frames, joints, points_px })
+}
+
+/// Scores of shape (T, K) that belong to a track.
+pub fn scores_from_numpy(scores: &Bound<'_, PyAny>, track: &Track) -> PyResult<Vec<f64>> {
+    let (frames, joints) = (track.frames, track.joints);
+    let wanted = format!("wanted scores: numpy array of shape ({frames}, {joints}), dtype float64");
+    let Ok(array) = scores.cast::<PyArray2<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(scores)?)));
+    };
+    let array = array.try_readonly()?;
+    let view = array.as_array();
+    if view.dim() != (frames, joints) {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(scores)?)));
+    }
+    Ok(view.iter().copied().collect())
+}
+
+/// Image points, frame after frame, as an array of shape (T, joints, 2).
+pub fn numpy_from_track(
+    py: Python<'_>,
+    points_px: Vec<DVec2>,
+    joints: usize,
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    let frames = points_px.len() / joints.max(1);
+    points_px
+        .into_iter()
+        .flat_map(|point| point.to_array())
+        .collect::<Vec<f64>>()
+        .into_pyarray(py)
+        .reshape([frames, joints, 2])
+}
+
+/// Times of shape (T,), s.
+pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let wanted = "wanted times: numpy array of shape (T,), dtype float64";
+    let Ok(array) = times.cast::<PyArray1<f64>>() else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(times)?)));
+    };
+    Ok(array.readonly().as_array().iter().copied().collect())
+}
+
+/// Joints over time of shape (T, K, 2), px, frame after frame; T and K.
+pub fn joints_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<(Vec<[f64; 2]>, [usize; 2])> {
+    let wanted = "wanted joints over time: numpy array of shape (T, K, 2), dtype float64";
+    let array = points.cast::<PyArray3<f64>>().ok().filter(|array| array.shape()[2] == 2);
+    let Some(array) = array else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    let array = array.readonly();
+    let view = array.as_array();
+    let (frames, joints, _) = view.dim();
+    let at = |i: usize| [0, 1].map(|axis| view[[i / joints, i % joints, axis]]);
+    Ok(((0..frames * joints).map(at).collect(), [frames, joints]))
+}
+
+/// Scores of joints over time, of the joints' shape (T, K), frame after frame.
+pub fn joint_scores_from_numpy(scores: &Bound<'_, PyAny>, shape: [usize; 2]) -> PyResult<Vec<f64>> {
+    let array = scores.cast::<PyArray2<f64>>().ok().filter(|array| array.shape() == shape);
+    let Some(array) = array else {
+        let wanted = format!("wanted scores: numpy array of shape {shape:?}, dtype float64");
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(scores)?)));
+    };
+    Ok(array.readonly().as_array().iter().copied().collect())
 }

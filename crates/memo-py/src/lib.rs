@@ -4,11 +4,14 @@ mod array;
 mod camera;
 mod error;
 mod image;
+mod keypoints;
 mod planar;
 mod pointlight;
+mod reproduce;
 mod score;
 mod synth;
 mod tracker;
+mod unswap;
 
 use pyo3::prelude::*;
 
@@ -21,16 +24,26 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    use super::keypoints::{
+        follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
+        stick_joints,
+    };
     #[pymodule_export]
     use super::planar::planar;
     #[pymodule_export]
     use super::pointlight::{pointlight, walker_motion};
+    #[pymodule_export]
+    use super::reproduce::{
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
+    };
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
     use super::synth::PyScene;
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
+    #[pymodule_export]
+    use super::unswap::unswap;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -4,6 +4,7 @@ pub mod motion;
 pub mod pointlight;
 pub mod random;
 pub mod scene;
+pub mod stick_walker;
 
 pub use motion::{Motion, MotionError, WALKER_LIMBS, WalkOptions, limbs_of, sampled_walk};
 pub use pointlight::{
@@ -12,3 +13,4 @@ pub use pointlight::{
 };
 pub use random::Random;
 pub use scene::{SceneOptions, SynthScene, Truth};
+pub use stick_walker::{StickCamera, StickView, StickWalker};

@@ -1,139 +1,177 @@
-//! Walks of motion capture as orthographic views, for the tests of planar motion.
+//! Real joints in space and views of them, for tests of postures.
 //!
-//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`.
+//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`;
+//! without it [`load`] says so and gives None. Joint centres carry neither neck nor pelvis: the neck is put
+//! 3.77 cm before the middle of the shoulders, where the trunk of Table A.1 (Lee and Chen 1985) has it, and
+//! the pelvis 10 cm from the middle of the hips towards the shoulders.
 
-#![allow(dead_code)]
+#![allow(dead_code, reason = "each test uses its own part")]
+
+pub mod stride;
 
 use std::path::PathBuf;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
+use memo_core::model::{Camera, Distortion};
+use memo_core::posture::lift::JointRays;
+use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::synth::Random;
 
-/// Columns of the joint files.
+/// The walks; two systems of measurement, four people.
+pub const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
+
+/// One recorded motion.
+pub struct Motion {
+    /// Its name.
+    pub name: String,
+    /// Time of each figure, seconds.
+    pub times_s: Vec<f64>,
+    /// Joints in the world, Z up, metres.
+    pub figures: Vec<StickFigure>,
+    /// Level unit vector the walker moves in; where nobody walks, the mean of the trunk's forward axis.
+    pub heading: DVec3,
+}
+
+/// Columns of the joint files, limb by limb from the trunk.
 pub const JOINTS: [&str; 12] =
     ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN"];
 
-/// The four limbs, joint by joint from the trunk.
-pub const LIMBS: [[usize; 3]; 4] = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]];
-
-/// A walk on the spot: the mean forward motion is taken out.
-#[derive(Debug, Clone)]
-pub struct Walk {
-    pub name: &'static str,
-    rate_hz: f64,
-    frames: Vec<[DVec3; 12]>,
-    /// Horizontal unit vector of progression.
-    forward: DVec3,
-    /// Frames a stride.
-    stride: f64,
-}
-
-/// Joints of one stride: image positions and depths away from the camera, metres, `[joint][view]`.
-pub struct Views {
-    pub image: Vec<Vec<DVec2>>,
-    pub depth: Vec<Vec<f64>>,
-}
-
-const WALKS: [(&str, usize); 4] =
-    [("BTK_ANTO_M_hole", 0), ("BTK_BELT_C", 0), ("CMU_02_01", 0), ("CMU_12_01", 50)];
-
-/// The four level walks, or none where the data are absent.
-pub fn walks() -> Option<Vec<Walk>> {
+/// The joints of every frame of a recorded motion, metres in the world, NaN where missing; and its rate.
+pub fn joints(name: &str) -> Option<(f64, Vec<[DVec3; 12]>)> {
     let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
     );
-    let read = |(name, skip): (&'static str, usize)| {
-        let text = std::fs::read_to_string(shared.join("mocap/joints").join(format!("{name}.csv"))).ok()?;
-        Some(Walk::parse(name, &text, skip))
+    let file = shared.join("mocap/joints").join(format!("{name}.csv"));
+    let Ok(text) = std::fs::read_to_string(&file) else {
+        println!("skipped: no {} (set MEMO_SHARED_DATA)", file.display());
+        return None;
     };
-    let walks: Option<Vec<Walk>> = WALKS.into_iter().map(read).collect();
-    if walks.is_none() {
-        println!("skipped: no joints in {} (set MEMO_SHARED_DATA)", shared.display());
-    }
-    walks
+    let mut lines = text.lines();
+    let rate_hz = rate_hz(lines.next().unwrap());
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = JOINTS.map(|joint| columns.iter().position(|c| *c == format!("{joint}_x")).unwrap());
+    let row = |line: &str| {
+        let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect();
+        at.map(|c| DVec3::new(values[c], values[c + 1], values[c + 2]))
+    };
+    // The first frames of this walk are a calibration posture.
+    let skipped = if name == "CMU_12_01" { 10 } else { 0 };
+    Some((rate_hz, lines.skip(skipped).map(row).collect()))
 }
 
-impl Walk {
-    fn parse(name: &'static str, text: &str, skip: usize) -> Self {
-        let mut lines = text.lines();
-        let head = lines.next().unwrap();
-        let rate_hz =
-            head.split(',').find_map(|part| part.trim().strip_suffix(" Hz")).unwrap().parse().unwrap();
-        let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let at = JOINTS.map(|joint| columns.iter().position(|c| *c == format!("{joint}_x")).unwrap());
-        let mut frames: Vec<[DVec3; 12]> = lines
-            .skip(skip)
-            .map(|line| {
-                let numbers: Vec<f64> = line.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect();
-                at.map(|c| DVec3::new(numbers[c], numbers[c + 1], numbers[c + 2]))
-            })
-            .filter(|joints: &[DVec3; 12]| joints.iter().all(|j| j.is_finite()))
-            .collect();
-        let hips = |frame: &[DVec3; 12]| 0.5 * (frame[6] + frame[9]);
-        let (first, last) = (hips(&frames[0]), hips(frames.last().unwrap()));
-        let drift = ((last - first) / (frames.len() - 1) as f64).with_z(0.0);
-        for (i, frame) in frames.iter_mut().enumerate() {
-            frame.iter_mut().for_each(|joint| *joint -= first.with_z(0.0) + i as f64 * drift);
+/// A recorded motion, every fifth frame (20-24 a second).
+pub fn load(name: &str) -> Option<Motion> {
+    let (rate_hz, frames) = joints(name)?;
+    let skipped = if name == "CMU_12_01" { 10 } else { 0 };
+    let taken = || frames.iter().enumerate().step_by(5);
+    let times_s = taken().map(|(frame, _)| (frame + skipped) as f64 / rate_hz).collect();
+    let figures: Vec<StickFigure> = taken()
+        .map(|(_, row)| figure(|joint| row[JOINTS.iter().position(|j| *j == joint).unwrap()]))
+        .collect();
+    let heading = heading(&figures);
+    Some(Motion { name: name.to_owned(), times_s, figures, heading })
+}
+
+fn rate_hz(header: &str) -> f64 {
+    let words: Vec<&str> = header.split([' ', ',']).collect();
+    words[words.iter().position(|w| *w == "Hz").unwrap() - 1].parse().unwrap()
+}
+
+fn figure(at: impl Fn(&str) -> DVec3) -> StickFigure {
+    let mut figure = StickFigure::UNKNOWN;
+    let named = [
+        (Joint::RightShoulder, "RSH"),
+        (Joint::RightElbow, "REL"),
+        (Joint::RightWrist, "RWR"),
+        (Joint::LeftShoulder, "LSH"),
+        (Joint::LeftElbow, "LEL"),
+        (Joint::LeftWrist, "LWR"),
+        (Joint::RightHip, "RHP"),
+        (Joint::RightKnee, "RKN"),
+        (Joint::RightAnkle, "RAN"),
+        (Joint::LeftHip, "LHP"),
+        (Joint::LeftKnee, "LKN"),
+        (Joint::LeftAnkle, "LAN"),
+    ];
+    for (joint, name) in named {
+        figure[joint] = at(name);
+    }
+    let shoulders = 0.5 * (figure[Joint::RightShoulder] + figure[Joint::LeftShoulder]);
+    let hips = 0.5 * (figure[Joint::RightHip] + figure[Joint::LeftHip]);
+    let across = figure[Joint::LeftShoulder] - figure[Joint::RightShoulder];
+    let forward = (hips - shoulders).cross(across).normalize();
+    figure[Joint::Neck] = shoulders + 0.0377 * forward;
+    figure[Joint::Pelvis] = hips + 0.10 * (shoulders - hips).normalize();
+    figure
+}
+
+fn heading(figures: &[StickFigure]) -> DVec3 {
+    let level = |v: DVec3| DVec3::new(v.x, v.y, 0.0);
+    let [first, last] = [figures[0], figures[figures.len() - 1]].map(|figure| figure[Joint::Pelvis]);
+    let travelled = level(last - first);
+    if travelled.length() > 1.0 {
+        return travelled.normalize();
+    }
+    let forward = |figure: &StickFigure| {
+        figure
+            .segment(Joint::Pelvis)
+            .cross(figure[Joint::LeftShoulder] - figure[Joint::RightShoulder])
+            .normalize()
+    };
+    level(figures.iter().map(forward).sum()).normalize()
+}
+
+/// What a camera sees of a figure.
+pub struct Seen {
+    /// The camera.
+    pub camera: Camera,
+    /// Pixels of the joints with noise.
+    pub pixels: PerJoint<DVec2>,
+    /// Their rays.
+    pub rays: JointRays,
+    /// The true joints in camera axes, metres.
+    pub figure_in_camera: StickFigure,
+    /// Up in camera axes.
+    pub up: DVec3,
+    /// The walker's heading in camera axes.
+    pub heading: DVec3,
+}
+
+/// A level camera that follows the walker: 4 m away, 1.2 m high, f = 1920 px (480 px/m), looking at the middle
+/// of the body. Azimuth 0 sees the walker from the front, 90 degrees from the walker's right side.
+pub fn view(figure: &StickFigure, heading: DVec3, azimuth_deg: f64, noise_px: f64, seed: u64) -> Seen {
+    let (sine, cosine) = (-azimuth_deg.to_radians()).sin_cos();
+    let towards =
+        DVec3::new(cosine * heading.x - sine * heading.y, sine * heading.x + cosine * heading.y, 0.0);
+    let pelvis = figure[Joint::Pelvis];
+    let position = DVec3::new(pelvis.x, pelvis.y, 1.2) + 4.0 * towards;
+    let (forward, down) = (-towards, -DVec3::Z);
+    let rotation = DMat3::from_cols(down.cross(forward), down, forward).transpose();
+    let camera = Camera {
+        size: [1920, 1920],
+        focal_px: DVec2::splat(1920.0),
+        centre_px: DVec2::splat(959.5),
+        distortion: Distortion::default(),
+        rotation,
+        translation: -(rotation * position),
+    };
+    let mut random = Random::new(seed);
+    let mut pixels = PerJoint([DVec2::NAN; JOINT_COUNT]);
+    for joint in Joint::ALL {
+        let [a, b] = random.normal_pair().map(f64::from);
+        if let Some(pixel) = camera.project(figure[joint]) {
+            pixels[joint] = pixel + noise_px * DVec2::new(a, b);
         }
-        let forward = drift.normalize();
-        // A stride is the lag at which ankles and knees best repeat.
-        let miss = |lag: usize| {
-            let far = |i: usize| [7, 8, 10, 11].map(|j| frames[i][j].distance_squared(frames[i + lag][j]));
-            (0..frames.len() - lag).map(|i| far(i).iter().sum::<f64>()).sum::<f64>()
-                / (frames.len() - lag) as f64
-        };
-        let lags = (0.85 * rate_hz) as usize..((1.6 * rate_hz) as usize).min(frames.len() - 10);
-        let stride = lags.min_by(|&a, &b| miss(a).total_cmp(&miss(b))).unwrap() as f64;
-        Self { name, rate_hz, frames, forward, stride }
     }
-
-    /// One stride in `count` views, started at `start` in [0, 1] of what the walk allows, seen orthographically
-    /// `azimuth_deg` off the side.
-    pub fn views(&self, start: f64, count: usize, azimuth_deg: f64) -> Views {
-        let first = start * (self.frames.len() as f64 - 1.0 - self.stride).max(0.0);
-        let (sin, cos) = azimuth_deg.to_radians().sin_cos();
-        let side = self.forward.cross(DVec3::Z);
-        let (right, away) = (cos * self.forward + sin * side, cos * side - sin * self.forward);
-        let mut views = Views { image: vec![Vec::new(); 12], depth: vec![Vec::new(); 12] };
-        for view in 0..count {
-            let frame = first + self.stride * view as f64 / count as f64;
-            let (whole, part) = (frame as usize, frame.fract());
-            let next = (whole + 1).min(self.frames.len() - 1);
-            for joint in 0..12 {
-                let point = self.frames[whole][joint].lerp(self.frames[next][joint], part);
-                views.image[joint].push(DVec2::new(right.dot(point), -point.z));
-                views.depth[joint].push(away.dot(point));
-            }
-        }
-        views
+    let weight = PerJoint([1.0; JOINT_COUNT]);
+    let rays = JointRays::from_pixels(&camera, &pixels, &weight, noise_px).unwrap();
+    Seen {
+        pixels,
+        rays,
+        figure_in_camera: PerJoint(figure.0.map(|point| camera.camera_from_world(point))),
+        up: rotation * DVec3::Z,
+        heading: rotation * heading,
+        camera,
     }
-
-    /// Mean length of a bone over the walk, metres.
-    pub fn length_m(&self, joints: [usize; 2]) -> f64 {
-        self.frames.iter().map(|f| f[joints[0]].distance(f[joints[1]])).sum::<f64>()
-            / self.frames.len() as f64
-    }
-
-    /// Seconds a stride.
-    pub fn stride_s(&self) -> f64 {
-        self.stride / self.rate_hz
-    }
-}
-
-/// An azimuth 15 to 60 degrees off either side, seen from either side.
-pub fn azimuth_deg(random: &mut Random) -> f64 {
-    let off = random.uniform(15.0, 60.0) * if random.uniform(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
-    off + if random.uniform(0.0, 1.0) < 0.5 { 180.0 } else { 0.0 }
-}
-
-/// Adds noise of a standard deviation to every coordinate.
-pub fn noisy(points: &[DVec2], sd: f64, random: &mut Random) -> Vec<DVec2> {
-    points.iter().map(|p| *p + sd * DVec2::from_array(random.normal_pair().map(f64::from))).collect()
-}
-
-/// The quantile of a sample, sorted in place.
-pub fn quantile(values: &mut [f64], fraction: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[((values.len() - 1) as f64 * fraction).round() as usize]
 }

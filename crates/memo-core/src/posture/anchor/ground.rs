@@ -1,0 +1,245 @@
+//! The neck's distance from the ground under the feet and the chain of segments up to the neck.
+//!
+//! The camera knows the ground. For every distance of the neck on a grid, the chain goes down: pelvis, hips,
+//! knees, ankles, at each segment both roots of eq. (7); what each chain claims is compared with what is known:
+//! the trunk stands upright, one ankle (the supporting one) is at its height above the ground, the other not
+//! below it, and the neck is above the middle between the ankles. The sum over all chains is the probability
+//! of the distance; either ankle may be the supporting one.
+//!
+//! Errors along the rays are carried down the chain as variances, roots that do not exist cost what their gap
+//! weighs against noise and lengths. The direction of knees is not used. Feet in the air or on something that
+//! is not the ground are not noticed in one frame; compare with the other sources ([`super::combine`]).
+
+use glam::DVec3;
+
+use super::{
+    Anchor, AnchorError, AnchorOptions, AnchorSource, Ground, NORMAL_NODES, anchor_of_density, check_lengths,
+    check_up, from_extent, neck_ray, pelvis_to_hip_line_m, positive,
+};
+use crate::posture::lift::{JointRays, RootKind, roots};
+use crate::posture::skeleton::{Joint, SegmentLengths, Side};
+
+/// Number of distances tried, evenly spaced in their logarithm: steps of 0.6 %.
+const GRID: usize = 240;
+/// Nearest and farthest distance tried over that of the extent.
+const RANGE: f64 = 2.0;
+/// Chains less probable than this against the best of their distance are left out: -2 ln.
+const NEGLIGIBLE: f64 = 40.0;
+
+/// The neck from the ground under the feet.
+///
+/// `ground` is the plane on which the person stands ([`Ground::of`] for a calibrated camera). Needs neck,
+/// pelvis, and hip, knee and ankle of one side at least.
+pub fn from_ground(
+    rays: &JointRays,
+    lengths: &SegmentLengths,
+    ground: &Ground,
+    options: &AnchorOptions,
+) -> Result<Anchor, AnchorError> {
+    let source_name = AnchorSource::Ground;
+    let ray = neck_ray(rays, source_name)?;
+    check_lengths(lengths)?;
+    options.check()?;
+    positive("camera_height_m", ground.camera_height_m)?;
+    let ground = Ground { up_in_camera: check_up(ground.up_in_camera)?, ..*ground };
+    if !rays.sees(Joint::Pelvis) {
+        return Err(AnchorError::NotSeen { source_name, missing: "pelvis" });
+    }
+    let sees_leg = |side: Side| [side.hip(), side.knee(), side.ankle()].iter().all(|&j| rays.sees(j));
+    let legs: Vec<Side> = Side::BOTH.into_iter().filter(|&side| sees_leg(side)).collect();
+    if legs.is_empty() {
+        return Err(AnchorError::NotSeen { source_name, missing: "hip, knee and ankle of one side" });
+    }
+    let rough = from_extent(rays, lengths, Some(ground.up_in_camera), options)?.distance_m;
+    let distances: Vec<f64> =
+        (0..GRID).map(|i| rough * RANGE.powf(2.0 * i as f64 / (GRID - 1) as f64 - 1.0)).collect();
+
+    let at_scale = |scale: f64| -> (Vec<f64>, Option<f64>) {
+        let lengths = scaled(lengths, scale);
+        let scene = Scene { rays, lengths: &lengths, ground: &ground, options, legs: &legs };
+        // Steps of the grid grow with the distance, hence ln k.
+        let log: Vec<f64> = distances.iter().map(|&k| scene.log_density(k * ray) + k.ln()).collect();
+        let best = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let density: Vec<f64> = log.iter().map(|l| (l - best).exp()).collect();
+        let total: f64 = density.iter().sum();
+        let mean = distances.iter().zip(&density).map(|(k, p)| k * p).sum::<f64>() / total;
+        (density.iter().map(|p| p / total).collect(), best.is_finite().then_some(mean))
+    };
+    let mut density = vec![0.0; GRID];
+    let mut means = [0.0; 3];
+    for (slot, (node, weight)) in means.iter_mut().zip(NORMAL_NODES) {
+        let (part, mean) = at_scale(1.0 + node * options.scale_sd);
+        let nearest_m = distances[0];
+        let farthest_m = distances[GRID - 1];
+        *slot = mean.ok_or(AnchorError::NothingFits { source_name, nearest_m, farthest_m })?;
+        density.iter_mut().zip(part).for_each(|(sum, p)| *sum += weight * p);
+    }
+    let sd_scale_m = 0.5 * (means[2] - means[0]).abs() / NORMAL_NODES[2].0;
+    anchor_of_density(ray, &distances, &density, sd_scale_m, source_name).ok_or(AnchorError::NothingFits {
+        source_name,
+        nearest_m: distances[0],
+        farthest_m: distances[GRID - 1],
+    })
+}
+
+fn scaled(lengths: &SegmentLengths, scale: f64) -> SegmentLengths {
+    let mut scaled = *lengths;
+    scaled.to.0.iter_mut().for_each(|l| *l *= scale);
+    scaled.rigid.iter_mut().for_each(|l| *l *= scale);
+    scaled
+}
+
+/// A place on a ray with the variance along the ray and what it cost so far (-2 ln of its probability).
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    point: DVec3,
+    variance: f64,
+    cost: f64,
+}
+
+struct Scene<'a> {
+    rays: &'a JointRays,
+    lengths: &'a SegmentLengths,
+    ground: &'a Ground,
+    options: &'a AnchorOptions,
+    legs: &'a [Side],
+}
+
+impl Scene<'_> {
+    /// ln of the probability of the neck at a place, up to a constant.
+    fn log_density(&self, neck: DVec3) -> f64 {
+        let start = Link { point: neck, variance: 0.0, cost: 0.0 };
+        let mut chains = Vec::with_capacity(256);
+        for pelvis in self.next(start, Joint::Pelvis, self.lengths.to[Joint::Pelvis]) {
+            let pelvis = self.upright(neck, pelvis);
+            let trunk = self.lengths.to[Joint::Pelvis];
+            let down = (pelvis.point - neck).normalize_or_zero();
+            let middle = neck + down * (trunk + pelvis_to_hip_line_m(self.lengths));
+            for right_is_near in [true, false] {
+                let ankles: Vec<Vec<Link>> = self
+                    .legs
+                    .iter()
+                    .map(|&side| self.ankles(Link { point: middle, ..pelvis }, side, right_is_near))
+                    .collect();
+                self.close(neck, pelvis.cost, &ankles, &mut chains);
+            }
+        }
+        let best = chains.iter().copied().fold(f64::INFINITY, f64::min);
+        let sum: f64 =
+            chains.iter().filter(|&&c| c < best + NEGLIGIBLE).map(|c| (-0.5 * (c - best)).exp()).sum();
+        sum.ln() - 0.5 * best
+    }
+
+    /// The two places of the joint at the end of a segment, nearer one first.
+    fn next(&self, from: Link, to: Joint, length_m: f64) -> [Link; 2] {
+        let noise_rad = self.noise_rad(from.point, length_m);
+        let roots = roots(from.point, self.rays.ray[to], length_m, noise_rad, 0.0);
+        let e = noise_rad * std::f64::consts::SQRT_2 * from.point.length();
+        let gap = match roots.kind {
+            RootKind::None { gap_m } => gap_m / e,
+            _ => 0.0,
+        };
+        let variance = from.variance + roots.sd_m * roots.sd_m;
+        [roots.near, roots.far].map(|point| Link { point, variance, cost: from.cost + gap * gap })
+    }
+
+    /// The noise of an image point with that of a length, as an angle at one end.
+    fn noise_rad(&self, at: DVec3, length_m: f64) -> f64 {
+        let own = self.options.length_sd * length_m / (std::f64::consts::SQRT_2 * at.length());
+        self.rays.noise_rad.hypot(own)
+    }
+
+    /// Draws the pelvis towards the place on its ray where the trunk is vertical.
+    fn upright(&self, neck: DVec3, pelvis: Link) -> Link {
+        let ray = self.rays.ray[Joint::Pelvis];
+        let up = self.ground.up_in_camera;
+        let length = self.lengths.to[Joint::Pelvis];
+        // The point of the ray whose horizontal distance from the neck is least.
+        let flat = |v: DVec3| v - v.dot(up) * up;
+        let (ray_flat, neck_flat) = (flat(ray), flat(neck));
+        if ray_flat.length_squared() < 1e-6 {
+            return pelvis;
+        }
+        let k = neck_flat.dot(ray_flat) / ray_flat.length_squared();
+        let expected = (self.options.lean_sd_rad * length).powi(2) / ray_flat.length_squared();
+        let found = pelvis.point.dot(ray);
+        let sum = expected + pelvis.variance;
+        let k_mean = (found * expected + k * pelvis.variance) / sum;
+        Link {
+            point: ray * k_mean,
+            variance: expected * pelvis.variance / sum,
+            cost: pelvis.cost + (found - k).powi(2) / sum + sum.ln(),
+        }
+    }
+
+    /// The four places of an ankle below one middle of the hips.
+    fn ankles(&self, middle: Link, side: Side, right_is_near: bool) -> Vec<Link> {
+        let [_, _, _, hips] = self.lengths.rigid;
+        let free = Link { cost: 0.0, ..middle };
+        let hip =
+            self.next(free, side.hip(), 0.5 * hips)[usize::from((side == Side::Right) != right_is_near)];
+        let knees = self.next(hip, side.knee(), self.lengths.to[side.knee()]);
+        knees
+            .into_iter()
+            .flat_map(|knee| self.next(knee, side.ankle(), self.lengths.to[side.ankle()]))
+            .collect()
+    }
+
+    /// All ways to end one trunk's chains on the ground, as costs.
+    fn close(&self, neck: DVec3, cost: f64, ankles: &[Vec<Link>], chains: &mut Vec<f64>) {
+        let roles = |a: &Link| (a.cost + self.support(a), a.cost + self.swing(a));
+        if let [right, left] = ankles {
+            let left: Vec<_> = left.iter().map(|l| (l, roles(l))).collect();
+            for r in right {
+                let (r_support, r_swing) = roles(r);
+                for (l, (l_support, l_swing)) in &left {
+                    let balance =
+                        self.balance(neck, 0.5 * (r.point + l.point), 0.25 * (r.variance + l.variance));
+                    chains.push(cost + balance + r_support + l_swing);
+                    chains.push(cost + balance + r_swing + l_support);
+                }
+            }
+        } else if let [one] = ankles {
+            for a in one {
+                let (support, swing) = roles(a);
+                let balance = self.balance(neck, a.point, a.variance);
+                chains.push(cost + balance + support);
+                chains.push(cost + balance + swing);
+            }
+        }
+    }
+
+    /// How far an ankle is above the height of a supporting one, and the variance of its height by the chain.
+    fn above(&self, ankle: &Link) -> (f64, f64) {
+        let shank = 0.5 * (self.lengths.to[Joint::RightAnkle] + self.lengths.to[Joint::LeftAnkle]);
+        let height = self.ground.height_m(ankle.point) - self.options.ankle_height_over_shank * shank;
+        let slope = ankle.point.normalize_or_zero().dot(self.ground.up_in_camera);
+        let noise_m = self.rays.noise_rad * ankle.point.length();
+        (height, slope * slope * ankle.variance + noise_m * noise_m)
+    }
+
+    fn support(&self, ankle: &Link) -> f64 {
+        let (above, variance) = self.above(ankle);
+        let total = variance + self.options.ankle_height_sd_m.powi(2);
+        above * above / total + total.ln()
+    }
+
+    fn swing(&self, ankle: &Link) -> f64 {
+        let (above, variance) = self.above(ankle);
+        let own = if above > 0.0 { self.options.swing_height_m } else { self.options.ankle_height_sd_m };
+        let width = self.options.swing_height_m.powi(2) + variance;
+        above * above / (own * own + variance) + width.ln()
+    }
+
+    fn balance(&self, neck: DVec3, middle: DVec3, variance: f64) -> f64 {
+        let offset = middle - neck;
+        let up = self.ground.up_in_camera;
+        let flat = offset - offset.dot(up) * up;
+        // The chain's variance lies along the ray alone.
+        let ray = middle.normalize_or_zero();
+        let along = (ray - ray.dot(up) * up).normalize_or_zero();
+        let (depth, total) = (flat.dot(along), self.options.balance_sd_m.powi(2) + variance);
+        let side = (flat.length_squared() - depth * depth).max(0.0) / self.options.balance_sd_m.powi(2);
+        depth * depth / total + total.ln() + side
+    }
+}

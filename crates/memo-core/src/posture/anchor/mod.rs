@@ -1,0 +1,621 @@
+//! Where the neck is along its ray: the place from which all other joints are found.
+//!
+//! Lee and Chen (1985, section 2.1) take it from six points of the head. A head is small, so its depth is poor;
+//! here are other sources: a given distance, the ground under the feet of a calibrated camera ([`ground`]), the
+//! rigid trunk ([`trunk`]) and the extent from neck to feet ([`from_extent`]). Each states a standard
+//! deviation, [`combine`] puts them together and [`track::smooth`] follows them over time.
+//!
+//! Distances are along the neck's unit ray from the centre of projection, not z. All sources but the given one
+//! rest on segment lengths; only the ground and a given distance tell the scale of these lengths. The feet
+//! must stand on the ground z = 0 for [`ground`]: a beam or a step under them shifts the neck.
+//!
+//! The constants of posture ([`AnchorOptions`]) were measured on four walks of motion capture: the neck stands
+//! above the lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk
+//! 0.005-0.012), above the middle of the ankles by 0.930-0.954 (0.013-0.022); the trunk leans forward by -1 to
+//! 12 degrees; the lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and
+//! jumping break them.
+
+pub mod ground;
+pub mod track;
+pub mod trunk;
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::lift::JointRays;
+use super::skeleton::{Joint, SegmentLengths, Side};
+use crate::model::camera::Camera;
+
+pub use ground::from_ground;
+pub use track::{DepthTrack, SmoothOptions, smooth};
+pub use trunk::{TrunkAttitude, TrunkFit, from_trunk};
+
+/// From where an anchor was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum AnchorSource {
+    /// The caller knows the distance.
+    Given,
+    /// The head's feature points.
+    Head,
+    /// Ankles above the known ground, and the chain of segments up to the neck.
+    Ground,
+    /// The rigid trunk.
+    Trunk,
+    /// The angle between neck and ankles against the sum of the lengths.
+    Extent,
+    /// Several of these, by their variances.
+    Combined,
+}
+
+impl AnchorSource {
+    /// The name in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Head => "head",
+            Self::Ground => "ground",
+            Self::Trunk => "trunk",
+            Self::Extent => "extent",
+            Self::Combined => "combined",
+        }
+    }
+}
+
+/// One of several distances that explain a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthMode {
+    /// Along the neck's ray, metres.
+    pub distance_m: f64,
+    /// Standard deviation about it, metres, that of the lengths included.
+    pub sd_m: f64,
+    /// Share of the probability, 0 to 1.
+    pub probability: f64,
+}
+
+/// The neck's place with its uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Anchor {
+    /// The neck on its ray, camera axes, metres.
+    pub neck: DVec3,
+    /// Its distance along the ray, metres.
+    pub distance_m: f64,
+    /// Standard deviation of that distance, metres, over all modes.
+    pub sd_depth_m: f64,
+    /// The part of it that comes from the scale of all lengths, metres: the same in every frame and in every
+    /// source that rests on lengths.
+    pub sd_scale_m: f64,
+    /// From where it was taken.
+    pub source: AnchorSource,
+    /// The separate distances that the frame allows, most probable first; mirror attitudes of the trunk are
+    /// in [`TrunkFit::attitudes`].
+    pub modes: Vec<DepthMode>,
+}
+
+impl Anchor {
+    /// An anchor of one mode on a unit ray.
+    fn single(ray: DVec3, distance_m: f64, sd_m: f64, sd_scale_m: f64, source: AnchorSource) -> Self {
+        let modes = vec![DepthMode { distance_m, sd_m, probability: 1.0 }];
+        Self { neck: ray * distance_m, distance_m, sd_depth_m: sd_m, sd_scale_m, source, modes }
+    }
+}
+
+/// Why there is no anchor.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum AnchorError {
+    /// A quantity must be a positive number.
+    #[error("{what} must be positive and finite, got {value}")]
+    NotPositive {
+        /// Its name.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The frame does not show what the source needs.
+    #[error("no neck from the {}: {missing} not seen", source_name.name())]
+    NotSeen {
+        /// The source.
+        source_name: AnchorSource,
+        /// What is missing.
+        missing: &'static str,
+    },
+    /// What is seen fits no distance.
+    #[error("no neck from the {}: no distance between {nearest_m:.2} and {farthest_m:.2} m fits", source_name.name())]
+    NothingFits {
+        /// The source.
+        source_name: AnchorSource,
+        /// Nearest distance tried, metres.
+        nearest_m: f64,
+        /// Farthest distance tried, metres.
+        farthest_m: f64,
+    },
+    /// There is nothing to combine or to follow.
+    #[error("no anchor given")]
+    Empty,
+    /// Anchors of different rays cannot be combined.
+    #[error("anchors lie on different rays, {angle_deg:.2} degrees apart")]
+    DifferentRays {
+        /// The angle.
+        angle_deg: f64,
+    },
+    /// Times and anchors do not go together.
+    #[error("{times} times but {anchors} anchors")]
+    Counts {
+        /// Number of times.
+        times: usize,
+        /// Number of anchors.
+        anchors: usize,
+    },
+    /// Times must increase.
+    #[error("times must be finite and increase, got {before_s} s then {after_s} s at frame {frame}")]
+    Times {
+        /// The frame of the later time.
+        frame: usize,
+        /// The earlier time.
+        before_s: f64,
+        /// The later time.
+        after_s: f64,
+    },
+}
+
+/// The ground and the vertical in camera axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// Unit vector upwards, camera axes.
+    pub up_in_camera: DVec3,
+    /// Height of the centre of projection above the ground, metres.
+    pub camera_height_m: f64,
+}
+
+impl Ground {
+    /// The plane z = 0 of a camera's world.
+    pub fn of(camera: &Camera) -> Self {
+        Self { up_in_camera: camera.rotation.z_axis, camera_height_m: camera.position().z }
+    }
+
+    /// Height of a point in camera axes, metres.
+    pub fn height_m(&self, point_in_camera: DVec3) -> f64 {
+        self.camera_height_m + self.up_in_camera.dot(point_in_camera)
+    }
+}
+
+/// What is assumed about posture and lengths; the defaults are for standing and walking (module head).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AnchorOptions {
+    /// Relative standard deviation of the scale of all lengths. 0.02: lengths measured on the person.
+    pub scale_sd: f64,
+    /// Relative standard deviation of a single length about that scale.
+    pub length_sd: f64,
+    /// Standard deviation of a joint against the rigid trunk, metres: hips and shoulders turn against each other.
+    pub rigidity_sd_m: f64,
+    /// Standard deviation of the trunk's lean from the vertical, radians, each way.
+    pub lean_sd_rad: f64,
+    /// Height of the supporting ankle above the ground, over the shank.
+    pub ankle_height_over_shank: f64,
+    /// Its standard deviation, metres.
+    pub ankle_height_sd_m: f64,
+    /// Height of the higher ankle above the lower, root mean square, metres.
+    pub swing_height_m: f64,
+    /// Horizontal distance of the neck from the middle of the ankles, standard deviation each way, metres.
+    pub balance_sd_m: f64,
+}
+
+impl Default for AnchorOptions {
+    fn default() -> Self {
+        Self {
+            scale_sd: 0.02,
+            length_sd: 0.02,
+            rigidity_sd_m: 0.01,
+            lean_sd_rad: 7f64.to_radians(),
+            ankle_height_over_shank: 0.17,
+            ankle_height_sd_m: 0.02,
+            swing_height_m: 0.09,
+            balance_sd_m: 0.12,
+        }
+    }
+}
+
+impl AnchorOptions {
+    /// Refuses values that are not positive numbers; the scale may be known exactly.
+    fn check(&self) -> Result<(), AnchorError> {
+        positive("length_sd", self.length_sd)?;
+        positive("rigidity_sd_m", self.rigidity_sd_m)?;
+        positive("lean_sd_rad", self.lean_sd_rad)?;
+        positive("ankle_height_over_shank", self.ankle_height_over_shank)?;
+        positive("ankle_height_sd_m", self.ankle_height_sd_m)?;
+        positive("swing_height_m", self.swing_height_m)?;
+        positive("balance_sd_m", self.balance_sd_m)?;
+        if self.scale_sd == 0.0 { Ok(()) } else { positive("scale_sd", self.scale_sd) }
+    }
+}
+
+fn positive(what: &'static str, value: f64) -> Result<(), AnchorError> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(AnchorError::NotPositive { what, value }) }
+}
+
+/// What every source asks of its input: sound lengths and noise, and the neck's ray.
+fn neck_ray(rays: &JointRays, source_name: AnchorSource) -> Result<DVec3, AnchorError> {
+    if !(rays.noise_rad >= 0.0 && rays.noise_rad.is_finite()) {
+        return Err(AnchorError::NotPositive { what: "noise_rad", value: rays.noise_rad });
+    }
+    if !rays.sees(Joint::Neck) {
+        return Err(AnchorError::NotSeen { source_name, missing: "neck" });
+    }
+    Ok(rays.ray[Joint::Neck])
+}
+
+fn check_lengths(lengths: &SegmentLengths) -> Result<(), AnchorError> {
+    let bad = lengths.named().find(|(_, l)| !(*l > 0.0 && l.is_finite()));
+    bad.map_or(Ok(()), |(_, value)| Err(AnchorError::NotPositive { what: "a segment length", value }))
+}
+
+/// A unit vector upwards, or what is wrong with it.
+fn check_up(up: DVec3) -> Result<DVec3, AnchorError> {
+    let length = up.length();
+    positive("length of the vector upwards", length)?;
+    Ok(up / length)
+}
+
+/// The neck at a known distance along its ray.
+pub fn from_given(rays: &JointRays, distance_m: f64, sd_m: f64) -> Result<Anchor, AnchorError> {
+    let ray = neck_ray(rays, AnchorSource::Given)?;
+    positive("distance_m", distance_m)?;
+    positive("sd_m", sd_m)?;
+    Ok(Anchor::single(ray, distance_m, sd_m, 0.0, AnchorSource::Given))
+}
+
+/// Height of the neck above the middle of the ankles over trunk, thigh and shank together: mean and standard
+/// deviation over four walks and their walkers.
+const RISE_OVER_MIDDLE: (f64, f64) = (0.943, 0.022);
+/// The same above the one ankle that is seen, which may be the lower or the higher one.
+const RISE_OVER_ONE: (f64, f64) = (0.95, 0.035);
+/// Horizontal distance of one ankle from the neck, standard deviation, metres.
+const ONE_ANKLE_OFFSET_M: f64 = 0.17;
+/// Tilt of neck to ankles against the image where the vertical is not known, standard deviation, radians.
+const UNKNOWN_TILT_RAD: f64 = 0.26;
+
+/// The neck from the angle between it and the ankles: weak, for standing and walking.
+///
+/// With unit rays n and f to the neck and to the middle of the ankles, rise s and a horizontal offset o of
+/// mean 0:
+///
+/// ```text
+/// k n - k_f f = s up + o     =>     k = w·(s up + o),   w = the row of the pseudo-inverse of (n, -f) for k
+/// ```
+///
+/// `up` is the vertical in camera axes; without it, neck to feet are taken to stand across the view within
+/// 15 degrees.
+pub fn from_extent(
+    rays: &JointRays,
+    lengths: &SegmentLengths,
+    up: Option<DVec3>,
+    options: &AnchorOptions,
+) -> Result<Anchor, AnchorError> {
+    let n = neck_ray(rays, AnchorSource::Extent)?;
+    check_lengths(lengths)?;
+    options.check()?;
+    let ankles: Vec<DVec3> =
+        Side::BOTH.into_iter().map(|s| rays.ray[s.ankle()]).filter(|r| r.is_finite()).collect();
+    let ((ratio, ratio_sd), mut offset_sd) = match ankles.len() {
+        0 => return Err(AnchorError::NotSeen { source_name: AnchorSource::Extent, missing: "both ankles" }),
+        1 => (RISE_OVER_ONE, ONE_ANKLE_OFFSET_M),
+        _ => (RISE_OVER_MIDDLE, options.balance_sd_m),
+    };
+    let f = ankles.iter().sum::<DVec3>().normalize();
+    let span = standing_span_m(lengths);
+    let rise = ratio * span;
+    let up = match up {
+        Some(up) => check_up(up)?,
+        None => {
+            offset_sd = offset_sd.hypot(UNKNOWN_TILT_RAD * rise);
+            (n - f).try_normalize().unwrap_or(DVec3::NAN)
+        }
+    };
+    // Pseudo-inverse of the 3x2 matrix (n, -f) of unit columns: its first row is (n - c f)/(1 - c²), c = n·f.
+    let c = n.dot(f);
+    let w = (n - c * f) / ((1.0 - c) * (1.0 + c));
+    let distance_m = rise * w.dot(up);
+    positive("distance of the neck by the extent", distance_m)?;
+    let across = (w.length_squared() - w.dot(up).powi(2)).max(0.0).sqrt();
+    let scale = distance_m * options.scale_sd;
+    let parts = [
+        ratio_sd * span * w.dot(up),
+        offset_sd * across,
+        // The neck's point and the mean of two ankles: 1 + 1/2.
+        1.5f64.sqrt() * rays.noise_rad * distance_m * w.length(),
+        scale,
+    ];
+    let sd = parts.into_iter().fold(0.0, f64::hypot);
+    Ok(Anchor::single(n, distance_m, sd, scale, AnchorSource::Extent))
+}
+
+/// Neck to hips, thigh and shank in a line, metres.
+fn standing_span_m(lengths: &SegmentLengths) -> f64 {
+    let pair = |right: Joint| 0.5 * (lengths.to[right] + lengths.to[right.mirrored()]);
+    lengths.to[Joint::Pelvis]
+        + pelvis_to_hip_line_m(lengths)
+        + pair(Joint::RightKnee)
+        + pair(Joint::RightAnkle)
+}
+
+/// From the pelvis joint to the middle of the hips, metres.
+fn pelvis_to_hip_line_m(lengths: &SegmentLengths) -> f64 {
+    let [_, _, _, hips] = lengths.rigid;
+    let hip = 0.5 * (lengths.to[Joint::RightHip] + lengths.to[Joint::LeftHip]);
+    (hip * hip - 0.25 * hips * hips).max(0.0).sqrt()
+}
+
+/// Two sources that contradict each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conflict {
+    /// The sources.
+    pub sources: [AnchorSource; 2],
+    /// Their distances, metres.
+    pub distances_m: [f64; 2],
+    /// The difference over its standard deviation.
+    pub sigmas: f64,
+}
+
+/// Several anchors as one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Combination {
+    /// The anchor; its standard deviation is widened where the sources scatter more than they state.
+    pub anchor: Anchor,
+    /// Pairs of sources more than [`CONFLICT_SIGMAS`] apart.
+    pub conflicts: Vec<Conflict>,
+}
+
+/// Beyond this many standard deviations two sources contradict each other.
+pub const CONFLICT_SIGMAS: f64 = 3.0;
+
+/// The mean of several anchors of one frame by their variances.
+///
+/// Weights are 1/sd². What the sources have of the scale of the lengths (`sd_scale_m`) is common to them and
+/// does not average out. If the sum of squared deviations χ² exceeds its degrees of freedom, the standard
+/// deviation grows by sqrt(χ²/(n-1)).
+pub fn combine(anchors: &[Anchor]) -> Result<Combination, AnchorError> {
+    let first = anchors.first().ok_or(AnchorError::Empty)?;
+    let ray = first.neck.normalize();
+    for anchor in anchors {
+        positive("distance_m", anchor.distance_m)?;
+        positive("sd_depth_m", anchor.sd_depth_m)?;
+        let angle_deg = ray.angle_between(anchor.neck).to_degrees();
+        if angle_deg.is_nan() || angle_deg >= 0.01 {
+            return Err(AnchorError::DifferentRays { angle_deg });
+        }
+    }
+    if anchors.len() == 1 {
+        return Ok(Combination { anchor: first.clone(), conflicts: Vec::new() });
+    }
+    let weight = |a: &Anchor| a.sd_depth_m.powi(-2);
+    let total: f64 = anchors.iter().map(weight).sum();
+    let mean =
+        |value: &dyn Fn(&Anchor) -> f64| anchors.iter().map(|a| weight(a) * value(a)).sum::<f64>() / total;
+    let distance_m = mean(&|a| a.distance_m);
+    let sd_scale_m = mean(&|a| a.sd_scale_m);
+    let own = |a: &Anchor| (a.sd_depth_m.powi(2) - a.sd_scale_m.powi(2)).max(0.0);
+    let own_sq: f64 = anchors.iter().map(|a| (weight(a) / total).powi(2) * own(a)).sum();
+    let chi_sq: f64 = anchors.iter().map(|a| weight(a) * (a.distance_m - distance_m).powi(2)).sum();
+    let widen = (chi_sq / (anchors.len() - 1) as f64).max(1.0).sqrt();
+    let sd = widen * own_sq.sqrt().hypot(sd_scale_m);
+    let anchor = Anchor::single(ray, distance_m, sd, sd_scale_m, AnchorSource::Combined);
+    Ok(Combination { anchor, conflicts: conflicts(anchors) })
+}
+
+fn conflicts(anchors: &[Anchor]) -> Vec<Conflict> {
+    let pairs = anchors.iter().enumerate().flat_map(|(i, a)| anchors[i + 1..].iter().map(move |b| (a, b)));
+    let conflict = |(a, b): (&Anchor, &Anchor)| {
+        // The common scale shifts both by the same share.
+        let own = |x: &Anchor| (x.sd_depth_m.powi(2) - x.sd_scale_m.powi(2)).max(0.0);
+        let sd = (own(a) + own(b) + (a.sd_scale_m - b.sd_scale_m).powi(2)).sqrt();
+        let sigmas = (a.distance_m - b.distance_m).abs() / sd;
+        let distances_m = [a.distance_m, b.distance_m];
+        Conflict { sources: [a.source, b.source], distances_m, sigmas }
+    };
+    pairs.map(conflict).filter(|c| c.sigmas > CONFLICT_SIGMAS).collect()
+}
+
+/// Nodes and weights of the Gauss-Hermite rule of three points for a standard normal variable.
+const NORMAL_NODES: [(f64, f64); 3] =
+    [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
+
+/// The anchor of a probability over distances: mean, standard deviation and modes parted at valleys below
+/// half the lower summit.
+fn anchor_of_density(
+    ray: DVec3,
+    distances: &[f64],
+    density: &[f64],
+    sd_scale_m: f64,
+    source: AnchorSource,
+) -> Option<Anchor> {
+    let (distance_m, sd_depth_m, total) = moments(distances, density)?;
+    let bounds = parted(density);
+    let mut modes: Vec<DepthMode> = bounds
+        .windows(2)
+        .filter_map(|w| {
+            let (mean, sd_m, mass) = moments(&distances[w[0]..w[1]], &density[w[0]..w[1]])?;
+            Some(DepthMode { distance_m: mean, sd_m, probability: mass / total })
+        })
+        .filter(|mode| mode.probability > 0.02)
+        .collect();
+    modes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    Some(Anchor { neck: ray * distance_m, distance_m, sd_depth_m, sd_scale_m, source, modes })
+}
+
+fn moments(distances: &[f64], density: &[f64]) -> Option<(f64, f64, f64)> {
+    let total: f64 = density.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return None;
+    }
+    let mean = distances.iter().zip(density).map(|(x, p)| x * p).sum::<f64>() / total;
+    let variance = distances.iter().zip(density).map(|(x, p)| (x - mean).powi(2) * p).sum::<f64>() / total;
+    Some((mean, variance.sqrt(), total))
+}
+
+/// Where a density falls into separate summits: the ends and the deepest points of real valleys.
+fn parted(density: &[f64]) -> Vec<usize> {
+    let mut bounds = vec![0];
+    let (mut summit, mut valley, mut at) = (0.0_f64, f64::INFINITY, 0);
+    for (i, &p) in density.iter().enumerate() {
+        if p < valley {
+            (valley, at) = (p, i);
+        }
+        if p > 2.0 * valley && summit > 2.0 * valley {
+            bounds.push(at);
+            (summit, valley) = (p, p);
+        } else if p > summit {
+            (summit, valley) = (p, p);
+        }
+    }
+    bounds.push(density.len());
+    bounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::skeleton::StickFigure;
+    use glam::DMat3;
+    use proptest::prelude::*;
+
+    /// Someone upright with legs a little apart, facing an azimuth, seen by a level camera 1.2 m high.
+    fn standing(
+        lengths: &SegmentLengths,
+        distance_m: f64,
+        azimuth_rad: f64,
+        stride_rad: f64,
+    ) -> (StickFigure, Ground) {
+        let trunk = trunk::rigid_trunk(lengths);
+        let turn = DMat3::from_rotation_y(azimuth_rad);
+        let mut figure = StickFigure::UNKNOWN;
+        for joint in Joint::ALL {
+            if trunk[joint].is_finite() {
+                figure[joint] = turn * trunk[joint];
+            }
+        }
+        for (side, swing) in [(Side::Right, stride_rad), (Side::Left, -stride_rad)] {
+            let leg = turn * DVec3::new(swing.sin(), swing.cos(), 0.0);
+            figure[side.knee()] = figure[side.hip()] + leg * lengths.to[side.knee()];
+            figure[side.ankle()] = figure[side.knee()] + leg * lengths.to[side.ankle()];
+        }
+        let ankle = AnchorOptions::default().ankle_height_over_shank * lengths.to[Joint::RightAnkle];
+        let shift = DVec3::new(0.2, 1.2 - ankle - figure[Joint::RightAnkle].y, distance_m);
+        for joint in Joint::ALL {
+            figure[joint] += shift;
+        }
+        (figure, Ground { up_in_camera: -DVec3::Y, camera_height_m: 1.2 })
+    }
+
+    /// Lengths known well, so that the planted distance must be found.
+    fn exact() -> AnchorOptions {
+        AnchorOptions {
+            scale_sd: 0.001,
+            length_sd: 0.002,
+            ankle_height_sd_m: 0.005,
+            ..AnchorOptions::default()
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        /// All facings, the trunk square on and edge on included.
+        #[test]
+        fn a_planted_distance_is_found(
+            distance in 2.0..9.0_f64, azimuth in 0.0..std::f64::consts::TAU, stride in 0.0..0.4_f64, height in 1.4..2.0_f64,
+        ) {
+            let lengths = SegmentLengths::from_height(height).unwrap();
+            let (figure, ground) = standing(&lengths, distance, azimuth, stride);
+            let rays = JointRays { noise_rad: 1e-5, ..JointRays::from_points(&figure) };
+            let truth = figure[Joint::Neck].length();
+            let up = Some(ground.up_in_camera);
+            let trunk = from_trunk(&rays, &lengths, up, &exact()).unwrap();
+            prop_assert!((trunk.anchor.distance_m / truth - 1.0).abs() < 0.02, "{trunk:?} {truth}");
+            let ground = from_ground(&rays, &lengths, &ground, &exact()).unwrap();
+            prop_assert!((ground.distance_m - truth).abs() < 3.0 * ground.sd_depth_m, "{ground:?} {truth}");
+            prop_assert!((ground.distance_m / truth - 1.0).abs() < 0.05, "{ground:?} {truth}");
+            let extent = from_extent(&rays, &lengths, up, &exact()).unwrap();
+            prop_assert!((extent.distance_m - truth).abs() < 3.0 * extent.sd_depth_m, "{extent:?} {truth}");
+        }
+    }
+
+    /// The mirror attitude of a trunk turned half away fits nearly as well, at nearly the same distance.
+    #[test]
+    fn the_trunks_mirror_attitude_is_kept() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let (figure, ground) = standing(&lengths, 6.0, 0.6, 0.1);
+        let rays = JointRays { noise_rad: 5e-4, ..JointRays::from_points(&figure) };
+        let fit = from_trunk(&rays, &lengths, Some(ground.up_in_camera), &AnchorOptions::default()).unwrap();
+        assert!(fit.attitudes.len() >= 2, "{:?}", fit.attitudes);
+        let [a, b] = [fit.attitudes[0], fit.attitudes[1]];
+        assert!((a.depth.distance_m - b.depth.distance_m).abs() < a.depth.sd_m);
+        // Mirrored through the image: the facings' depth components are opposite.
+        let facing = |a: &TrunkAttitude| a.camera_from_trunk.z_axis.z;
+        assert!(
+            (facing(&a) + facing(&b)).abs() < 0.25 && facing(&a).abs() > 0.3,
+            "{} {}",
+            facing(&a),
+            facing(&b)
+        );
+        let sum: f64 = fit.attitudes.iter().map(|a| a.depth.probability).sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sources_combine_by_their_variances_and_conflicts_are_told() {
+        let ray = DVec3::new(0.1, 0.0, 1.0).normalize();
+        let anchor = |d, sd, source| Anchor::single(ray, d, sd, 0.0, source);
+        let a = anchor(4.0, 0.1, AnchorSource::Ground);
+        let both = combine(&[a.clone(), anchor(4.1, 0.2, AnchorSource::Trunk)]).unwrap();
+        assert!((both.anchor.distance_m - 4.02).abs() < 1e-12 && both.conflicts.is_empty());
+        assert!(
+            (both.anchor.sd_depth_m - (0.8f64.powi(2) * 0.01 + 0.2f64.powi(2) * 0.04).sqrt()).abs() < 1e-12
+        );
+        let far = combine(&[a.clone(), anchor(5.0, 0.1, AnchorSource::Trunk)]).unwrap();
+        let [conflict] = far.conflicts[..] else { panic!("{far:?}") };
+        assert!((conflict.sigmas - 1.0 / 0.02f64.sqrt()).abs() < 1e-9);
+        assert_eq!(conflict.distances_m, [4.0, 5.0]);
+        assert!(far.anchor.sd_depth_m > 0.45, "{far:?}");
+        assert_eq!(combine(&[]), Err(AnchorError::Empty));
+        let other = Anchor::single(DVec3::Z, 4.0, 0.1, 0.0, AnchorSource::Head);
+        assert!(matches!(combine(&[a, other]), Err(AnchorError::DifferentRays { .. })));
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_its_values() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let (mut figure, ground) = standing(&lengths, 4.0, 0.0, 0.1);
+        let rays = JointRays::from_points(&figure);
+        let options = AnchorOptions::default();
+        assert!(from_given(&rays, f64::NAN, 0.1).unwrap_err().to_string().contains("NaN"));
+        assert!(from_given(&rays, 4.0, 0.0).is_err());
+        let bad = AnchorOptions { length_sd: -0.1, ..options };
+        assert!(from_ground(&rays, &lengths, &ground, &bad).is_err());
+        assert!(from_trunk(&rays, &lengths, Some(DVec3::ZERO), &options).is_err());
+        assert!(from_extent(&rays, &lengths, Some(DVec3::NAN), &options).is_err());
+        let below = Ground { camera_height_m: -1.0, ..ground };
+        assert!(from_ground(&rays, &lengths, &below, &options).is_err());
+        let mut broken = lengths;
+        broken.to[Joint::Pelvis] = f64::INFINITY;
+        assert!(from_trunk(&rays, &broken, None, &options).is_err());
+        // One leg is enough; none is not; nor is a frame without the neck.
+        figure[Joint::RightKnee] = DVec3::NAN;
+        let one_leg = from_ground(&JointRays::from_points(&figure), &lengths, &ground, &options).unwrap();
+        assert!((one_leg.distance_m - figure[Joint::Neck].length()).abs() < 3.0 * one_leg.sd_depth_m);
+        figure[Joint::LeftAnkle] = DVec3::NAN;
+        let error = from_ground(&JointRays::from_points(&figure), &lengths, &ground, &options).unwrap_err();
+        assert!(error.to_string().contains("ground") && error.to_string().contains("one side"), "{error}");
+        figure[Joint::Neck] = DVec3::NAN;
+        let error = from_given(&JointRays::from_points(&figure), 4.0, 0.1).unwrap_err();
+        assert!(matches!(error, AnchorError::NotSeen { missing: "neck", .. }));
+    }
+
+    #[test]
+    fn a_density_of_two_summits_has_two_modes() {
+        let distances: Vec<f64> = (0..200).map(|i| 3.0 + 0.01 * f64::from(i)).collect();
+        let bump = |x: f64, m: f64| (-0.5 * ((x - m) / 0.05).powi(2)).exp();
+        let density: Vec<f64> = distances.iter().map(|&x| bump(x, 3.5) + 0.5 * bump(x, 4.2)).collect();
+        let anchor = anchor_of_density(DVec3::Z, &distances, &density, 0.0, AnchorSource::Ground).unwrap();
+        let [first, second] = anchor.modes[..] else { panic!("{anchor:?}") };
+        assert!((first.distance_m - 3.5).abs() < 0.01 && (second.distance_m - 4.2).abs() < 0.01);
+        assert!((first.probability - 2.0 / 3.0).abs() < 0.01 && (first.sd_m - 0.05).abs() < 0.005);
+    }
+}

@@ -1,0 +1,343 @@
+//! Parts of the body cannot be in one place (Lee and Chen 1985, section 3.2 C: arms and torso, arms and legs;
+//! here also leg and leg).
+//!
+//! Limbs are capsules about their segments, the torso is the quadrilateral of shoulders and hips, two
+//! triangles. A clearance is the distance of the two axes; where a limb passes through the torso it is
+//! negative: minus the shortest way out, over the border or by an end.
+//!
+//! The paper gives no radii. The default ones are half of the 3 cm at which no true arm and leg of four walks,
+//! a jump and a bout of punching collide (the least true distance of arm and leg in walking is 10 cm);
+//! without noise no true forearm there passes the quadrilateral. Radii of flesh were not tried.
+
+use glam::DVec3;
+
+use super::constraint::{Constraint, Violation};
+use super::placed::{Placed, PlacedFigure};
+use super::skeleton::{Joint, Side};
+
+/// Radii of the parts of the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Collisions {
+    /// Radius of upper arm and forearm, metres.
+    pub arm_m: f64,
+    /// Radius of thigh and shank, metres.
+    pub leg_m: f64,
+    /// Least clearance of arm and torso quadrilateral, metres; 0: the forearm must not pass through it.
+    pub torso_m: f64,
+    /// The part of the upper arm next to its shoulder, a corner of the torso, that is not looked at.
+    pub shoulder_part: f64,
+    /// Every clearance may fall short by this many standard deviations of the propagated noise.
+    pub noise_factor: f64,
+}
+
+impl Collisions {
+    /// Stick figures whatever the noise: the forearm must not pass through the torso, arms and legs stay 3 cm
+    /// apart.
+    pub fn paper() -> Self {
+        Self { noise_factor: 0.0, ..Self::measured() }
+    }
+
+    /// The same with room for noise.
+    pub fn measured() -> Self {
+        Self { arm_m: 0.015, leg_m: 0.015, torso_m: 0.0, shoulder_part: 1.0 / 3.0, noise_factor: 1.5 }
+    }
+
+    /// Checks one constraint; None where it holds or is no collision.
+    pub(crate) fn check(&self, constraint: Constraint, figure: &PlacedFigure) -> Option<Violation> {
+        use Constraint as C;
+        match constraint {
+            C::UpperArmTorso(s) => {
+                let elbow = &figure[s.elbow()];
+                let shoulder = figure[s.shoulder()].point;
+                let start = shoulder.lerp(elbow.point, self.shoulder_part);
+                self.check_torso(constraint, figure, start, elbow.point, elbow, None)
+            }
+            C::ForearmTorso(s) => {
+                let [elbow, wrist] = [&figure[s.elbow()], &figure[s.wrist()]];
+                self.check_torso(constraint, figure, elbow.point, wrist.point, elbow, Some(wrist))
+            }
+            C::ThighThigh => {
+                let pairs = [(Side::Right.knee(), Side::Left.knee())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ShankThigh(s) => {
+                let pairs = [(s.ankle(), s.other().knee())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ShankShank => {
+                let pairs = [(Side::Right.ankle(), Side::Left.ankle())];
+                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            }
+            C::ArmThigh { arm, leg } => {
+                let pairs = [(arm.elbow(), leg.knee()), (arm.wrist(), leg.knee())];
+                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
+            }
+            C::ArmShank { arm, leg } => {
+                let pairs = [(arm.elbow(), leg.ankle()), (arm.wrist(), leg.ankle())];
+                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
+            }
+            _ => None,
+        }
+    }
+
+    /// Standard deviation of a limb's place against the body's, metres: that of its outer end.
+    fn spread(&self, upper: &Placed, lower: Option<&Placed>) -> f64 {
+        let lower = lower.map_or(0.0, |placed| placed.sd_m);
+        self.noise_factor * upper.sd_m.hypot(lower).hypot(upper.lateral_m)
+    }
+
+    fn check_torso(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        start: DVec3,
+        end: DVec3,
+        upper: &Placed,
+        lower: Option<&Placed>,
+    ) -> Option<Violation> {
+        use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
+        let corners = [RightShoulder, LeftShoulder, LeftHip, RightHip].map(|joint| figure[joint].point);
+        if self.torso_m <= 0.0 && passes_beside(&corners, start, end) {
+            return None;
+        }
+        let clearance = quadrilateral_clearance(&corners, start, end);
+        if clearance >= self.torso_m {
+            return None;
+        }
+        let slack = if self.noise_factor > 0.0 { self.spread(upper, lower) } else { 0.0 };
+        Violation::under(constraint, clearance, self.torso_m - slack)
+    }
+
+    fn check_limbs(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        pairs: &[(Joint, Joint)],
+        radii_m: f64,
+    ) -> Option<Violation> {
+        let worst = |&(a, b): &(Joint, Joint)| {
+            let [[a0, a1], [b0, b1]] = [a, b].map(|end| ends(figure, end));
+            // Spheres about the segments first: most pairs are far apart.
+            let apart_sq = 0.25 * (a0 + a1 - b0 - b1).length_squared();
+            let reach = radii_m + 0.5 * (figure[a].length_m + figure[b].length_m);
+            if apart_sq > reach * reach {
+                return None;
+            }
+            let distance = segment_distance(a0, a1, b0, b1);
+            if distance >= radii_m {
+                return None;
+            }
+            let slack = if self.noise_factor > 0.0 {
+                self.limb_spread(figure, a).hypot(self.limb_spread(figure, b))
+            } else {
+                0.0
+            };
+            Violation::under(constraint, distance, radii_m - slack)
+        };
+        pairs.iter().filter_map(worst).max_by(|a, b| a.excess.total_cmp(&b.excess))
+    }
+
+    /// Spread of the segment that ends at a joint.
+    fn limb_spread(&self, figure: &PlacedFigure, end: Joint) -> f64 {
+        match end {
+            Joint::RightElbow | Joint::LeftElbow | Joint::RightKnee | Joint::LeftKnee => {
+                self.spread(&figure[end], None)
+            }
+            _ => self.spread(&figure[end.start().unwrap_or(end)], Some(&figure[end])),
+        }
+    }
+}
+
+/// The two ends of the segment that ends at a joint.
+fn ends(figure: &PlacedFigure, end: Joint) -> [DVec3; 2] {
+    [figure[end.start().unwrap_or(end)].point, figure[end].point]
+}
+
+impl Default for Collisions {
+    fn default() -> Self {
+        Self::measured()
+    }
+}
+
+/// Distance of two segments in space (Ericson 2005, Real-Time Collision Detection, 5.1.9). Either may be a
+/// point.
+pub fn segment_distance(a0: DVec3, a1: DVec3, b0: DVec3, b1: DVec3) -> f64 {
+    let (u, v, r) = (a1 - a0, b1 - b0, a0 - b0);
+    let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
+    let (ur, vr) = (u.dot(r), v.dot(r));
+    let fraction = |top: f64, bottom: f64| if bottom > 0.0 { (top / bottom).clamp(0.0, 1.0) } else { 0.0 };
+    let mut s = fraction(uv * vr - ur * vv, uu * vv - uv * uv);
+    let mut t = if vv > 0.0 { (uv * s + vr) / vv } else { 0.0 };
+    if !(0.0..=1.0).contains(&t) || vv == 0.0 {
+        t = t.clamp(0.0, 1.0);
+        s = fraction(uv * t - ur, uu);
+    }
+    (r + s * u - t * v).length()
+}
+
+/// Whether a segment lies wholly on one side of the planes of both triangles, so that it passes neither.
+fn passes_beside(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> bool {
+    triangles(corners).iter().all(|[a, b, c]| {
+        let normal = (b - a).cross(c - a);
+        normal.dot(start - a) * normal.dot(end - a) > 0.0
+    })
+}
+
+fn triangles(corners: &[DVec3; 4]) -> [[DVec3; 3]; 2] {
+    [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]
+}
+
+/// Clearance of a segment and a quadrilateral in space, metres: their distance, or minus the shortest way
+/// out where the segment passes through it.
+///
+/// The quadrilateral is that of two triangles that share the diagonal from its first to its third corner.
+pub fn quadrilateral_clearance(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> f64 {
+    let border = |p: DVec3| {
+        (0..4).map(|i| segment_distance(p, p, corners[i], corners[(i + 1) % 4])).fold(f64::MAX, f64::min)
+    };
+    let mut clearance = f64::MAX;
+    for triangle in triangles(corners) {
+        match crossing(&triangle, start, end) {
+            Some((point, to_ends)) => clearance = clearance.min(-to_ends.min(border(point))),
+            None => clearance = clearance.min(triangle_distance(&triangle, start, end)),
+        }
+    }
+    clearance
+}
+
+/// Where a segment crosses a triangle, and the shorter distance of its ends from the triangle's plane.
+fn crossing([a, b, c]: &[DVec3; 3], start: DVec3, end: DVec3) -> Option<(DVec3, f64)> {
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let [from, to] = [start, end].map(|p| normal.dot(p - a));
+    if from * to >= 0.0 {
+        return None;
+    }
+    let point = start.lerp(end, from / (from - to));
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).cross(point - *p).dot(normal) >= 0.0);
+    inside.then_some((point, from.abs().min(to.abs())))
+}
+
+/// Distance of a segment and a triangle that it does not cross.
+fn triangle_distance([a, b, c]: &[DVec3; 3], start: DVec3, end: DVec3) -> f64 {
+    let edges = [(a, b), (b, c), (c, a)];
+    let beside = edges.iter().map(|(p, q)| segment_distance(start, end, **p, **q)).fold(f64::MAX, f64::min);
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return beside };
+    let above = |p: DVec3| {
+        let over = edges.iter().all(|(e, f)| (**f - **e).cross(p - **e).dot(normal) >= 0.0);
+        if over { normal.dot(p - *a).abs() } else { f64::MAX }
+    };
+    beside.min(above(start)).min(above(end))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0_f64, -1.0..1.0_f64, -1.0..1.0_f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    /// Least distance of points sampled on two sets of parameters, refined about the best.
+    fn sampled(distance: impl Fn(&[f64]) -> f64, dimensions: usize) -> f64 {
+        let mut best = vec![0.5; dimensions];
+        let mut step = 0.5;
+        let mut least = distance(&best);
+        // The distance is convex: random steps that shrink only when none of them helps.
+        let mut random = crate::synth::Random::new(1);
+        while step > 1e-6 {
+            let centre = best.clone();
+            let before = least;
+            for _ in 0..100 {
+                let mut at = centre.clone();
+                for value in &mut at {
+                    *value = (*value + random.uniform(-step, step)).clamp(0.0, 1.0);
+                }
+                let d = distance(&at);
+                if d < least {
+                    (least, best) = (d, at);
+                }
+            }
+            if least == before {
+                step *= 0.7;
+            }
+        }
+        least
+    }
+
+    /// All faces of a triangle, segment or point: the subsets of its corners.
+    fn faces(corners: &[DVec3]) -> impl Iterator<Item = Vec<DVec3>> + '_ {
+        (1..1usize << corners.len())
+            .map(|set| (0..corners.len()).filter(|i| set >> i & 1 == 1).map(|i| corners[i]).collect())
+    }
+
+    /// Distance of two simplices: least squares over the flats of every pair of faces, of which those count
+    /// whose nearest points lie within the faces.
+    fn simplex_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+        let mut least = f64::MAX;
+        for (p, q) in faces(a).flat_map(|p| faces(b).map(move |q| (p.clone(), q))) {
+            let columns: Vec<DVec3> =
+                p[1..].iter().map(|x| x - p[0]).chain(q[1..].iter().map(|x| q[0] - x)).collect();
+            let apart = q[0] - p[0];
+            let mut weights = nalgebra::DVector::zeros(columns.len());
+            if !columns.is_empty() {
+                let matrix = nalgebra::DMatrix::from_fn(3, columns.len(), |r, c| columns[c][r]);
+                let target = nalgebra::DVector::from_row_slice(&apart.to_array());
+                weights = matrix.svd(true, true).solve(&target, 1e-12).unwrap();
+            }
+            let (of_p, of_q) = weights.as_slice().split_at(p.len() - 1);
+            let inside = |w: &[f64]| w.iter().all(|&x| x >= -1e-9) && w.iter().sum::<f64>() <= 1.0 + 1e-9;
+            if inside(of_p) && inside(of_q) {
+                let reached: DVec3 = columns.iter().zip(weights.iter()).map(|(c, w)| *c * *w).sum();
+                least = least.min((apart - reached).length());
+            }
+        }
+        least
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn segment_distance_is_the_least_of_samples(a in point(), b in point(), c in point(), d in point(),
+                                                     degenerate in 0..4) {
+            let (b, d) = match degenerate {
+                1 => (a, d),
+                2 => (b, c + (b - a)),
+                3 => (b, c),
+                _ => (b, d),
+            };
+            let oracle = sampled(|p| a.lerp(b, p[0]).distance(c.lerp(d, p[1])), 2);
+            prop_assert!((segment_distance(a, b, c, d) - oracle).abs() < 1e-5);
+        }
+
+        #[test]
+        fn clearance_is_that_of_the_nearest_faces(a in point(), b in point(), c in point(), d in point(),
+                                             e in point(), f in point()) {
+            let clearance = quadrilateral_clearance(&[a, b, c, d], e, f);
+            let oracle = triangles(&[a, b, c, d])
+                .iter()
+                .map(|t| simplex_distance(t, &[e, f]))
+                .fold(f64::MAX, f64::min);
+            prop_assert!((clearance.max(0.0) - oracle).abs() < 1e-7, "{clearance} {oracle}");
+        }
+    }
+
+    #[test]
+    fn a_forearm_through_the_torso_has_a_negative_clearance() {
+        let corners = [
+            DVec3::new(0.2, 0.0, 0.0),
+            DVec3::new(-0.2, 0.0, 0.0),
+            DVec3::new(-0.2, 0.5, 0.0),
+            DVec3::new(0.2, 0.5, 0.0),
+        ];
+        let through =
+            quadrilateral_clearance(&corners, DVec3::new(0.1, 0.2, -0.06), DVec3::new(0.1, 0.2, 0.2));
+        assert!((through + 0.06).abs() < 1e-12, "{through}");
+        let over_the_border =
+            quadrilateral_clearance(&corners, DVec3::new(0.17, 0.2, -0.3), DVec3::new(0.17, 0.2, 0.2));
+        assert!((over_the_border + 0.03).abs() < 1e-12, "{over_the_border}");
+        let before = quadrilateral_clearance(&corners, DVec3::new(0.1, 0.2, 0.05), DVec3::new(0.1, 0.4, 0.2));
+        assert!((before - 0.05).abs() < 1e-12);
+    }
+}

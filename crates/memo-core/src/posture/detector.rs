@@ -1,0 +1,945 @@
+//! What keypoint detectors deliver: which point stands where, what it is called, and how the fourteen joints of
+//! the stick figure and the six head points of Lee and Chen (1985) come from it.
+//!
+//! Every point has one name here (`right_knee`); the spellings of the detectors, of motion capture and of tables
+//! lead to it ([`joint_name`]). A [`Layout`] is the order of a detector's points; its source is part of it. Two
+//! layouts have 25 points, so [`Layout::from_points`] looks at the points themselves.
+//!
+//! How the joints of the stick figure (section 2, figure 1, in the order of the paper's tree) are obtained:
+//!
+//! * shoulders, elbows, wrists, hips, knees and ankles are the detector's own;
+//! * the neck is the detector's point `neck` where its layout has one, else the middle of the shoulders. In
+//!   BODY_25 and COCO_18 it was trained as that middle. `upper_neck` of BODY_25B is another point, about 4 cm
+//!   above the line of the shoulders (median of 100 frames measured in space), and is used for the head only;
+//! * the pelvis is a point of the trunk's axis above the line of the hips. The lengths of table A.1 fit one rigid
+//!   trunk only, with the pelvis joint 10.09 cm above the line of the hips and 45.98 cm below that of the
+//!   shoulders, hence
+//!   `pelvis = m_hip + 10.09 / (10.09 + 45.98) (m_shoulder - m_hip)`
+//!   with the middles m in the image.
+//!
+//! The source of a joint depends on the layout and not on the frame, so that its meaning does not change within
+//! a track. A joint with a missing source is missing (NaN, weight 0): nothing is invented.
+//!
+//! What this cannot do: the middle of two image points is the image of the middle only where both are equally
+//! far away; at 4 m with one shoulder 0.4 m nearer it is off by 1 cm. The paper's neck lies 3.77 cm in front of
+//! the line of the shoulders, which a middle of two points cannot know. Detectors place hips and shoulders by
+//! habit, not by anatomy.
+
+use glam::DVec2;
+use thiserror::Error;
+
+/// Names of the stick figure's joints in the order of the paper's tree, the root first.
+pub const STICK_JOINTS: [&str; 14] = [
+    "neck",
+    "right_shoulder",
+    "left_shoulder",
+    "pelvis",
+    "right_hip",
+    "left_hip",
+    "right_elbow",
+    "left_elbow",
+    "right_wrist",
+    "left_wrist",
+    "right_knee",
+    "left_knee",
+    "right_ankle",
+    "left_ankle",
+];
+
+/// Names of the head points in the order of table A.2.
+pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "right_ear", "left_ear"];
+
+/// Where the pelvis joint lies on the way from the middle of the hips to the middle of the shoulders: from the
+/// lengths of table A.1 as a rigid trunk.
+pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
+
+/// The order of a detector's points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Its name, as its makers write it.
+    pub name: &'static str,
+    /// Names of its points in order, in this project's spelling.
+    pub joints: &'static [&'static str],
+    /// Where the order was read.
+    pub source: &'static str,
+}
+
+/// All layouts known.
+pub static LAYOUTS: [Layout; 8] = [
+    Layout {
+        name: "BODY_25",
+        joints: &[
+            "nose",
+            "neck",
+            "right_shoulder",
+            "right_elbow",
+            "right_wrist",
+            "left_shoulder",
+            "left_elbow",
+            "left_wrist",
+            "mid_hip",
+            "right_hip",
+            "right_knee",
+            "right_ankle",
+            "left_hip",
+            "left_knee",
+            "left_ankle",
+            "right_eye",
+            "left_eye",
+            "right_ear",
+            "left_ear",
+            "left_big_toe",
+            "left_small_toe",
+            "left_heel",
+            "right_big_toe",
+            "right_small_toe",
+            "right_heel",
+        ],
+        source: "CMU-Perceptual-Computing-Lab/openpose src/openpose/pose/poseParameters.cpp, \
+                 POSE_BODY_25_BODY_PARTS",
+    },
+    Layout {
+        name: "BODY_25B",
+        joints: &[
+            "nose",
+            "left_eye",
+            "right_eye",
+            "left_ear",
+            "right_ear",
+            "left_shoulder",
+            "right_shoulder",
+            "left_elbow",
+            "right_elbow",
+            "left_wrist",
+            "right_wrist",
+            "left_hip",
+            "right_hip",
+            "left_knee",
+            "right_knee",
+            "left_ankle",
+            "right_ankle",
+            "upper_neck",
+            "head_top",
+            "left_big_toe",
+            "left_small_toe",
+            "left_heel",
+            "right_big_toe",
+            "right_small_toe",
+            "right_heel",
+        ],
+        source: "openpose poseParameters.cpp, POSE_BODY_25B_BODY_PARTS; perfanalytics/pose2sim \
+                 Pose2Sim/skeletons.py, BODY_25B",
+    },
+    Layout {
+        name: "COCO_18",
+        joints: &[
+            "nose",
+            "neck",
+            "right_shoulder",
+            "right_elbow",
+            "right_wrist",
+            "left_shoulder",
+            "left_elbow",
+            "left_wrist",
+            "right_hip",
+            "right_knee",
+            "right_ankle",
+            "left_hip",
+            "left_knee",
+            "left_ankle",
+            "right_eye",
+            "left_eye",
+            "right_ear",
+            "left_ear",
+        ],
+        source: "CMU-Perceptual-Computing-Lab/openpose src/openpose/pose/poseParameters.cpp, \
+                 POSE_COCO_BODY_PARTS",
+    },
+    Layout {
+        name: "COCO_17",
+        joints: &[
+            "nose",
+            "left_eye",
+            "right_eye",
+            "left_ear",
+            "right_ear",
+            "left_shoulder",
+            "right_shoulder",
+            "left_elbow",
+            "right_elbow",
+            "left_wrist",
+            "right_wrist",
+            "left_hip",
+            "right_hip",
+            "left_knee",
+            "right_knee",
+            "left_ankle",
+            "right_ankle",
+        ],
+        source: "COCO person_keypoints_val2017.json, categories[0].keypoints; AlphaPose docs/output.md, COCO",
+    },
+    Layout {
+        name: "HALPE_26",
+        joints: &[
+            "nose",
+            "left_eye",
+            "right_eye",
+            "left_ear",
+            "right_ear",
+            "left_shoulder",
+            "right_shoulder",
+            "left_elbow",
+            "right_elbow",
+            "left_wrist",
+            "right_wrist",
+            "left_hip",
+            "right_hip",
+            "left_knee",
+            "right_knee",
+            "left_ankle",
+            "right_ankle",
+            "head_top",
+            "neck",
+            "mid_hip",
+            "left_big_toe",
+            "right_big_toe",
+            "left_small_toe",
+            "right_small_toe",
+            "left_heel",
+            "right_heel",
+        ],
+        source: "Fang-Haoshu/Halpe-FullBody README.md, Keypoints format, body",
+    },
+    Layout {
+        name: "MEDIAPIPE_33",
+        joints: &[
+            "nose",
+            "left_eye_inner",
+            "left_eye",
+            "left_eye_outer",
+            "right_eye_inner",
+            "right_eye",
+            "right_eye_outer",
+            "left_ear",
+            "right_ear",
+            "left_mouth",
+            "right_mouth",
+            "left_shoulder",
+            "right_shoulder",
+            "left_elbow",
+            "right_elbow",
+            "left_wrist",
+            "right_wrist",
+            "left_pinky",
+            "right_pinky",
+            "left_index",
+            "right_index",
+            "left_thumb",
+            "right_thumb",
+            "left_hip",
+            "right_hip",
+            "left_knee",
+            "right_knee",
+            "left_ankle",
+            "right_ankle",
+            "left_heel",
+            "right_heel",
+            "left_big_toe",
+            "right_big_toe",
+        ],
+        source: "google-ai-edge/mediapipe mediapipe/python/solutions/pose.py, PoseLandmark \
+                 (its FOOT_INDEX is the big toe)",
+    },
+    Layout {
+        name: "STICK_14",
+        joints: &STICK_JOINTS,
+        source: "Lee and Chen 1985, figure 1, in the order of the interpretation tree",
+    },
+    Layout {
+        name: "MOCAP_12",
+        joints: &[
+            "right_shoulder",
+            "right_elbow",
+            "right_wrist",
+            "left_shoulder",
+            "left_elbow",
+            "left_wrist",
+            "right_hip",
+            "right_knee",
+            "right_ankle",
+            "left_hip",
+            "left_knee",
+            "left_ankle",
+        ],
+        source: "joint tables of motion capture: RSH REL RWR LSH LEL LWR RHP RKN RAN LHP LKN LAN",
+    },
+];
+
+/// Points without a side, with their other spellings (lower case, nothing but letters and digits).
+const MIDDLE_PARTS: [(&str, &[&str]); 6] = [
+    ("nose", &[]),
+    ("neck", &[]),
+    ("upper_neck", &[]),
+    ("head_top", &["head"]),
+    ("mid_hip", &["hip", "chip", "mhip"]),
+    ("pelvis", &[]),
+];
+
+/// Parts with a right and a left point: group, right name, left name, other spellings of the part.
+const SIDE_PARTS: [(SwapGroup, &str, &str, &[&str]); 17] = [
+    (SwapGroup::Legs, "right_hip", "left_hip", &["hp"]),
+    (SwapGroup::Legs, "right_knee", "left_knee", &["kn"]),
+    (SwapGroup::Legs, "right_ankle", "left_ankle", &["an"]),
+    (SwapGroup::Legs, "right_heel", "left_heel", &["hee"]),
+    (SwapGroup::Legs, "right_big_toe", "left_big_toe", &["footindex"]),
+    (SwapGroup::Legs, "right_small_toe", "left_small_toe", &[]),
+    (SwapGroup::Arms, "right_shoulder", "left_shoulder", &["sh"]),
+    (SwapGroup::Arms, "right_elbow", "left_elbow", &["el"]),
+    (SwapGroup::Arms, "right_wrist", "left_wrist", &["wr"]),
+    (SwapGroup::Arms, "right_pinky", "left_pinky", &[]),
+    (SwapGroup::Arms, "right_index", "left_index", &[]),
+    (SwapGroup::Arms, "right_thumb", "left_thumb", &[]),
+    (SwapGroup::Head, "right_eye", "left_eye", &[]),
+    (SwapGroup::Head, "right_ear", "left_ear", &[]),
+    (SwapGroup::Head, "right_eye_inner", "left_eye_inner", &[]),
+    (SwapGroup::Head, "right_eye_outer", "left_eye_outer", &[]),
+    (SwapGroup::Head, "right_mouth", "left_mouth", &[]),
+];
+
+/// Why points were refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum DetectorError {
+    /// No layout of this name.
+    #[error("unknown keypoint layout `{name}`{}; known are {}", hint(nearest), layout_names().join(", "))]
+    UnknownLayout {
+        /// The name given.
+        name: String,
+        /// The known name most like it, if one is.
+        nearest: Option<&'static str>,
+    },
+    /// No point of this name.
+    #[error("unknown joint `{name}`{}; known are {}", hint(nearest), joint_names().join(", "))]
+    UnknownJoint {
+        /// The name given.
+        name: String,
+        /// The known name most like it, if one is.
+        nearest: Option<&'static str>,
+    },
+    /// Two points of one name.
+    #[error("joint `{name}` is named twice, at places {first} and {second}")]
+    RepeatedJoint {
+        /// The joint.
+        name: &'static str,
+        /// Its first place.
+        first: usize,
+        /// Its second place.
+        second: usize,
+    },
+    /// Not as many points or scores as names.
+    #[error("expected {expected} {what}, got {got}")]
+    Count {
+        /// Points or scores.
+        what: &'static str,
+        /// The number of names.
+        expected: usize,
+        /// The number that came.
+        got: usize,
+    },
+    /// No layout has so many points.
+    #[error("no keypoint layout has {count} points; known are {}", layout_counts().join(", "))]
+    UnknownCount {
+        /// The number of points.
+        count: usize,
+    },
+    /// Two layouts have so many points and the points do not tell which.
+    #[error(
+        "{count} points may be {} or {}, and they do not tell which{}: name the layout",
+        names[0], names[1], distance.map_or(String::new(), |far| format!(" (middle test {far:.3})"))
+    )]
+    UnclearLayout {
+        /// The number of points.
+        count: usize,
+        /// The layouts that have it.
+        names: [&'static str; 2],
+        /// Result of the middle test, if a frame allowed it; see [`Layout::from_points`].
+        distance: Option<f64>,
+    },
+}
+
+fn hint(nearest: &Option<&'static str>) -> String {
+    nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
+}
+
+fn layout_names() -> Vec<&'static str> {
+    LAYOUTS.iter().map(|layout| layout.name).collect()
+}
+
+fn layout_counts() -> Vec<String> {
+    LAYOUTS.iter().map(|layout| format!("{} ({})", layout.joints.len(), layout.name)).collect()
+}
+
+/// All names of points.
+pub fn joint_names() -> Vec<&'static str> {
+    let middle = MIDDLE_PARTS.iter().map(|(name, _)| *name);
+    middle.chain(SIDE_PARTS.iter().flat_map(|(_, right, left, _)| [*right, *left])).collect()
+}
+
+/// The name here of a point that `name` spells in any known way: `RKnee`, `right_knee`, `RIGHT_KNEE`, `RKN`.
+pub fn joint_name(name: &str) -> Result<&'static str, DetectorError> {
+    let plain = plain(name);
+    let spelt = |own: &str, others: &[&str]| plain_is(own, &plain) || others.contains(&plain.as_str());
+    if let Some((found, _)) = MIDDLE_PARTS.iter().find(|(own, others)| spelt(own, others)) {
+        return Ok(found);
+    }
+    for (_, right, left, others) in &SIDE_PARTS {
+        let part = right.trim_start_matches("right_");
+        for (side, own) in [("right", right), ("left", left)] {
+            let sides = [side, &side[..1]];
+            let before =
+                |side: &str| plain.strip_prefix(side).is_some_and(|rest| rest_is(rest, part, others));
+            let after = |side: &str| plain.strip_suffix(side).is_some_and(|rest| rest_is(rest, part, others));
+            if sides.into_iter().any(before) || after(side) {
+                return Ok(own);
+            }
+        }
+    }
+    Err(DetectorError::UnknownJoint { name: name.to_owned(), nearest: nearest(&plain, joint_names()) })
+}
+
+fn rest_is(rest: &str, part: &str, others: &[&str]) -> bool {
+    plain_is(part, rest) || others.contains(&rest)
+}
+
+/// Lower case, letters and digits only.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_ascii_alphanumeric()).map(|c| c.to_ascii_lowercase()).collect()
+}
+
+/// Whether a name of this project reads `plain` without its underscores.
+fn plain_is(own: &str, plain: &str) -> bool {
+    own.bytes().filter(|&b| b != b'_').eq(plain.bytes())
+}
+
+/// The name most like `plain`, if few letters differ: one, or two from eight letters on.
+fn nearest(plain_name: &str, known: Vec<&'static str>) -> Option<&'static str> {
+    const LONGEST: usize = 40;
+    if plain_name.is_empty() || plain_name.len() > LONGEST {
+        return None;
+    }
+    let allowed = if plain_name.len() < 8 { 1 } else { 2 };
+    let distances = known.into_iter().map(|name| (edit_distance(&plain(name), plain_name), name));
+    distances.filter(|(distance, _)| *distance <= allowed).min().map(|(_, name)| name)
+}
+
+/// Letters to insert, drop, change or exchange with their neighbour to make one text of the other
+/// (Damerau and Levenshtein's, each stretch edited once).
+fn edit_distance(a: &str, b: &str) -> usize {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let mut before = vec![0; b.len() + 1];
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i; b.len() + 1];
+        for j in 1..=b.len() {
+            let changed = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            row[j] = changed.min(last[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                row[j] = row[j].min(before[j - 2] + 1);
+            }
+        }
+        before = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+impl Layout {
+    /// The layout called `name`, however its letters and separators are written.
+    pub fn by_name(name: &str) -> Result<&'static Self, DetectorError> {
+        let wanted = plain(name);
+        let same = |layout: &&'static Self| plain(layout.name) == wanted;
+        LAYOUTS.iter().find(same).ok_or_else(|| DetectorError::UnknownLayout {
+            name: name.to_owned(),
+            nearest: nearest(&wanted, layout_names()),
+        })
+    }
+
+    /// The layout with `joint_count` points that `points_px` are in, frame after frame, NaN where missing.
+    ///
+    /// BODY_25 and BODY_25B both have 25. The **middle test** tells them apart: BODY_25 alone has a neck and a
+    /// middle of the hips, which were trained as middles of the shoulders and of the hips. In published BODY_25
+    /// files those points lie within 0.01 of the figure's size (the diagonal of the box around it) of the
+    /// middles; where a BODY_25B file has other points in those places, the distance is 0.24 to 0.45 for the
+    /// hips and 0.02 to 0.16 for the neck. The greater of the two medians over the frames decides: up to
+    /// [`MIDDLE_NEAR`] it is BODY_25, from [`MIDDLE_FAR`] on it is not, and between it is an error.
+    pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
+        let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
+        let (with_middles, without) = match fitting[..] {
+            [] => return Err(DetectorError::UnknownCount { count: joint_count }),
+            [only] => return Ok(only),
+            [first, second, ..] => (first, second),
+        };
+        let distance = with_middles.distance_from_middles(points_px);
+        match distance {
+            Some(distance) if distance <= MIDDLE_NEAR => Ok(with_middles),
+            Some(distance) if distance >= MIDDLE_FAR => Ok(without),
+            _ => Err(DetectorError::UnclearLayout {
+                count: joint_count,
+                names: [with_middles.name, without.name],
+                distance,
+            }),
+        }
+    }
+
+    /// How far the neck and the middle of the hips lie from the middles of shoulders and hips, in sizes of the
+    /// figure: the greater of the medians over the frames. None where no frame tells.
+    fn distance_from_middles(&self, points_px: &[DVec2]) -> Option<f64> {
+        let place = |name: &str| self.joints.iter().position(|joint| *joint == name);
+        let middles = [["neck", "right_shoulder", "left_shoulder"], ["mid_hip", "right_hip", "left_hip"]];
+        let median = |[middle, right, left]: [&str; 3]| {
+            let (middle, right, left) = (place(middle)?, place(right)?, place(left)?);
+            let mut distances: Vec<f64> = points_px
+                .chunks_exact(self.joints.len())
+                .map(|frame| frame[middle].distance(frame[right].midpoint(frame[left])) / size_px(frame))
+                .filter(|distance| distance.is_finite())
+                .collect();
+            distances.sort_by(f64::total_cmp);
+            distances.get(distances.len() / 2).copied()
+        };
+        middles.into_iter().filter_map(median).max_by(f64::total_cmp)
+    }
+}
+
+/// Diagonal of the box around the points that are not missing.
+pub(super) fn size_px(points_px: &[DVec2]) -> f64 {
+    let seen = || points_px.iter().filter(|point| point.is_finite());
+    let low = seen().fold(DVec2::INFINITY, |low, point| low.min(*point));
+    let high = seen().fold(DVec2::NEG_INFINITY, |high, point| high.max(*point));
+    if seen().next().is_none() { 0.0 } else { (high - low).length() }
+}
+
+/// Up to here points lie in the middle; see [`Layout::from_points`].
+pub const MIDDLE_NEAR: f64 = 0.04;
+
+/// From here on they do not.
+pub const MIDDLE_FAR: f64 = 0.06;
+
+/// Points that change sides together when a detector confuses right and left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SwapGroup {
+    /// Hip, knee, ankle, heel and toes.
+    Legs,
+    /// Shoulder, elbow, wrist and fingers.
+    Arms,
+    /// Eyes, ears and mouth.
+    Head,
+}
+
+impl SwapGroup {
+    /// Its name in files: "legs", "arms" or "head".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Legs => "legs",
+            Self::Arms => "arms",
+            Self::Head => "head",
+        }
+    }
+}
+
+/// A right and a left point of the same kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SidePair {
+    /// What it changes sides with.
+    pub group: SwapGroup,
+    /// The part without its side, such as `knee`.
+    pub part: &'static str,
+    /// Place of the right point.
+    pub right: usize,
+    /// Place of the left point.
+    pub left: usize,
+}
+
+/// N image points with weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedPoints<const N: usize> {
+    /// Pixels; NaN where missing.
+    pub points_px: [DVec2; N],
+    /// The least score among a point's sources; 0 where missing, or where a score is negative or not finite.
+    pub weights: [f64; N],
+}
+
+/// What a point is computed from: places in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Own(usize),
+    Middle([usize; 2]),
+    /// Hips, then shoulders.
+    OnTrunk([[usize; 2]; 2]),
+    Absent,
+}
+
+/// The named points of a detector, ready to be turned into joints of the stick figure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Detector {
+    names: Vec<&'static str>,
+    stick: [Source; 14],
+    head: [Source; 6],
+}
+
+impl Detector {
+    /// From the names of a frame's points in order, each in any known spelling.
+    pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, DetectorError> {
+        let mut known: Vec<&'static str> = Vec::with_capacity(names.len().min(LAYOUTS.len() * 33));
+        for name in names {
+            let name = joint_name(name.as_ref())?;
+            if let Some(first) = known.iter().position(|other| *other == name) {
+                return Err(DetectorError::RepeatedJoint { name, first, second: known.len() });
+            }
+            known.push(name);
+        }
+        Ok(Self::from_known(known))
+    }
+
+    /// Of a layout.
+    pub fn from_layout(layout: &'static Layout) -> Self {
+        Self::from_known(layout.joints.to_vec())
+    }
+
+    fn from_known(names: Vec<&'static str>) -> Self {
+        let place = |name: &str| names.iter().position(|other| *other == name);
+        let both = |right: &str, left: &str| Some([place(right)?, place(left)?]);
+        let shoulders = both("right_shoulder", "left_shoulder");
+        let hips = both("right_hip", "left_hip");
+        let own = |name: &str| place(name).map(Source::Own);
+        let neck = own("neck").or(shoulders.map(Source::Middle));
+        let stick = STICK_JOINTS.map(|name| match name {
+            "neck" => neck,
+            "pelvis" => {
+                own(name).or_else(|| hips.zip(shoulders).map(|(hips, tops)| Source::OnTrunk([hips, tops])))
+            }
+            _ => own(name),
+        });
+        // Table A.2 has the neck 9.5 cm below the tip of the nose: the upper neck, where there is one.
+        let head =
+            HEAD_POINTS.map(|name| if name == "neck" { own("upper_neck").or(neck) } else { own(name) });
+        let or_absent = |source: Option<Source>| source.unwrap_or(Source::Absent);
+        Self { stick: stick.map(or_absent), head: head.map(or_absent), names }
+    }
+
+    /// The names of its points in order.
+    pub fn names(&self) -> &[&'static str] {
+        &self.names
+    }
+
+    /// The joints of the stick figure, as [`STICK_JOINTS`], in one frame.
+    pub fn stick_joints(
+        &self,
+        points_px: &[DVec2],
+        scores: &[f64],
+    ) -> Result<WeightedPoints<14>, DetectorError> {
+        self.collect(&self.stick, points_px, scores)
+    }
+
+    /// The head points, as [`HEAD_POINTS`], in one frame. The neck is the upper neck of BODY_25B, else the neck
+    /// of the stick figure.
+    pub fn head_points(
+        &self,
+        points_px: &[DVec2],
+        scores: &[f64],
+    ) -> Result<WeightedPoints<6>, DetectorError> {
+        self.collect(&self.head, points_px, scores)
+    }
+
+    /// Which of [`HEAD_POINTS`] the detector can give at all.
+    pub fn available_head_points(&self) -> [bool; 6] {
+        self.head.map(|source| source != Source::Absent)
+    }
+
+    /// The pairs of right and left points among its points: legs from hip to toes, then arms, then head.
+    pub fn side_pairs(&self) -> Vec<SidePair> {
+        let place = |name: &str| self.names.iter().position(|other| *other == name);
+        let pair = |&(group, right, left, _): &(SwapGroup, &'static str, &str, _)| {
+            let part = right.trim_start_matches("right_");
+            Some(SidePair { group, part, right: place(right)?, left: place(left)? })
+        };
+        SIDE_PARTS.iter().filter_map(pair).collect()
+    }
+
+    fn collect<const N: usize>(
+        &self,
+        sources: &[Source; N],
+        points_px: &[DVec2],
+        scores: &[f64],
+    ) -> Result<WeightedPoints<N>, DetectorError> {
+        let expected = self.names.len();
+        for (what, got) in [("points", points_px.len()), ("scores", scores.len())] {
+            if got != expected {
+                return Err(DetectorError::Count { what, expected, got });
+            }
+        }
+        let middle = |[a, b]: [usize; 2]| points_px[a].midpoint(points_px[b]);
+        let points_px = sources.map(|source| match source {
+            Source::Own(at) => points_px[at],
+            Source::Middle(ends) => middle(ends),
+            Source::OnTrunk([hips, shoulders]) => middle(hips).lerp(middle(shoulders), PELVIS_ON_TRUNK),
+            Source::Absent => DVec2::NAN,
+        });
+        let least =
+            |places: &[usize]| places.iter().map(|&at| usable_score(scores[at])).fold(f64::MAX, f64::min);
+        let weights = sources.map(|source| match source {
+            Source::Own(at) => least(&[at]),
+            Source::Middle(ends) => least(&ends),
+            Source::OnTrunk(places) => least(places.as_flattened()),
+            Source::Absent => 0.0,
+        });
+        let mut found = WeightedPoints { points_px, weights };
+        for (point, weight) in found.points_px.iter_mut().zip(&mut found.weights) {
+            if !point.is_finite() {
+                (*point, *weight) = (DVec2::NAN, 0.0);
+            }
+        }
+        Ok(found)
+    }
+}
+
+fn usable_score(score: f64) -> f64 {
+    if score.is_finite() { score.max(0.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::random::Random;
+    use proptest::prelude::*;
+
+    /// Places copied by hand from the makers' own documents, as far as mistakes would hurt most.
+    #[test]
+    fn places_are_those_the_makers_document() {
+        let at = |layout: &str, place: usize| Layout::by_name(layout).unwrap().joints[place];
+        assert_eq!(
+            [at("body_25", 8), at("body_25", 11), at("body_25", 22)],
+            ["mid_hip", "right_ankle", "right_big_toe"]
+        );
+        assert_eq!(
+            [at("BODY25B", 6), at("body-25b", 15), at("BODY_25B", 21)],
+            ["right_shoulder", "left_ankle", "left_heel"]
+        );
+        assert_eq!([at("COCO_18", 8), at("COCO_18", 13)], ["right_hip", "left_ankle"]);
+        assert_eq!([at("COCO_17", 5), at("COCO_17", 16)], ["left_shoulder", "right_ankle"]);
+        assert_eq!([at("HALPE_26", 19), at("HALPE_26", 25)], ["mid_hip", "right_heel"]);
+        assert_eq!([at("MEDIAPIPE_33", 24), at("MEDIAPIPE_33", 31)], ["right_hip", "left_big_toe"]);
+        let counts = LAYOUTS.each_ref().map(|layout| layout.joints.len());
+        assert_eq!(counts, [25, 25, 18, 17, 26, 33, 14, 12]);
+    }
+
+    #[test]
+    fn every_layout_holds_known_names_once_and_its_sides_in_pairs() {
+        for layout in &LAYOUTS {
+            let detector = Detector::from_names(layout.joints).unwrap();
+            assert_eq!(detector, Detector::from_layout(layout));
+            let sided = layout.joints.iter().filter(|name| name.contains("right_") || name.contains("left_"));
+            assert_eq!(2 * detector.side_pairs().len(), sided.count(), "{}", layout.name);
+            for pair in detector.side_pairs() {
+                let other_side = layout.joints[pair.right].replace("right", "left");
+                assert_eq!(layout.joints[pair.left], other_side);
+            }
+        }
+    }
+
+    #[test]
+    fn spellings_of_all_origins_lead_to_one_name() {
+        for (name, spellings) in [
+            ("right_knee", ["RKnee", "Rknee", "RIGHT_KNEE", "right knee", "RKN", "knee_right"].as_slice()),
+            ("left_shoulder", &["LSH", "LShoulder", "left-shoulder"]),
+            ("right_elbow", &["REL", "relbow"]),
+            ("left_wrist", &["LWR"]),
+            ("right_hip", &["RHP", "RHip"]),
+            ("left_ankle", &["LAN", "LAnkle"]),
+            ("right_ear", &["REar"]),
+            ("left_eye", &["LEye"]),
+            ("left_big_toe", &["LBigToe", "LEFT_FOOT_INDEX"]),
+            ("right_index", &["RIGHT_INDEX"]),
+            ("left_mouth", &["MOUTH_LEFT"]),
+            ("mid_hip", &["MidHip", "Hip", "CHip"]),
+            ("head_top", &["Head", "HeadTop"]),
+            ("upper_neck", &["UpperNeck"]),
+        ] {
+            for spelling in spellings {
+                assert_eq!(joint_name(spelling).unwrap(), name, "{spelling}");
+            }
+        }
+        for name in joint_names() {
+            assert_eq!(joint_name(name).unwrap(), name);
+        }
+    }
+
+    #[test]
+    fn refusals_name_what_is_known_and_what_is_nearest() {
+        let message = joint_name("right_nkee").unwrap_err().to_string();
+        assert!(
+            message.contains("did you mean `right_knee`?") && message.contains("left_ankle"),
+            "{message}"
+        );
+        let message = joint_name("sternum").unwrap_err().to_string();
+        assert!(!message.contains("did you mean") && message.contains("known are"), "{message}");
+        let message = Layout::by_name("BODY_26").unwrap_err().to_string();
+        assert!(message.contains("did you mean `BODY_25`?") && message.contains("HALPE_26"), "{message}");
+        let message = Layout::from_points(19, &[]).unwrap_err().to_string();
+        assert!(message.contains("19 points") && message.contains("18 (COCO_18)"), "{message}");
+        let message = Detector::from_names(&["RKnee", "nose", "RKN"]).unwrap_err().to_string();
+        assert_eq!(message, "joint `right_knee` is named twice, at places 0 and 2");
+        let detector = Detector::from_names(&["nose"]).unwrap();
+        let message = detector.stick_joints(&[DVec2::ZERO; 2], &[1.0]).unwrap_err().to_string();
+        assert_eq!(message, "expected 1 points, got 2");
+        for name in ["", "_", &"x".repeat(100_000)] {
+            assert!(joint_name(name).is_err() && Layout::by_name(name).is_err());
+        }
+    }
+
+    #[test]
+    fn the_trunk_lengths_of_table_a1_place_the_pelvis() {
+        // Shoulders 56.07 above the hips, drawn at 1 px/cm, leaning: the pelvis is 10.09 up that axis and the
+        // distance from it to the neck 45.98.
+        let names = ["right_shoulder", "left_shoulder", "right_hip", "left_hip"];
+        let axis = DVec2::from_angle(-1.4);
+        let (hips, across) = (DVec2::new(300.0, 500.0), 16.1 * axis.perp());
+        let shoulders = hips + 56.07 * axis;
+        let points = [shoulders - across, shoulders + across, hips - across, hips + across];
+        let found =
+            Detector::from_names(&names).unwrap().stick_joints(&points, &[0.9, 0.8, 0.7, 0.6]).unwrap();
+        let (neck, pelvis) = (found.points_px[0], found.points_px[3]);
+        assert!(
+            ((pelvis - hips).length() - 10.09).abs() < 1e-9
+                && ((neck - pelvis).length() - 45.98).abs() < 1e-9
+        );
+        assert_eq!((found.weights[0], found.weights[3]), (0.8, 0.6));
+        assert!(found.points_px[8].is_nan() && found.weights[8] == 0.0, "no wrist was given");
+    }
+
+    #[test]
+    fn the_neck_is_the_detectors_own_or_the_middle_of_the_shoulders() {
+        let marked = |layout: &str| {
+            let layout = Layout::by_name(layout).unwrap();
+            let points: Vec<DVec2> = (0..layout.joints.len()).map(|k| DVec2::new(k as f64, 100.0)).collect();
+            let detector = Detector::from_layout(layout);
+            let scores = vec![1.0; points.len()];
+            let stick = detector.stick_joints(&points, &scores).unwrap();
+            (stick.points_px[0].x, detector.head_points(&points, &scores).unwrap().points_px[0].x)
+        };
+        assert_eq!(marked("BODY_25"), (1.0, 1.0));
+        assert_eq!(marked("HALPE_26"), (18.0, 18.0));
+        assert_eq!(marked("COCO_17"), (5.5, 5.5));
+        assert_eq!(marked("BODY_25B"), (5.5, 17.0));
+        let body_only = Detector::from_layout(Layout::by_name("MOCAP_12").unwrap());
+        assert_eq!(body_only.available_head_points(), [true, false, false, false, false, false]);
+    }
+
+    /// A standing figure in some layout, seen from the front or the side, with noise of some pixels.
+    fn standing(layout: &Layout, random: &mut Random, noise_px: f64, width: f64) -> Vec<DVec2> {
+        let height = |name: &str| match name.split_once('_').map_or(name, |(_, part)| part) {
+            "ankle" | "heel" | "big_toe" | "small_toe" => 0.05,
+            "knee" => 0.28,
+            "hip" | "wrist" => 0.52,
+            "elbow" => 0.65,
+            "shoulder" | "neck" => 0.82,
+            _ => 0.93,
+        };
+        let side =
+            |name: &str| if name.starts_with("right") { -1.0 } else { f64::from(name.starts_with("left")) };
+        let place = |name: &&str| DVec2::new(300.0 + width * side(name), 400.0 - 300.0 * height(name));
+        let noise = |random: &mut Random| DVec2::from(random.normal_pair().map(f64::from)) * noise_px;
+        layout.joints.iter().map(|name| place(name) + noise(random)).collect()
+    }
+
+    #[test]
+    fn twenty_five_points_are_told_apart_by_the_middle_test() {
+        let mut random = Random::new(3);
+        for layout in &LAYOUTS[..2] {
+            for (width, noise_px) in [(30.0, 0.0), (30.0, 4.0), (0.0, 0.0), (5.0, 4.0)] {
+                let points: Vec<DVec2> =
+                    (0..20).flat_map(|_| standing(layout, &mut random, noise_px, width)).collect();
+                assert_eq!(Layout::from_points(25, &points).unwrap().name, layout.name, "{width} {noise_px}");
+            }
+        }
+        let on_the_edge =
+            |k: usize| DVec2::new(if k == 1 { 5.0 } else { 0.0 }, if k == 0 { 100.0 } else { 0.0 });
+        let edge: Vec<DVec2> = (0..25).map(on_the_edge).collect();
+        for unclear in
+            [edge.as_slice(), &[], &[DVec2::NAN; 25], &[DVec2::splat(1e308); 25], &[DVec2::ONE; 24]]
+        {
+            let error = Layout::from_points(25, unclear).unwrap_err();
+            assert!(error.to_string().contains("name the layout"), "{error}");
+        }
+    }
+
+    /// Points 1, 2, 5, 8, 9, 12 of two real BODY_25 frames, with the nose and a heel: figures that published
+    /// software carries as examples.
+    #[test]
+    fn real_body_25_frames_are_recognised() {
+        let frames = [
+            [
+                (0, 378.929, 123.152),
+                (1, 378.89, 155.758),
+                (2, 350.195, 153.183),
+                (5, 402.429, 155.77),
+                (8, 378.881, 234.069),
+                (9, 360.64, 234.067),
+                (12, 392.025, 234.092),
+                (24, 369.755, 341.068),
+            ],
+            [
+                (0, 789.327, 185.923),
+                (1, 736.197, 294.809),
+                (2, 645.14, 297.87),
+                (5, 821.695, 291.873),
+                (8, 742.157, 577.328),
+                (9, 692.05, 577.387),
+                (12, 792.319, 574.466),
+                (24, 709.862, 998.327),
+            ],
+        ];
+        for frame in frames {
+            let mut points = [DVec2::NAN; 25];
+            for (place, u, v) in frame {
+                points[place] = DVec2::new(u, v);
+            }
+            assert_eq!(Layout::from_points(25, &points).unwrap().name, "BODY_25");
+        }
+    }
+
+    proptest! {
+        /// Whatever is missing or broken in a frame: a joint is missing exactly when one of its sources is.
+        #[test]
+        fn a_joint_is_missing_exactly_when_a_source_is(
+            which in 0..LAYOUTS.len(),
+            missing in prop::collection::vec(any::<bool>(), 33),
+            scores in prop::collection::vec(prop_oneof![0.0..1.0f64, Just(f64::NAN), Just(-1.0)], 33),
+        ) {
+            let layout = &LAYOUTS[which];
+            let count = layout.joints.len();
+            let point = |k: usize| if missing[k] { DVec2::NAN } else { DVec2::new(k as f64, 2.0 * k as f64) };
+            let points: Vec<DVec2> = (0..count).map(point).collect();
+            let found = Detector::from_layout(layout).stick_joints(&points, &scores[..count]).unwrap();
+            let seen = |name: &str| {
+                layout.joints.iter().position(|joint| *joint == name).is_some_and(|k| !missing[k])
+            };
+            for (k, name) in STICK_JOINTS.into_iter().enumerate() {
+                let both = |part: &str| seen(&format!("right_{part}")) && seen(&format!("left_{part}"));
+                let expected = match name {
+                    "neck" if layout.joints.contains(&"neck") => seen("neck"),
+                    "neck" => both("shoulder"),
+                    "pelvis" if layout.joints.contains(&"pelvis") => seen("pelvis"),
+                    "pelvis" => both("shoulder") && both("hip"),
+                    _ => seen(name),
+                };
+                prop_assert_eq!(found.points_px[k].is_finite(), expected, "{}", name);
+                prop_assert!(found.weights[k] >= 0.0 && found.weights[k] <= 1.0);
+                prop_assert!(expected || found.weights[k] == 0.0);
+            }
+        }
+
+        #[test]
+        fn no_text_breaks_the_names(text in any::<String>()) {
+            let _ = joint_name(&text);
+            let _ = Layout::by_name(&text);
+        }
+    }
+}

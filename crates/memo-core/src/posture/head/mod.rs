@@ -1,0 +1,261 @@
+//! Where the head is and faces, from its feature points in one image (Lee and Chen 1985, section 2.1).
+//!
+//! | function | needs | gives |
+//! |---|---|---|
+//! | [`linear_head`] | 6 points, not coplanar | eqs. (1)-(5): `[T]`, `[R]`, f and position, no uncertainty |
+//! | [`head_pose`] | 4 points with f known, 6 with f free | every least-squares pose, with covariance |
+//! | [`head_pose_in_image`] | a [`Camera`](crate::model::Camera), 4 pixels | the same, through its lens |
+//!
+//! # Frames
+//!
+//! Head: right-handed; x forward, y up, z to the head's right (Table A.2). The *head plane* is spanned by y
+//! and z, so its normal, the facing direction, is x: the paper uses the normal without defining the plane.
+//!
+//! Camera: OpenCV axes (x right, y down, z forward) with the origin in the centre of projection. The paper's
+//! camera is left-handed (y up) with its origin on the image plane, f in front of the centre of projection:
+//!
+//! ```text
+//! x = x_paper,   y = -y_paper,   z = z_paper + f
+//! ```
+//!
+//! Its "camera position" is that origin, which presupposes that image and head have the same unit. Only
+//! [`LinearHead`], [`PaperView`] and [`HeadTable`] speak the paper's axes.
+//!
+//! # What it cannot do
+//!
+//! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 5 to 7 cm for each pixel of
+//! noise and its facing by 1 to 3 degrees; with f free the depth is next to undetermined. Points are taken as
+//! matched and independent, with one standard deviation: outliers are not searched for, but show in
+//! [`HeadPose::chi_squared`] if that is given.
+
+mod linear;
+mod model;
+mod pose;
+mod search;
+mod table;
+
+pub use linear::{Conditioning, LinearHead, PaperView, linear_head};
+pub use model::{HeadModel, HeadPoint, LEE_CHEN_BODY_HEIGHT_M};
+pub use pose::{Facing, HeadPose, PointEstimate};
+pub use search::{Focal, HeadOptions, HeadSolution, head_pose, head_pose_in_image};
+pub use table::{HeadTable, HeadTableColumn, exact_projections, table_2};
+
+use crate::model::body::BodyError;
+use crate::model::camera::CameraError;
+use glam::{DMat3, DVec2, DVec3};
+use nalgebra::{DMatrix, Matrix3};
+use thiserror::Error;
+
+/// Largest coordinate taken, in the caller's unit.
+pub const MAX_COORDINATE: f64 = 1e9;
+/// Smallest spread of points taken, in the caller's unit.
+pub const MIN_SPREAD: f64 = 1e-9;
+/// Points are collinear or coplanar below this ratio of the singular values of their centred coordinates.
+pub const MIN_SHAPE_RATIO: f64 = 1e-6;
+
+/// Why the head could not be found.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum HeadError {
+    /// Not enough points.
+    #[error("{method} needs at least {needed} points, got {count}")]
+    TooFewPoints {
+        /// What was asked for.
+        method: &'static str,
+        /// Points given.
+        count: usize,
+        /// Points needed.
+        needed: usize,
+    },
+    /// Points are not paired.
+    #[error("{head} head points but {image} image points")]
+    Unpaired {
+        /// Number of head points.
+        head: usize,
+        /// Number of image points.
+        image: usize,
+    },
+    /// A coordinate is NaN, infinite or absurdly large.
+    #[error("{kind} point {index} must be finite and at most {MAX_COORDINATE:e} in size, got {value}")]
+    Coordinate {
+        /// "head" or "image".
+        kind: &'static str,
+        /// Number of the point.
+        index: usize,
+        /// The offending coordinate.
+        value: f64,
+    },
+    /// Two head points are one.
+    #[error("head points {first} and {second} coincide")]
+    Duplicate {
+        /// Number of one point.
+        first: usize,
+        /// Number of the other.
+        second: usize,
+    },
+    /// The head points lie on one line: the rotation about it cannot be seen.
+    #[error("head points are collinear: singular value ratio {ratio:.1e}, needed {MIN_SHAPE_RATIO:e}")]
+    Collinear {
+        /// Second over first singular value of the centred points.
+        ratio: f64,
+    },
+    /// The head points lie in one plane, from which eq. (3) does not determine `[T]`.
+    #[error("head points are coplanar: singular value ratio {ratio:.1e}, needed {MIN_SHAPE_RATIO:e}")]
+    Coplanar {
+        /// Third over first singular value of the centred points.
+        ratio: f64,
+    },
+    /// All image points are one.
+    #[error("image points lie within {spread:.1e} of each other")]
+    ImageSpread {
+        /// Root mean square distance from their centroid.
+        spread: f64,
+    },
+    /// The equations leave more than one solution.
+    #[error("the points leave the answer undetermined: singular value ratio {ratio:.1e}, needed {needed:e}")]
+    Undetermined {
+        /// Ratio of the singular value that must not vanish to the first.
+        ratio: f64,
+        /// Its least value.
+        needed: f64,
+    },
+    /// The linear solution puts points on both sides of the camera.
+    #[error("the linear solution puts point {index} behind the camera (H = {scale:.3e})")]
+    BehindCamera {
+        /// Number of the point.
+        index: usize,
+        /// Its homogeneous scale H of eq. (1).
+        scale: f64,
+    },
+    /// The linear solution is a mirrored head.
+    #[error("the linear solution is no rotation: determinant {determinant:.3}")]
+    Mirrored {
+        /// Determinant of `[R]`.
+        determinant: f64,
+    },
+    /// The search ended nowhere.
+    #[error("none of {starts} starting poses led to a pose with all points in front of the camera")]
+    NoPose {
+        /// Poses tried.
+        starts: usize,
+    },
+    /// An option is out of its range.
+    #[error("{option} must be {expected}, got {value}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// Its range.
+        expected: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The camera is invalid or does not image a pixel.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The body height is implausible.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+}
+
+/// The centroid of points, and what their spread is.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    centroid: DVec3,
+    /// Root mean square distance from the centroid.
+    radius: f64,
+    /// Second and third over first singular value of the centred points.
+    ratios: [f64; 2],
+    /// Unit direction in which the points spread least.
+    thin_axis: DVec3,
+}
+
+/// Refuses points that are unpaired, too few, not finite, duplicate or collinear.
+fn checked_shape(
+    method: &'static str,
+    needed: usize,
+    points_in_head: &[DVec3],
+    image_points: &[DVec2],
+) -> Result<Shape, HeadError> {
+    let (head, image) = (points_in_head.len(), image_points.len());
+    if head != image {
+        return Err(HeadError::Unpaired { head, image });
+    }
+    if head < needed {
+        return Err(HeadError::TooFewPoints { method, count: head, needed });
+    }
+    check_coordinates("head", points_in_head.iter().map(DVec3::to_array))?;
+    check_coordinates("image", image_points.iter().map(DVec2::to_array))?;
+    let shape = shape_of(points_in_head)?;
+    check_duplicates(points_in_head, shape.radius)?;
+    if shape.ratios[0] < MIN_SHAPE_RATIO {
+        return Err(HeadError::Collinear { ratio: shape.ratios[0] });
+    }
+    let (_, spread) = centroid_and_spread(image_points);
+    if spread < MIN_SPREAD {
+        return Err(HeadError::ImageSpread { spread });
+    }
+    Ok(shape)
+}
+
+fn check_coordinates<const N: usize>(
+    kind: &'static str,
+    points: impl Iterator<Item = [f64; N]>,
+) -> Result<(), HeadError> {
+    for (index, point) in points.enumerate() {
+        if let Some(&value) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
+            return Err(HeadError::Coordinate { kind, index, value });
+        }
+    }
+    Ok(())
+}
+
+fn check_duplicates(points: &[DVec3], radius: f64) -> Result<(), HeadError> {
+    for (first, a) in points.iter().enumerate() {
+        if let Some(gap) = points[first + 1..].iter().position(|b| a.distance(*b) <= 1e-9 * radius) {
+            return Err(HeadError::Duplicate { first, second: first + 1 + gap });
+        }
+    }
+    Ok(())
+}
+
+fn shape_of(points: &[DVec3]) -> Result<Shape, HeadError> {
+    let centroid = points.iter().sum::<DVec3>() / points.len() as f64;
+    let centred: Vec<DVec3> = points.iter().map(|p| *p - centroid).collect();
+    let radius = (centred.iter().map(|p| p.length_squared()).sum::<f64>() / points.len() as f64).sqrt();
+    if radius <= MIN_SPREAD {
+        return Err(HeadError::Duplicate { first: 0, second: 1 });
+    }
+    let matrix =
+        DMatrix::from_fn(points.len().max(3), 3, |i, j| centred.get(i).map_or(0.0, |p| p[j] / radius));
+    let (sigma, v_t) = right_svd(matrix).ok_or(HeadError::Collinear { ratio: 0.0 })?;
+    let ratios = [sigma[1] / sigma[0], sigma[2] / sigma[0]];
+    let thin_axis = DVec3::new(v_t[(2, 0)], v_t[(2, 1)], v_t[(2, 2)]);
+    Ok(Shape { centroid, radius, ratios, thin_axis })
+}
+
+fn centroid_and_spread(points: &[DVec2]) -> (DVec2, f64) {
+    let count = points.len() as f64;
+    let centroid = points.iter().sum::<DVec2>() / count;
+    let sum_sq: f64 = points.iter().map(|p| p.distance_squared(centroid)).sum();
+    (centroid, (sum_sq / count).sqrt())
+}
+
+/// Singular values, greatest first, and Vᵀ; `None` if the iteration does not end.
+fn right_svd(matrix: DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let svd = matrix.try_svd(false, true, f64::EPSILON, 10_000)?;
+    let v_t = svd.v_t?;
+    Some((svd.singular_values.iter().copied().collect(), v_t))
+}
+
+/// The rotation nearest to a matrix in the Frobenius norm.
+fn nearest_rotation(matrix: DMat3) -> Option<DMat3> {
+    let svd = to_nalgebra(matrix).try_svd(true, true, f64::EPSILON, 10_000)?;
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let handedness = (u * v_t).determinant().signum();
+    let fixed = u * Matrix3::from_diagonal(&[1.0, 1.0, handedness].into()) * v_t;
+    let rotation = DMat3::from_cols_slice(fixed.as_slice());
+    rotation.is_finite().then_some(rotation)
+}
+
+fn to_nalgebra(matrix: DMat3) -> Matrix3<f64> {
+    Matrix3::from_column_slice(&matrix.to_cols_array())
+}

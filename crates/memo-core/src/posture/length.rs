@@ -1,0 +1,472 @@
+//! Segment lengths from a sequence of one view, when nobody measured them.
+//!
+//! A segment is never seen longer than it is: with the neck's distance known roughly, the largest extents that
+//! its image shows over a sequence come near to its length if it once stands across the view. Left and right
+//! are taken as equal. That is put together with the proportions of the body (Drillis and Contini 1966, by
+//! [`SegmentLengths::from_height`]) as a prior.
+//!
+//! Drillis and Contini print means alone. The spreads of [`SPREAD`] are those of four motion-captured walkers
+//! about these means; with four persons they are rough. Segments that never turn across the view (widths from the
+//! side, forearms from the front) stay with the prior, and the result says so. The overall scale cannot be seen
+//! in one view: it comes from body height, from the ground or a given distance, or is assumed ([`ScaleFrom`]).
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk};
+use super::lift::JointRays;
+use super::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
+
+/// What a length rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum LengthBasis {
+    /// Its own extents in the images, pooled with those of the other side.
+    Measured,
+    /// The extents of the other side alone.
+    Pooled,
+    /// The proportions of the body: it was not seen, or never across the view.
+    Prior,
+}
+
+/// Where the scale of all lengths comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ScaleFrom {
+    /// The body height that was given.
+    BodyHeight,
+    /// The distance of the person, known otherwise than by these lengths: ground, or given.
+    Distance,
+    /// Nothing: an adult of mean height is assumed.
+    Assumed,
+}
+
+/// A body's lengths before anything is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LengthPrior {
+    /// The lengths.
+    pub lengths: SegmentLengths,
+    /// Relative standard deviation of their common scale.
+    pub scale_sd: f64,
+    /// Where the scale comes from.
+    pub scale_from: ScaleFrom,
+}
+
+/// Height assumed of an adult, metres: between the means of women and men in most populations.
+pub const ASSUMED_HEIGHT_M: f64 = 1.70;
+/// Relative standard deviation of adult height over both sexes.
+const ASSUMED_HEIGHT_SD: f64 = 0.06;
+/// Relative standard deviation of the scale of a body of known height.
+const KNOWN_HEIGHT_SD: f64 = 0.02;
+
+impl LengthPrior {
+    /// Of a person of known height; without it, of an adult of [`ASSUMED_HEIGHT_M`].
+    pub fn from_height(height_m: Option<f64>) -> Result<Self, LengthError> {
+        let lengths = SegmentLengths::from_height(height_m.unwrap_or(ASSUMED_HEIGHT_M))?;
+        Ok(match height_m {
+            Some(_) => Self { lengths, scale_sd: KNOWN_HEIGHT_SD, scale_from: ScaleFrom::BodyHeight },
+            None => Self { lengths, scale_sd: ASSUMED_HEIGHT_SD, scale_from: ScaleFrom::Assumed },
+        })
+    }
+}
+
+/// One length with what is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LengthEstimate {
+    /// The name, as in [`SegmentLengths::named`].
+    pub segment: String,
+    /// The length, metres.
+    pub length_m: f64,
+    /// Its standard deviation, metres, the common scale included.
+    pub sd_m: f64,
+    /// What it rests on.
+    pub basis: LengthBasis,
+    /// The largest extent seen (80 %, less the noise, both sides), metres; NaN if not seen.
+    pub seen_m: f64,
+}
+
+/// Lengths estimated from a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LengthFit {
+    /// The lengths.
+    pub lengths: SegmentLengths,
+    /// Each with its standard deviation and basis, in the order of [`SegmentLengths::named`].
+    pub estimates: Vec<LengthEstimate>,
+    /// Standard deviations of the 13 segments, metres, by ending joint; 0 at the neck.
+    pub sd_m: PerJoint<f64>,
+    /// The scale against the prior's lengths.
+    pub scale: f64,
+    /// Its relative standard deviation.
+    pub scale_sd: f64,
+    /// Where the scale comes from.
+    pub scale_from: ScaleFrom,
+}
+
+/// Why no lengths were estimated.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LengthFitError {
+    /// Too few frames with an anchor.
+    #[error("lengths need at least {MIN_FRAMES} frames with a known distance of the neck, got {frames}")]
+    TooFewFrames {
+        /// Frames with an anchor.
+        frames: usize,
+    },
+    /// Frames and anchors do not go together.
+    #[error("{frames} frames but {anchors} anchors")]
+    Counts {
+        /// Number of frames.
+        frames: usize,
+        /// Number of anchors.
+        anchors: usize,
+    },
+    /// No frame gave an anchor; the error of the last one.
+    #[error("no frame gives the neck's distance: {0}")]
+    NoAnchor(#[from] AnchorError),
+    /// The prior's or the resulting lengths make no sense.
+    #[error(transparent)]
+    Length(#[from] LengthError),
+    /// A standard deviation is not usable.
+    #[error("the prior's scale_sd must be positive and finite, got {scale_sd}")]
+    ScaleSd {
+        /// The value.
+        scale_sd: f64,
+    },
+}
+
+/// Frames that are needed at least.
+pub const MIN_FRAMES: usize = 5;
+/// Of a longer sequence so many frames, evenly spaced, are used to find distances.
+const MOST_FRAMES: usize = 32;
+/// Rounds of lengths and anchors.
+const ROUNDS: usize = 3;
+
+/// A group of segments of equal length: what is known of it beforehand.
+struct Group {
+    pairs: &'static [[Joint; 2]],
+    /// Relative standard deviation between persons of the same height.
+    spread: f64,
+    /// Probability that the segment never stands across the view in a sequence.
+    hidden: f64,
+    /// Whether the scale of the body may be read from it.
+    tells_scale: bool,
+}
+
+/// The relative spreads of limbs, of trunk and forearm, and of widths between persons of the same height.
+///
+/// Root mean square deviations of four walkers from Drillis and Contini's means: thigh 5 %, shank 12 %, upper
+/// arm 7 %; forearm 23 % (two walkers have hinges instead of wrists) and neck to pelvis 24 % (the pelvis joint
+/// is a convention); width of the shoulders 21 %, of the hips 24 %.
+pub const SPREAD: [f64; 3] = [0.08, 0.20, 0.22];
+
+const GROUPS: [Group; 10] = {
+    use Joint::*;
+    const fn group(pairs: &'static [[Joint; 2]], spread: f64, hidden: f64, tells_scale: bool) -> Group {
+        Group { pairs, spread, hidden, tells_scale }
+    }
+    [
+        group(&[[Neck, RightShoulder], [Neck, LeftShoulder]], SPREAD[2], 0.5, false),
+        group(&[[Neck, Pelvis]], SPREAD[1], 0.1, false),
+        group(&[[Pelvis, RightHip], [Pelvis, LeftHip]], SPREAD[2], 0.5, false),
+        group(&[[RightShoulder, RightElbow], [LeftShoulder, LeftElbow]], SPREAD[0], 0.1, true),
+        group(&[[RightElbow, RightWrist], [LeftElbow, LeftWrist]], SPREAD[1], 0.4, false),
+        group(&[[RightHip, RightKnee], [LeftHip, LeftKnee]], SPREAD[0], 0.05, true),
+        group(&[[RightKnee, RightAnkle], [LeftKnee, LeftAnkle]], SPREAD[0], 0.05, true),
+        group(&[[RightShoulder, LeftShoulder]], SPREAD[2], 0.5, false),
+        group(&[[RightShoulder, Pelvis], [LeftShoulder, Pelvis]], SPREAD[1], 0.3, false),
+        group(&[[RightHip, LeftHip]], SPREAD[2], 0.5, false),
+    ]
+};
+
+/// Mean shortening of a segment in its best views, tilts of up to 10 degrees.
+const SHORTENING: f64 = 0.01;
+/// Relative standard deviation of an extent through the segment's own depth, a few centimetres off the neck's.
+const DEPTH_SD: f64 = 0.03;
+
+/// Lengths from rays and distances of the neck.
+///
+/// `up` is the vertical in camera axes, if known: joints are then taken to lie in the vertical plane across the
+/// view through the neck, else in the plane across the neck's ray. `is_scale_seen` says that the anchors
+/// do not rest on the prior's lengths alone (ground or given, not trunk).
+pub fn estimate(
+    rays: &[JointRays],
+    anchors: &[Option<Anchor>],
+    up: Option<DVec3>,
+    prior: &LengthPrior,
+    is_scale_seen: bool,
+) -> Result<LengthFit, LengthFitError> {
+    if rays.len() != anchors.len() {
+        return Err(LengthFitError::Counts { frames: rays.len(), anchors: anchors.len() });
+    }
+    if !(prior.scale_sd > 0.0 && prior.scale_sd.is_finite()) {
+        return Err(LengthFitError::ScaleSd { scale_sd: prior.scale_sd });
+    }
+    prior.lengths.validated()?;
+    let frames: Vec<(&JointRays, &Anchor)> =
+        rays.iter().zip(anchors).filter_map(|(r, a)| Some((r, a.as_ref()?))).collect();
+    if frames.len() < MIN_FRAMES {
+        return Err(LengthFitError::TooFewFrames { frames: frames.len() });
+    }
+    let scatter = frame_scatter(&frames);
+    let seen: Vec<Vec<f64>> = GROUPS
+        .iter()
+        .map(|group| group.pairs.iter().map(|&pair| envelope(&frames, pair, up, scatter)).collect())
+        .collect();
+    let pooled: Vec<f64> = seen.iter().map(|sides| mean_of_seen(sides)).collect();
+    let (scale, scale_sd) =
+        if is_scale_seen { scale_seen(&pooled, prior, relative_sd(&frames)) } else { (1.0, prior.scale_sd) };
+    let mut fit = LengthFit {
+        lengths: prior.lengths,
+        estimates: Vec::new(),
+        sd_m: PerJoint::default(),
+        scale,
+        scale_sd,
+        scale_from: if is_scale_seen && scale_sd < 0.8 * prior.scale_sd {
+            ScaleFrom::Distance
+        } else {
+            prior.scale_from
+        },
+    };
+    for ((group, sides), pooled) in GROUPS.iter().zip(&seen).zip(&pooled) {
+        let expected = scale * length_of(&prior.lengths, group.pairs[0]);
+        let (length_m, own_sd) = posterior(expected, group, *pooled, scale_sd);
+        let basis_of_pair = own_sd < 0.8 * group.spread * expected;
+        for (&pair, seen_m) in group.pairs.iter().zip(sides) {
+            let basis = match (basis_of_pair, seen_m.is_finite()) {
+                (false, _) => LengthBasis::Prior,
+                (true, true) => LengthBasis::Measured,
+                (true, false) => LengthBasis::Pooled,
+            };
+            let sd_m = own_sd.hypot(scale_sd * length_m);
+            set(
+                &mut fit,
+                pair,
+                LengthEstimate { segment: String::new(), length_m, sd_m, basis, seen_m: *pooled },
+            );
+        }
+    }
+    let order: Vec<String> = fit.lengths.named().map(|(name, _)| name).collect();
+    let place = |e: &LengthEstimate| order.iter().position(|name| *name == e.segment);
+    fit.estimates.sort_by_key(place);
+    fit.lengths = fit.lengths.validated()?;
+    Ok(fit)
+}
+
+/// Lengths and distances of the neck in turn, a few rounds: each rests on the other.
+///
+/// With the ground, anchors come from the feet on it and tell the scale; without, from the trunk, and the
+/// scale stays the prior's. Returns the lengths; take anchors anew with them and their `scale_sd`.
+pub fn estimate_from_sequence(
+    rays: &[JointRays],
+    ground: Option<&Ground>,
+    prior: &LengthPrior,
+    options: &AnchorOptions,
+) -> Result<LengthFit, LengthFitError> {
+    let step = rays.len().div_ceil(MOST_FRAMES).max(1);
+    let rays: Vec<JointRays> = rays.iter().step_by(step).copied().collect();
+    let up = ground.map(|g| g.up_in_camera);
+    let mut lengths = prior.lengths;
+    let mut options = AnchorOptions { scale_sd: prior.scale_sd, ..*options };
+    let mut fit = None;
+    for _ in 0..ROUNDS {
+        let mut error = AnchorError::Empty;
+        let anchors: Vec<Option<Anchor>> = rays
+            .iter()
+            .map(|rays| {
+                let anchor = match ground {
+                    Some(ground) => from_ground(rays, &lengths, ground, &options),
+                    None => from_trunk(rays, &lengths, None, &options).map(|fit| fit.anchor),
+                };
+                anchor.map_err(|e| error = e).ok()
+            })
+            .collect();
+        if anchors.iter().all(Option::is_none) {
+            return Err(error.into());
+        }
+        let found = estimate(&rays, &anchors, up, prior, ground.is_some())?;
+        lengths = found.lengths;
+        options.scale_sd = found.scale_sd;
+        fit = Some(found);
+    }
+    fit.ok_or(LengthFitError::TooFewFrames { frames: rays.len() })
+}
+
+/// The largest extent of a segment over the frames: their 80 % quantile without what noise adds to it. NaN if
+/// seen in fewer than [`MIN_FRAMES`].
+///
+/// Extents pile up at their upper end, so the spread is taken above the median alone: with u = (q80 - q50)/0.84
+/// and the noise e of an extent, q50 + 0.84 sqrt(u² - e²). `scatter` is that of the distances from frame to
+/// frame, relative.
+fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVec3>, scatter: f64) -> f64 {
+    let mut noise_sq = 0.0;
+    let mut extents: Vec<f64> = Vec::with_capacity(frames.len());
+    for (rays, anchor) in frames {
+        if !(rays.sees(a) && rays.sees(b)) {
+            continue;
+        }
+        let neck_ray = anchor.neck.normalize();
+        let across = up.map(|up| neck_ray - neck_ray.dot(up) * up).and_then(DVec3::try_normalize);
+        let normal = across.unwrap_or(neck_ray);
+        let depth = normal.dot(anchor.neck);
+        let on_plane = |joint: Joint| rays.ray[joint] * (depth / normal.dot(rays.ray[joint]));
+        let extent = on_plane(a).distance(on_plane(b));
+        if extent.is_finite() {
+            extents.push(extent);
+            noise_sq += 2.0 * (rays.noise_rad * anchor.distance_m).powi(2) + (scatter * extent).powi(2);
+        }
+    }
+    if extents.len() < MIN_FRAMES {
+        return f64::NAN;
+    }
+    let count = extents.len() as f64;
+    noise_sq /= count;
+    extents.sort_by(f64::total_cmp);
+    let quantile = |q: f64| extents[((count - 1.0) * q).round() as usize];
+    let (middle, high) = (quantile(0.5), quantile(0.8));
+    let spread = (high - middle) / 0.84;
+    middle + 0.84 * (spread * spread - noise_sq).max(0.0).sqrt()
+}
+
+/// Relative standard deviation of the distances from frame to frame, without steady motion.
+fn frame_scatter(frames: &[(&JointRays, &Anchor)]) -> f64 {
+    let steps: Vec<f64> = frames.windows(2).map(|w| (w[1].1.distance_m / w[0].1.distance_m).ln()).collect();
+    let drift = median(steps.clone());
+    median(steps.iter().map(|s| (s - drift).abs()).collect()) * 1.4826 / std::f64::consts::SQRT_2
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn mean_of_seen(sides: &[f64]) -> f64 {
+    let seen: Vec<f64> = sides.iter().copied().filter(|s| s.is_finite()).collect();
+    seen.iter().sum::<f64>() / seen.len() as f64
+}
+
+/// Relative standard deviation of the distances, as if common to all frames.
+fn relative_sd(frames: &[(&JointRays, &Anchor)]) -> f64 {
+    frames.iter().map(|(_, a)| a.sd_depth_m / a.distance_m).sum::<f64>() / frames.len() as f64
+}
+
+/// The scale by the segments that turn across the view, and by the prior.
+fn scale_seen(pooled: &[f64], prior: &LengthPrior, distance_sd: f64) -> (f64, f64) {
+    let ratios: Vec<(f64, f64)> = GROUPS
+        .iter()
+        .zip(pooled)
+        .filter(|(group, seen)| group.tells_scale && seen.is_finite())
+        .map(|(group, seen)| {
+            let ratio = seen / (1.0 - SHORTENING) / length_of(&prior.lengths, group.pairs[0]);
+            (ratio, (group.spread.powi(2) + DEPTH_SD * DEPTH_SD).recip())
+        })
+        .collect();
+    let weight: f64 = ratios.iter().map(|r| r.1).sum();
+    if weight <= 0.0 {
+        return (1.0, prior.scale_sd);
+    }
+    let mean = ratios.iter().map(|r| r.0 * r.1).sum::<f64>() / weight;
+    let measured = (1.0 / weight + distance_sd * distance_sd).recip();
+    let known = prior.scale_sd.powi(-2);
+    ((mean * measured + known) / (measured + known), (measured + known).sqrt().recip())
+}
+
+const GRID: usize = 400;
+
+/// Mean and standard deviation of a length of expected value and spread whose largest extent was `seen`.
+///
+/// The extent is the length times c, disturbed by [`DEPTH_SD`]: c = 1 - x with x exponential of mean
+/// [`SHORTENING`] if the segment once stands across the view, any c below 1 if it never does.
+fn posterior(expected: f64, group: &Group, seen: f64, scale_sd: f64) -> (f64, f64) {
+    let spread = group.spread.hypot(scale_sd);
+    if !seen.is_finite() {
+        return (expected, group.spread * expected);
+    }
+    let range = (expected * (1.0 - 4.0 * spread)).max(0.05 * expected)..expected * (1.0 + 4.0 * spread);
+    let at = |i: usize| range.start + (range.end - range.start) * i as f64 / (GRID - 1) as f64;
+    let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
+    for length in (0..GRID).map(at) {
+        let deviation = (length - expected) / (spread * expected);
+        let p = (-0.5 * deviation * deviation).exp() * likelihood(seen / length, group.hidden) / length;
+        total += p;
+        first += p * length;
+        second += p * length * length;
+    }
+    if total <= 0.0 {
+        return (expected, group.spread * expected);
+    }
+    let mean = first / total;
+    (mean, (second / total - mean * mean).max(0.0).sqrt())
+}
+
+/// Density of seen over true length: a normal of [`DEPTH_SD`] folded with the shortening, by six steps of it.
+fn likelihood(ratio: f64, hidden: f64) -> f64 {
+    let normal = |x: f64| (-0.5 * (x / DEPTH_SD).powi(2)).exp() / DEPTH_SD / std::f64::consts::TAU.sqrt();
+    // Quantiles of an exponential distribution at (i + 1/2)/6.
+    let across: f64 =
+        (0..6).map(|i| normal(ratio - 1.0 - SHORTENING * (1.0 - (f64::from(i) + 0.5) / 6.0).ln())).sum();
+    let hidden_density = 1.0 / (1.0 + ((ratio - 1.0) / (0.6 * DEPTH_SD)).exp());
+    (1.0 - hidden) * across / 6.0 + hidden * hidden_density
+}
+
+fn rigid_of([a, b]: [Joint; 2]) -> Option<RigidDistance> {
+    RigidDistance::ALL.into_iter().find(|d| d.joints() == [a, b])
+}
+
+fn length_of(lengths: &SegmentLengths, pair: [Joint; 2]) -> f64 {
+    rigid_of(pair).map_or(lengths.to[pair[1]], |d| lengths.rigid[d as usize])
+}
+
+fn set(fit: &mut LengthFit, pair: [Joint; 2], mut estimate: LengthEstimate) {
+    match rigid_of(pair) {
+        Some(distance) => {
+            fit.lengths.rigid[distance as usize] = estimate.length_m;
+            estimate.segment = distance.name().to_owned();
+        }
+        None => {
+            fit.lengths.to[pair[1]] = estimate.length_m;
+            fit.sd_m[pair[1]] = estimate.sd_m;
+            estimate.segment = super::skeleton::segment_name(pair[1]);
+        }
+    }
+    fit.estimates.push(estimate);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_segment_belongs_to_one_group() {
+        let lengths = SegmentLengths::lee_chen();
+        let count: usize = GROUPS.iter().map(|g| g.pairs.len()).sum();
+        assert_eq!(count, lengths.named().count());
+        for group in &GROUPS {
+            for &pair in group.pairs {
+                assert!(rigid_of(pair).is_some() || pair[1].start() == Some(pair[0]), "{pair:?}");
+                assert_eq!(length_of(&lengths, pair), length_of(&lengths, group.pairs[0]));
+            }
+        }
+    }
+
+    #[test]
+    fn a_length_seen_across_is_taken_and_one_hidden_is_not() {
+        let thigh = &GROUPS[5];
+        let (length, sd) = posterior(0.40, thigh, 0.43, 0.02);
+        assert!((length - 0.434).abs() < 0.008 && sd < 0.015, "{length} {sd}");
+        let width = &GROUPS[7];
+        let (length, sd) = posterior(0.38, width, 0.10, 0.02);
+        assert!((length - 0.38).abs() < 0.04 && sd > 0.05, "{length} {sd}");
+        // Nothing is shorter than it was seen.
+        let (length, _) = posterior(0.38, width, 0.45, 0.02);
+        assert!(length > 0.44, "{length}");
+    }
+
+    #[test]
+    fn too_little_is_refused() {
+        let prior = LengthPrior::from_height(Some(1.75)).unwrap();
+        assert_eq!(estimate(&[], &[], None, &prior, true), Err(LengthFitError::TooFewFrames { frames: 0 }));
+        let options = AnchorOptions::default();
+        assert!(matches!(
+            estimate_from_sequence(&[], None, &prior, &options),
+            Err(LengthFitError::NoAnchor(AnchorError::Empty))
+        ));
+        assert!(LengthPrior::from_height(Some(175.0)).is_err());
+    }
+}

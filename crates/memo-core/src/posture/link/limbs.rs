@@ -1,0 +1,317 @@
+//! Arms and legs of a sequence, given the trunk.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::super::angles::{elbow_rad, knee_rad, swing_rad};
+use super::super::skeleton::{Joint, PerJoint, Side, StickFigure};
+use super::super::smooth::{Measured, smooth_track};
+use super::super::viterbi::least_path;
+use super::flip::{Chain, Flip};
+use super::trunk::Trunk;
+use super::{Problem, place};
+
+/// Both limbs of a pair, right and left: where the limb hangs, its middle joint, its end. Pair 0 the arms.
+const PAIRS: [[[Joint; 3]; 2]; 2] = [
+    [
+        [Joint::RightShoulder, Joint::RightElbow, Joint::RightWrist],
+        [Joint::LeftShoulder, Joint::LeftElbow, Joint::LeftWrist],
+    ],
+    [
+        [Joint::RightHip, Joint::RightKnee, Joint::RightAnkle],
+        [Joint::LeftHip, Joint::LeftKnee, Joint::LeftAnkle],
+    ],
+];
+
+/// Bits of a pair's reading: inner and outer segment of the right limb, then of the left; 1 the farther root.
+const SEGMENTS: usize = 4;
+
+/// Number of readings of a pair.
+const READINGS: usize = 1 << SEGMENTS;
+
+/// What may be mirrored together: one segment, a whole limb, both inner segments, all.
+const MASKS: [usize; 8] = [1, 2, 4, 8, 3, 12, 5, 15];
+
+/// Times arms and legs are linked anew given the other.
+const ROUNDS: usize = 4;
+
+/// One limb's four readings in a frame.
+#[derive(Clone, Copy)]
+struct LimbFrame {
+    /// Signed extents of inner and outer segment.
+    extents: [[Measured; 2]; 4],
+    /// Cost of the limb's attitude.
+    cost: [f64; 4],
+    /// Swing of the inner segment with its noise, radians.
+    swing: [Measured; 4],
+}
+
+/// A reading of one limb of a pair's reading.
+fn limb_bits(state: usize, side: usize) -> usize {
+    state >> (2 * side) & 3
+}
+
+/// The readings of one pair of limbs.
+struct Pair {
+    /// `[side][frame]`.
+    frames: [Vec<LimbFrame>; 2],
+    /// Transition costs of one limb: `[side][frame][k * 16 + i * 4 + j]`.
+    transitions: [Vec<[f64; 64]>; 2],
+    acceleration_mps2: [f64; SEGMENTS],
+}
+
+/// The limbs' paths.
+pub(super) struct Limbs {
+    /// Figures of every frame, trunk and limbs, smoothed.
+    pub smoothed: Vec<StickFigure>,
+    /// Standard deviation of each joint along its ray against its starting joint, metres.
+    pub sd_m: Vec<PerJoint<f64>>,
+    flips: [Vec<Flip>; 2],
+}
+
+impl Limbs {
+    pub fn link(problem: &Problem, trunk: &Trunk) -> Self {
+        let pairs = [0, 1].map(|pair| Pair::new(problem, trunk, pair));
+        let mut states: [Option<Vec<usize>>; 2] = [None, None];
+        // The legs first: knees bend one way only, which tells more.
+        for _ in 0..ROUNDS {
+            let before = states.clone();
+            for pair in [1, 0] {
+                let cost = pair_costs(problem, &pairs, pair, states[1 - pair].as_deref());
+                states[pair] = Some(pairs[pair].path(&cost));
+            }
+            if before == states {
+                break;
+            }
+        }
+        let mut states = states.map(Option::unwrap_or_default);
+        let times_s = problem.times_s();
+        let mut flips = [vec![], vec![]];
+        for last in [false, true] {
+            for pair in [1, 0] {
+                let cost = pair_costs(problem, &pairs, pair, Some(&states[1 - pair]));
+                flips[pair] = pairs[pair].refine(&times_s, &cost, &mut states[pair], last);
+            }
+        }
+        let mut limbs = Self { smoothed: trunk.smoothed.clone(), sd_m: trunk.sd_m.clone(), flips };
+        for (pair, states) in states.into_iter().enumerate() {
+            limbs.smooth(problem, pair, &pairs[pair], &states);
+        }
+        limbs
+    }
+
+    /// Other readings: what is mirrored, and the joints concerned.
+    pub fn readings(&self) -> impl Iterator<Item = (Flip, Vec<Joint>)> + '_ {
+        self.flips.iter().enumerate().flat_map(|(pair, flips)| {
+            flips.iter().map(move |&flip| {
+                let bits = (0..SEGMENTS).filter(|bit| flip.mask >> bit & 1 == 1);
+                (flip, bits.map(|bit| PAIRS[pair][bit / 2][bit % 2 + 1]).collect())
+            })
+        })
+    }
+
+    fn smooth(&mut self, problem: &Problem, pair: usize, readings: &Pair, states: &[usize]) {
+        let times_s = problem.times_s();
+        for bit in 0..SEGMENTS {
+            let joint = PAIRS[pair][bit / 2][bit % 2 + 1];
+            let measured: Vec<Measured> =
+                states.iter().enumerate().map(|(t, &state)| readings.extent(bit, t, state)).collect();
+            let track = smooth_track(&times_s, &measured, readings.acceleration_mps2[bit]);
+            for (t, extent) in track.iter().enumerate() {
+                place(&mut self.smoothed[t], joint, problem.ray(t, joint), extent.value);
+                self.sd_m[t][joint] = extent.sd;
+            }
+        }
+    }
+}
+
+impl Pair {
+    fn new(problem: &Problem, trunk: &Trunk, pair: usize) -> Self {
+        let frames = [0, 1].map(|side| {
+            let limb = |t| problem.limb_frame(t, trunk, pair, side);
+            (0..trunk.smoothed.len()).into_par_iter().map(limb).collect::<Vec<_>>()
+        });
+        let transitions = [0, 1].map(|side| {
+            let steps = (0..frames[side].len()).into_par_iter();
+            steps.map(|t| problem.limb_transitions(t, &frames[side], pair)).collect()
+        });
+        let segments = &problem.options.prior.segments[2 * pair..][..2];
+        let [inner, outer] = [segments[0].acceleration_mps2, segments[1].acceleration_mps2];
+        Self { frames, transitions, acceleration_mps2: [inner, outer, inner, outer] }
+    }
+
+    fn extent(&self, bit: usize, t: usize, state: usize) -> Measured {
+        let side = bit / 2;
+        self.frames[side][t].extents[limb_bits(state, side)][bit % 2]
+    }
+
+    /// The pair's least-cost path.
+    fn path(&self, cost: &[[f64; READINGS]]) -> Vec<usize> {
+        let step = |side: usize, t: usize, [k, i, j]: [usize; 3]| {
+            let [k, i, j] = [k, i, j].map(|state| limb_bits(state, side));
+            self.transitions[side][t][k * 16 + i * 4 + j]
+        };
+        least_path(
+            &vec![READINGS; cost.len()],
+            |t, s| cost[t][s],
+            |t, k, i, j| step(0, t, [k, i, j]) + step(1, t, [k, i, j]),
+        )
+    }
+
+    /// Mirrors what is better mirrored of a path; returns what the rest would cost if asked.
+    fn refine(
+        &self,
+        times_s: &[f64],
+        cost: &[[f64; READINGS]],
+        states: &mut [usize],
+        rest: bool,
+    ) -> Vec<Flip> {
+        let chain = Chain {
+            times_s,
+            acceleration_mps2: &self.acceleration_mps2,
+            masks: &MASKS,
+            affected: |mask| mask | (mask & 0b0101) << 1,
+            extent: &|bit, t, state| self.extent(bit, t, state),
+            cost: &|t, state| cost[t][state],
+        };
+        chain.refine(states);
+        if rest { chain.flips(states) } else { vec![] }
+    }
+}
+
+/// Costs of the readings of a pair in every frame, given the other pair's states if there are some.
+fn pair_costs(
+    problem: &Problem,
+    pairs: &[Pair; 2],
+    pair: usize,
+    other: Option<&[usize]>,
+) -> Vec<[f64; READINGS]> {
+    let prior = &problem.options.prior;
+    (0..problem.frames.len())
+        .map(|t| {
+            let weight = 0.5 * problem.weight(t);
+            let limbs = [0, 1].map(|side| &pairs[pair].frames[side][t]);
+            std::array::from_fn(|state| {
+                let mut cost = 0.0;
+                let swings = [0, 1].map(|side| {
+                    let bits = limb_bits(state, side);
+                    cost += limbs[side].cost[bits];
+                    limbs[side].swing[bits]
+                });
+                let [right, left] = swings;
+                cost +=
+                    weight * prior.opposition[pair].cost(right.value + left.value, right.sd.hypot(left.sd));
+                if let Some(other) = other {
+                    for (side, swing) in swings.into_iter().enumerate() {
+                        let theirs = pairs[1 - pair].frames[side][t].swing[limb_bits(other[t], side)];
+                        let [a, b] = [(pair, swing), (1 - pair, theirs)].map(|(pair, swing)| {
+                            let usual = prior.segments[2 * pair].swing;
+                            ((swing.value - usual.mean_rad) / usual.sd_rad, swing.sd / usual.sd_rad)
+                        });
+                        cost += weight * prior.same_side.cost(a.0 + b.0, a.1.hypot(b.1));
+                    }
+                }
+                cost
+            })
+        })
+        .collect()
+}
+
+impl Problem<'_> {
+    fn limb_frame(&self, t: usize, trunk: &Trunk, pair: usize, side: usize) -> LimbFrame {
+        let middle = PAIRS[pair][side][1];
+        let reference = self.reference(&trunk.smoothed[t]);
+        let mut limb = LimbFrame {
+            extents: [[Measured::NOTHING; 2]; 4],
+            cost: [0.0; 4],
+            swing: [Measured { value: f64::NAN, sd: 0.0 }; 4],
+        };
+        for bits in 0..4 {
+            let [(inner, u), (outer, v)] = self.limb_extents(t, trunk, pair, side, bits);
+            limb.extents[bits] = [inner, outer];
+            if let Some(axes) = reference {
+                let noise = inner.sd * axes.x_axis.dot(self.ray(t, middle)).abs() / self.lengths.to[middle];
+                limb.swing[bits] = Measured { value: swing_rad(&axes, u), sd: noise };
+                let cost = self.limb_cost(t, &axes, [u, v], [inner.sd, outer.sd], pair, side);
+                limb.cost[bits] = 0.5 * self.weight(t) * cost;
+            }
+        }
+        limb
+    }
+
+    /// Inner and outer segment of a reading: signed extent along the ray of its end, and its vector.
+    fn limb_extents(
+        &self,
+        t: usize,
+        trunk: &Trunk,
+        pair: usize,
+        side: usize,
+        bits: usize,
+    ) -> [(Measured, DVec3); 2] {
+        let joints = PAIRS[pair][side];
+        let mut start = trunk.smoothed[t][joints[0]];
+        let mut start_sd = trunk.sd_m[t][joints[0]];
+        if let Some(parent) = joints[0].start() {
+            start_sd = start_sd.hypot(trunk.sd_m[t][parent]);
+        }
+        [0, 1].map(|segment| {
+            let end = joints[segment + 1];
+            let found = self.roots(t, start, start_sd, end);
+            start_sd = start_sd.hypot(found.sd_m);
+            let point = if bits >> segment & 1 == 0 { found.near } else { found.far };
+            let vector = point - start;
+            start = point;
+            (Measured { value: vector.dot(self.ray(t, end)), sd: found.sd_m }, vector)
+        })
+    }
+
+    /// Twice the cost of a limb's attitude: what is usual, and what its middle joint allows.
+    fn limb_cost(
+        &self,
+        t: usize,
+        axes: &DMat3,
+        segments: [DVec3; 2],
+        sd_m: [f64; 2],
+        pair: usize,
+        side: usize,
+    ) -> f64 {
+        let prior = &self.options.prior;
+        let joints = PAIRS[pair][side];
+        let outward = match Side::BOTH[side] {
+            Side::Right => -axes.z_axis,
+            Side::Left => axes.z_axis,
+        };
+        let mut cost = 0.0;
+        for (i, w) in segments.into_iter().enumerate() {
+            let usual = &prior.segments[pair * 2 + i];
+            let end = joints[i + 1];
+            let noise = |axis: DVec3| sd_m[i] * axis.dot(self.ray(t, end)).abs() / self.lengths.to[end];
+            let swing = swing_rad(axes, w);
+            cost += usual.swing.cost(swing, noise(axes.x_axis));
+            let aside = outward.dot(w.normalize()).clamp(-1.0, 1.0).asin();
+            let drift = usual.outward_per_swing * swing.clamp(-1.5, 1.5);
+            cost += usual.outward.cost(aside - drift, noise(axes.z_axis));
+        }
+        let [u, v] = segments;
+        let bend = if pair == 0 { elbow_rad(axes, u, v) } else { knee_rad(axes, u, v) };
+        let noise = (sd_m[0] / self.lengths.to[joints[1]]).hypot(sd_m[1] / self.lengths.to[joints[2]]);
+        cost + prior.least_bend[pair].cost_beyond(bend, noise)
+    }
+
+    fn limb_transitions(&self, t: usize, limb: &[LimbFrame], pair: usize) -> [f64; 64] {
+        if t < 2 {
+            return [0.0; 64];
+        }
+        let three = [&limb[t - 2], &limb[t - 1], &limb[t]];
+        std::array::from_fn(|index| {
+            let states = [index >> 4, index >> 2 & 3, index & 3];
+            (0..2)
+                .map(|segment| {
+                    let extents = std::array::from_fn(|n| three[n].extents[states[n]][segment]);
+                    let sd = self.options.prior.segments[pair * 2 + segment].acceleration_mps2;
+                    self.acceleration_cost(t, extents, sd)
+                })
+                .sum()
+        })
+    }
+}

@@ -1,0 +1,388 @@
+//! One posture a frame: the roots of a sequence linked over time (the work that Lee and Chen 1985 announce in
+//! their summary).
+//!
+//! A limb that passes parallel to the image meets its mirror there: to first order in time "it crossed" and
+//! "it bounced" cost the same, so the cost takes three frames, a change of velocity. The trunk is linked
+//! first, then both arms and both legs, each pair jointly, given the trunk and the other pair. Costs are
+//! negative log likelihoods, in nats. What a person can do, and does when walking, enters softly
+//! ([`MotionPrior`]).
+//!
+//! The candidates are all roots, not only the survivors of the tree: a hard limit missed by a degree of noise
+//! would break the chain. Short gaps of a joint's track are bridged for the decision only; the figures hold
+//! what was seen.
+
+mod flip;
+mod limbs;
+mod trunk;
+
+use glam::{DMat3, DVec3};
+use thiserror::Error;
+
+use super::angles::trunk_axes;
+use super::lift::{JointRays, RootKind, Roots, extent_sd, roots};
+use super::prior::{MotionPrior, chi_sq};
+use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
+use super::smooth::Measured;
+use flip::Flip;
+use limbs::Limbs;
+use trunk::Trunk;
+
+/// Why a sequence cannot be linked.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LinkError {
+    /// A time does not follow the one before.
+    #[error("times must increase: frame {frame} is at {time_s} s, the one before at {before_s} s")]
+    Times {
+        /// The frame.
+        frame: usize,
+        /// Its time, seconds.
+        time_s: f64,
+        /// The time of the frame before, seconds.
+        before_s: f64,
+    },
+    /// A neck is at infinity or not before the camera.
+    #[error("the neck of frame {frame} must be before the camera or unknown (NaN), got {neck} m")]
+    Neck {
+        /// The frame.
+        frame: usize,
+        /// The neck given, metres.
+        neck: DVec3,
+    },
+    /// A direction has no length or is not finite.
+    #[error("{parameter} must be a finite direction, got {value}")]
+    Direction {
+        /// Which one.
+        parameter: &'static str,
+        /// What was given.
+        value: DVec3,
+    },
+    /// A segment length is wrong.
+    #[error(transparent)]
+    Lengths(#[from] LengthError),
+}
+
+/// What one frame shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkFrame {
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Rays to the joints, camera axes.
+    pub rays: JointRays,
+    /// The neck, camera axes, metres; NaN where it is not known, and then nothing of the frame is.
+    pub neck: DVec3,
+}
+
+/// How to link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkOptions {
+    /// What the person is expected to do.
+    pub prior: MotionPrior,
+    /// The world's upward direction in camera axes; without it the trunk's own axis stands for it.
+    pub up: Option<DVec3>,
+    /// The moving direction in camera axes; without it the trunk's forward axis stands for it.
+    pub moving_direction: Option<DVec3>,
+    /// Gaps of a joint's track up to this long are bridged for the decision, seconds: a quarter of a step.
+    pub bridge_s: f64,
+    /// Two readings are different where a joint lies farther apart than this, metres.
+    pub distinct_m: f64,
+}
+
+impl Default for LinkOptions {
+    fn default() -> Self {
+        Self {
+            prior: MotionPrior::walking(),
+            up: None,
+            moving_direction: None,
+            bridge_s: 0.12,
+            distinct_m: 0.10,
+        }
+    }
+}
+
+/// A second way to read a sequence: some segments mirrored over some frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// The joints at the ends of the mirrored segments.
+    pub joints: Vec<Joint>,
+    /// First frame.
+    pub from: usize,
+    /// One past the last frame.
+    pub to: usize,
+    /// The postures of these frames, camera axes, metres.
+    pub figures: Vec<StickFigure>,
+    /// By how much it costs more than the best, nats: exp(-margin) is its odds.
+    pub margin: f64,
+}
+
+/// A linked sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkedPath {
+    /// The posture of every frame, camera axes, metres: at every joint one of its roots; NaN where the joint,
+    /// or one it hangs on, was not seen.
+    pub figures: Vec<StickFigure>,
+    /// The same smoothed over time: joints stay on their rays, depths are those of a steady motion.
+    pub smoothed: Vec<StickFigure>,
+    /// Standard deviation of each smoothed joint along its ray against its starting joint, metres.
+    pub sd_m: Vec<PerJoint<f64>>,
+    /// By how much each joint of `figures` is farther from its starting joint than its segment is long,
+    /// metres: more than 0 where no real root was.
+    pub gap_m: Vec<PerJoint<f64>>,
+    /// The cheapest reading that puts a joint elsewhere; none where there is none.
+    pub second: Option<Alternative>,
+    /// For each frame, what it would cost at least to put one of its joints elsewhere, nats; infinite where
+    /// no joint could be.
+    pub margin: Vec<f64>,
+}
+
+/// Links the frames of a sequence.
+///
+/// # Errors
+/// Times that do not increase, a neck behind the camera, a direction without length, impossible lengths.
+pub fn link(
+    frames: &[LinkFrame],
+    lengths: &SegmentLengths,
+    options: &LinkOptions,
+) -> Result<LinkedPath, LinkError> {
+    lengths.validated()?;
+    check(frames, options)?;
+    let known: Vec<usize> = (0..frames.len()).filter(|&t| !frames[t].neck.is_nan()).collect();
+    let seen: Vec<LinkFrame> = known.iter().map(|&t| frames[t]).collect();
+    // 1. Bridge short gaps for the decision.
+    let bridged = bridge(&seen, options.bridge_s);
+    let problem = Problem { frames: &bridged, lengths, options };
+    // 2. The trunk, then arms and legs in turn, each given the other.
+    let trunk = Trunk::link(&problem);
+    let limbs = Limbs::link(&problem, &trunk);
+    // 3. Leaves of the tree, second-best reading and margins.
+    let path = problem.path(&seen, &trunk, &limbs);
+    Ok(path.spread(&known, frames.len()))
+}
+
+fn check(frames: &[LinkFrame], options: &LinkOptions) -> Result<(), LinkError> {
+    for (frame, pair) in frames.windows(2).enumerate() {
+        let [before_s, time_s] = [pair[0].time_s, pair[1].time_s];
+        if !(time_s > before_s && time_s.is_finite() && before_s.is_finite()) {
+            return Err(LinkError::Times { frame: frame + 1, time_s, before_s });
+        }
+    }
+    for (frame, &LinkFrame { neck, .. }) in frames.iter().enumerate() {
+        if !(neck.is_nan() || neck.is_finite() && neck.z > 0.0) {
+            return Err(LinkError::Neck { frame, neck });
+        }
+    }
+    for (parameter, value) in [("up", options.up), ("moving_direction", options.moving_direction)] {
+        if let Some(value) = value.filter(|v| v.try_normalize().is_none()) {
+            return Err(LinkError::Direction { parameter, value });
+        }
+    }
+    Ok(())
+}
+
+/// Fills gaps of a joint's rays up to `bridge_s` long by linear interpolation.
+fn bridge(frames: &[LinkFrame], bridge_s: f64) -> Vec<LinkFrame> {
+    let mut bridged = frames.to_vec();
+    for joint in Joint::ALL {
+        let mut last: Option<usize> = None;
+        for (t, frame) in frames.iter().enumerate().filter(|(_, frame)| frame.rays.sees(joint)) {
+            let from = last.replace(t).unwrap_or(t);
+            let span_s = frame.time_s - frames[from].time_s;
+            if t > from + 1 && span_s <= bridge_s + 1e-9 {
+                for gap in from + 1..t {
+                    let share = (frames[gap].time_s - frames[from].time_s) / span_s;
+                    let ray = frames[from].rays.ray[joint].lerp(frame.rays.ray[joint], share);
+                    bridged[gap].rays.ray[joint] = ray.normalize();
+                }
+            }
+        }
+    }
+    bridged
+}
+
+/// The sequence with what is known of it.
+#[derive(Clone, Copy)]
+struct Problem<'a> {
+    frames: &'a [LinkFrame],
+    lengths: &'a SegmentLengths,
+    options: &'a LinkOptions,
+}
+
+impl Problem<'_> {
+    fn times_s(&self) -> Vec<f64> {
+        self.frames.iter().map(|frame| frame.time_s).collect()
+    }
+
+    fn ray(&self, t: usize, joint: Joint) -> DVec3 {
+        self.frames[t].rays.ray[joint]
+    }
+
+    /// The roots of a segment whose starting joint is known along its ray to `start_sd_m`.
+    ///
+    /// The distance d of start and ray is uncertain by the noise of the image, by how steady the segment's
+    /// length is, and by the starting joint's own place: moved along its ray, it comes nearer to the end's.
+    fn roots(&self, t: usize, start: DVec3, start_sd_m: f64, end: Joint) -> Roots {
+        let rays = &self.frames[t].rays;
+        let length = self.lengths.to[end];
+        let ray = rays.ray[end];
+        let mut found = roots(start, ray, length, rays.noise_rad, 0.0);
+        let half = 0.5 * found.near.distance(found.far);
+        let across = (0.5 * (found.near + found.far)).distance(start);
+        let noise = std::f64::consts::SQRT_2 * rays.noise_rad * start.length();
+        let drift = start_sd_m * start.normalize().cross(ray).length();
+        found.sd_m =
+            extent_sd(half, across, noise.hypot(self.options.prior.length_sd(end) * length).hypot(drift));
+        found
+    }
+
+    /// Axes forward, down, left to which swings are measured.
+    fn reference(&self, trunk: &StickFigure) -> Option<DMat3> {
+        let own = trunk_axes(trunk);
+        let down = self.options.up.map(|up| -up.normalize()).or(own.map(|axes| axes.y_axis))?;
+        let forward = self.options.moving_direction.or(own.map(|axes| axes.x_axis))?;
+        let forward = (forward - forward.dot(down) * down).try_normalize()?;
+        Some(DMat3::from_cols(forward, down, forward.cross(down)))
+    }
+
+    /// Share of a frame in the evidence of the priors: neighbouring frames say the same.
+    fn weight(&self, t: usize) -> f64 {
+        let last = self.frames.len() - 1;
+        let [before, after] = [t.saturating_sub(1), (t + 1).min(last)];
+        if before == after {
+            return 1.0;
+        }
+        let dt = (self.frames[after].time_s - self.frames[before].time_s) / (after - before) as f64;
+        (dt / self.options.prior.independence_s).min(1.0)
+    }
+
+    /// Half the square of a change of velocity in its standard deviations; 0 where an extent is not known.
+    fn acceleration_cost(&self, t: usize, extents: [Measured; 3], sd_mps2: f64) -> f64 {
+        let before_s = self.frames[t - 1].time_s - self.frames[t - 2].time_s;
+        let after_s = self.frames[t].time_s - self.frames[t - 1].time_s;
+        let [a, b, c] = extents;
+        let change = (c.value - b.value) / after_s - (b.value - a.value) / before_s;
+        let noise = [a.sd / before_s, b.sd * (1.0 / before_s + 1.0 / after_s), c.sd / after_s];
+        let own = sd_mps2 * 0.5 * (before_s + after_s);
+        let variance = own * own + noise.iter().map(|n| n * n).sum::<f64>();
+        0.5 * chi_sq(change / variance.sqrt())
+    }
+
+    /// Leaves, margins and the second-best reading of a linked sequence.
+    fn path(&self, seen: &[LinkFrame], trunk: &Trunk, limbs: &Limbs) -> LinkedPath {
+        let leaves: Vec<Leaf> =
+            (0..seen.len()).map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &[])).collect();
+        let readings = trunk.readings().chain(limbs.readings());
+        let mut margin = vec![f64::INFINITY; seen.len()];
+        let mut second: Option<(Flip, Vec<Joint>)> = None;
+        for (flip, joints) in readings {
+            let apart = |t: usize| {
+                joints.iter().any(|&joint| 2.0 * leaves[t].extent_m[joint].abs() > self.options.distinct_m)
+            };
+            let delta = flip.delta.max(0.0);
+            let mut distinct = false;
+            for t in (flip.from..flip.to).filter(|&t| apart(t)) {
+                margin[t] = margin[t].min(delta);
+                distinct = true;
+            }
+            if distinct && second.as_ref().is_none_or(|(best, _)| flip.delta < best.delta) {
+                second = Some((flip, joints));
+            }
+        }
+        let second = second.map(|(flip, joints)| Alternative {
+            from: flip.from,
+            to: flip.to,
+            figures: (flip.from..flip.to)
+                .map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &joints).figure)
+                .collect(),
+            margin: flip.delta.max(0.0),
+            joints,
+        });
+        let mut smoothed = limbs.smoothed.clone();
+        let mut sd_m = limbs.sd_m.clone();
+        for (t, frame) in seen.iter().enumerate() {
+            for joint in
+                Joint::ALL.into_iter().filter(|&joint| !frame.rays.sees(joint) && joint != Joint::Neck)
+            {
+                smoothed[t][joint] = DVec3::NAN;
+                sd_m[t][joint] = f64::NAN;
+            }
+        }
+        LinkedPath {
+            smoothed,
+            sd_m,
+            second,
+            margin,
+            gap_m: leaves.iter().map(|leaf| leaf.gap_m).collect(),
+            figures: leaves.into_iter().map(|leaf| leaf.figure).collect(),
+        }
+    }
+
+    /// The leaf of the tree whose segments point to the same side along their rays as the figure's, some
+    /// mirrored.
+    fn leaf(&self, frame: &LinkFrame, like: &StickFigure, mirrored: &[Joint]) -> Leaf {
+        let mut leaf = Leaf {
+            figure: StickFigure::UNKNOWN,
+            extent_m: PerJoint([f64::NAN; JOINT_COUNT]),
+            gap_m: PerJoint([f64::NAN; JOINT_COUNT]),
+        };
+        leaf.figure[Joint::Neck] = frame.neck;
+        leaf.gap_m[Joint::Neck] = 0.0;
+        for joint in Joint::ALL.into_iter().skip(1) {
+            let start = joint.start().unwrap_or(Joint::Neck);
+            let ray = frame.rays.ray[joint];
+            let found = roots(leaf.figure[start], ray, self.lengths.to[joint], 0.0, 0.0);
+            let away = (like[joint] - like[start]).dot(ray) >= 0.0;
+            leaf.figure[joint] = if away != mirrored.contains(&joint) { found.far } else { found.near };
+            leaf.extent_m[joint] = (leaf.figure[joint] - leaf.figure[start]).dot(ray);
+            if leaf.figure[joint].is_finite() {
+                leaf.gap_m[joint] = if let RootKind::None { gap_m } = found.kind { gap_m } else { 0.0 };
+            }
+        }
+        leaf
+    }
+}
+
+/// A leaf of the interpretation tree.
+struct Leaf {
+    figure: StickFigure,
+    extent_m: PerJoint<f64>,
+    gap_m: PerJoint<f64>,
+}
+
+/// Puts a joint on its ray, at an extent along it from its starting joint.
+fn place(figure: &mut StickFigure, joint: Joint, ray: DVec3, extent_m: f64) {
+    let start = figure[joint.start().unwrap_or(Joint::Neck)];
+    figure[joint] = (start.dot(ray) + extent_m) * ray;
+}
+
+impl LinkedPath {
+    /// The path with its frames at their places in the whole sequence, nothing known in between.
+    fn spread(self, known: &[usize], frames: usize) -> Self {
+        if known.len() == frames {
+            return self;
+        }
+        fn at<T: Clone>(values: Vec<T>, known: &[usize], frames: usize, unknown: T) -> Vec<T> {
+            let mut spread = vec![unknown; frames];
+            for (&t, value) in known.iter().zip(values) {
+                spread[t] = value;
+            }
+            spread
+        }
+        let nothing = PerJoint([f64::NAN; JOINT_COUNT]);
+        Self {
+            figures: at(self.figures, known, frames, StickFigure::UNKNOWN),
+            smoothed: at(self.smoothed, known, frames, StickFigure::UNKNOWN),
+            sd_m: at(self.sd_m, known, frames, nothing),
+            gap_m: at(self.gap_m, known, frames, nothing),
+            margin: at(self.margin, known, frames, f64::NAN),
+            second: self.second.map(|second| {
+                let [from, to] = [known[second.from], known[second.to - 1] + 1];
+                let inside: Vec<usize> = (second.from..second.to).map(|t| known[t] - from).collect();
+                Alternative {
+                    figures: at(second.figures, &inside, to - from, StickFigure::UNKNOWN),
+                    from,
+                    to,
+                    ..second
+                }
+            }),
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The trunk of a sequence: shoulders, pelvis and hips.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::super::angles::{hip_axes, swing_rad, trunk_axes};
+use super::super::prior::{Soft, chi_sq};
+use super::super::skeleton::{Joint, PerJoint, RigidDistance, StickFigure};
+use super::super::smooth::{Measured, smooth_track};
+use super::super::viterbi::least_path;
+use super::flip::{Chain, Flip};
+use super::{Problem, place};
+
+/// Joints of the trunk in the order of their levels; bit i of a reading is the root of joint i, 1 the farther.
+const JOINTS: [Joint; 5] =
+    [Joint::RightShoulder, Joint::LeftShoulder, Joint::Pelvis, Joint::RightHip, Joint::LeftHip];
+
+/// Number of readings.
+const READINGS: usize = 1 << JOINTS.len();
+
+/// Readings of a frame among which the dynamic program chooses, the least costly ones.
+const KEPT: usize = 8;
+
+/// Share of a usual spread that is constant over a sequence.
+const STEADY_SHARE: f64 = 0.7;
+
+/// What may be mirrored together: one segment, both shoulders, both hips.
+const MASKS: [usize; 7] = [1, 2, 4, 8, 16, 3, 24];
+
+/// The trunk's path.
+pub(super) struct Trunk {
+    /// Neck and trunk of every frame, smoothed.
+    pub smoothed: Vec<StickFigure>,
+    /// Standard deviation of each joint along its ray against its starting joint, metres.
+    pub sd_m: Vec<PerJoint<f64>>,
+    flips: Vec<Flip>,
+}
+
+/// One reading of the trunk in a frame.
+#[derive(Clone, Copy)]
+struct Reading {
+    extents: [Measured; 5],
+    cost: f64,
+}
+
+impl Trunk {
+    pub fn link(problem: &Problem) -> Self {
+        let readings: Vec<[Reading; READINGS]> = (0..problem.frames.len())
+            .into_par_iter()
+            .map(|t| std::array::from_fn(|bits| problem.trunk_reading(t, bits)))
+            .collect();
+        let kept: Vec<Vec<usize>> = readings.iter().map(cheapest).collect();
+        let counts: Vec<usize> = kept.iter().map(Vec::len).collect();
+        let acceleration = problem.options.prior.trunk_acceleration_mps2;
+        let path = least_path(
+            &counts,
+            |t, s| readings[t][kept[t][s]].cost,
+            |t, k, i, j| {
+                let three = [&readings[t - 2][kept[t - 2][k]], &readings[t - 1][kept[t - 1][i]]];
+                let now = &readings[t][kept[t][j]];
+                (0..JOINTS.len())
+                    .map(|joint| {
+                        let extents = [three[0].extents[joint], three[1].extents[joint], now.extents[joint]];
+                        problem.acceleration_cost(t, extents, acceleration)
+                    })
+                    .sum()
+            },
+        );
+        let states: Vec<usize> = path.iter().enumerate().map(|(t, &s)| kept[t][s]).collect();
+        let chain = Chain {
+            times_s: &problem.times_s(),
+            acceleration_mps2: &[acceleration; 5],
+            masks: &MASKS,
+            affected: |mask| if mask & 4 == 4 { 4 | 8 | 16 } else { mask },
+            extent: &|bit, t, state| readings[t][state].extents[bit],
+            cost: &|t, state| readings[t][state].cost,
+        };
+        let flips = chain.flips(&states);
+        let extents: Vec<[Measured; 5]> =
+            states.iter().enumerate().map(|(t, &state)| readings[t][state].extents).collect();
+        let (smoothed, sd_m) = problem.smooth_trunk(&extents);
+        Self { smoothed, sd_m, flips }
+    }
+
+    /// Other readings: what is mirrored, and the joints concerned.
+    pub fn readings(&self) -> impl Iterator<Item = (Flip, Vec<Joint>)> + '_ {
+        self.flips.iter().map(|&flip| {
+            let joints = JOINTS.into_iter().enumerate().filter(|(i, _)| flip.mask >> i & 1 == 1);
+            (flip, joints.map(|(_, joint)| joint).collect())
+        })
+    }
+}
+
+/// The readings that cost least, of equal ones the lower.
+fn cheapest(readings: &[Reading; READINGS]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..READINGS).collect();
+    order.sort_by(|&a, &b| readings[a].cost.total_cmp(&readings[b].cost));
+    order.truncate(KEPT);
+    order
+}
+
+impl Problem<'_> {
+    fn trunk_reading(&self, t: usize, bits: usize) -> Reading {
+        let mut figure = StickFigure::UNKNOWN;
+        figure[Joint::Neck] = self.frames[t].neck;
+        let mut extents = [Measured::NOTHING; 5];
+        for (i, joint) in JOINTS.into_iter().enumerate() {
+            let start = figure[joint.start().unwrap_or(Joint::Neck)];
+            let parent = joint.start().and_then(|start| JOINTS.iter().position(|&other| other == start));
+            let start_sd = parent.map_or(0.0, |parent| extents[parent].sd);
+            let found = self.roots(t, start, start_sd, joint);
+            figure[joint] = if bits >> i & 1 == 0 { found.near } else { found.far };
+            let value = (figure[joint] - start).dot(self.ray(t, joint));
+            extents[i] = Measured { value, sd: found.sd_m };
+        }
+        let sd_m =
+            PerJoint(std::array::from_fn(|joint| extents.get(joint.wrapping_sub(1)).map_or(0.0, |e| e.sd)));
+        let cost =
+            self.rigid_cost(t, &figure, &sd_m) + self.weight(t) * self.attitude_cost(t, &figure, &sd_m);
+        Reading { extents, cost: 0.5 * cost }
+    }
+
+    /// Twice the cost of the distances within torso and hip part.
+    fn rigid_cost(&self, t: usize, figure: &StickFigure, sd_m: &PerJoint<f64>) -> f64 {
+        let lateral_m = self.frames[t].rays.noise_rad * self.frames[t].neck.length();
+        RigidDistance::ALL
+            .into_iter()
+            .map(|distance| {
+                let [a, b] = distance.joints();
+                let between = figure[b] - figure[a];
+                let along = between.normalize_or_zero().dot(self.ray(t, b));
+                let sd = self
+                    .options
+                    .prior
+                    .rigid_m
+                    .hypot(along * sd_m[a].hypot(sd_m[b]))
+                    .hypot(std::f64::consts::SQRT_2 * lateral_m);
+                chi_sq((between.length() - self.lengths.rigid[distance as usize]) / sd)
+            })
+            .sum()
+    }
+
+    /// Twice the cost of how the trunk stands and turns.
+    fn attitude_cost(&self, t: usize, figure: &StickFigure, sd_m: &PerJoint<f64>) -> f64 {
+        let Some(axes) = self.reference(figure) else { return 0.0 };
+        let prior = &self.options.prior;
+        let usual = |soft: Soft, value: f64, v: DVec3, sd: f64, axis: DVec3, joint: Joint| {
+            soft.cost(value, sd * axis.dot(self.ray(t, joint)).abs() / v.length())
+        };
+        let spine = figure.segment(Joint::Pelvis);
+        let (pelvis, sd) = (Joint::Pelvis, sd_m[Joint::Pelvis]);
+        let roll = axes.z_axis.dot(spine).atan2(axes.y_axis.dot(spine));
+        let mut cost = usual(prior.trunk_lean, -swing_rad(&axes, spine), spine, sd, axes.x_axis, pelvis)
+            + usual(prior.trunk_roll, roll, spine, sd, axes.z_axis, pelvis);
+        for (right, left, soft) in [
+            (Joint::RightShoulder, Joint::LeftShoulder, prior.shoulder_turn),
+            (Joint::RightHip, Joint::LeftHip, prior.hip_turn),
+        ] {
+            let line = figure[left] - figure[right];
+            let turn = axes.x_axis.dot(line).atan2(axes.z_axis.dot(line));
+            cost += usual(soft, turn, line, sd_m[right].hypot(sd_m[left]), axes.x_axis, left);
+        }
+        let [right, left] = [Joint::RightShoulder, Joint::LeftShoulder];
+        let forward = axes.x_axis.dot(figure[Joint::Neck] - 0.5 * (figure[right] + figure[left]));
+        let sd = prior.neck_forward_sd_m.hypot(0.5 * sd_m[right].hypot(sd_m[left]));
+        cost += chi_sq((forward - self.neck_forward_m()) / sd);
+        if let (Some(torso), Some(hips)) = (trunk_axes(figure), hip_axes(figure))
+            && torso.x_axis.dot(hips.x_axis) < 0.0
+        {
+            cost += prior.hips_against_torso;
+        }
+        cost
+    }
+
+    /// The trunk smoothed over time, with what is usual of it as a further measurement.
+    fn smooth_trunk(&self, extents: &[[Measured; 5]]) -> (Vec<StickFigure>, Vec<PerJoint<f64>>) {
+        let times_s = self.times_s();
+        let mut figures: Vec<StickFigure> = self
+            .frames
+            .iter()
+            .map(|frame| {
+                let mut figure = StickFigure::UNKNOWN;
+                figure[Joint::Neck] = frame.neck;
+                figure
+            })
+            .collect();
+        let mut sd_m = vec![PerJoint::default(); figures.len()];
+        for (i, joint) in JOINTS.into_iter().enumerate() {
+            let measured: Vec<Measured> = extents
+                .iter()
+                .enumerate()
+                .map(|(t, extents)| {
+                    self.usual_extent(t, joint).map_or(extents[i], |usual| extents[i].fused(usual))
+                })
+                .collect();
+            let smoothed = smooth_track(&times_s, &measured, self.options.prior.trunk_acceleration_mps2);
+            for (t, figure) in figures.iter_mut().enumerate() {
+                place(figure, joint, self.ray(t, joint), smoothed[t].value);
+                // What is wrong with a whole sequence, such as an unusual lean, smoothing does not lessen.
+                let steady =
+                    self.usual_extent(t, joint).map_or(0.0, |usual| usual.sd * self.weight(t).sqrt());
+                sd_m[t][joint] = smoothed[t].sd.max(STEADY_SHARE * steady);
+            }
+        }
+        (figures, sd_m)
+    }
+
+    /// How far the neck lies before the line of the shoulders, by the lengths of the rigid torso.
+    fn neck_forward_m(&self) -> f64 {
+        let half = 0.5 * self.lengths.rigid[RigidDistance::Shoulders as usize];
+        let to_shoulder =
+            0.5 * (self.lengths.to[Joint::RightShoulder] + self.lengths.to[Joint::LeftShoulder]);
+        (to_shoulder * to_shoulder - half * half).max(0.0).sqrt()
+    }
+
+    /// Where a joint of the trunk is expected along its ray from its starting joint, if up and the moving
+    /// direction are given.
+    fn usual_extent(&self, t: usize, joint: Joint) -> Option<Measured> {
+        self.options.up.and(self.options.moving_direction)?;
+        let axes = self.reference(&StickFigure::UNKNOWN)?;
+        let prior = &self.options.prior;
+        let length = self.lengths.to[joint];
+        let half = |distance: RigidDistance| {
+            let half = 0.5 * self.lengths.rigid[distance as usize];
+            if matches!(joint, Joint::RightShoulder | Joint::RightHip) { -half } else { half }
+        };
+        let (usual, sd_m) = match joint {
+            Joint::Pelvis => (length * axes.y_axis, length * prior.trunk_lean.sd_rad),
+            Joint::RightShoulder | Joint::LeftShoulder => {
+                let side = half(RigidDistance::Shoulders);
+                let back = self.neck_forward_m() * axes.x_axis;
+                (
+                    side * axes.z_axis - back,
+                    (side * prior.shoulder_turn.sd_rad).hypot(prior.neck_forward_sd_m),
+                )
+            }
+            _ => {
+                let side = half(RigidDistance::Hips);
+                let down = (length * length - side * side).max(0.0).sqrt();
+                (side * axes.z_axis + down * axes.y_axis, (side * prior.hip_turn.sd_rad).abs())
+            }
+        };
+        let sd = sd_m / self.weight(t).sqrt();
+        sd.is_finite().then(|| Measured { value: usual.dot(self.ray(t, joint)), sd })
+    }
+}

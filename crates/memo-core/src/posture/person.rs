@@ -1,0 +1,226 @@
+//! Which of the people a detector found in each frame is the one to follow.
+//!
+//! The most prominent person of the whole sequence (the greatest product of size and mean score) is where it
+//! starts; from there the nearest person is followed from frame to frame, forwards and backwards. Size is the
+//! diagonal of the box around the points; nearness the median distance over the points seen in both frames. A
+//! frame in which nobody is near enough has no person.
+//!
+//! What it cannot do: two people who come closer to each other than the person moves between two frames may be
+//! confused, as no motion is predicted.
+
+use super::detector::size_px;
+use glam::DVec2;
+use thiserror::Error;
+
+/// How far the nearest person may be, as a fraction of their size, from where the person was last seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FollowOptions {
+    /// Between neighbouring frames. A walker at 7 frames a second covers 0.12 body heights between two; the rest
+    /// is for detectors that jump.
+    pub reach: f64,
+    /// More for every frame in which nobody was near.
+    pub reach_per_frame: f64,
+    /// At most, however long the person was lost.
+    pub farthest: f64,
+}
+
+impl Default for FollowOptions {
+    fn default() -> Self {
+        Self { reach: 0.3, reach_per_frame: 0.1, farthest: 1.0 }
+    }
+}
+
+/// Why people were refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum FollowError {
+    /// The lists do not belong together.
+    #[error(
+        "{people} people with {joints} points each need {} points and scores, got {points} and {scores}",
+        people.saturating_mul(*joints)
+    )]
+    Count {
+        /// Number of people, one frame number each.
+        people: usize,
+        /// Points of a person.
+        joints: usize,
+        /// Points that came.
+        points: usize,
+        /// Scores that came.
+        scores: usize,
+    },
+    /// Frames are not in order.
+    #[error("frame {after} follows frame {before}: people must be in the order of their frames")]
+    Order {
+        /// The earlier entry.
+        before: i64,
+        /// The one that follows.
+        after: i64,
+    },
+}
+
+/// One detected person.
+struct Person<'a> {
+    frame: i64,
+    points_px: &'a [DVec2],
+    size_px: f64,
+    prominence: f64,
+}
+
+/// Marks the followed person among all people, `frames[i]` being the frame of person i, in order, and
+/// `joint_count` points (NaN where missing) and scores belonging to each. At most one a frame is marked; where no
+/// frame has two people, all are.
+pub fn follow_person(
+    frames: &[i64],
+    joint_count: usize,
+    points_px: &[DVec2],
+    scores: &[f64],
+    options: &FollowOptions,
+) -> Result<Vec<bool>, FollowError> {
+    let expected = frames.len().checked_mul(joint_count);
+    if expected != Some(points_px.len()) || expected != Some(scores.len()) {
+        let (points, scores) = (points_px.len(), scores.len());
+        return Err(FollowError::Count { people: frames.len(), joints: joint_count, points, scores });
+    }
+    if let Some(pair) = frames.windows(2).find(|pair| pair[1] < pair[0]) {
+        return Err(FollowError::Order { before: pair[0], after: pair[1] });
+    }
+    let alone = frames.windows(2).all(|pair| pair[0] != pair[1]);
+    if alone || joint_count == 0 {
+        return Ok(vec![alone; frames.len()]);
+    }
+    let people: Vec<Person> = (0..frames.len())
+        .map(|i| {
+            let range = i * joint_count..(i + 1) * joint_count;
+            Person::new(frames[i], &points_px[range.clone()], &scores[range])
+        })
+        .collect();
+    let by_prominence =
+        |&a: &usize, &b: &usize| people[a].prominence.total_cmp(&people[b].prominence).then(b.cmp(&a));
+    let mut chosen = vec![false; people.len()];
+    if let Some(anchor) = (0..people.len()).max_by(by_prominence) {
+        chosen[anchor] = true;
+        follow(&people, anchor, (anchor + 1..people.len()).collect(), options, &mut chosen);
+        follow(&people, anchor, (0..anchor).rev().collect(), options, &mut chosen);
+    }
+    Ok(chosen)
+}
+
+/// Follows from `anchor` through the people of `order`, frame by frame.
+fn follow(people: &[Person], anchor: usize, order: Vec<usize>, options: &FollowOptions, chosen: &mut [bool]) {
+    let mut last = anchor;
+    for same_frame in order.chunk_by(|&a, &b| people[a].frame == people[b].frame) {
+        let frame = people[same_frame[0]].frame;
+        if frame == people[anchor].frame {
+            continue;
+        }
+        let lost = frame.abs_diff(people[last].frame).saturating_sub(1) as f64;
+        let reach = (options.reach + options.reach_per_frame * lost).min(options.farthest);
+        let near = same_frame.iter().filter_map(|&i| {
+            let distance = people[i].distance_px(&people[last])?;
+            (distance <= reach * people[i].size_px.max(people[last].size_px)).then_some((distance, i))
+        });
+        if let Some((_, nearest)) = near.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            chosen[nearest] = true;
+            last = nearest;
+        }
+    }
+}
+
+impl<'a> Person<'a> {
+    fn new(frame: i64, points_px: &'a [DVec2], scores: &[f64]) -> Self {
+        let seen = || points_px.iter().zip(scores).filter(|(point, _)| point.is_finite());
+        let count = seen().count();
+        let size_px = size_px(points_px);
+        let total: f64 = seen().map(|(_, score)| if score.is_finite() { score.max(0.0) } else { 0.0 }).sum();
+        let prominence = size_px * total / count.max(1) as f64;
+        // Coordinates beyond all pictures overflow; they must not win.
+        Self { frame, points_px, size_px, prominence: if prominence.is_finite() { prominence } else { 0.0 } }
+    }
+
+    /// Median distance of the points seen in both; none where no point is.
+    fn distance_px(&self, other: &Self) -> Option<f64> {
+        let pairs = self.points_px.iter().zip(other.points_px);
+        let mut distances: Vec<f64> =
+            pairs.map(|(a, b)| a.distance(*b)).filter(|distance| distance.is_finite()).collect();
+        distances.sort_by(f64::total_cmp);
+        distances.get(distances.len() / 2).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::random::Random;
+
+    /// A person of five points at `x`, `size` high.
+    fn person(x: f64, size: f64, random: &mut Random) -> Vec<DVec2> {
+        let point = |k: usize, jitter: DVec2| DVec2::new(x, size * k as f64 / 4.0) + jitter;
+        (0..5).map(|k| point(k, DVec2::from(random.normal_pair().map(f64::from)))).collect()
+    }
+
+    /// Two people who cross (in random order within a frame) and a ghost in the first frame; who is marked.
+    fn followed(first_gap: std::ops::Range<usize>) -> Vec<Option<char>> {
+        let mut random = Random::new(11);
+        let (mut frames, mut points, mut scores, mut who) = (vec![], vec![], vec![], vec![]);
+        for t in 0..60_usize {
+            let walker = (100.0 + 8.0 * t as f64, 200.0, 0.9, 'w');
+            let other = (700.0 - 3.0 * t as f64, 120.0, 0.8, 'o');
+            let ghost = (30.0, 60.0, 0.3, 'g');
+            let mut present = vec![other];
+            present.extend((!first_gap.contains(&t)).then_some(walker));
+            present.extend((t == 0).then_some(ghost));
+            if random.uniform(0.0, 1.0) < 0.5 {
+                present.reverse();
+            }
+            for (x, size, score, name) in present {
+                frames.push(t as i64);
+                points.extend(person(x, size, &mut random));
+                scores.extend([score; 5]);
+                who.push(name);
+            }
+        }
+        let chosen = follow_person(&frames, 5, &points, &scores, &FollowOptions::default()).unwrap();
+        (0..60)
+            .map(|t| {
+                let marked: Vec<usize> = (0..frames.len()).filter(|&i| frames[i] == t && chosen[i]).collect();
+                assert!(marked.len() <= 1);
+                marked.first().map(|&i| who[i])
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_largest_person_is_followed_past_others_and_ghosts() {
+        assert_eq!(followed(0..0), vec![Some('w'); 60]);
+    }
+
+    #[test]
+    fn a_person_out_of_sight_leaves_a_gap_and_nobody_takes_their_place() {
+        let found = followed(20..26);
+        for (t, name) in found.into_iter().enumerate() {
+            assert_eq!(name, (!(20..26).contains(&t)).then_some('w'), "frame {t}");
+        }
+    }
+
+    #[test]
+    fn people_alone_in_their_frames_need_no_choice() {
+        let points = [DVec2::ZERO, DVec2::new(1e6, 0.0), DVec2::NAN];
+        let all = follow_person(&[0, 5, 6], 1, &points, &[1.0; 3], &FollowOptions::default());
+        assert_eq!(all, Ok(vec![true; 3]));
+    }
+
+    #[test]
+    fn broken_points_are_no_person_and_broken_lists_are_refused() {
+        let options = FollowOptions::default();
+        let points = [DVec2::NAN, DVec2::NAN, DVec2::splat(f64::MAX), DVec2::splat(-f64::MAX)];
+        let chosen =
+            follow_person(&[0, 0], 2, &points, &[f64::NAN, 1.0, 1.0, f64::INFINITY], &options).unwrap();
+        assert_eq!(chosen.iter().filter(|&&chosen| chosen).count(), 1);
+        assert_eq!(follow_person(&[0, 0], 0, &[], &[], &options), Ok(vec![false; 2]));
+        assert_eq!(follow_person(&[], 3, &[], &[], &options), Ok(vec![]));
+        let message = follow_person(&[0, 1], 2, &points[..3], &[1.0; 4], &options).unwrap_err().to_string();
+        assert_eq!(message, "2 people with 2 points each need 4 points and scores, got 3 and 4");
+        let message = follow_person(&[4, 1], 2, &points, &[1.0; 4], &options).unwrap_err().to_string();
+        assert!(message.starts_with("frame 1 follows frame 4"), "{message}");
+    }
+}

@@ -1,0 +1,230 @@
+//! A stick figure prepared for being judged: directions, lengths and the noise of each segment, and the
+//! axes of its trunk.
+//!
+//! Noise of a segment is taken to first order: its vector has the standard deviation `sd_m` along the ray of
+//! its ending joint and `lateral_m` across it, independent. A direction then has the standard deviation
+//! hypot(lateral, sd (r·g)) / length towards a unit vector g perpendicular to it.
+
+use glam::{DMat3, DVec3};
+
+use super::angles::{hip_axes, trunk_axes};
+use super::constraint::JointSet;
+use super::lift::{RootKind, Roots};
+use super::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
+
+/// A joint in its place, and the segment that ends there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Placed {
+    /// The joint, camera axes, metres.
+    pub point: DVec3,
+    /// Its ray.
+    pub ray: DVec3,
+    /// Direction of the segment.
+    pub unit: DVec3,
+    pub length_m: f64,
+    /// Standard deviation of the segment's extent along the ray.
+    pub sd_m: f64,
+    /// Standard deviation of the segment across the ray.
+    pub lateral_m: f64,
+    pub kind: RootKind,
+}
+
+impl Placed {
+    pub const UNKNOWN: Self = Self {
+        point: DVec3::NAN,
+        ray: DVec3::NAN,
+        unit: DVec3::NAN,
+        length_m: f64::NAN,
+        sd_m: f64::NAN,
+        lateral_m: f64::NAN,
+        kind: RootKind::Degenerate,
+    };
+
+    /// The joint at one of the roots of its segment.
+    pub fn at_root(start: DVec3, point: DVec3, ray: DVec3, roots: &Roots, noise_rad: f64) -> Self {
+        let segment = point - start;
+        let length_m = segment.length();
+        let lateral_m = std::f64::consts::SQRT_2 * noise_rad * point.length();
+        let unit = segment / length_m;
+        Self { point, ray, unit, length_m, sd_m: roots.sd_m, lateral_m, kind: roots.kind }
+    }
+
+    /// Standard deviation of the segment's direction towards a unit vector perpendicular to it, radians.
+    pub fn direction_sd(&self, towards: DVec3) -> f64 {
+        self.along(towards) / self.length_m
+    }
+
+    /// The largest standard deviation of the segment's direction, radians.
+    pub fn worst_direction_sd(&self) -> f64 {
+        let across = (1.0 - self.ray.dot(self.unit).powi(2)).max(0.0);
+        (self.lateral_m.powi(2) + self.sd_m.powi(2) * across).sqrt() / self.length_m
+    }
+
+    /// Standard deviation of the ending joint against the starting joint along a vector, metres.
+    pub fn along(&self, towards: DVec3) -> f64 {
+        let depth = self.sd_m * self.ray.dot(towards);
+        (self.lateral_m * self.lateral_m + depth * depth).sqrt()
+    }
+}
+
+/// All joints in their places.
+pub(crate) type PlacedFigure = PerJoint<Placed>;
+
+impl PlacedFigure {
+    pub(crate) const UNKNOWN_PLACES: Self = Self([Placed::UNKNOWN; JOINT_COUNT]);
+
+    /// A figure of joints known in space without noise, in any axes.
+    pub(crate) fn of_points(figure: &StickFigure) -> Self {
+        let mut placed = Self::UNKNOWN_PLACES;
+        for joint in Joint::ALL {
+            let point = figure[joint];
+            let segment = figure.segment(joint);
+            let length_m = segment.length();
+            placed[joint] = Placed {
+                point,
+                ray: point.normalize_or_zero(),
+                unit: segment / length_m,
+                length_m,
+                sd_m: 0.0,
+                lateral_m: 0.0,
+                kind: RootKind::Degenerate,
+            };
+        }
+        placed
+    }
+
+    pub(crate) fn points(&self) -> StickFigure {
+        PerJoint(self.0.map(|placed| placed.point))
+    }
+
+    /// The joints that are known.
+    pub(crate) fn known(&self) -> JointSet {
+        let known: Vec<Joint> = Joint::ALL.into_iter().filter(|&j| self[j].point.is_finite()).collect();
+        JointSet::of(&known)
+    }
+}
+
+/// What is known about the surroundings of a figure, in its own axes (for a tree the camera's).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bearings {
+    /// Direction against gravity; without it the trunk's, from pelvis to neck, stands for it.
+    pub up: Option<DVec3>,
+    /// The direction the person moves in.
+    pub heading: Option<DVec3>,
+    /// Axes of the head in the sense of the trunk's: x the way the face looks, y down, z to its left.
+    pub head: Option<DMat3>,
+}
+
+/// Where the moving direction was taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum HeadingSource {
+    /// It was given.
+    Given,
+    /// The way the face looks, the paper's normal of the head plane.
+    Head,
+    /// The forward axis of the trunk, a different one in each branch.
+    Trunk,
+}
+
+impl HeadingSource {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Head => "head",
+            Self::Trunk => "trunk",
+        }
+    }
+}
+
+impl Bearings {
+    /// Which source is used: a direction that was given before the head's, and that before the trunk's.
+    pub fn heading_source(&self) -> HeadingSource {
+        match (self.heading, self.head) {
+            (Some(_), _) => HeadingSource::Given,
+            (None, Some(_)) => HeadingSource::Head,
+            (None, None) => HeadingSource::Trunk,
+        }
+    }
+}
+
+/// Axes of a figure's trunk, how well they are known, and the directions of its motion.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Trunk {
+    /// Columns x, y, z; NaN where unknown.
+    pub torso: DMat3,
+    /// Standard deviation of a turn of the torso about its x, y, z, radians.
+    pub torso_sd: DVec3,
+    pub hips: DMat3,
+    pub hips_sd: DVec3,
+    pub up: DVec3,
+    /// Across the moving direction, level.
+    pub lateral: DVec3,
+    /// Standard deviation of that direction.
+    pub lateral_sd: f64,
+    /// Normal of the plane of the body without swing, forward: perpendicular to the trunk (rule 3).
+    pub body_normal: DVec3,
+}
+
+impl Trunk {
+    pub const UNKNOWN: Self = Self {
+        torso: DMat3::NAN,
+        torso_sd: DVec3::NAN,
+        hips: DMat3::NAN,
+        hips_sd: DVec3::NAN,
+        up: DVec3::NAN,
+        lateral: DVec3::NAN,
+        lateral_sd: f64::NAN,
+        body_normal: DVec3::NAN,
+    };
+
+    /// Of shoulders and pelvis, without the hips.
+    pub fn of_torso(figure: &PlacedFigure, bearings: &Bearings) -> Self {
+        let torso = trunk_axes(&figure.points()).unwrap_or(DMat3::NAN);
+        let torso_sd = torso_sd(figure, &torso);
+        let source = bearings.heading_source();
+        let forward = match source {
+            HeadingSource::Given => bearings.heading.unwrap_or(DVec3::NAN),
+            HeadingSource::Head => bearings.head.map_or(DVec3::NAN, |head| head.x_axis),
+            HeadingSource::Trunk => torso.x_axis,
+        };
+        let down = torso.y_axis;
+        let up = bearings.up.map_or(-down, DVec3::normalize);
+        let normal = forward - forward.dot(down) * down;
+        Self {
+            torso,
+            torso_sd,
+            hips: DMat3::NAN,
+            hips_sd: DVec3::NAN,
+            up,
+            lateral: up.cross(forward).try_normalize().unwrap_or(DVec3::NAN),
+            lateral_sd: if source == HeadingSource::Trunk { torso_sd.y } else { 0.0 },
+            body_normal: normal.try_normalize().unwrap_or(DVec3::NAN),
+        }
+    }
+
+    /// The same with hips.
+    pub fn with_hips(mut self, figure: &PlacedFigure) -> Self {
+        let points = figure.points();
+        self.hips = hip_axes(&points).unwrap_or(DMat3::NAN);
+        let [right, left] = [figure[Joint::RightHip], figure[Joint::LeftHip]];
+        let drop = (0.5 * (right.point + left.point) - figure[Joint::Pelvis].point).length();
+        let width = right.point.distance(left.point);
+        let both = |g: DVec3| right.along(g).hypot(left.along(g));
+        let [x, z] = [self.hips.x_axis, self.hips.z_axis];
+        self.hips_sd = DVec3::new(0.5 * both(z) / drop, both(x) / width, 0.5 * both(x) / drop);
+        self
+    }
+
+    pub fn of(figure: &PlacedFigure, bearings: &Bearings) -> Self {
+        Self::of_torso(figure, bearings).with_hips(figure)
+    }
+}
+
+fn torso_sd(figure: &PlacedFigure, torso: &DMat3) -> DVec3 {
+    let pelvis = &figure[Joint::Pelvis];
+    let [right, left] = [&figure[Joint::RightShoulder], &figure[Joint::LeftShoulder]];
+    let [x, z] = [torso.x_axis, torso.z_axis];
+    let width = right.point.distance(left.point);
+    DVec3::new(pelvis.direction_sd(z), right.along(x).hypot(left.along(x)) / width, pelvis.direction_sd(x))
+}

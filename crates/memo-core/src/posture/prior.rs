@@ -1,0 +1,165 @@
+//! What a person is expected to do, softly: means and standard deviations of angles and accelerations.
+//!
+//! The hard limits of the interpretation tree say what cannot be; these say what is usual, for choosing among
+//! what can. Angles against upright axes: x the moving direction, y down, z to the left.
+//!
+//! Chosen on four walks of motion capture (two Plug-in-Gait walkers of BTKData, CMU 02_01 and 12_01); the
+//! spreads are two to three times what one walker shows, so that people may differ.
+
+use super::skeleton::Joint;
+
+/// A quantity's usual value and spread, radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Soft {
+    /// Usual value.
+    pub mean_rad: f64,
+    /// Standard deviation between people and moments.
+    pub sd_rad: f64,
+}
+
+/// A squared deviation never counts for more than this many squared standard deviations: an outlier is an
+/// outlier.
+const CAP: f64 = 25.0;
+
+/// A squared deviation in standard deviations; 0 for what is not known (NaN).
+pub fn chi_sq(deviation: f64) -> f64 {
+    let square = deviation * deviation;
+    if square.is_nan() { 0.0 } else { square.min(CAP) }
+}
+
+impl Soft {
+    /// Anything goes.
+    pub const FREE: Self = Self { mean_rad: 0.0, sd_rad: f64::INFINITY };
+
+    /// From degrees.
+    pub fn degrees(mean_deg: f64, sd_deg: f64) -> Self {
+        Self { mean_rad: mean_deg.to_radians(), sd_rad: sd_deg.to_radians() }
+    }
+
+    /// Squared deviation of a value measured with a standard deviation; 0 for NaN.
+    pub fn cost(&self, value_rad: f64, noise_rad: f64) -> f64 {
+        chi_sq((value_rad - self.mean_rad) / self.sd_rad.hypot(noise_rad))
+    }
+
+    /// The same for values below the mean alone: the mean is a limit.
+    pub fn cost_beyond(&self, value_rad: f64, noise_rad: f64) -> f64 {
+        self.cost(value_rad.min(self.mean_rad), noise_rad)
+    }
+}
+
+/// What is usual of a limb's segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SegmentPrior {
+    /// Against the vertical in the moving direction, forward positive.
+    pub swing: Soft,
+    /// Out of the vertical plane of the moving direction, outward positive, at no swing.
+    pub outward: Soft,
+    /// How much farther outward for each radian of swing: arms swing forwards in front of the body.
+    pub outward_per_swing: f64,
+    /// Acceleration of the segment's end against its start, m/s².
+    pub acceleration_mps2: f64,
+    /// Standard deviation of the segment's apparent length, as a fraction: the centres of joints are no pivots.
+    pub length_sd: f64,
+}
+
+/// What a person is expected to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionPrior {
+    /// Upper arm, forearm, thigh, shank.
+    pub segments: [SegmentPrior; 4],
+    /// Least flexion of elbow and knee, with the softness of the limit.
+    pub least_bend: [Soft; 2],
+    /// Sum of the swings of both upper arms and of both thighs: they swing in opposition (Rule 1).
+    pub opposition: [Soft; 2],
+    /// Sum of the swings of arm and leg of a side in their standard deviations: in opposition too (Rule 2).
+    pub same_side: Soft,
+    /// Trunk against the vertical, forward positive.
+    pub trunk_lean: Soft,
+    /// Trunk against the vertical, to the left positive.
+    pub trunk_roll: Soft,
+    /// Line of the shoulders about the vertical.
+    pub shoulder_turn: Soft,
+    /// Line of the hips about the vertical.
+    pub hip_turn: Soft,
+    /// How far the neck may lie before or behind where the lengths of the torso put it, metres.
+    pub neck_forward_sd_m: f64,
+    /// Standard deviation of the distances within the trunk, metres.
+    pub rigid_m: f64,
+    /// Standard deviation of the apparent lengths of the trunk's segments, as a fraction.
+    pub trunk_length_sd: f64,
+    /// Cost of a torso that faces against the hips.
+    pub hips_against_torso: f64,
+    /// Acceleration of a joint of the trunk against its starting joint, m/s².
+    pub trunk_acceleration_mps2: f64,
+    /// Time after which another frame is new evidence, seconds.
+    pub independence_s: f64,
+}
+
+impl MotionPrior {
+    /// A walking person.
+    pub fn walking() -> Self {
+        let segment =
+            |swing: (f64, f64), outward: (f64, f64), outward_per_swing, acceleration_mps2, length_sd| {
+                SegmentPrior {
+                    swing: Soft::degrees(swing.0, swing.1),
+                    outward: Soft::degrees(outward.0, outward.1),
+                    outward_per_swing,
+                    acceleration_mps2,
+                    length_sd,
+                }
+            };
+        Self {
+            segments: [
+                segment((-9.0, 20.0), (10.0, 9.0), 0.25, 4.0, 0.005),
+                segment((25.0, 45.0), (4.0, 7.0), -0.15, 6.0, 0.005),
+                segment((5.0, 22.0), (-1.0, 6.0), 0.0, 8.0, 0.025),
+                segment((-15.0, 30.0), (-2.0, 5.0), 0.0, 15.0, 0.025),
+            ],
+            least_bend: [Soft::degrees(5.0, 8.0), Soft::degrees(0.0, 8.0)],
+            opposition: [Soft::degrees(-18.0, 20.0), Soft::degrees(10.0, 20.0)],
+            same_side: Soft { mean_rad: 0.0, sd_rad: 1.0 },
+            trunk_lean: Soft::degrees(0.0, 8.0),
+            trunk_roll: Soft::degrees(0.0, 4.0),
+            shoulder_turn: Soft::degrees(0.0, 8.0),
+            hip_turn: Soft::degrees(0.0, 10.0),
+            neck_forward_sd_m: 0.02,
+            rigid_m: 0.01,
+            trunk_length_sd: 0.025,
+            hips_against_torso: 25.0,
+            trunk_acceleration_mps2: 3.0,
+            independence_s: 0.08,
+        }
+    }
+    /// Anybody doing anything: what joints allow, a trunk more upright than not, and inertia.
+    pub fn any() -> Self {
+        let segment = |acceleration_mps2| SegmentPrior {
+            swing: Soft::FREE,
+            outward: Soft::FREE,
+            outward_per_swing: 0.0,
+            acceleration_mps2,
+            length_sd: 0.025,
+        };
+        Self {
+            segments: [8.0, 15.0, 8.0, 15.0].map(segment),
+            least_bend: [Soft::degrees(0.0, 15.0), Soft::degrees(0.0, 10.0)],
+            opposition: [Soft::FREE; 2],
+            same_side: Soft::FREE,
+            trunk_lean: Soft::degrees(0.0, 25.0),
+            trunk_roll: Soft::degrees(0.0, 15.0),
+            shoulder_turn: Soft::FREE,
+            hip_turn: Soft::FREE,
+            ..Self::walking()
+        }
+    }
+
+    /// Standard deviation of the apparent length of the segment that ends at a joint, as a fraction.
+    pub(crate) fn length_sd(&self, end: Joint) -> f64 {
+        match end {
+            Joint::RightElbow | Joint::LeftElbow => self.segments[0].length_sd,
+            Joint::RightWrist | Joint::LeftWrist => self.segments[1].length_sd,
+            Joint::RightKnee | Joint::LeftKnee => self.segments[2].length_sd,
+            Joint::RightAnkle | Joint::LeftAnkle => self.segments[3].length_sd,
+            _ => self.trunk_length_sd,
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Smoothing of one quantity over time by the frames before and after: a constant-velocity Kalman filter and
+//! the Rauch-Tung-Striebel pass backwards, uneven times and missing values allowed.
+
+use crate::track::kalman::{ConstantVelocity, Noise, smooth};
+
+/// A value with its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The value; NaN where nothing was measured.
+    pub value: f64,
+    /// Its standard deviation, in the value's unit.
+    pub sd: f64,
+}
+
+impl Measured {
+    /// Nothing was measured.
+    pub const NOTHING: Self = Self { value: f64::NAN, sd: f64::NAN };
+
+    /// Both measurements of one quantity together.
+    pub fn fused(self, other: Self) -> Self {
+        let weight = |m: Self| if m.value.is_finite() { 1.0 / (m.sd * m.sd).max(1e-12) } else { 0.0 };
+        let [a, b] = [weight(self), weight(other)];
+        if a == 0.0 || b == 0.0 {
+            return if a == 0.0 { other } else { self };
+        }
+        Self { value: (a * self.value + b * other.value) / (a + b), sd: (a + b).sqrt().recip() }
+    }
+}
+
+/// Time over which an acceleration lasts, seconds: the velocity gains acceleration² times this a second.
+const ACCELERATION_LASTS_S: f64 = 0.1;
+
+/// Standard deviation of the velocity before the first measurement, units a second.
+const FIRST_VELOCITY_SD: f64 = 2.0;
+
+/// Least standard deviation of a measurement: a model is not exact.
+const LEAST_SD: f64 = 1e-4;
+
+fn noise(acceleration_sd: f64, measurement_sd: f64) -> Noise {
+    Noise {
+        velocity_variance_per_s: acceleration_sd * acceleration_sd * ACCELERATION_LASTS_S,
+        measurement_variance: measurement_sd * measurement_sd,
+    }
+}
+
+/// One step of the filter: predicts over `step_s` and takes a measurement in.
+///
+/// The filter is none before the first measurement. The second value is the innovation and its standard
+/// deviation, where there is a prediction and a measurement.
+pub fn filter_step(
+    filter: Option<ConstantVelocity>,
+    step_s: f64,
+    measured: Measured,
+    acceleration_sd: f64,
+) -> (Option<ConstantVelocity>, Option<Measured>) {
+    let seen = measured.value.is_finite();
+    let sd = measured.sd.max(LEAST_SD);
+    let noise = noise(acceleration_sd, sd);
+    match filter.map(|state| state.predict(step_s, &noise)) {
+        None if seen => {
+            let start =
+                ConstantVelocity::new(measured.value, 0.0, sd * sd, FIRST_VELOCITY_SD * FIRST_VELOCITY_SD);
+            (Some(start), None)
+        }
+        Some(state) if seen => {
+            let innovation =
+                Measured { value: measured.value - state.position, sd: state.position_sd().hypot(sd) };
+            (Some(state.update(measured.value, &noise)), Some(innovation))
+        }
+        waiting => (waiting, None),
+    }
+}
+
+/// Smooths a track. `acceleration_sd` in units/s². Between and after measurements the value is the motion's
+/// expected one, with its growing uncertainty; before the first it is not known (NaN).
+pub fn smooth_track(times_s: &[f64], measured: &[Measured], acceleration_sd: f64) -> Vec<Measured> {
+    let first = measured.iter().position(|m| m.value.is_finite()).unwrap_or(measured.len());
+    let steps: Vec<f64> = times_s[first..].windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut filter = None;
+    let mut filtered = Vec::with_capacity(measured.len() - first);
+    for (k, m) in measured[first..].iter().enumerate() {
+        let step_s = if k == 0 { 0.0 } else { steps[k - 1] };
+        filter = filter_step(filter, step_s, *m, acceleration_sd).0;
+        filtered.extend(filter);
+    }
+    let smoothed = smooth(&filtered, &steps, &noise(acceleration_sd, LEAST_SD));
+    let known = smoothed.iter().map(|state| Measured { value: state.position, sd: state.position_sd() });
+    std::iter::repeat_n(Measured::NOTHING, first).chain(known).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::Random;
+
+    #[test]
+    fn smoothing_halves_the_noise_of_a_swing_and_states_what_is_left() {
+        let mut random = Random::new(11);
+        let times_s: Vec<f64> = (0..400).map(|t| f64::from(t) * 0.05 + random.uniform(0.0, 0.01)).collect();
+        let truth = |time_s: f64| 0.15 * (std::f64::consts::TAU * time_s).sin();
+        let measured: Vec<Measured> = times_s
+            .iter()
+            .enumerate()
+            .map(|(t, &time_s)| {
+                let noise = 0.03 * f64::from(random.normal_pair()[0]);
+                if t % 7 == 3 {
+                    Measured::NOTHING
+                } else {
+                    Measured { value: truth(time_s) + noise, sd: 0.03 }
+                }
+            })
+            .collect();
+        let smoothed = smooth_track(&times_s, &measured, 4.0);
+        let errors: Vec<f64> = smoothed.iter().zip(&times_s).map(|(s, &t)| s.value - truth(t)).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / 400.0).sqrt();
+        let stated = smoothed.iter().map(|s| s.sd).sum::<f64>() / 400.0;
+        assert!(rms < 0.018, "{rms}");
+        assert!((rms / stated - 1.0).abs() < 0.25, "measured {rms}, stated {stated}");
+    }
+
+    #[test]
+    fn nothing_is_known_before_the_first_measurement() {
+        let one = Measured { value: 2.0, sd: 0.1 };
+        let smoothed = smooth_track(&[0.0, 0.1, 0.2], &[Measured::NOTHING, one, Measured::NOTHING], 1.0);
+        assert!(smoothed[0].value.is_nan());
+        assert_eq!(smoothed[1].value, 2.0);
+        assert!(smoothed[2].sd > smoothed[1].sd);
+        assert!(smooth_track(&[0.0], &[Measured::NOTHING], 1.0)[0].value.is_nan());
+        assert!(smooth_track(&[], &[], 1.0).is_empty());
+    }
+}

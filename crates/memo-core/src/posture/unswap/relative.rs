@@ -1,0 +1,197 @@
+//! What is seen of left and right relative to one another, its noise and how hard it accelerates.
+//!
+//! With the difference d = right - left and the mean m of a pair, an exchange changes the sign of d and
+//! leaves m alone. So m gives the noise whatever the labels, and the labels are right where the signs make d
+//! smooth.
+
+use glam::DVec2;
+
+/// A pair seen on both sides.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    /// Right minus left as labelled, px.
+    pub difference: DVec2,
+    /// px.
+    pub mean: DVec2,
+    /// Of the two scores, (0, 1]; noise variance is divided by it.
+    pub weight: f64,
+}
+
+/// One pair over time; `None` where a side is missing or the sample was found to be an outlier.
+pub(super) type Track = Vec<Option<Sample>>;
+
+/// Noise and acceleration of one pair.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scale {
+    /// Variance of one coordinate of one joint, px^2.
+    pub noise_sq: f64,
+    /// Mean square of one coordinate of the acceleration of d, (px/s^2)^2.
+    pub acceleration_sq: f64,
+    /// Variance no residual goes below, px^2.
+    pub floor_sq: f64,
+}
+
+/// Degrees of freedom of the residuals' Student distribution: heavy tails for heel strikes and bad detections.
+const NU: f64 = 4.0;
+/// One triple of samples says no more than this, nats: anything can happen once in e^8. Less and
+/// an exchange of knee and ankle alone is lost, more and single bad detections turn a whole run.
+const MOST_NATS: f64 = 8.0;
+/// Residuals of neighbouring triples share two of three samples: for white noise the log odds of a single
+/// exchange vary by 7.8 (d / sd)^2 where independent residuals of that mean would vary by 4. Doubling the
+/// noise's variance keeps the odds from being too sure.
+const SHARED: f64 = 2.0;
+/// Over this lag walking accelerates evenly enough and noise no longer hides it.
+const LAG_S: f64 = 0.1;
+/// An outlier's distance from its neighbours' line, in medians of that distance.
+const OUTLIER_MEDIANS: f64 = 4.5;
+/// Median of |r|^2 over the variance of a coordinate, for two Gaussian coordinates: 2 ln 2.
+const MEDIAN_CHI2: f64 = 2.0 * std::f64::consts::LN_2;
+
+/// The costs in nats of the four sign patterns (before * last, last * now), index `2 * (turned) + turned`.
+///
+/// With the steps h1 = t1 - t0, h2 = t2 - t1 and q = h2 / h1:
+/// r = d2 - d1 - q (d1 - d0), var r = noise (1 + (1 + q)^2 + q^2) + (a h2 (h1 + h2) / 2)^2;
+/// cost = (nu + 2) / 2 ln(1 + |r|^2 / (nu var r)).
+pub(super) fn triple_costs(times_s: [f64; 3], samples: [Sample; 3], scale: &Scale) -> [f64; 4] {
+    let [h1, h2] = [times_s[1] - times_s[0], times_s[2] - times_s[1]];
+    let q = h2 / h1;
+    let coefficients = [q, 1.0 + q, 1.0];
+    let shared: f64 = coefficients.iter().zip(&samples).map(|(c, s)| c * c / s.weight).sum();
+    let bend = 0.5 * h2 * (h1 + h2);
+    let variance =
+        2.0 * SHARED * scale.noise_sq * shared + scale.acceleration_sq * bend * bend + scale.floor_sq;
+    let [d0, d1, d2] = samples.map(|s| s.difference);
+    let cost = |turns: usize| {
+        let [s0, s2] = [turns >> 1, turns & 1].map(|turned| if turned == 1 { -1.0 } else { 1.0 });
+        let r = s2 * d2 - (1.0 + q) * d1 + q * s0 * d0;
+        0.5 * (NU + 2.0) * (r.length_squared() / (NU * variance)).ln_1p()
+    };
+    let costs = [0, 1, 2, 3].map(cost);
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    costs.map(|c| (c - least).min(MOST_NATS))
+}
+
+/// Drops samples that lie off their neighbours' line whatever the signs; the frames dropped.
+pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
+    let mut dropped = Vec::new();
+    for _ in 0..3 {
+        let seen: Vec<usize> = (0..track.len()).filter(|&t| track[t].is_some()).collect();
+        let off = distances_from_line(times_s, track, &seen);
+        let lengths = seen.iter().filter_map(|&t| track[t]).map(|s| s.difference.length());
+        let (Some(typical), Some(length)) = (median(off.clone()), median(lengths.collect())) else { break };
+        let limit = (OUTLIER_MEDIANS * typical).max(0.3 * length);
+        let at = |i: usize| off.get(i).copied().unwrap_or(0.0);
+        let worst =
+            (0..off.len()).filter(|&i| at(i) > limit && (i == 0 || at(i) > at(i - 1)) && at(i) >= at(i + 1));
+        let worst: Vec<usize> = worst.map(|i| seen[i + 1]).collect();
+        if worst.is_empty() {
+            break;
+        }
+        for t in worst {
+            track[t] = None;
+            dropped.push(t);
+        }
+    }
+    dropped.sort_unstable();
+    dropped
+}
+
+/// Of every inner sample, from the line between its neighbours: of m and, for the best signs, of d / 2.
+///
+/// Divided by how much further apart than usual the neighbours are, since a bend grows with h1 h2.
+fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f64> {
+    let Some(step) = median(seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect()) else {
+        return Vec::new();
+    };
+    let distance = |w: &[usize]| {
+        let [Some(a), Some(b), Some(c)] = [track[w[0]], track[w[1]], track[w[2]]] else { return 0.0 };
+        let [h1, h2] = [times_s[w[1]] - times_s[w[0]], times_s[w[2]] - times_s[w[1]]];
+        let x = h1 / (h1 + h2);
+        let of_mean = b.mean.distance_squared(a.mean.lerp(c.mean, x));
+        let of_difference = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+            .map(|(p, n)| b.difference.distance_squared((p * a.difference).lerp(n * c.difference, x)))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        (of_mean + 0.25 * of_difference).sqrt() / (h1 * h2 / (step * step)).max(1.0)
+    };
+    seen.windows(3).map(distance).collect()
+}
+
+/// Noise from the means of a group's pairs, then each pair's acceleration from its differences.
+///
+/// `signs` are those of a path found before; without them the smoothest of the four patterns is taken.
+pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>]>) -> Vec<Scale> {
+    let steps = times_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let step_s = median(steps).unwrap_or(1.0);
+    let lag = ((LAG_S / step_s).round() as usize).clamp(1, 50);
+    let of_means: Vec<[f64; 2]> = tracks.iter().map(|t| noise_and_bend(times_s, t, step_s, lag)).collect();
+    let noise_sq = median(of_means.iter().map(|m| m[0]).collect()).unwrap_or(0.0);
+    let lengths = tracks.iter().flatten().flatten().map(|s| s.difference.length());
+    let floor_sq = (0.005 * median(lengths.collect()).unwrap_or(0.0)).powi(2) + 1e-12;
+    let scale = |(i, track): (usize, &Track)| {
+        let lag = if signs.is_some() { lag } else { 1 };
+        let r_sq = |w: [usize; 3]| {
+            let s = w.map(|t| track[t].map(|s| s.difference));
+            let [Some(a), Some(b), Some(c)] = s else { return None };
+            let q = (times_s[w[2]] - times_s[w[1]]) / (times_s[w[1]] - times_s[w[0]]);
+            let with = |p: f64, n: f64| (n * c - (1.0 + q) * b + q * p * a).length_squared();
+            Some(match signs {
+                Some(signs) => with(signs[i][w[0]] * signs[i][w[1]], signs[i][w[1]] * signs[i][w[2]]),
+                None => with(1.0, 1.0).min(with(1.0, -1.0)).min(with(-1.0, 1.0)).min(with(-1.0, -1.0)),
+            })
+        };
+        let total = second_difference_variance(times_s, track, step_s, lag, r_sq).unwrap_or(0.0);
+        let bend_sq = (total - 12.0 * noise_sq).max(0.0) / (lag as f64).powi(4);
+        let acceleration_sq = bend_sq.max(of_means[i][1]) / step_s.powi(4);
+        Scale { noise_sq, acceleration_sq, floor_sq }
+    };
+    tracks.iter().enumerate().map(scale).collect()
+}
+
+/// Noise variance of a joint and mean square bend a^2 h^4 of the mean m, from second differences over one
+/// step and over `lag` steps: R_1 = 3 noise + bend, R_k = 3 noise + k^4 bend.
+///
+/// With a lag of one step the two cannot be told apart: then all of it counts as bend but a tenth.
+fn noise_and_bend(times_s: &[f64], track: &Track, step_s: f64, lag: usize) -> [f64; 2] {
+    let variance = |lag| {
+        second_difference_variance(times_s, track, step_s, lag, |w| {
+            let [Some(a), Some(b), Some(c)] = w.map(|t| track[t].map(|s| s.mean)) else { return None };
+            let q = (times_s[w[2]] - times_s[w[1]]) / (times_s[w[1]] - times_s[w[0]]);
+            Some((c - (1.0 + q) * b + q * a).length_squared())
+        })
+    };
+    let one = variance(1).unwrap_or(0.0);
+    match (lag, variance(lag)) {
+        (2.., Some(many)) => {
+            let bend = ((many - one) / ((lag as f64).powi(4) - 1.0)).clamp(0.0, one);
+            [((one - bend) / 3.0).max(0.01 * one), bend]
+        }
+        _ => [0.1 * one / 3.0, 0.9 * one],
+    }
+}
+
+/// Variance of a coordinate of the second differences over `lag` samples, robustly, from even triples.
+fn second_difference_variance(
+    times_s: &[f64],
+    track: &Track,
+    step_s: f64,
+    lag: usize,
+    r_sq: impl Fn([usize; 3]) -> Option<f64>,
+) -> Option<f64> {
+    let wanted = step_s * lag as f64;
+    let even = |a: usize, b: usize| (times_s[b] - times_s[a] - wanted).abs() < 0.3 * wanted;
+    let values = (2 * lag..track.len())
+        .map(|t| [t - 2 * lag, t - lag, t])
+        .filter(|w| even(w[0], w[1]) && even(w[1], w[2]))
+        .filter_map(r_sq);
+    median(values.collect()).map(|m| m / MEDIAN_CHI2)
+}
+
+/// The median; `None` of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

@@ -1,0 +1,135 @@
+//! Points of keypoint detectors: their names and orders, and the joints of the stick figure from them.
+
+use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
+use crate::error::value_error;
+use glam::DVec2;
+use memo_core::posture::detector::{
+    Detector, DetectorError, LAYOUTS, Layout, WeightedPoints, joint_name as core_joint_name,
+};
+use memo_core::posture::person::{FollowOptions, follow_person as core_follow_person};
+use numpy::{PyArray2, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+
+/// Names of all keypoint layouts.
+#[pyfunction]
+pub fn keypoint_layouts() -> Vec<&'static str> {
+    LAYOUTS.iter().map(|layout| layout.name).collect()
+}
+
+/// The joints of a layout in order.
+#[pyfunction]
+pub fn keypoint_layout(name: &str) -> PyResult<(&'static str, Vec<&'static str>)> {
+    let layout = Layout::by_name(name).map_err(value_error)?;
+    Ok((layout.name, layout.joints.to_vec()))
+}
+
+/// The layout that points (T, K, 2) are in, by their number and, where two have as many, by whether neck and
+/// middle of the hips lie where one of them has them.
+#[pyfunction]
+pub fn guess_layout(points: &Bound<'_, PyAny>) -> PyResult<&'static str> {
+    let track = track_from_numpy(points)?;
+    Layout::from_points(track.joints, &track.points_px).map(|layout| layout.name).map_err(value_error)
+}
+
+/// The name here of a joint that is spelt in any known way; None for what is like no known name. A near miss is
+/// an error.
+#[pyfunction]
+pub fn joint_name(name: &str) -> PyResult<Option<&'static str>> {
+    match core_joint_name(name) {
+        Ok(known) => Ok(Some(known)),
+        Err(DetectorError::UnknownJoint { nearest: None, .. }) => Ok(None),
+        Err(misspelt) => Err(value_error(misspelt)),
+    }
+}
+
+/// A layout's name, or the names of the points one by one.
+#[derive(FromPyObject)]
+pub enum LayoutOrNames {
+    /// The name of a layout.
+    Layout(String),
+    /// The names of the points.
+    Names(Vec<String>),
+}
+
+impl LayoutOrNames {
+    fn detector(&self) -> PyResult<Detector> {
+        match self {
+            Self::Layout(name) => Layout::by_name(name).map(Detector::from_layout),
+            Self::Names(names) => Detector::from_names(names),
+        }
+        .map_err(value_error)
+    }
+}
+
+/// Points (T, N, 2) and weights (T, N).
+type PointsAndWeights<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// The 14 joints of the stick figure, neck to left ankle, from points (T, K, 2) and scores (T, K); NaN and
+/// weight 0 where a source is missing.
+#[pyfunction]
+pub fn stick_joints<'py>(
+    py: Python<'py>,
+    layout_or_names: LayoutOrNames,
+    points: &Bound<'py, PyAny>,
+    scores: &Bound<'py, PyAny>,
+) -> PyResult<PointsAndWeights<'py>> {
+    collect(py, &layout_or_names, points, scores, Detector::stick_joints)
+}
+
+/// The 6 head points neck, nose, right eye, left eye, right ear, left ear, as `stick_joints`.
+#[pyfunction]
+pub fn head_points<'py>(
+    py: Python<'py>,
+    layout_or_names: LayoutOrNames,
+    points: &Bound<'py, PyAny>,
+    scores: &Bound<'py, PyAny>,
+) -> PyResult<PointsAndWeights<'py>> {
+    collect(py, &layout_or_names, points, scores, Detector::head_points)
+}
+
+fn collect<'py, const N: usize>(
+    py: Python<'py>,
+    layout_or_names: &LayoutOrNames,
+    points: &Bound<'py, PyAny>,
+    scores: &Bound<'py, PyAny>,
+    one_frame: impl Fn(&Detector, &[DVec2], &[f64]) -> Result<WeightedPoints<N>, DetectorError>,
+) -> PyResult<PointsAndWeights<'py>> {
+    let detector = layout_or_names.detector()?;
+    let track = track_from_numpy(points)?;
+    let scores = scores_from_numpy(scores, &track)?;
+    let mut found = Vec::with_capacity(track.frames);
+    for t in 0..track.frames {
+        let range = t * track.joints..(t + 1) * track.joints;
+        found.push(
+            one_frame(&detector, &track.points_px[range.clone()], &scores[range]).map_err(value_error)?,
+        );
+    }
+    let points = found.iter().flat_map(|frame| frame.points_px).collect();
+    let weights: Vec<f64> = found.iter().flat_map(|frame| frame.weights).collect();
+    let weights = numpy_from_column(py, weights).reshape([track.frames, N])?;
+    Ok((numpy_from_track(py, points, N)?, weights))
+}
+
+/// Pairs of right and left points: (group "legs", "arms" or "head", part, place of the right, of the left).
+#[pyfunction]
+pub fn side_pairs(
+    layout_or_names: LayoutOrNames,
+) -> PyResult<Vec<(&'static str, &'static str, usize, usize)>> {
+    let pairs = layout_or_names.detector()?.side_pairs();
+    Ok(pairs.into_iter().map(|pair| (pair.group.name(), pair.part, pair.right, pair.left)).collect())
+}
+
+/// Marks the most prominent person among all people: frames (N), in order, points (N, K, 2), scores (N, K).
+#[pyfunction]
+pub fn follow_person(
+    py: Python<'_>,
+    frames: Vec<i64>,
+    points: &Bound<'_, PyAny>,
+    scores: &Bound<'_, PyAny>,
+) -> PyResult<Vec<bool>> {
+    let people = track_from_numpy(points)?;
+    let scores = scores_from_numpy(scores, &people)?;
+    let options = FollowOptions::default();
+    py.detach(|| core_follow_person(&frames, people.joints, &people.points_px, &scores, &options))
+        .map_err(value_error)
+}

@@ -1,0 +1,119 @@
+//! Repair of exchanged left and right labels.
+
+use crate::array::{joint_scores_from_numpy, joints_from_numpy, numpy_from_column, times_from_numpy};
+use crate::error::value_error;
+use memo_core::posture::unswap::{
+    GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, Unswapped, unswap as core_unswap,
+};
+use numpy::{IntoPyArray, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Undoes exchanges of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN where
+/// missing, scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk
+/// outwards. Returns points, scores and, per limb, arrays over frames.
+#[pyfunction]
+#[pyo3(signature = (
+    times_s, points, scores=None, *, groups, as_is_nats=None, partial_begin_nats=None,
+    partial_stay_nats=None, decided_at=None
+))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub fn unswap<'py>(
+    py: Python<'py>,
+    times_s: &Bound<'py, PyAny>,
+    points: &Bound<'py, PyAny>,
+    scores: Option<&Bound<'py, PyAny>>,
+    groups: &Bound<'py, PyDict>,
+    as_is_nats: Option<f64>,
+    partial_begin_nats: Option<f64>,
+    partial_stay_nats: Option<f64>,
+    decided_at: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let times_s = times_from_numpy(times_s)?;
+    let (points_px, shape) = joints_from_numpy(points)?;
+    let scores = scores.map(|scores| joint_scores_from_numpy(scores, shape)).transpose()?;
+    let groups = groups_from_dict(groups)?;
+    let default = UnswapOptions::default();
+    let options = UnswapOptions {
+        as_is_nats: as_is_nats.unwrap_or(default.as_is_nats),
+        partial_begin_nats: partial_begin_nats.unwrap_or(default.partial_begin_nats),
+        partial_stay_nats: partial_stay_nats.unwrap_or(default.partial_stay_nats),
+        decided_at: decided_at.unwrap_or(default.decided_at),
+    };
+    let keypoints =
+        Keypoints { times_s: &times_s, joints: shape[1], points_px: &points_px, scores: scores.as_deref() };
+    let found = py.detach(|| core_unswap(&keypoints, &groups, &options)).map_err(value_error)?;
+    dict_from_unswapped(py, found, &groups, shape)
+}
+
+/// Limbs in the order given.
+fn groups_from_dict(groups: &Bound<'_, PyDict>) -> PyResult<Vec<LimbGroup>> {
+    let wanted = "wanted groups as {limb: {level: [(left, right), ...]}}";
+    let bad = |got: &Bound<'_, PyAny>| {
+        pyo3::exceptions::PyValueError::new_err(format!("{wanted}; got {got} in its place"))
+    };
+    let level = |(name, pairs): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let pairs = pairs.extract::<Vec<[usize; 2]>>().map_err(|_| bad(&pairs))?;
+        Ok(Level { name: name.extract().map_err(|_| bad(&name))?, pairs })
+    };
+    let group = |(name, levels): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let levels = levels.cast::<PyDict>().map_err(|_| bad(&levels))?;
+        let levels = levels.iter().map(level).collect::<PyResult<_>>()?;
+        Ok(LimbGroup { name: name.extract().map_err(|_| bad(&name))?, levels })
+    };
+    groups.iter().map(group).collect()
+}
+
+fn dict_from_unswapped<'py>(
+    py: Python<'py>,
+    found: Unswapped,
+    groups: &[LimbGroup],
+    shape: [usize; 2],
+) -> PyResult<Bound<'py, PyDict>> {
+    let [frames, joints] = shape;
+    let result = PyDict::new(py);
+    let points: Vec<f64> = found.points_px.into_iter().flatten().collect();
+    result.set_item("points", points.into_pyarray(py).reshape([frames, joints, 2])?)?;
+    let scores = found.scores.map(|scores| scores.into_pyarray(py).reshape([frames, joints])).transpose()?;
+    result.set_item("scores", scores)?;
+    let of_groups = PyDict::new(py);
+    for (group, found) in groups.iter().zip(&found.groups) {
+        of_groups.set_item(&group.name, dict_from_group(py, group, found)?)?;
+    }
+    result.set_item("groups", of_groups)?;
+    Ok(result)
+}
+
+fn dict_from_group<'py>(
+    py: Python<'py>,
+    group: &LimbGroup,
+    found: &GroupResult,
+) -> PyResult<Bound<'py, PyDict>> {
+    let verdicts = &found.verdicts;
+    let shape = [verdicts.len(), group.levels.len()];
+    let result = PyDict::new(py);
+    let flags = |of: fn(&memo_core::posture::unswap::Verdict) -> bool| {
+        numpy_from_column(py, verdicts.iter().map(of).collect())
+    };
+    result.set_item("flipped", flags(|v| v.flipped))?;
+    result.set_item("partial", flags(|v| v.partial))?;
+    result.set_item("decided", flags(|v| v.decided))?;
+    let probability = verdicts.iter().map(|v| v.probability).collect();
+    result.set_item("p_flipped", numpy_from_column(py, probability))?;
+    let reasons: Vec<String> = verdicts.iter().map(|v| v.reason.describe(v.flipped, group)).collect();
+    result.set_item("reason", reasons)?;
+    let levels: Vec<&str> = group.levels.iter().map(|level| level.name.as_str()).collect();
+    result.set_item("levels", levels)?;
+    let flipped: Vec<bool> = verdicts.iter().flat_map(|v| v.level_flipped.iter().copied()).collect();
+    result.set_item("level_flipped", flipped.into_pyarray(py).reshape(shape)?)?;
+    let p: Vec<f64> = verdicts.iter().flat_map(|v| v.level_probability.iter().copied()).collect();
+    result.set_item("level_p_flipped", p.into_pyarray(py).reshape(shape)?)?;
+    let runs: Vec<(usize, usize, f64, f64)> =
+        found.runs.iter().map(|r| (r.start, r.end, r.probability, r.gap_before_s)).collect();
+    result.set_item("runs", runs)?;
+    result.set_item("p_global", found.global_probability)?;
+    result.set_item("noise_px", found.noise_px)?;
+    let left_out: Vec<(usize, usize)> = found.left_out.iter().map(|&[frame, left]| (frame, left)).collect();
+    result.set_item("left_out", left_out)?;
+    Ok(result)
+}

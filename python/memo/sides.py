@@ -1,0 +1,103 @@
+"""Right and left put right in keypoints: which pairs change sides together, and a row for every change.
+
+The decision itself is the core's; this file hands it the pairs of legs and arms and tells what it found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from memo import _memo
+from memo.keypoints import Keypoints, KeypointsError
+
+__all__ = ["SideRepair", "unswap"]
+
+#: What moves with which joint: heel and toes with the ankle, fingers with the wrist.
+_LEVELS = {
+    "legs": {"hip": "hip", "knee": "knee", "ankle": "ankle heel big_toe small_toe"},
+    "arms": {"shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist pinky index thumb"},
+}
+
+
+@dataclass(frozen=True)
+class SideRepair:
+    """Keypoints with right and left where they belong, and what was done."""
+
+    keypoints: Keypoints
+    """As read, with entries of right and left exchanged where they had been confused."""
+    flips: list[dict[str, Any]]
+    """Rows of `flips.csv`: one for every frame in which a group was exchanged, one for every run of frames in
+    which it could not be decided; `probability` is that of having come exchanged."""
+    exchanged: dict[str, int]
+    """How many frames were exchanged, by group."""
+    undecided: dict[str, int]
+    """In how many frames the labels are only the best guess, by group."""
+
+
+def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> SideRepair:
+    """Exchanges right and left, in legs and arms apart, where the motion shows that they were confused.
+
+    Which leg is the left one is what most frames say. Nothing is moved, made up or removed.
+    """
+    pairs = {group: levels for group in groups if (levels := _levels(keypoints.names, group))}
+    if not pairs:
+        raise KeypointsError(
+            f"{keypoints.source.path}: no pair of right and left joints of {' or '.join(groups)}; "
+            f"it has {', '.join(keypoints.names)}"
+        )
+    # AlphaPose's older scores go to 6; the core weights within 0 to 1.
+    weights = np.clip(keypoints.scores, 0, 1)
+    found = _memo.unswap(keypoints.times_s, keypoints.points, weights, groups=pairs)["groups"]
+    points, scores = keypoints.points.copy(), keypoints.scores.copy()
+    for group, levels in pairs.items():
+        for level, at in enumerate(levels.values()):
+            rows = np.flatnonzero(found[group]["level_flipped"][:, level])[:, None]
+            for left, right in at:
+                points[rows, [left, right]] = points[rows, [right, left]]
+                scores[rows, [left, right]] = scores[rows, [right, left]]
+    flips = [row for group in pairs for row in _rows(keypoints, group, found[group])]
+    return SideRepair(
+        keypoints=keypoints.replaced(points, scores),
+        flips=sorted(flips, key=lambda row: (row["frame"], row["group"], row["verdict"])),
+        exchanged={group: int(found[group]["level_flipped"].any(axis=1).sum()) for group in pairs},
+        undecided={group: int((~found[group]["decided"]).sum()) for group in pairs},
+    )
+
+
+def _levels(names: Sequence[str], group: str) -> dict[str, list[tuple[int, int]]]:
+    """The (left, right) pairs of a group's levels that are there."""
+    at = {part: (left, right) for own, part, right, left in _memo.side_pairs(names) if own == group}
+    levels = {
+        level: [at[part] for part in parts.split() if part in at] for level, parts in _LEVELS[group].items()
+    }
+    return {level: pairs for level, pairs in levels.items() if pairs}
+
+
+def _rows(keypoints: Keypoints, group: str, found: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    flipped, probability = found["level_flipped"], found["level_p_flipped"]
+
+    def row(first: int, last: int, told: int, levels: Any, verdict: str, p: float) -> dict[str, Any]:
+        return {
+            "frame": int(keypoints.frames[first]),
+            "time_s": float(keypoints.times_s[first]),
+            "last_frame": int(keypoints.frames[last]),
+            "group": group,
+            "levels": " ".join(levels),
+            "verdict": verdict,
+            "probability": p,
+            "reason": found["reason"][told],
+        }
+
+    for t in np.flatnonzero(flipped.any(axis=1)).tolist():
+        levels = [name for name, own in zip(found["levels"], flipped[t], strict=True) if own]
+        yield row(t, t, t, levels, "flipped", float(probability[t][flipped[t]].min()))
+    doubt = np.flatnonzero(~found["decided"])
+    for run in np.split(doubt, np.flatnonzero(np.diff(doubt) > 1) + 1):
+        if len(run):
+            least_sure = run[np.argmin(np.abs(found["p_flipped"][run] - 0.5))]
+            p = float(found["p_flipped"][least_sure])
+            yield row(run[0], run[-1], least_sure, found["levels"], "undecided", p)

@@ -1,0 +1,650 @@
+"""Keypoints: read and written in the formats of the detectors, and what is refused.
+
+`MEMO_FUZZ_EXAMPLES=20000 pytest tests/test_keypoints.py -k damaged` tries so many damaged files a format.
+"""
+
+import csv
+import json
+import math
+import os
+import shutil
+from pathlib import Path
+
+import memo
+import numpy as np
+import pytest
+from conftest import SHARED_DATA
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from memo import _memo
+from memo.keypoints import KeypointsError, layouts, read_keypoints
+
+FUZZ_EXAMPLES = int(os.environ.get("MEMO_FUZZ_EXAMPLES", "100"))
+
+#: Heights (fraction of the body) and sides of a standing figure, for files that look like people.
+HEIGHTS = {
+    "ankle": 0.05,
+    "knee": 0.28,
+    "hip": 0.52,
+    "wrist": 0.5,
+    "elbow": 0.65,
+    "shoulder": 0.82,
+    "neck": 0.82,
+}
+
+
+def figure(names, u=300.0, height_px=400.0, seed=0):
+    """(K, 3) a standing person with feet at v = 600, each point its own score."""
+    rng = np.random.default_rng(seed)
+
+    def point(name):
+        part = name.split("_", 1)[-1]
+        side = {"right": -1, "left": 1}.get(name.split("_")[0], 0)
+        height = HEIGHTS.get(part, 0.04 if "toe" in part or part == "heel" else 0.93)
+        return u + 0.1 * height_px * side, 600 - height_px * height
+
+    points = np.array([point(name) for name in names]) + rng.normal(0, 0.5, (len(names), 2))
+    return np.round(np.column_stack([points, rng.uniform(0.5, 0.99, len(names))]), 3)
+
+
+def triples(values):
+    return [number for row in values.tolist() for number in row]
+
+
+def openpose_frame(*people, version=1.3):
+    return {
+        "version": version,
+        "people": [
+            {"person_id": [-1], "pose_keypoints_2d": triples(person), "face_keypoints_2d": [1.5, 2.5, 0.5]}
+            for person in people
+        ],
+    }
+
+
+def write_openpose(folder, frames, compact=True):
+    """Writes {frame: JSON} as OpenPose names its files."""
+    folder.mkdir(parents=True)
+    for frame, data in frames.items():
+        text = json.dumps(data, separators=(",", ":") if compact else None)
+        (folder / f"walk_{frame:012d}_keypoints.json").write_text(text)
+    return folder
+
+
+def one_line(error):
+    return "\n" not in str(error.value)
+
+
+# OpenPose.
+
+
+def test_openpose_missing_points_missing_frames_and_empty_frames(tmp_path):
+    names = layouts()["BODY_25"]
+    person = figure(names)
+    person[4] = 0
+    frames = {3: openpose_frame(person), 4: openpose_frame(), 6: openpose_frame(person + np.array([2, 0, 0]))}
+    found = read_keypoints(write_openpose(tmp_path / "json", frames), fps=50)
+    assert found.layout == "BODY_25" and found.names == names
+    assert found.frames.tolist() == [3, 4, 5, 6] and found.people.tolist() == [1, 0, 0, 1]
+    np.testing.assert_allclose(found.times_s, [0.06, 0.08, 0.10, 0.12])
+    assert np.isnan(found.points[1:3]).all() and (found.scores[1:3] == 0).all()
+    assert np.isnan(found.points[0, 4]).all() and found.scores[0, 4] == 0
+    np.testing.assert_array_equal(np.delete(found.points[0], 4, 0), np.delete(person[:, :2], 4, 0))
+
+
+@pytest.mark.parametrize("layout", ["BODY_25", "BODY_25B", "COCO_18", "HALPE_26", "MEDIAPIPE_33"])
+def test_the_layout_is_seen_from_the_points_and_may_be_given(tmp_path, layout):
+    folder = write_openpose(tmp_path / "json", {0: openpose_frame(figure(layouts()[layout]))})
+    assert read_keypoints(folder, fps=25).layout == layout
+    assert read_keypoints(folder, fps=25, layout=layout.lower()).layout == layout
+
+
+def test_the_layout_given_wins(tmp_path):
+    folder = write_openpose(tmp_path / "json", {0: openpose_frame(figure(layouts()["BODY_25"]))})
+    assert read_keypoints(folder, fps=25, layout="BODY_25B").names == layouts()["BODY_25B"]
+    with pytest.raises(KeypointsError, match="has 25 points a person, COCO_17 has 17"):
+        read_keypoints(folder, fps=25, layout="COCO_17")
+    with pytest.raises(KeypointsError, match="did you mean `BODY_25`"):
+        read_keypoints(folder, fps=25, layout="BODY_52")
+
+
+def crossing(folder):
+    """A tall walker who passes a short one; the order in the file changes, a ghost stands in frame 0."""
+    names = layouts()["COCO_18"]
+    frames, walker = {}, []
+    for t in range(40):
+        people = [figure(names, 100 + 10 * t, 400, t), figure(names, 500 - 2 * t, 250, 100 + t)]
+        walker.append(people[0])
+        people = people[:: 1 if t % 3 else -1]
+        frames[t] = openpose_frame(*people, *([figure(names, 900, 80)] if t == 0 else []))
+    return write_openpose(folder, frames), np.array(walker)
+
+
+def test_the_most_prominent_person_is_followed(tmp_path):
+    folder, walker = crossing(tmp_path / "json")
+    found = read_keypoints(folder, fps=25)
+    np.testing.assert_array_equal(found.points, walker[..., :2])
+    np.testing.assert_array_equal(found.scores, walker[..., 2])
+    assert found.people.tolist() == [3] + 39 * [2]
+
+
+def test_a_person_may_be_chosen_by_place(tmp_path):
+    folder, walker = crossing(tmp_path / "json")
+    found = read_keypoints(folder, fps=25, person=0)
+    np.testing.assert_array_equal(found.points[1::3], walker[1::3, :, :2])
+    assert not np.array_equal(found.points[0], walker[0, :, :2])
+    only_first = read_keypoints(folder, fps=25, person=2)
+    assert np.isnan(only_first.points[1:]).all() and not np.isnan(only_first.points[0]).any()
+    with pytest.raises(KeypointsError, match="no frame has a person 7"):
+        read_keypoints(folder, fps=25, person=7)
+
+
+def test_writing_openpose_changes_the_person_and_nothing_else(tmp_path):
+    folder, _ = crossing(tmp_path / "json")
+    found = read_keypoints(folder, fps=25)
+    points, scores = found.points.copy(), found.scores.copy()
+    pairs = [pair for pair in _memo.side_pairs(found.layout) if pair[0] == "legs"]
+    for _, _, right, left in pairs:
+        points[5, [right, left]] = points[5, [left, right]]
+        scores[5, [right, left]] = scores[5, [left, right]]
+    points[6, 2] = np.nan
+    found.replaced(points, scores).write(tmp_path / "out" / "json")
+    for frame, file in enumerate(sorted(folder.iterdir())):
+        before, after = file.read_text(), (tmp_path / "out" / "json" / file.name).read_text()
+        if frame not in (5, 6):
+            assert after == before
+            continue
+        before, after = json.loads(before), json.loads(after)
+        changed = [p for p, q in zip(before["people"], after["people"], strict=True) if p != q]
+        assert len(changed) == 1
+        for one in (before, after):
+            next(p for p in one["people"] if p["face_keypoints_2d"]).pop("pose_keypoints_2d")
+            for person in one["people"]:
+                person.pop("pose_keypoints_2d", None)
+        assert before == after
+    again = read_keypoints(tmp_path / "out" / "json", fps=25)
+    np.testing.assert_array_equal(again.points, points)
+    assert again.scores[6, 2] == 0
+    scores[6, 2] = 0
+    np.testing.assert_array_equal(again.scores, scores)
+
+
+def test_openpose_results_replace_only_earlier_results(tmp_path):
+    names = layouts()["COCO_18"]
+    folder = write_openpose(
+        tmp_path / "json", {0: openpose_frame(figure(names)), 1: openpose_frame(figure(names))}
+    )
+    found = read_keypoints(folder, fps=25)
+    found.write(tmp_path / "out")
+    found.replaced(found.points + 1, found.scores).write(tmp_path / "out")
+    assert read_keypoints(tmp_path / "out", fps=25).points[0, 0, 0] == found.points[0, 0, 0] + 1
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    with pytest.raises(KeypointsError, match=r"holds other files \(notes.txt\)"):
+        found.write(tmp_path / "out")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(KeypointsError, match="is a file"):
+        found.write(tmp_path / "file")
+    for same in (folder, tmp_path / "out" / ".." / "json"):
+        with pytest.raises(KeypointsError, match="write to another place"):
+            found.write(same)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["file", "json", "out"]
+
+
+def test_a_result_appears_complete_or_not_at_all(tmp_path):
+    names = layouts()["COCO_18"]
+    folder = write_openpose(tmp_path / "json", {t: openpose_frame(figure(names)) for t in range(3)})
+    found = read_keypoints(folder, fps=25)
+    (folder / "walk_000000000002_keypoints.json").write_text('{"people": []}')
+    with pytest.raises(KeypointsError, match="has changed since it was read"):
+        found.replaced(found.points + 1, found.scores).write(tmp_path / "out")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["json"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not JSON"),
+        ("{", "not JSON: .* in line 1"),
+        ("[1]", "no list `people`"),
+        ('{"people": 3}', "no list `people`"),
+        ('{"people": [3]}', r"people\[0\] has no pose_keypoints_2d"),
+        ('{"people": [{"pose_keypoints_2d": [1, 2]}]}', "not a list of x, y, score"),
+        ('{"people": [{"pose_keypoints_2d": [1, "2", 3]}]}', r"pose_keypoints_2d\[1\]: 2 is not a number"),
+        ('{"people": [{"pose_keypoints_2d": [1, true, 3]}]}', "True is not a number"),
+        ('{"people": [{"pose_keypoints_2d": [1, 1e999, 3]}]}', "beyond 1e"),
+        ('{"people": [{"pose_keypoints_2d": [1, 2, 3]}]}', "no keypoint layout has 1 points"),
+        ('{"people": [{"pose_keypoints_2d": [1, ' + "9" * 400 + ", 3]}]}", "too large"),
+        ("[" * 100_000, "not JSON that can be read"),
+        ("9" * 5000, "not JSON that can be read"),
+    ],
+)
+def test_broken_openpose_files_are_refused(tmp_path, text, message):
+    folder = tmp_path / "json"
+    folder.mkdir()
+    (folder / "a_7.json").write_text(text)
+    with pytest.raises(KeypointsError, match=message) as error:
+        read_keypoints(folder, fps=25)
+    assert str(folder) in str(error.value) and one_line(error) and len(str(error.value)) < 600
+
+
+def test_folders_that_are_no_sequence_are_refused(tmp_path):
+    names = layouts()["COCO_18"]
+    frame = json.dumps(openpose_frame(figure(names)))
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(KeypointsError, match="without JSON files"):
+        read_keypoints(empty, fps=25)
+    (empty / "frame.json").write_text(frame)
+    with pytest.raises(KeypointsError, match="no frame number"):
+        read_keypoints(empty, fps=25)
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    for name in ("cam1.001.json", "cam2.001.json"):
+        (mixed / name).write_text(frame)
+    with pytest.raises(KeypointsError, match="both frame 1; one camera a folder"):
+        read_keypoints(mixed, fps=25)
+    (mixed / "cam2.001.json").rename(mixed / "cam2.900000000.json")
+    with pytest.raises(KeypointsError, match="only 2 of them are there"):
+        read_keypoints(mixed, fps=25)
+    with pytest.raises(KeypointsError, match="no such file"):
+        read_keypoints(tmp_path / "nowhere", fps=25)
+    nobody = write_openpose(tmp_path / "nobody", {0: openpose_frame()})
+    with pytest.raises(KeypointsError, match="no person in any frame"):
+        read_keypoints(nobody, fps=25)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"fps": 0}, {"fps": math.nan}, {"fps": -3}, {}, {"fps": 25, "person": -1}, {"fps": 25, "person": True}],
+)
+def test_senseless_options_are_refused(tmp_path, options):
+    folder = write_openpose(tmp_path / "json", {0: openpose_frame(figure(layouts()["COCO_18"]))})
+    with pytest.raises(KeypointsError):
+        read_keypoints(folder, **options)
+
+
+# COCO and AlphaPose.
+
+
+def test_alphapose_is_read_and_written(tmp_path):
+    names = layouts()["HALPE_26"]
+    people = np.array([figure(names, 100 + 8 * t, seed=t) for t in range(5)])
+    entries = [
+        {"image_id": f"{t}.jpg", "category_id": 1, "keypoints": triples(people[t]), "score": 2.5, "idx": 1}
+        for t in (0, 1, 3, 4)
+    ]
+    path = tmp_path / "alphapose-results.json"
+    path.write_text(json.dumps(entries))
+    found = read_keypoints(path, fps=30)
+    assert found.layout == "HALPE_26" and found.frames.tolist() == [0, 1, 2, 3, 4]
+    np.testing.assert_array_equal(found.points[[0, 1, 3, 4]], people[[0, 1, 3, 4], :, :2])
+    assert np.isnan(found.points[2]).all()
+    points = found.points.copy()
+    points[1, [11, 12]] = points[1, [12, 11]]
+    found.replaced(points, found.scores).write(tmp_path / "out.json")
+    written = json.loads((tmp_path / "out.json").read_text())
+    assert [e for e in written if e["image_id"] != "1.jpg"] == [
+        e for e in entries if e["image_id"] != "1.jpg"
+    ]
+    entries[1]["keypoints"][33:35], entries[1]["keypoints"][36:38] = (
+        entries[1]["keypoints"][36:38],
+        entries[1]["keypoints"][33:35],
+    )
+    assert written == entries
+
+
+def test_coco_annotations_keep_their_visibility(tmp_path):
+    names = layouts()["COCO_17"]
+    values = figure(names)
+    values[:, 2] = [2, 1] * 8 + [2]
+    values[3] = 0
+    data = {
+        "images": [{"id": 7, "width": 640, "height": 480, "file_name": "a.png"}],
+        "annotations": [{"id": 1, "image_id": 7, "keypoints": triples(values), "bbox": [1, 2, 3, 4]}],
+        "categories": [{"id": 1, "name": "person"}],
+    }
+    path = tmp_path / "person_keypoints.json"
+    path.write_text(json.dumps(data, separators=(",", ":")))
+    found = read_keypoints(path, fps=25)
+    assert found.image_size == (640, 480) and found.layout == "COCO_17" and found.frames.tolist() == [7]
+    assert found.scores[0, :4].tolist() == [1, 0.5, 1, 0] and np.isnan(found.points[0, 3]).all()
+    found.write(tmp_path / "same.json")
+    assert (tmp_path / "same.json").read_text() == path.read_text()
+    scores = found.scores.copy()
+    scores[0, 0] = 0.5
+    found.replaced(found.points, scores).write(tmp_path / "out.json")
+    data["annotations"][0]["keypoints"][2] = 1
+    assert json.loads((tmp_path / "out.json").read_text()) == data
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", "no person in any frame"),
+        ("{}", "neither COCO results"),
+        ('{"people": []}', "give the folder"),
+        ('[{"image_id": 1}]', "entry 0: needs image_id and keypoints"),
+        ('[{"image_id": "a.png", "keypoints": [1, 2, 3]}]', "image_id a.png has no frame number"),
+        ('[{"image_id": 1e99, "keypoints": [1, 2, 3]}]', "no frame number"),
+        ('[{"image_id": -1, "keypoints": [1, 2, 3]}]', "not the number of a frame"),
+        (
+            '[{"image_id": 1, "keypoints": [1, 2, 3]}, {"image_id": 2, "keypoints": [1, 2, 3, 4, 5, 6]}]',
+            "different numbers of points",
+        ),
+    ],
+)
+def test_broken_coco_files_are_refused(tmp_path, text, message):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(KeypointsError, match=message) as error:
+        read_keypoints(path, fps=25)
+    assert str(path) in str(error.value) and one_line(error)
+
+
+# Tables.
+
+WIDE = """frame,time_s,RKnee_x,RKnee_y,RKnee_score,left_knee_x,left_knee_y,left_knee_score,note
+0,0.00,100.5,200.25,0.9,110,205,0.8,"a, b"
+1,0.04,101.5,201.25,0.9,,,,
+3,0.12,103.5,203.25,0.7,113,208,0.6,end
+"""
+
+LONG = """time_s;joint;x;y;score
+0.0;RKN;100.5;200.25;0.9
+0.0;LKN;110;205;0.8
+0.04;LKN;111;206;0.8
+0.0;C7;50;60;1
+"""
+
+
+def test_a_wide_table_is_read_and_written(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(WIDE)
+    found = read_keypoints(path)
+    assert found.names == ("right_knee", "left_knee") and found.layout is None
+    np.testing.assert_allclose(found.times_s, [0, 0.04, 0.08, 0.12])
+    assert np.isnan(found.points[1, 1]).all() and np.isnan(found.points[2]).all()
+    assert found.points[3].tolist() == [[103.5, 203.25], [113, 208]] and found.scores[3].tolist() == [
+        0.7,
+        0.6,
+    ]
+    found.write(tmp_path / "same.csv")
+    assert (tmp_path / "same.csv").read_text() == WIDE
+    swapped = found.replaced(found.points[:, ::-1], found.scores[:, ::-1])
+    swapped.write(tmp_path / "out.csv")
+    rows = list(csv.DictReader((tmp_path / "out.csv").open()))
+    assert [row["note"] for row in rows] == ["a, b", "", "end"]
+    assert rows[1]["RKnee_x"] == "" and rows[1]["left_knee_x"] == "101.5" and rows[0]["time_s"] == "0.00"
+    again = read_keypoints(tmp_path / "out.csv")
+    np.testing.assert_array_equal(again.points, swapped.points)
+    np.testing.assert_array_equal(again.scores, swapped.scores)
+    assert read_keypoints(path, fps=100).times_s.tolist() == [0, 0.01, 0.02, 0.03]
+
+
+def test_a_long_table_is_read_and_written(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(LONG)
+    found = read_keypoints(path)
+    assert found.names == ("right_knee", "left_knee") and found.times_s.tolist() == [0, 0.04]
+    assert found.points[0].tolist() == [[100.5, 200.25], [110, 205]] and np.isnan(found.points[1, 0]).all()
+    found.write(tmp_path / "same.csv")
+    assert (tmp_path / "same.csv").read_text() == LONG
+    swapped = found.replaced(found.points[:, ::-1], found.scores[:, ::-1])
+    swapped.write(tmp_path / "out.csv")
+    again = read_keypoints(tmp_path / "out.csv")
+    np.testing.assert_array_equal(again.points, swapped.points)
+    assert "0.0;C7;50;60;1" in (tmp_path / "out.csv").read_text()
+
+
+def test_tables_of_several_people(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = ["frame,person,right_hip_x,right_hip_y,right_ankle_x,right_ankle_y"]
+    for t in range(10):
+        rows += [f"{t},2,{900 - t},300,{900 - t},350", f"{t},1,{100 + t},100,{100 + t},500"]
+    path.write_text("\n".join(rows))
+    found = read_keypoints(path, fps=10)
+    np.testing.assert_array_equal(found.points[:, 0, 0], 100 + np.arange(10))
+    assert read_keypoints(path, fps=10, person=0).points[3, 0, 0] == 897
+    path.write_text("\n".join(rows).replace("person", "someone"))
+    with pytest.raises(KeypointsError, match="frame 0 stands there twice and no column `person`"):
+        read_keypoints(path, fps=10)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a,b\n1,2\n", "needs a column `frame` or `time_s`"),
+        ("frame,b\n1,2\n", "no joint in it"),
+        ("frame,left_nkee_x,left_nkee_y\n1,2,3\n", "did you mean `left_knee`"),
+        ("frame,left_knee_x\n1,2\n", "column left_knee_x without left_knee_y"),
+        ("frame,left_knee_x,left_knee_y,left_knee_z\n1,2,3,4\n", "points in space"),
+        ("frame,left_knee_x,left_knee_y,LKN_x,LKN_y\n1,2,3,4,5\n", "left_knee stands there twice"),
+        ("frame,left_knee_x,left_knee_y\n1,2\n", "row 2 has 2 cells, the header 3"),
+        ("frame,left_knee_x,left_knee_y\n1,two,3\n", "row 2: two is not a number"),
+        ("frame,left_knee_x,left_knee_y\n1,inf,3\n", "row 2: inf is not finite"),
+        ("frame,left_knee_x,left_knee_y\n1,2e9,3\n", "row 2: coordinates beyond"),
+        ("frame,left_knee_x,left_knee_y\n1.5,2,3\n", "row 2: frame 1.5 is not the number of a frame"),
+        ("frame,left_knee_x,left_knee_y\n,2,3\n", "row 2: frame  is not"),
+        ("frame,left_knee_x,left_knee_y\n1,2,3\n1,2,3\n", "frame 1 stands there twice"),
+        ("frame,time_s,left_knee_x,left_knee_y\n1,1,2,3\n2,1,2,3\n", "time_s must increase"),
+        ("frame,time_s,left_knee_x,left_knee_y\n1,,2,3\n", "row 2: no time_s"),
+        ("frame,joint,x,y\n1,LKN,2,3\n1,left_knee,2,3\n", "row 3: left_knee stands twice in frame 1"),
+        ("frame,left_knee_x,left_knee_y\n", "no person in any frame"),
+        ("frame,left_knee_x,left_knee_y\n1,2,3\n900000000,2,3\n", "only 2 of them"),
+        ("\x00,\x01", "needs a column"),
+        ("\n\nx", "row 3 has 1 cells"),
+        ("   \n", "is empty"),
+        ('frame,"a\nb",x\n1,2,3\n', r"got the columns frame, a\?b, x"),
+        ('frame,"right\nkne_x","b"\n1,2,3\n', r"unknown joint `right\?kne`"),
+    ],
+)
+def test_broken_tables_are_refused(tmp_path, text, message):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(KeypointsError, match=message) as error:
+        read_keypoints(path, **({} if "time_s" in text else {"fps": 25}))
+    assert str(path) in str(error.value) and one_line(error)
+
+
+def test_points_without_a_place_in_the_file_are_refused(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(WIDE)
+    found = read_keypoints(path)
+    points = found.points.copy()
+    points[2] = 5
+    with pytest.raises(KeypointsError, match="frame 2 has no person to write points to"):
+        found.replaced(points, found.scores).write(tmp_path / "out.csv")
+    with pytest.raises(KeypointsError, match="finite"):
+        found.replaced(np.full_like(points, np.inf) * [[[1]], [[1]], [[np.nan]], [[1]]], found.scores).write(
+            tmp_path / "out.csv"
+        )
+    with pytest.raises(KeypointsError, match="wanted points of shape"):
+        found.replaced(points[:2], found.scores)
+    with pytest.raises(KeypointsError, match="write to another place"):
+        found.write(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.csv"]
+
+
+# Damaged files.
+
+
+def samples():
+    """A small good file of each format: name in a folder of its own, bytes."""
+    names = layouts()
+    body = [figure(names["BODY_25"], 100 + 5 * t, seed=t) for t in range(2)]
+    halpe = [figure(names["HALPE_26"], 100 + 5 * t, seed=t) for t in range(2)]
+    coco = figure(names["COCO_17"])
+    results = [{"image_id": f"{t}.jpg", "keypoints": triples(halpe[t]), "score": 2.5} for t in range(2)]
+    annotations = {
+        "images": [{"id": 1, "width": 640, "height": 480}],
+        "annotations": [{"image_id": 1, "keypoints": triples(coco)}],
+    }
+    return {
+        "openpose": json.dumps(openpose_frame(*body)).encode(),
+        "results": json.dumps(results).encode(),
+        "annotations": json.dumps(annotations).encode(),
+        "wide": WIDE.encode(),
+        "long": LONG.encode(),
+    }
+
+
+@st.composite
+def damages(draw):
+    """A few edits: where (as a fraction), how many bytes go, which come."""
+    tokens = [
+        b"",
+        b"9",
+        b"-",
+        b"e9",
+        b"[",
+        b"]",
+        b"{",
+        b"}",
+        b",",
+        b'"',
+        b"\n",
+        b"null",
+        b"NaN",
+        b"1e999",
+        b"\x00",
+    ]
+    coming = st.one_of(
+        st.sampled_from(tokens), st.binary(max_size=6), st.text(max_size=4).map(lambda t: t.encode())
+    )
+    edit = st.tuples(st.floats(0, 1), st.integers(0, 40), coming)
+    return draw(st.lists(edit, min_size=1, max_size=5))
+
+
+@pytest.mark.parametrize("name", ["openpose", "results", "annotations", "wide", "long"])
+@settings(
+    max_examples=FUZZ_EXAMPLES,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(edits=damages())
+def test_damaged_files_raise_one_kind_of_error(tmp_path, name, edits):
+    data = samples_once()[name]
+    for where, gone, come in edits:
+        start = round(where * len(data))
+        data = data[:start] + come + data[start + gone :]
+    path = tmp_path / "in"
+    if name == "openpose":
+        path.mkdir(exist_ok=True)
+        (path / "a_1.json").write_bytes(data)
+    else:
+        path.write_bytes(data)
+    try:
+        found = read_keypoints(path, fps=25)
+    except KeypointsError as error:
+        assert "\n" not in str(error)
+        return
+    assert (
+        found.points.size < 1_000_000 and np.isfinite(found.scores).all() and not np.isinf(found.points).any()
+    )
+    points = np.roll(found.points, 1, axis=1)
+    try:
+        found.replaced(points, found.scores).write(tmp_path / "out")
+    except KeypointsError:
+        return
+    again = read_keypoints(tmp_path / "out", fps=25, layout=found.layout)
+    if found.people.max() == 1:
+        np.testing.assert_array_equal(again.points, points)
+    shutil.rmtree(tmp_path / "out") if name == "openpose" else (tmp_path / "out").unlink()
+
+
+_SAMPLES: dict[str, bytes] = {}
+
+
+def samples_once():
+    if not _SAMPLES:
+        _SAMPLES.update(samples())
+    return _SAMPLES
+
+
+# The core's names.
+
+
+def test_the_core_names_joints_and_pairs():
+    assert layouts()["STICK_14"][0] == "neck" and len(layouts()) == 8
+    assert _memo.joint_name("RKN") == "right_knee" and _memo.joint_name("C7") is None
+    with pytest.raises(ValueError, match="did you mean"):
+        _memo.joint_name("right_kne")
+    pairs = _memo.side_pairs("BODY_25")
+    assert (
+        ("legs", "knee", 10, 13) in pairs
+        and ("arms", "wrist", 4, 7) in pairs
+        and ("head", "ear", 17, 18) in pairs
+    )
+
+
+def test_stick_joints_of_a_track():
+    names = layouts()["COCO_17"]
+    values = np.array([figure(names, 100 + t, seed=t) for t in range(3)])
+    values[1, 5] = np.nan
+    points, weights = memo.stick_joints("COCO_17", values[..., :2], values[..., 2])
+    assert points.shape == (3, 14, 2) and weights.shape == (3, 14)
+    shoulders, hips = values[0, 5:7, :2].mean(0), values[0, 11:13, :2].mean(0)
+    np.testing.assert_allclose(points[0, 0], shoulders)
+    np.testing.assert_allclose(points[0, 3], hips + (shoulders - hips) * 10.09 / 56.07)
+    assert np.isnan(points[1, [0, 2, 3]]).all() and (weights[1, [0, 2, 3]] == 0).all()
+    assert weights[0, 0] == values[0, 5:7, 2].min()
+    same, _ = memo.stick_joints(names, values[..., :2], values[..., 2])
+    np.testing.assert_array_equal(same, points)
+    head, _ = memo.head_points("COCO_17", values[..., :2], values[..., 2])
+    np.testing.assert_array_equal(head[0, 1:], values[0, [0, 2, 1, 4, 3], :2])
+    with pytest.raises(ValueError, match="expected 17 points, got 16"):
+        memo.stick_joints("COCO_17", np.zeros((3, 16, 2)), np.zeros((3, 16)))
+    with pytest.raises(ValueError, match="shape"):
+        memo.stick_joints("COCO_17", np.zeros((3, 17, 3)), np.zeros((3, 17)))
+    with pytest.raises(TypeError, match="dtype float64"):
+        memo.stick_joints("COCO_17", np.zeros((3, 17, 2), np.float32), np.zeros((3, 17)))
+
+
+# Real files.
+
+
+def pose2sim_sample():
+    folder = SHARED_DATA / "keypoints" / "pose2sim_balancing"
+    if not folder.is_dir():
+        pytest.skip(f"no keypoints in {folder} (set MEMO_SHARED_DATA)")
+    return folder
+
+
+def trc_joints(path: Path):
+    """Joints by name, (T, 3) each, in the calibration's world."""
+    lines = path.read_text().splitlines()
+    names = [name for name in lines[3].split("\t")[2:] if name]
+    rows = np.array([[float(cell) for cell in line.split("\t")] for line in lines[5:] if line.strip()])
+    values = rows[:, 2:].reshape(len(rows), -1, 3)[..., [2, 0, 1]]
+    return {name: np.ascontiguousarray(values[:, index]) for index, name in enumerate(names)}
+
+
+@pytest.mark.parametrize("camera_name", ["cam_02", "cam_04"])
+def test_joints_of_a_real_sequence_lie_on_its_triangulated_ones(camera_name):
+    folder = pose2sim_sample()
+    found = read_keypoints(folder / f"{camera_name.replace('_', '')}_json", fps=60, layout="BODY_25B")
+    assert len(found.frames) == 100 and (found.people == 1).all()
+    camera = memo.Camera.from_toml(folder / "Calib_qualisys.toml", name=camera_name)
+    space = trc_joints(next(folder.glob("*.trc")))
+    distances = {}
+    for spelling, points in space.items():
+        name = {"Neck": "upper_neck"}.get(spelling) or _memo.joint_name(spelling)
+        seen = found.points[:, found.names.index(name)]
+        distances[name] = np.nanmedian(np.linalg.norm(camera.project(points) - seen, axis=1))
+    assert len(distances) == 21
+    assert np.median(list(distances.values())) < 9, distances
+    assert max(distances.values()) < 40, distances
+
+
+@pytest.mark.parametrize("camera_name", ["cam02", "cam04"])
+def test_the_layout_of_a_real_sequence_is_recognised(camera_name):
+    assert read_keypoints(pose2sim_sample() / f"{camera_name}_json", fps=60).layout == "BODY_25B"
+
+
+def test_a_real_sequence_is_written_as_it_was(tmp_path):
+    folder = pose2sim_sample() / "cam02_json"
+    found = read_keypoints(folder, fps=60)
+    found.write(tmp_path / "same")
+    for file in folder.iterdir():
+        assert (tmp_path / "same" / file.name).read_bytes() == file.read_bytes()
+    found.replaced(found.points + 1, found.scores).write(tmp_path / "moved")
+    np.testing.assert_array_equal(read_keypoints(tmp_path / "moved", fps=60).points, found.points + 1)
