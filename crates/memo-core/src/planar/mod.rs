@@ -6,7 +6,6 @@
 //! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
 //! (p, q) is (-p, -q).
 
-mod cover;
 pub mod depth_change;
 pub mod evidence;
 pub mod figure;

@@ -18,108 +18,19 @@
 //! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit). Far from
 //! planar the cost has several minima, and a second best may be returned (1 of 30 draws, 12 % dearer).
 
+#[cfg(test)]
+mod example;
+mod moments;
+mod options;
+mod robust;
+
+pub(super) use moments::{form, slope_from_form};
+pub use options::{FitError, FitOptions};
+
 use super::Plane;
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec2;
+use moments::Moments;
 use nalgebra::{Matrix4, Vector4};
-use thiserror::Error;
-
-/// Why points in several views could not be fitted.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum FitError {
-    /// Every point needs one position a view.
-    #[error("the points have {pivot} and {end} views; they must be as many")]
-    Lengths {
-        /// Views of the pivot.
-        pivot: usize,
-        /// Views of the other point.
-        end: usize,
-    },
-    /// A position is infinite.
-    #[error("a position in view {view} is infinite; mark missing points with NaN")]
-    Infinite {
-        /// First such view.
-        view: usize,
-    },
-    /// The points lie so far apart or so near each other that fourth powers leave the range of numbers.
-    #[error("the longest image vector is {largest}; use a unit in which it is nearer to 1")]
-    Size {
-        /// Length of the longest image vector.
-        largest: f64,
-    },
-    /// Too few views show a rod.
-    #[error("{found} views show a rod's points, {needed} are needed")]
-    TooFewViews {
-        /// Views found.
-        found: usize,
-        /// Views needed.
-        needed: usize,
-    },
-    /// The points do not move relative to each other: every plane fits.
-    #[error("the points do not move relative to each other (motion {motion})")]
-    NoMotion {
-        /// RMS motion of the least moving rod.
-        motion: f64,
-    },
-    /// An option makes no sense.
-    #[error("{option} must be {demand}, got {value}")]
-    Option {
-        /// Its name.
-        option: &'static str,
-        /// What it must be.
-        demand: &'static str,
-        /// What it was.
-        value: f64,
-    },
-}
-
-/// Options of the fits over many views.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FitOptions {
-    /// Standard deviation of each image coordinate of each point, in the unit of the points. 0 is allowed:
-    /// the covariance then comes from the residuals alone.
-    pub noise_sd: f64,
-    /// Largest tilt of the plane against the image, degrees. 80: nearer to edge-on the slope is noise.
-    pub max_tilt_deg: f64,
-    /// A view is an outlier when a residual exceeds this many robust standard deviations (1.4826 median
-    /// |residual|, at least that of the noise), first about the plane of least median residual.
-    pub outlier_sd: f64,
-    /// Largest fraction of the views that may be left out as outliers; with more, none is. 0 = keep all.
-    pub max_outlier_fraction: f64,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        Self { noise_sd: 0.0, max_tilt_deg: 80.0, outlier_sd: 4.5, max_outlier_fraction: 0.2 }
-    }
-}
-
-impl FitOptions {
-    fn check(&self) -> Result<(), FitError> {
-        let positive = "positive and finite";
-        let checks = [
-            ("noise_sd", "finite and not negative", self.noise_sd, self.noise_sd >= 0.0),
-            (
-                "max_tilt_deg",
-                "in (0, 90)",
-                self.max_tilt_deg,
-                self.max_tilt_deg > 0.0 && self.max_tilt_deg < 90.0,
-            ),
-            ("outlier_sd", positive, self.outlier_sd, self.outlier_sd > 0.0),
-            (
-                "max_outlier_fraction",
-                "in [0, 0.5]",
-                self.max_outlier_fraction,
-                (0.0..=0.5).contains(&self.max_outlier_fraction),
-            ),
-        ];
-        for (option, demand, value, good) in checks {
-            if !good || !value.is_finite() {
-                return Err(FitError::Option { option, demand, value });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Slopes beyond this part of the limit count as at the limit: 79.8 of 80 degrees.
 const AT_LIMIT: f64 = 0.98;
@@ -187,26 +98,6 @@ pub(super) fn fit<const K: usize>(views: &[View<K>], options: &FitOptions) -> Re
     let (solution, outliers) =
         all.without_outliers(needed).unwrap_or_else(|| (all.solve(), vec![false; views.len()]));
     Ok(all.report(solution, outliers, motion))
-}
-
-/// Median of the numbers among the values; they are reordered.
-fn median(values: &mut Vec<f64>) -> f64 {
-    values.retain(|x| !x.is_nan());
-    let middle = values.len() / 2;
-    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
-}
-
-const DIRECTIONS: usize = 12;
-const TILTS: usize = 7;
-
-/// Slopes in all directions, up to the mirror, and of all tilts.
-fn grid(slope_limit: f64) -> [[DVec2; TILTS]; DIRECTIONS] {
-    let tilts: [f64; TILTS] =
-        std::array::from_fn(|tilt| (slope_limit.atan() * (tilt as f64 + 0.7) / TILTS as f64).tan());
-    std::array::from_fn(|direction| {
-        let along = DVec2::from_angle(std::f64::consts::PI * direction as f64 / DIRECTIONS as f64);
-        tilts.map(|tilt| tilt * along)
-    })
 }
 
 /// Views that show rod k.
@@ -360,82 +251,6 @@ impl<'a, const K: usize> Problem<'a, K> {
         inside.into_iter().fold(best, |best, other| if other.cost < best.cost { other } else { best })
     }
 
-    /// The fit without outliers and which they are; none if there are none, or too many to tell.
-    ///
-    /// A fit to all views that shows no outlier and a spread like the noise's stands. Else it may be the work
-    /// of outliers: the search starts from the plane of least median residual, and leaves out and fits until
-    /// nothing changes.
-    fn without_outliers(&self, needed: usize) -> Option<(Solution<K>, Vec<bool>)> {
-        if self.options.max_outlier_fraction * (self.views.len() as f64) < 1.0 {
-            return None;
-        }
-        let first = self.solve();
-        let mut outliers = vec![false; self.views.len()];
-        let limit = self.outlier_limit(&first);
-        if limit <= 2.0 * self.options.outlier_sd * self.noise_sq.sqrt()
-            && self.beyond(&first, limit) == outliers
-        {
-            return Some((first, outliers));
-        }
-        let mut solution = self.least_median();
-        for _ in 0..8 {
-            let found = self.beyond(&solution, self.outlier_limit(&solution));
-            if found == outliers {
-                // Without any from the start the first fit stands.
-                return if found.contains(&true) {
-                    self.few(solution, outliers)
-                } else {
-                    Some((first, outliers))
-                };
-            }
-            let kept: Vec<View<K>> =
-                self.views.iter().zip(&found).filter(|(_, o)| !**o).map(|(v, _)| *v).collect();
-            if (0..K).any(|k| count(&kept, k) <= needed) {
-                return None;
-            }
-            outliers = found;
-            solution = Problem { views: &kept, ..*self }.solve();
-        }
-        self.few(solution, outliers)
-    }
-
-    /// The fit and its outliers if they are few enough.
-    fn few(&self, solution: Solution<K>, outliers: Vec<bool>) -> Option<(Solution<K>, Vec<bool>)> {
-        let most = self.options.max_outlier_fraction * self.views.len() as f64;
-        (outliers.iter().filter(|o| **o).count() as f64 <= most).then_some((solution, outliers))
-    }
-
-    /// [`FitOptions::outlier_sd`] robust standard deviations.
-    fn outlier_limit(&self, solution: &Solution<K>) -> f64 {
-        let residuals = self.views.iter().flat_map(|v| self.terms(v, solution).map(|t| t.r.abs()));
-        let spread = 1.4826 * median(&mut residuals.collect());
-        self.options.outlier_sd * spread.max(self.noise_sq.sqrt()).max(1e-12 * self.size)
-    }
-
-    /// Views with a residual beyond a limit.
-    fn beyond(&self, solution: &Solution<K>, limit: f64) -> Vec<bool> {
-        self.views.iter().map(|v| self.terms(v, solution).iter().any(|t| t.r.abs() > limit)).collect()
-    }
-
-    /// The plane of a grid with the least median of |residual|, each rod's length the median of its own.
-    fn least_median(&self) -> Solution<K> {
-        let grid = grid(self.slope_limit);
-        let mut values = Vec::with_capacity(K * self.views.len());
-        let candidates = grid.iter().flatten().map(|&g| {
-            let h = |d: DVec2| d.length_squared() + g.dot(d).powi(2);
-            let c = std::array::from_fn(|k| {
-                values.clear();
-                values.extend(self.views.iter().map(|v| h(v[k])));
-                median(&mut values)
-            });
-            let solution = Solution { g, c, cost: 0.0 };
-            values.clear();
-            values.extend(self.views.iter().flat_map(|v| self.terms(v, &solution).map(|t| t.r.abs())));
-            Solution { cost: median(&mut values), ..solution }
-        });
-        candidates.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("the grid is not empty")
-    }
-
     /// Levenberg-Marquardt on (u, c) with g = limit u / sqrt(1 + |u|^2), which keeps the slope within its limit.
     fn refine(&self, start: Solution<K>, iterations: usize) -> Solution<K> {
         let limit = self.slope_limit;
@@ -535,192 +350,12 @@ impl<'a, const K: usize> Problem<'a, K> {
     }
 }
 
-/// Moments of u = (x^2, 2 x y, y^2) about each rod's mean, and second moments of the image vectors.
-///
-/// With v = (1 + p^2, p q, 1 + q^2): h = u . v, and a plane's cost is about v' S v / v' N v.
-struct Moments {
-    s: DMat3,
-    n: DMat3,
-}
-
-impl Moments {
-    fn new<const K: usize>(views: &[View<K>]) -> Self {
-        let (mut s, mut n) = (DMat3::ZERO, DMat3::ZERO);
-        for k in 0..K {
-            let seen = || views.iter().map(|v| v[k]).filter(|d| !d.x.is_nan());
-            let powers = |d: DVec2| DVec3::new(d.x * d.x, 2.0 * d.x * d.y, d.y * d.y);
-            let (total, number) = seen().fold((DVec3::ZERO, 0.0), |(t, m), d| (t + powers(d), m + 1.0));
-            let mean = total / number;
-            for d in seen() {
-                let u = powers(d) - mean;
-                s += DMat3::from_cols(u.x * u, u.y * u, u.z * u);
-            }
-            // |M d|^2 summed, as a quadratic form in v.
-            let (xx, xy, yy) = (total.x, 0.5 * total.y, total.z);
-            n += DMat3::from_cols(
-                DVec3::new(xx, xy, 0.0),
-                DVec3::new(xy, xx + yy, xy),
-                DVec3::new(0.0, xy, yy),
-            );
-        }
-        Self { s, n }
-    }
-
-    fn cost(&self, g: DVec2) -> f64 {
-        let v = form(g);
-        v.dot(self.s * v) / v.dot(self.n * v)
-    }
-
-    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v' N v
-    /// and near a minimum so is the Hessian.
-    fn descend(&self, mut g: DVec2, slope_limit: f64) -> (f64, DVec2) {
-        let mut cost = self.cost(g);
-        for _ in 0..10 {
-            let v = form(g);
-            let (v_p, v_q) = (DVec3::new(2.0 * g.x, g.y, 0.0), DVec3::new(0.0, g.x, 2.0 * g.y));
-            let d = self.s - self.n * cost;
-            let (d_v, d_p, d_q) = (d * v, d * v_p, d * v_q);
-            let gradient = DVec2::new(d_v.dot(v_p), d_v.dot(v_q));
-            let (pp, pq, qq) = (v_p.dot(d_p) + 2.0 * d_v.x, v_p.dot(d_q) + d_v.y, v_q.dot(d_q) + 2.0 * d_v.z);
-            // Made positive definite where it is not.
-            let least = 0.5 * (pp + qq) - (0.25 * (pp - qq) * (pp - qq) + pq * pq).sqrt();
-            let add = if least > 0.0 { 0.0 } else { -2.0 * least + 1e-3 * (pp.abs() + qq.abs()) };
-            let (pp, qq) = (pp + add, qq + add);
-            let step = DVec2::new(qq * gradient.x - pq * gradient.y, pp * gradient.y - pq * gradient.x)
-                / -(pp * qq - pq * pq);
-            if !step.is_finite() {
-                break;
-            }
-            let shrunk = [1.0, 0.3, 0.05].into_iter().map(|size| {
-                let next = (g + size * step).clamp_length_max(slope_limit);
-                (self.cost(next), next)
-            });
-            let Some((next_cost, next)) = shrunk.into_iter().find(|(next, _)| *next < cost) else { break };
-            let gain = cost - next_cost;
-            (cost, g) = (next_cost, next);
-            if gain < 1e-3 * cost {
-                break;
-            }
-        }
-        (cost, g)
-    }
-
-    /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a grid.
-    fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 2] {
-        let grid = grid(slope_limit);
-        let costs = grid.map(|row| row.map(|g| self.cost(g)));
-        let mut best: [Option<(f64, DVec2)>; 2] = [None; 2];
-        for direction in 0..DIRECTIONS {
-            for tilt in 0..TILTS {
-                let cost = costs[direction][tilt];
-                let turned = |by: usize| costs[(direction + by) % DIRECTIONS][tilt];
-                let lower_tilt = tilt == 0 || costs[direction][tilt - 1] >= cost;
-                let higher_tilt = tilt + 1 == TILTS || costs[direction][tilt + 1] >= cost;
-                if turned(1) < cost || turned(DIRECTIONS - 1) < cost || !lower_tilt || !higher_tilt {
-                    continue;
-                }
-                let found = Some((cost, grid[direction][tilt]));
-                if best[0].is_none_or(|(least, _)| cost < least) {
-                    best = [found, best[0]];
-                } else if best[1].is_none_or(|(least, _)| cost < least) {
-                    best[1] = found;
-                }
-            }
-        }
-        let fallback = DVec2::new(0.5, 0.5).clamp_length_max(0.5 * slope_limit);
-        let [first, second] = best.map(|b| b.map(|(_, g)| self.descend(g, slope_limit)));
-        let first = first.unwrap_or((self.cost(fallback), fallback));
-        // A second minimum may win with the exact weights unless it is far worse with these.
-        let is_rival = |rival: DVec2, cost: f64| {
-            cost < 4.0 * first.0 && (rival - first.1).length().min((rival + first.1).length()) > 0.1
-        };
-        let second = second.filter(|(cost, g)| is_rival(*g, *cost)).map(|(_, g)| g);
-        let ellipse = self.ellipse(form(first.1), slope_limit);
-        // The exact ellipse replaces a minimum that it equals; the data may have no noise.
-        match ellipse {
-            Some(g) if self.cost(g) <= first.0 => [Some(g), second],
-            _ => [Some(first.1), second],
-        }
-    }
-
-    /// The ellipse of least v' S v / v' N v by inverse iteration; none if it is no rod's.
-    fn ellipse(&self, start: DVec3, slope_limit: f64) -> Option<DVec2> {
-        let trace = self.s.x_axis.x + self.s.y_axis.y + self.s.z_axis.z;
-        let norm = self.n.x_axis.x + self.n.y_axis.y + self.n.z_axis.z;
-        let inverse = (self.s + self.n * (1e-14 * trace / norm)).inverse();
-        let mut v = start;
-        for _ in 0..4 {
-            v = (inverse * (self.n * v)).try_normalize()?;
-        }
-        slope_from_form(v, v.x * v.z - v.y * v.y).filter(|g| g.length() <= slope_limit)
-    }
-}
-
-/// (1 + p^2, p q, 1 + q^2), the entries of M.
-pub(super) fn form(g: DVec2) -> DVec3 {
-    DVec3::new(1.0 + g.x * g.x, g.x * g.y, 1.0 + g.y * g.y)
-}
-
-/// Slope of a quadratic form (A, B, C) proportional to that of a plane; p >= 0. None if indefinite.
-///
-/// The determinant A C - B^2 is asked for as its differences may cancel.
-pub(super) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
-    let half_difference = 0.5 * (v.x - v.z);
-    let spread = half_difference.hypot(v.y);
-    let mean = 0.5 * (v.x + v.z);
-    // Sign of the form is free; the smaller eigenvalue belongs to the rod's full length.
-    let (mean, half_difference, b) =
-        if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
-    let least = determinant / (mean + spread);
-    if least <= 0.0 || least.is_nan() {
-        return None;
-    }
-    // |g|^2 = largest/least - 1; 2 angle of g = angle of (A - C, 2 B).
-    let size = (2.0 * spread / least).sqrt();
-    if spread == 0.0 {
-        return Some(DVec2::ZERO);
-    }
-    let cos_sq = 0.5 * (1.0 + half_difference / spread);
-    let (cosine, sine) = if half_difference >= 0.0 {
-        let cosine = cos_sq.sqrt();
-        (cosine, 0.5 * b / (spread * cosine))
-    } else {
-        let sine = (0.5 * (1.0 - half_difference / spread)).sqrt();
-        let signed = 0.5 * b / (spread * sine);
-        if signed >= 0.0 { (signed, sine) } else { (-signed, -sine) }
-    };
-    Some(size * DVec2::new(cosine, sine))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::example::{normal, swinging};
     use super::*;
     use crate::planar::{fit_hinge, fit_rod, hinge_from_two_views, rod_from_three_views};
     use crate::synth::Random;
-
-    fn normal(random: &mut Random) -> DVec2 {
-        DVec2::from_array(random.normal_pair().map(f64::from))
-    }
-
-    /// First end, pivot and second end of a hinge of lengths 0.4 and 0.45 that swings in the plane and is
-    /// carried about.
-    fn swinging(slope: DVec2, views: usize, sd: f64, random: &mut Random) -> [Vec<DVec2>; 3] {
-        let along = slope.try_normalize().unwrap_or(DVec2::X);
-        let cos_tilt = 1.0 / (1.0 + slope.length_squared()).sqrt();
-        let image = |a: f64, l: f64| l * (a.cos() * cos_tilt * along + a.sin() * along.perp());
-        let (start, phase) = (random.uniform(0.0, 6.3), random.uniform(0.0, 6.3));
-        let mut points = [vec![], vec![], vec![]];
-        for view in 0..views {
-            let t = 6.3 * view as f64 / views as f64;
-            let pivot = DVec2::new(5.0 + t, (3.0 * t).sin());
-            let a = pivot + image(start + 0.7 * t.sin(), 0.4);
-            let b = pivot + image(start + 2.5 + 0.9 * (t + phase).sin(), 0.45);
-            for (points, point) in points.iter_mut().zip([a, pivot, b]) {
-                points.push(point + sd * normal(random));
-            }
-        }
-        points
-    }
 
     #[test]
     fn bad_input_is_refused_with_its_values() {
@@ -874,38 +509,6 @@ mod tests {
         assert!(squares.iter().all(|s| (0.75..1.3).contains(s)), "{squares:?}");
         // 80 residuals, 4 unknowns, correlated by half at most.
         assert!((0.88..1.0).contains(&residual), "{residual}");
-    }
-
-    #[test]
-    fn missing_views_and_outliers_do_no_harm() {
-        let mut random = Random::new(6);
-        let sd = 0.002;
-        let mut false_alarms = 0;
-        for _ in 0..100 {
-            let slope = random.uniform(0.4, 1.5) * DVec2::from_angle(random.uniform(0.0, 6.3));
-            let [mut a, mut o, b] = swinging(slope, 40, sd, &mut random);
-            let wrong = [3, 11, 12, 29];
-            for view in wrong {
-                a[view] += 0.3 * DVec2::from_angle(random.uniform(0.0, 6.3)) + 0.1 * normal(&mut random);
-            }
-            a[7] = DVec2::NAN;
-            o[20].y = f64::NAN;
-            let options = FitOptions { noise_sd: sd, ..FitOptions::default() };
-            let fit = fit_hinge(&a, &o, &b, &options).unwrap();
-            assert!(fit.depth[7][0].is_nan() && !fit.depth[7][1].is_nan() && fit.depth[20][1].is_nan());
-            // An outlier along the rod's own ellipse is none: ask for those that are far off it.
-            let limit = options.outlier_sd * 2.0 * sd;
-            for view in wrong {
-                let far = fit.residuals[view][0].abs() > 2.0 * limit;
-                assert!(fit.outliers[view] || !far, "view {view}: {:?}", fit.residuals[view]);
-            }
-            false_alarms += (0..40).filter(|v| fit.outliers[*v] && !wrong.contains(v)).count();
-            assert!((fit.lengths[0] - 0.4).abs() < 0.03, "{slope} {fit:?}");
-            assert!((fit.lengths[1] - 0.45).abs() < 0.03, "{slope} {fit:?}");
-            let left_out = fit.outliers.iter().filter(|o| **o).count();
-            assert_eq!(fit.redundancy, 80 - 3 - 2 * left_out - 4);
-        }
-        assert!(false_alarms < 20, "{false_alarms}");
     }
 
     #[test]
