@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from conftest import shared_video
 from memo import cli
+from memo.cli.demo import against_truth
 from memo.files import (
     TRACK_COLUMNS,
     complete_file,
@@ -221,7 +222,7 @@ def test_truth_is_compared_by_frame_number(core):
     columns = {name: values[10:].copy() for name, values in truth.items()}
     columns["x_m"] += 0.03
     columns["phase"] = (columns["phase"] + 0.99) % 1
-    lines = " ".join(cli._against_truth(columns, truth))
+    lines = " ".join(against_truth(columns, truth))
     assert "over 20 frames" in lines and "torso x 3.0 cm, y 0.0 cm" in lines and "phase 0.010" in lines
 
 

@@ -5,7 +5,8 @@ import csv
 import numpy as np
 import pytest
 from memo import _memo, cli
-from memo.cli import Exit, Experiment
+from memo.cli.delivery import Exit
+from memo.cli.reproduce import Experiment
 from memo.reproduce import EXPERIMENTS, lee_chen, plot_posture, plot_superposition
 
 # Tables 3 and 4, last row, as the paper prints them: left ankle, frames 1, 3, 5, then with rules 1 and 2.

@@ -1,0 +1,67 @@
+"""The command line: `memo track`, `unswap`, `reproduce`, `demo`, `pointlight`, `planar`.
+
+This package alone knows how results are delivered: what is checked before work starts, what is written,
+what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
+from the `app` extra is imported inside functions, after `main` has looked for it. (Typer reads annotations
+where they stand, hence no `from __future__ import annotations` in the commands.)
+"""
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated
+
+import memo
+from memo.cli.delivery import Exit, complain
+from memo.cli.demo import add_demo
+from memo.cli.planar import add_planar
+from memo.cli.pointlight import add_pointlight
+from memo.cli.reproduce import add_reproduce
+from memo.cli.track import EXIT_CODES, add_track
+from memo.cli.unswap import add_unswap
+
+if TYPE_CHECKING:
+    import typer
+
+EXTRA = ("av", "matplotlib", "rich", "typer")
+
+
+def main() -> None:
+    """Entry point of the `memo` command."""
+    absent = [name for name in EXTRA if find_spec(name) is None]
+    if absent:
+        complain(f'the command line needs {", ".join(absent)}: pip install "memo-motion[app]"')
+        raise SystemExit(Exit.NO_EXTRA)
+    try:
+        _app()()
+    except KeyboardInterrupt:  # while the extra is still being imported
+        raise SystemExit(Exit.INTERRUPTED) from None
+
+
+def _app() -> "typer.Typer":
+    import typer
+
+    app = typer.Typer(
+        name="memo",
+        help="3D motion of a walker from one fixed camera.",
+        epilog=EXIT_CODES,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+
+    def version(wanted: bool) -> None:
+        if wanted:
+            print(f"memo {memo.__version__}")
+            raise typer.Exit
+
+    @app.callback()
+    def options(
+        version: Annotated[bool, typer.Option("--version", callback=version, is_eager=True)] = False,
+    ) -> None: ...
+
+    add_track(app)
+    add_unswap(app)
+    add_demo(app)
+    add_reproduce(app)
+    add_pointlight(app)
+    add_planar(app)
+    return app

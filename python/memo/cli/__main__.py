@@ -1,0 +1,5 @@
+"""`python -m memo.cli`."""
+
+from memo.cli import main
+
+main()

@@ -1,0 +1,148 @@
+"""How a command delivers: exit codes, where results go, what is said, progress, interrupts.
+
+The base install has numpy alone, so everything from the `app` extra is imported inside functions.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from memo.video import Frame
+
+
+class Exit(IntEnum):
+    """What the exit codes mean."""
+
+    TRACKED = 0
+    DONE = 0  # where nobody is to be tracked
+    BAD_INPUT = 1
+    NOBODY = 3
+    NO_EXTRA = 4
+    INTERRUPTED = 130
+
+
+class InputError(ValueError):
+    """A mistake in what the user gave; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Where results go, which of them, and how much is said."""
+
+    out: Path
+    overlay: bool = True
+    plots: bool = True
+    as_json: bool = False
+    quiet: bool = False
+
+    @property
+    def talks(self) -> bool:
+        """Whether results are told in sentences."""
+        return not (self.quiet or self.as_json)
+
+    def tell(self, summary: Mapping[str, Any], lines: Iterable[str], written: Sequence[Path]) -> None:
+        """Says what was found and written: as JSON, in `lines` and the names of the files, or not at all."""
+        if self.as_json:
+            print(json.dumps(plain({**summary, "files": [str(path) for path in written]})))
+        elif self.talks:
+            for line in lines:
+                print(line)
+            print(f"Written to {self.out}: {', '.join(path.name for path in written)}.")
+
+
+def guarded(work: Callable[[], Exit]) -> Exit:
+    """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept."""
+    from memo.video import VideoDamageWarning
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", VideoDamageWarning)  # damage is told in one line instead
+            return work()
+    except (ValueError, TypeError, OSError, OverflowError) as error:
+        if os.environ.get("MEMO_DEBUG"):
+            raise
+        complain(" ".join(str(error).split()))
+        return Exit.BAD_INPUT
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return Exit.INTERRUPTED
+
+
+def complain(message: str) -> None:
+    print(f"memo: {message}", file=sys.stderr)
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON knows it: no numpy types, and null for what is not finite."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def with_progress(
+    frames: Iterable[Frame], what: str, count: int | None, delivery: Delivery
+) -> Iterator[Frame]:
+    """The same frames; on a terminal, a bar with the time left."""
+    from rich.progress import track
+
+    console = _console(delivery)
+    yield from track(frames, what, total=count, console=console, transient=True, disable=console is None)
+
+
+def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextManager[object]:
+    """While one step of unknown length lasts; on a terminal, what it is and for how long already."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = _console(delivery)
+    if console is None:
+        return contextlib.nullcontext()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    progress = Progress(*columns, console=console, transient=True)
+    progress.add_task(what, total=None)
+    return progress
+
+
+def _console(delivery: Delivery) -> Console | None:
+    """The terminal progress is shown on, if there is one and it is wanted."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    return None if delivery.quiet or not console.is_terminal else console
+
+
+class Interrupt(contextlib.AbstractContextManager["Interrupt"]):
+    """Turns the first Ctrl-C into a request, so that no frame is left half way; the second is raised."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def __enter__(self) -> Interrupt:
+        self._before = signal.signal(signal.SIGINT, self._request)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _request(self, *_: object) -> None:
+        self.requested = True
+        signal.signal(signal.SIGINT, self._before)

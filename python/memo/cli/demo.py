@@ -1,0 +1,80 @@
+"""`memo demo`: a walker whose motion is known, tracked and compared.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.cli.delivery import Delivery, Exit, guarded
+from memo.cli.given import check_writable
+from memo.cli.track import EXIT_CODES, deliver_interrupted, exit_code, follow, new_tracker, report, write_all
+from memo.files import JOINTS
+
+if TYPE_CHECKING:
+    import typer
+
+    from memo.video import Frame
+
+
+def add_demo(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def demo(
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
+        seed: Annotated[int, typer.Option(help="Which scene is drawn.", min=0)] = 0,
+    ) -> None:
+        """Draws a walker whose motion is known, tracks it and compares."""
+        raise typer.Exit(guarded(lambda: _demo(out, seed)))
+
+
+def _demo(out: Path, seed: int) -> Exit:
+    delivery = Delivery(out)
+    check_writable(out)
+    scene, frames = _draw_scene(seed)
+    tracker = new_tracker({"height_m": scene.height_m, "camera": scene.camera})
+    track, interrupted = follow(frames, tracker, len(frames), 0, delivery)
+    if interrupted:
+        return deliver_interrupted(track, delivery)
+    rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
+    written = write_all(track, frames, len(frames), rate_hz, delivery)
+    report(track, written, delivery)
+    for line in against_truth(track.columns, scene.truth):
+        print(line)
+    print("Next, your own video of one person walking across the picture, camera on a tripod:")
+    print("  memo track VIDEO --height 1.75")
+    return exit_code(track)
+
+
+def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
+    from memo.video import Frame
+
+    scene = memo.demo_scene(seed=seed)
+    timed = zip(scene.times_s, scene.frames, strict=True)
+    return scene, [Frame(index, float(time_s), luma) for index, (time_s, luma) in enumerate(timed)]
+
+
+def against_truth(columns: dict[str, Any], truth: dict[str, Any]) -> list[str]:
+    """Root mean square differences from the scene's truth, in sentences; none without a tracked frame."""
+    rows = np.searchsorted(truth["frame"], columns["frame"])
+    if not len(rows):
+        return []
+
+    def rms(names: Iterable[str]) -> float:
+        return math.sqrt(np.nanmean([(columns[name] - np.asarray(truth[name])[rows]) ** 2 for name in names]))
+
+    phase = (columns["phase"] - np.asarray(truth["phase"])[rows] + 0.5) % 1 - 0.5
+    joints = math.sqrt(3) * rms(f"{joint}_{axis}_m" for joint in JOINTS for axis in "xyz")
+    angles = rms(f"{side}_{joint}_deg" for side in ("right", "left") for joint in ("hip", "knee"))
+    return [
+        f"Against the drawn truth, root mean square over {len(rows)} frames:",
+        "  torso " + ", ".join(f"{axis} {100 * rms([f'{axis}_m']):.1f} cm" for axis in "xyz"),
+        f"  phase {math.sqrt(np.mean(phase**2)):.3f} of a cycle, hips and knees {angles:.1f} degrees",
+        f"  joints {100 * joints:.1f} cm in space",
+    ]

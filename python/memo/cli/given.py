@@ -1,0 +1,37 @@
+"""What several commands are given, checked before any work."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import memo
+from memo.cli.delivery import InputError
+from memo.files import read_tsai_xml
+
+
+def load_camera(path: Path, name: str | None) -> Any:
+    if not path.is_file():
+        raise InputError(f"{path}: no such camera file")
+    if path.suffix.lower() == ".xml":
+        return memo.Camera.from_tsai(**read_tsai_xml(path))
+    return memo.Camera.from_toml(str(path), name=name)
+
+
+def checked_height(height_m: float) -> float:
+    if 50 <= height_m <= 250:
+        raise InputError(f"--height {height_m:g} looks like centimetres: give --height {height_m / 100:g}")
+    if not (math.isfinite(height_m) and 0.5 <= height_m <= 2.5):
+        raise InputError(f"--height {height_m:g} is not the height of a person in metres (0.5 to 2.5)")
+    return height_m
+
+
+def check_writable(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written to: {error.strerror}") from None

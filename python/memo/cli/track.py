@@ -1,0 +1,225 @@
+"""`memo track`: one person through a video.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.cli.delivery import Delivery, Exit, InputError, Interrupt, complain, guarded, with_progress
+from memo.cli.given import check_writable, checked_height, load_camera
+from memo.files import write_events_csv, write_track_csv
+
+if TYPE_CHECKING:
+    import typer
+
+    from memo.video import Frame
+
+EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage;
+3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
+(what was tracked until then is written)."""
+
+_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png")
+
+_LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at before they are used
+
+
+def add_track(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def track(
+        video: Annotated[Path, typer.Argument(help="A video file, or a folder of images (then --fps too).")],
+        camera: Annotated[Path | None, typer.Option(help="Calibration: TOML, or Tsai XML.")] = None,
+        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
+        fov_deg: Annotated[
+            float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
+        ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
+        frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
+        fps: Annotated[
+            float | None, typer.Option(help="True frame rate, in place of the time stamps (slow motion).")
+        ] = None,
+        overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
+        plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Tracks one person who walks through VIDEO."""
+        delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
+
+        def work() -> Exit:
+            tracker_options = _tracker_options(height, camera, camera_name, fov_deg)
+            return _track_video(video, _frame_range(frames), fps, tracker_options, delivery)
+
+        raise typer.Exit(guarded(work))
+
+
+def _track_video(
+    video: Path,
+    frame_range: tuple[int, int | None],
+    fps: float | None,
+    tracker_options: dict[str, Any],
+    delivery: Delivery,
+) -> Exit:
+    from memo.video import VideoReader
+
+    check_writable(delivery.out)
+
+    def opened() -> VideoReader:
+        return VideoReader(video, start=frame_range[0], stop=frame_range[1], rate_hz=fps)
+
+    with opened() as reader:
+        _check_camera_fits(tracker_options, reader)
+        if "camera" not in tracker_options and reader.pixel_aspect != 1:
+            complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
+        tracker = new_tracker(tracker_options)
+        track, interrupted = follow(reader, tracker, reader.frame_count, frame_range[0], delivery)
+        if reader.damage:
+            complain(f"{video}: {reader.damage}")
+    if interrupted:
+        return deliver_interrupted(track, delivery)
+    with opened() as reader:
+        written = write_all(track, reader, reader.frame_count, reader.rate_hz, delivery)
+    report(track, written, delivery)
+    if "camera" not in tracker_options and delivery.talks:
+        print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
+    return exit_code(track)
+
+
+def new_tracker(options: dict[str, Any]) -> Any:
+    return memo.Tracker(**options)
+
+
+def follow(
+    frames: "Iterable[Frame]", tracker: Any, count: int | None, first_frame: int, delivery: Delivery
+) -> tuple[Any, bool]:
+    """Gives all frames to the tracker; an interrupt ends it after the current frame.
+
+    An error in the middle is raised again once the tables hold what was tracked until then.
+    """
+    try:
+        with Interrupt() as interrupt:
+            for frame in with_progress(frames, "tracking", count, delivery):
+                tracker.update(frame.luma, frame.time_s)
+                if interrupt.requested:
+                    break
+    except ValueError as error:
+        track = _snapshot(tracker.finish(), first_frame)
+        if not len(track.columns["frame"]):
+            raise
+        _write_tables(track, delivery)
+        raise InputError(f"{error}; the tables hold what was tracked until then") from error
+    return _snapshot(tracker.finish(), first_frame), interrupt.requested
+
+
+def _snapshot(track: Any, first_frame: int) -> Any:
+    """The track's tables, read once, with frames numbered as in the video (the tracker counts from 0)."""
+
+    def renumbered(table: dict[str, Any]) -> dict[str, Any]:
+        return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else table
+
+    return SimpleNamespace(
+        columns=renumbered(dict(track.columns)),
+        events=[{**event, "frame": event["frame"] + first_frame} for event in track.events],
+        start=renumbered(dict(track.start)),
+        measured=renumbered(dict(track.measured)),
+        contours=track.contours,
+        summary=dict(track.summary),
+    )
+
+
+# What the user gave, checked before any work.
+
+
+def _tracker_options(
+    height_m: float, camera: Path | None, camera_name: str | None, fov_deg: float | None
+) -> dict[str, Any]:
+    options: dict[str, Any] = {"height_m": checked_height(height_m)}
+    if camera is not None and fov_deg is not None:
+        raise InputError("--camera already holds the field of view: leave --fov-deg out")
+    if camera is None and camera_name is not None:
+        raise InputError("--camera-name needs --camera")
+    if camera is not None:
+        options["camera"] = load_camera(camera, camera_name)
+    if fov_deg is not None:
+        if not 5 <= fov_deg <= 170:
+            raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
+        options["fov_deg"] = fov_deg
+    return options
+
+
+def _frame_range(text: str) -> tuple[int, int | None]:
+    start, colon, stop = text.partition(":")
+    try:
+        first, end = int(start or 0), int(stop) if stop else None
+    except ValueError:
+        first, end, colon = 0, None, ""
+    if not colon or first < 0 or (end is not None and end <= first):
+        raise InputError(f"--frames {text} is not A:B with 0 <= A < B")
+    return first, end
+
+
+def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
+    camera = tracker_options.get("camera")
+    if camera is None or tuple(camera.size) == reader.size:
+        return
+    (width, height), (video_width, video_height) = camera.size, reader.size
+    raise InputError(f"the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}")
+
+
+# What is written and said.
+
+
+def _write_tables(track: Any, delivery: Delivery) -> list[Path]:
+    for stale in _DRAWN:  # of an earlier run: they would stand beside tables they do not belong to
+        (delivery.out / stale).unlink(missing_ok=True)
+    table, events = delivery.out / "track.csv", delivery.out / "events.csv"
+    write_track_csv(table, track.columns)
+    write_events_csv(events, track.events)
+    return [table, events]
+
+
+def write_all(
+    track: Any, frames: "Iterable[Frame]", count: int | None, rate_hz: float, delivery: Delivery
+) -> list[Path]:
+    written = _write_tables(track, delivery)
+    if not len(track.columns["frame"]):
+        return written
+    if delivery.overlay:
+        from memo.overlay import write_overlay
+
+        path = delivery.out / "overlay.mp4"
+        write_overlay(path, with_progress(frames, "drawing", count, delivery), track, rate_hz=rate_hz)
+        written.append(path)
+    if delivery.plots:
+        from memo.plot import write_plots
+
+        written += write_plots(track, delivery.out)
+    return written
+
+
+def deliver_interrupted(track: Any, delivery: Delivery) -> Exit:
+    report(track, _write_tables(track, delivery), delivery)
+    complain("interrupted: the tables hold what was tracked until then; no overlay, no plots")
+    return Exit.INTERRUPTED
+
+
+def report(track: Any, written: list[Path], delivery: Delivery) -> None:
+    lines = [track.summary["message"]]
+    p_swapped = track.summary.get("p_swapped")
+    if p_swapped is not None and p_swapped > _LIKELY_SWAPPED:
+        lines.append(
+            f"Left and right may be swapped (probability {p_swapped:.0%}): look before you use them."
+        )
+    delivery.tell({**track.summary, "rows": len(track.columns["frame"])}, lines, written)
+
+
+def exit_code(track: Any) -> Exit:
+    return Exit.TRACKED if len(track.columns["frame"]) else Exit.NOBODY

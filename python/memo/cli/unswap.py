@@ -1,0 +1,67 @@
+"""`memo unswap`: right and left put right in keypoints.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import memo
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
+from memo.cli.given import check_writable
+from memo.files import write_flips_csv
+
+if TYPE_CHECKING:
+    import typer
+
+UNSWAP_EXIT_CODES = """Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong usage;
+4 the app extra is not installed; 130 interrupted (nothing is written)."""
+
+
+def add_unswap(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=UNSWAP_EXIT_CODES)
+    def unswap(
+        keypoints: Annotated[
+            Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
+        ],
+        fps: Annotated[
+            float | None, typer.Option(help="Frame rate; needed where no times are given.")
+        ] = None,
+        layout: Annotated[
+            str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
+        ] = None,
+        person: Annotated[
+            int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
+        ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Exchanges right and left in KEYPOINTS where a detector confused them."""
+        delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
+        options = {"fps": fps, "layout": layout, "person": person}
+        raise typer.Exit(guarded(lambda: _unswap(keypoints, options, delivery)))
+
+
+def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
+    check_writable(delivery.out)
+    with with_elapsed("looking at right and left", delivery):
+        repair = memo.unswap(memo.read_keypoints(path, **options))
+        written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
+        if written[0].name == written[1].name:
+            raise InputError(f"{path}: is called as the table of changes; rename it")
+        repair.keypoints.write(written[0])
+        write_flips_csv(written[1], repair.flips)
+    frames = len(repair.keypoints.frames)
+    summary = {"frames": frames, "exchanged": repair.exchanged, "undecided": repair.undecided}
+    delivery.tell(summary, [f"Right and left exchanged, of {frames} frames: {exchanges(repair)}."], written)
+    return Exit.DONE
+
+
+def exchanges(repair: memo.SideRepair) -> str:
+    """How many frames were exchanged and how many are in doubt, in words."""
+    done = " and ".join(f"{group} in {frames}" for group, frames in repair.exchanged.items())
+    doubt = " and ".join(f"{group} in {frames}" for group, frames in repair.undecided.items() if frames)
+    return f"{done} ({f'undecided: {doubt}' if doubt else 'none undecided'})"
