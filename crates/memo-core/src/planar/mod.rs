@@ -21,8 +21,8 @@ pub use evidence::{
     rod_evidence,
 };
 pub use figure::{
-    Chain, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation, Joint, Link,
-    Method, Status, interpret_figure, reflection_by_bend,
+    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation,
+    Link, Method, Status, interpret_figure, interpret_named_figure, joint_of,
 };
 pub use fit::{FitError, FitOptions};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};

@@ -58,12 +58,12 @@ impl Walk {
     }
 
     /// One stride in `count` views, started at `start` in [0, 1] of what the walk allows, seen orthographically
-    /// `azimuth_deg` off the side.
+    /// `azimuth_deg` off the right side.
     pub fn views(&self, start: f64, count: usize, azimuth_deg: f64) -> Views {
         let first = start * (self.frames.len() as f64 - 1.0 - self.stride).max(0.0);
         let (sin, cos) = azimuth_deg.to_radians().sin_cos();
         let side = self.forward.cross(DVec3::Z);
-        let (right, away) = (cos * self.forward + sin * side, cos * side - sin * self.forward);
+        let (right, away) = (cos * self.forward + sin * side, sin * self.forward - cos * side);
         let mut views = Views { image: vec![Vec::new(); 12], depth: vec![Vec::new(); 12] };
         for view in 0..count {
             let frame = first + self.stride * view as f64 / count as f64;

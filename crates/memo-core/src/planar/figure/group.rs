@@ -3,7 +3,7 @@
 
 use super::FigureOptions;
 use super::cover::{MOST_POINTS, Piece, best_cover};
-use super::linkage::{Chain, Figure, Joint, Link, Method};
+use super::linkage::{Chain, Contact, Figure, Link, Method};
 use crate::planar::{FitError, HingeFit, RodFit, fit_hinge, fit_rod, hinge_evidence, rod_evidence};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -147,7 +147,7 @@ fn candidates(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptio
 }
 
 /// How groups sit on each other: the least spanning forest over ends that stay together.
-fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions) -> Vec<Joint> {
+fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions) -> Vec<Contact> {
     let ends = |group: &[usize]| [group[0], group[group.len() - 1]];
     let mut pairs = Vec::new();
     for (a, first) in groups.iter().enumerate() {
@@ -161,7 +161,7 @@ fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions
     }
     pairs.retain(|pair| pair.0 < options.costs.detached);
     let edges = spanning_forest(groups.len(), &mut pairs);
-    edges.into_iter().map(|(apart, points)| Joint { points, apart: apart * size }).collect()
+    edges.into_iter().map(|(apart, points)| Contact { points, apart: apart * size }).collect()
 }
 
 /// Kruskal's forest over edges (weight, node, node, what), weights and whats returned, lightest first.
@@ -184,7 +184,7 @@ fn chain(
     group: &[usize],
     tracks: &[&[DVec2]],
     rods: &Rods,
-    joints: &[Joint],
+    joints: &[Contact],
     options: &FigureOptions,
     judge: &impl Fn([usize; 2]) -> (f64, f64),
 ) -> Option<Chain> {
@@ -213,6 +213,7 @@ fn chain(
             residual_rms: fit.residual_rms,
             evidence: rod_evidence(fit, options.fit.noise_sd, &options.evidence),
             depth: depth.iter().map(|&z| vec![0.0, z]).collect(),
+            reflection_margin_deg: None,
             angle_rad: Vec::new(),
             points,
         });
@@ -226,6 +227,7 @@ fn chain(
         residual_rms: fit.residual_rms,
         evidence: hinge_evidence(&fit, options.fit.noise_sd, &options.evidence),
         depth: fit.depth.iter().map(|[first, second]| vec![0.0, -first, second - first]).collect(),
+        reflection_margin_deg: None,
         angle_rad: (0..tracks[pivot].len())
             .map(|t| angle(&fit, [a, pivot, b].map(|p| tracks[p][t]), t))
             .collect(),

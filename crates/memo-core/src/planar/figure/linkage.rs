@@ -43,13 +43,16 @@ pub struct Chain {
     /// Depth of each point against the first, frame by frame in the order of `points`; NaN where unseen.
     /// Or all with the other sign.
     pub depth: Vec<Vec<f64>>,
+    /// By how many degrees its joints keep their ranges better than those of its mirror; `None` where the
+    /// reflection is open. See [`reflection`](super::joint_of).
+    pub reflection_margin_deg: Option<f64>,
     /// Angle at the pivot frame by frame, radians, π = straight; empty for a rod. The mirror has the same.
     pub angle_rad: Vec<f64>,
 }
 
 /// Where two groups sit on each other: a pair of points that hardly moves apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Joint {
+pub struct Contact {
     /// A point of each group.
     pub points: [usize; 2],
     /// What sets them apart (residual and motion), in the unit of the tracks.
@@ -64,7 +67,7 @@ pub struct Figure {
     /// Its chains.
     pub chains: Vec<Chain>,
     /// How chains and single points sit on each other, best first; points of no joint stand free.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<Contact>,
     /// Points in no chain.
     pub alone: Vec<usize>,
     /// Cost of the cover in the unit of the tracks; NaN for a forest.

@@ -27,14 +27,16 @@ mod reflection;
 
 pub use cover::MOST_POINTS;
 pub use depth::DepthSource;
-pub use linkage::{Chain, Figure, Joint, Link, Method};
-pub use reflection::reflection_by_bend;
+pub use linkage::{Chain, Contact, Figure, Link, Method};
+pub use reflection::joint_of;
 
 use super::{EvidenceOptions, FitOptions, Verdict};
+use crate::posture::skeleton::Joint;
 use depth::depth_over_time;
 use glam::DVec2;
 use group::best_figure;
 use rayon::prelude::*;
+use reflection::reflect_by_anatomy;
 use thiserror::Error;
 
 /// More points than this are refused.
@@ -58,6 +60,14 @@ pub enum FigureError {
         positions: usize,
         /// Times given.
         times: usize,
+    },
+    /// Not one name a track.
+    #[error("{names} names for {tracks} tracks")]
+    Names {
+        /// Names given.
+        names: usize,
+        /// Tracks given.
+        tracks: usize,
     },
     /// Too few frames for any test.
     #[error("{frames} frames are too few: at least {FEWEST_FRAMES} wanted")]
@@ -234,8 +244,31 @@ pub fn interpret_figure(
             FigureWindow { start, end, status, chains: [planar, refuted, silent], figure }
         })
         .collect();
+    Ok(over_time(windows, tracks, options))
+}
+
+/// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint limits
+/// tell each limb from its mirror ([`Chain::reflection_margin_deg`]).
+///
+/// # Errors
+/// Those of [`interpret_figure`]; not as many names as tracks.
+pub fn interpret_named_figure(
+    tracks: &[Vec<DVec2>],
+    joints: &[Option<Joint>],
+    times_s: &[f64],
+    options: &FigureOptions,
+) -> Result<Interpretation, FigureError> {
+    if joints.len() != tracks.len() {
+        return Err(FigureError::Names { names: joints.len(), tracks: tracks.len() });
+    }
+    let mut windows = interpret_figure(tracks, times_s, options)?.windows;
+    reflect_by_anatomy(&mut windows, tracks, joints);
+    Ok(over_time(windows, tracks, options))
+}
+
+fn over_time(windows: Vec<FigureWindow>, tracks: &[Vec<DVec2>], options: &FigureOptions) -> Interpretation {
     let (depth, sources) = depth_over_time(tracks, &windows, options.carries_structure);
-    Ok(Interpretation { windows, depth, sources })
+    Interpretation { windows, depth, sources }
 }
 
 fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Result<(), FigureError> {
