@@ -6,8 +6,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
 use memo_core::planar::{
-    FitOptions, Rod, RodRefusal, fit_hinge, fit_rod, hinge_from_two_views, rod_by_paper, rod_depths,
-    rod_from_ellipse, rod_from_three_views,
+    FitOptions, Rod, RodRefusal, fit_hinge, fit_rod, hinge_depths, hinge_from_two_views, rod_by_paper,
+    rod_depths, rod_from_ellipse, rod_from_three_views,
 };
 use memo_core::synth::Random;
 use std::hint::black_box;
@@ -43,14 +43,15 @@ fn closed_forms(c: &mut Criterion) {
             black_box(&mut copies);
         });
     });
+    let hinges: Vec<[[DVec2; 2]; 2]> =
+        problems.iter().map(|[a, b, c]| [[*a, *b], [*c, 1.3 * *a + 0.2 * *c]]).collect();
     let mut depths = vec![[0.0f64; 3]; PROBLEMS];
-    group.bench_function("rod, bare depths", |b| {
-        b.iter(|| {
-            for (depth, rod) in depths.iter_mut().zip(black_box(&problems)) {
-                *depth = rod_depths(rod);
-            }
-            black_box(&mut depths);
-        });
+    group.bench_function("rods, bare depths", |b| {
+        b.iter(|| rod_depths(black_box(&problems), black_box(&mut depths)));
+    });
+    let mut hinge_rows = vec![[0.0f64; 4]; PROBLEMS];
+    group.bench_function("hinges, bare depths", |b| {
+        b.iter(|| hinge_depths(black_box(&hinges), black_box(&mut hinge_rows)));
     });
     type Solve = fn(&[DVec2; 3]) -> Result<Rod, RodRefusal>;
     let solvers: [(&str, Solve); 3] = [

@@ -32,7 +32,8 @@ fn named_limbs_have_the_reflection_of_the_walker() {
         // Legs, arms: right, all, and the same of margins over 5 degrees.
         let mut counts = [[0usize; 4]; 2];
         for walk in &walks {
-            for azimuth in AZIMUTHS_DEG.into_iter().zip([0.0, 180.0].into_iter().cycle()).map(|(a, b)| a + b) {
+            for azimuth in AZIMUTHS_DEG.into_iter().zip([0.0, 180.0].into_iter().cycle()).map(|(a, b)| a + b)
+            {
                 let seen = walk.views(0.4, 60, azimuth);
                 let tracks: Vec<Vec<DVec2>> =
                     seen.image.iter().map(|t| noisy(&in_px(t), noise_px, &mut random)).collect();

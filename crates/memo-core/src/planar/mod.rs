@@ -6,15 +6,18 @@
 //! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
 //! (p, q) is (-p, -q).
 
+pub mod batch;
 pub mod depth_change;
 pub mod evidence;
 pub mod figure;
 mod fit;
+pub mod group;
 pub mod hinge;
 pub mod motion;
 pub mod plane;
 pub mod rod;
 
+pub use batch::{hinge_depths, rod_depths};
 pub use depth_change::{RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px};
 pub use evidence::{
     Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
@@ -25,9 +28,8 @@ pub use figure::{
     Link, Method, Status, interpret_figure, interpret_named_figure, joint_of,
 };
 pub use fit::{FitError, FitOptions};
+pub use group::{Pair, Triple, test_pairs, test_triples};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
 pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
 pub use plane::Plane;
-pub use rod::{
-    Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_depths, rod_from_ellipse, rod_from_three_views,
-};
+pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};

@@ -222,28 +222,6 @@ pub(super) fn polish(pairs: [[DVec2; 2]; 2], mut g: DVec2) -> DVec2 {
     g
 }
 
-/// z1, z2, z3 by eqs. (4)-(14) and nothing else, for many problems a second: NaN (all three) says that there is
-/// no rod, or that k1 or k3 vanish. Not polished and with no word on conditioning: near degenerate cases use
-/// [`rod_from_three_views`].
-#[inline]
-pub fn rod_depths(d: &[DVec2; 3]) -> [f64; 3] {
-    let (k1, k2) = (difference_of_squares(d[0], d[1]), difference_of_squares(d[0], d[2]));
-    let (k3, k4, k5) = (d[1].perp_dot(d[2]), d[2].perp_dot(d[0]), d[0].perp_dot(d[1]));
-    let (k3_sq, k4_sq, k5_sq) = (k3 * k3, k4 * k4, k5 * k5);
-    let a = k2 * (k4_sq - k3_sq) - k1 * k4_sq;
-    let half_b = k4 * k5 * (k2 - k1);
-    let c = k2 * k5_sq - k1 * (k5_sq - k3_sq);
-    let h = -(half_b + (half_b * half_b - a * c).sqrt().copysign(half_b));
-    let form = |m: f64, n: f64| (k4_sq - k3_sq) * m * m + k5_sq * n * n + 2.0 * k4 * k5 * m * n;
-    let (first, second) = (form(h, a), form(c, h));
-    // The root that is real: -k1 / form > 0.
-    let is_first = k1 * first < 0.0;
-    let (m, n, form) = if is_first { (h, a, first) } else { (c, h, second) };
-    let s = if k1 * k3 == 0.0 { f64::NAN } else { (-k1 * k3_sq / form).sqrt() };
-    let (z2, z3) = (m * s, n * s);
-    [-(k4 * z2 + k5 * z3) / k3, z2, z3]
-}
-
 /// |a|^2 - |b|^2 without cancellation.
 fn difference_of_squares(a: DVec2, b: DVec2) -> f64 {
     (a - b).dot(a + b)
@@ -490,32 +468,6 @@ mod tests {
         }
         let rate = planar as f64 / 20_000.0;
         assert!((0.33..0.37).contains(&rate), "{rate}");
-    }
-
-    #[test]
-    fn bare_depths_are_those_of_the_rod_or_nan() {
-        let mut random = Random::new(6);
-        let mut compared = 0;
-        for _ in 0..20_000 {
-            let views = [0; 3].map(|_| DVec2::from_array(random.normal_pair().map(f64::from)));
-            let bare = rod_depths(&views);
-            match rod_by_paper(&views) {
-                Ok(rod) if rod.condition < 1e4 => {
-                    compared += 1;
-                    let off =
-                        |sign: f64| (0..3).map(|i| (bare[i] - sign * rod.depth[i]).abs()).fold(0.0, f64::max);
-                    assert!(off(1.0).min(off(-1.0)) < 1e-6 * rod.length, "{bare:?} {rod:?}");
-                }
-                Ok(_) => {}
-                Err(_) => assert!(bare.iter().all(|z| z.is_nan()), "{views:?} {bare:?}"),
-            }
-        }
-        assert!(compared > 5000, "{compared}");
-        let collinear = [DVec2::new(0.3, 1.0), DVec2::new(1.0, 0.2), DVec2::new(2.0, 0.4)];
-        let equal = [DVec2::new(1.0, 0.0), DVec2::new(0.0, 1.0), DVec2::new(0.9, 1.1)];
-        for views in [collinear, equal, [DVec2::ZERO; 3], [DVec2::NAN; 3]] {
-            assert!(rod_depths(&views).iter().all(|z| z.is_nan()), "{views:?}");
-        }
     }
 
     #[test]

@@ -4,9 +4,10 @@
 use super::FigureOptions;
 use super::cover::{MOST_POINTS, Piece, best_cover};
 use super::linkage::{Chain, Contact, Figure, Link, Method};
-use crate::planar::{FitError, HingeFit, RodFit, fit_hinge, fit_rod, hinge_evidence, rod_evidence};
+use crate::planar::{
+    FitError, HingeFit, RodFit, fit_hinge, hinge_evidence, rod_evidence, test_pairs, test_triples,
+};
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 /// Fits of all rods of a window, and what they cost.
 struct Rods {
@@ -21,13 +22,11 @@ impl Rods {
     fn fitted(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Self {
         let points = tracks.len();
         let both_ways = |index: usize| (index / points, index % points);
-        let results: Vec<Result<RodFit, FitError>> = (0..points * points)
-            .into_par_iter()
-            .map(|index| match both_ways(index) {
-                (i, j) if i < j => fit_rod(tracks[i], tracks[j], &options.fit),
-                _ => Err(FitError::TooFewViews { found: 0, needed: 0 }),
-            })
-            .collect();
+        let none = || Err(FitError::TooFewViews { found: 0, needed: 0 });
+        let mut results: Vec<Result<RodFit, FitError>> = (0..points * points).map(|_| none()).collect();
+        for pair in test_pairs(tracks, &options.fit, &options.evidence) {
+            results[pair.points[0] * points + pair.points[1]] = pair.tested.map(|(fit, _)| fit);
+        }
         let apart = (0..points * points).map(|index| {
             let (i, j) = both_ways(index);
             match &results[i.min(j) * points + i.max(j)] {
@@ -131,18 +130,15 @@ fn candidates(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptio
             }
         }
     }
-    let triples: Vec<[usize; 3]> = (0..points)
-        .flat_map(|pivot| (0..points).map(move |i| (pivot, i)))
-        .flat_map(|(pivot, i)| (i + 1..points).map(move |j| [i, pivot, j]))
-        .filter(|[i, pivot, j]| i != pivot && j != pivot)
-        .collect();
-    found.par_extend(triples.into_par_iter().filter_map(|[i, pivot, j]| {
-        let fit = fit_hinge(tracks[i], tracks[pivot], tracks[j], &options.fit).ok()?;
+    for triple in test_triples(tracks, &options.fit, &options.evidence) {
+        let ([i, pivot, j], Ok((fit, _))) = (triple.points, triple.tested) else { continue };
         let length = (fit.lengths[0] + fit.lengths[1]) / size;
         let own = unexplained(fit.residual_rms, options) / size + costs.length * length;
         let cost = own + rods.detachment(&[i, j], &[i, pivot, j], costs.detached);
-        (cost < most).then_some(Candidate { points: vec![i, pivot, j], cost })
-    }));
+        if cost < most {
+            found.push(Candidate { points: vec![i, pivot, j], cost });
+        }
+    }
     found
 }
 

@@ -20,6 +20,7 @@
 
 #[cfg(test)]
 mod example;
+mod lanes;
 mod moments;
 mod options;
 mod robust;
@@ -29,6 +30,7 @@ pub use options::{FitError, FitOptions};
 
 use super::Plane;
 use glam::DVec2;
+use lanes::{Columns, NormalEquations};
 use moments::Moments;
 use nalgebra::{Matrix4, Vector4};
 
@@ -128,18 +130,10 @@ struct Solution<const K: usize> {
     cost: f64,
 }
 
-/// One rod in one view: residual, its derivatives by p, q and c, and M d.
-#[derive(Clone, Copy)]
-struct Term {
-    r: f64,
-    by_p: f64,
-    by_q: f64,
-    by_c: f64,
-    m_d: DVec2,
-}
-
+/// Views, and what all steps of a fit to them need.
 struct Problem<'a, const K: usize> {
     views: &'a [View<K>],
+    columns: Columns<K>,
     options: &'a FitOptions,
     size: f64,
     /// Variance of an image coordinate of a rod's vector: both ends are noisy.
@@ -154,6 +148,7 @@ impl<'a, const K: usize> Problem<'a, K> {
         let noise_sq = 2.0 * options.noise_sd * options.noise_sd;
         Self {
             views,
+            columns: Columns::new(views, size),
             options,
             size,
             noise_sq,
@@ -162,62 +157,30 @@ impl<'a, const K: usize> Problem<'a, K> {
         }
     }
 
-    /// r = (h - c) / w, w^2 = 4 (|M d|^2 + floor); NaN where missing.
-    fn term(&self, d: DVec2, g: DVec2, c: f64) -> Term {
-        let depth = g.dot(d);
-        let m_d = d + depth * g;
-        let by_w = 0.5 / (m_d.length_squared() + self.floor_sq).sqrt();
-        let r = (d.length_squared() + depth * depth - c) * by_w;
-        // dw/dp = 4 (M d) . (x g + depth e_x) / w
-        let w_by = 4.0 * by_w * (m_d.dot(g) * d + depth * m_d);
-        let by = (2.0 * depth * d - r * w_by) * by_w;
-        Term { r, by_p: by.x, by_q: by.y, by_c: -by_w, m_d }
+    /// The same problem with other views.
+    fn of<'b>(&self, views: &'b [View<K>]) -> Problem<'b, K>
+    where
+        'a: 'b,
+    {
+        Problem { views, columns: Columns::new(views, self.size), ..*self }
     }
 
-    fn terms(&self, view: &View<K>, s: &Solution<K>) -> [Term; K] {
-        std::array::from_fn(|k| self.term(view[k], s.g, s.c[k]))
+    /// r = (h - c) / w, w^2 = 4 (|M d|^2 + floor); NaN where missing.
+    fn residuals(&self, view: &View<K>, s: &Solution<K>) -> [f64; K] {
+        std::array::from_fn(|k| {
+            let depth = s.g.dot(view[k]);
+            let m_d = view[k] + depth * s.g;
+            let by_w = 0.5 / (m_d.length_squared() + self.floor_sq).sqrt();
+            (view[k].length_squared() + depth * depth - s.c[k]) * by_w
+        })
     }
 
     /// Cost, normal matrix and right side at a solution; residuals of a hinge whitened.
-    fn normal_equations(&self, s: &Solution<K>) -> (f64, Matrix4<f64>, Vector4<f64>) {
-        let (mut cost, mut normal, mut right) = (0.0, Matrix4::zeros(), Vector4::zeros());
-        let mut add = |r: f64, row: [f64; 4]| {
-            cost += r * r;
-            for i in 0..4 {
-                for j in 0..=i {
-                    normal[(i, j)] += row[i] * row[j];
-                }
-                right[i] -= row[i] * r;
-            }
-        };
-        for view in self.views {
-            let terms = self.terms(view, s);
-            let first = terms[0];
-            let first_row = [first.by_p, first.by_q, first.by_c, 0.0];
-            if !first.r.is_nan() {
-                add(first.r, first_row);
-            }
-            let Some(second) = terms.get(1).filter(|t| !t.r.is_nan()) else { continue };
-            let row = [second.by_p, second.by_q, 0.0, second.by_c];
-            if first.r.is_nan() {
-                add(second.r, row);
-                continue;
-            }
-            let correlation = self.correlation(&first, second);
-            let sharpen = 1.0 / (1.0 - correlation * correlation).sqrt();
-            let whitened = |second: f64, first: f64| (second - correlation * first) * sharpen;
-            add(whitened(second.r, first.r), std::array::from_fn(|i| whitened(row[i], first_row[i])));
-        }
-        if K == 1 {
-            normal[(3, 3)] = 1.0;
-        }
-        normal.fill_upper_triangle_with_lower_triangle();
-        (cost, normal, right)
-    }
-
-    /// Of the residuals of a hinge's rods, through the noise of the pivot; in [-1/2, 1/2].
-    fn correlation(&self, a: &Term, b: &Term) -> f64 {
-        2.0 * a.m_d.dot(b.m_d) * a.by_c * b.by_c
+    ///
+    /// With w the gradient's length, dw/dp = 4 (M d) . (x g + depth e_x) / w. Residuals of a hinge's rods correlate through the noise of the pivot, by 2 (M a . M b) da/dc db/dc in
+    /// [-1/2, 1/2].
+    fn normal_equations(&self, s: &Solution<K>) -> NormalEquations {
+        self.columns.normal_equations(s, self.floor_sq)
     }
 
     /// Squared lengths that fit a slope best, rod by rod.
@@ -314,10 +277,14 @@ impl<'a, const K: usize> Problem<'a, K> {
     ///
     /// The noise adds noise^2 trace(M) to every h, so c is too large by that.
     fn report(&self, s: Solution<K>, outliers: Vec<bool>, motion: [f64; K]) -> Fit<K> {
-        let residuals: Vec<[f64; K]> = self.views.iter().map(|v| self.terms(v, &s).map(|t| t.r)).collect();
+        let residuals: Vec<[f64; K]> = self.views.iter().map(|v| self.residuals(v, &s)).collect();
         let kept: Vec<View<K>> =
             self.views.iter().zip(&outliers).filter(|(_, o)| !**o).map(|(v, _)| *v).collect();
-        let (_, normal, _) = Problem { views: &kept, ..*self }.normal_equations(&s);
+        let (_, normal, _) = if outliers.contains(&true) {
+            self.of(&kept).normal_equations(&s)
+        } else {
+            self.normal_equations(&s)
+        };
         let inside = residuals.iter().zip(&outliers).filter(|(_, o)| !**o).flat_map(|(r, _)| r);
         let (mut squares, mut used) = (0.0, 0);
         for r in inside.filter(|r| !r.is_nan()) {

@@ -23,15 +23,13 @@ impl<const K: usize> Problem<'_, K> {
         }
         let first = self.solve();
         let mut outliers = vec![false; self.views.len()];
-        let limit = self.outlier_limit(&first);
-        if limit <= 2.0 * self.options.outlier_sd * self.noise_sq.sqrt()
-            && self.beyond(&first, limit) == outliers
-        {
+        let (limit, found) = self.outliers(&first);
+        if limit <= 2.0 * self.options.outlier_sd * self.noise_sq.sqrt() && found == outliers {
             return Some((first, outliers));
         }
         let mut solution = self.least_median();
         for _ in 0..8 {
-            let found = self.beyond(&solution, self.outlier_limit(&solution));
+            let (_, found) = self.outliers(&solution);
             if found == outliers {
                 // Without any from the start the first fit stands.
                 return if found.contains(&true) {
@@ -46,7 +44,7 @@ impl<const K: usize> Problem<'_, K> {
                 return None;
             }
             outliers = found;
-            solution = Problem { views: &kept, ..*self }.solve();
+            solution = self.of(&kept).solve();
         }
         self.few(solution, outliers)
     }
@@ -57,16 +55,14 @@ impl<const K: usize> Problem<'_, K> {
         (outliers.iter().filter(|o| **o).count() as f64 <= most).then_some((solution, outliers))
     }
 
-    /// [`FitOptions::outlier_sd`] robust standard deviations.
-    fn outlier_limit(&self, solution: &Solution<K>) -> f64 {
-        let residuals = self.views.iter().flat_map(|v| self.terms(v, solution).map(|t| t.r.abs()));
-        let spread = 1.4826 * median(&mut residuals.collect());
-        self.options.outlier_sd * spread.max(self.noise_sq.sqrt()).max(1e-12 * self.size)
-    }
-
-    /// Views with a residual beyond a limit.
-    fn beyond(&self, solution: &Solution<K>, limit: f64) -> Vec<bool> {
-        self.views.iter().map(|v| self.terms(v, solution).iter().any(|t| t.r.abs() > limit)).collect()
+    /// [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the views with a
+    /// residual beyond.
+    fn outliers(&self, solution: &Solution<K>) -> (f64, Vec<bool>) {
+        let residuals: Vec<[f64; K]> =
+            self.views.iter().map(|v| self.residuals(v, solution).map(f64::abs)).collect();
+        let spread = 1.4826 * median(&mut residuals.iter().flatten().copied().collect());
+        let limit = self.options.outlier_sd * spread.max(self.noise_sq.sqrt()).max(1e-12 * self.size);
+        (limit, residuals.iter().map(|r| r.iter().any(|r| *r > limit)).collect())
     }
 
     /// The plane of a grid with the least median of |residual|, each rod's length the median of its own.
@@ -82,7 +78,7 @@ impl<const K: usize> Problem<'_, K> {
             });
             let solution = Solution { g, c, cost: 0.0 };
             values.clear();
-            values.extend(self.views.iter().flat_map(|v| self.terms(v, &solution).map(|t| t.r.abs())));
+            values.extend(self.views.iter().flat_map(|v| self.residuals(v, &solution).map(f64::abs)));
             Solution { cost: median(&mut values), ..solution }
         });
         candidates.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("the grid is not empty")
