@@ -28,6 +28,8 @@ __all__ = [
     "lee_chen_last_stage",
     "moving_regions",
     "planar",
+    "planar_hinges",
+    "planar_rods",
     "pointlight",
     "side_pairs",
     "silhouettes",
@@ -221,7 +223,12 @@ def planar(
     carry: bool = False,
     false_target_rate: float = 0.01,
     max_tilt_deg: float = 80.0,
+    names: Sequence[str] | None = None,
+    scales: Sequence[float] | npt.NDArray[np.float64] | None = None,
+    focal_px: float | None = None,
 ) -> dict[str, Any]: ...
+def planar_rods(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
+def planar_hinges(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 def keypoint_layouts() -> list[str]: ...
 def keypoint_layout(name: str) -> tuple[str, list[str]]: ...
 def guess_layout(points: npt.NDArray[np.float64]) -> str: ...

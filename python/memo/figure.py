@@ -40,11 +40,15 @@ _SHORT = {
 
 @dataclass(frozen=True)
 class Points:
-    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen."""
+    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
+
+    `scales` (T,): scale of each frame, where a person comes nearer or goes away.
+    """
 
     names: list[str]
     times_s: Array
     positions: Array
+    scales: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -54,14 +58,16 @@ class PlanarFigure:
     `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen"),
     the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
     (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
-    motion, depth and angle_deg. `depth` (T, K) is each point's depth against the first point of its chain
-    in pixels, NaN where not known, up to a reflection of each chain; `sources` says by frame where it comes
-    from.
+    motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
+    where it is open). `depth` (T, K) is each point's depth against the first point of its chain
+    in pixels, NaN where not known, up to a reflection of each open chain; `sources` says by frame where it
+    comes from. `perspective_px`: by how much perspective moves a point at most, if a focal length was given.
     """
 
     windows: list[dict[str, Any]]
     depth: Array
     sources: list[str]
+    perspective_px: float | None = None
 
     @property
     def interpreted(self) -> list[dict[str, Any]]:
@@ -86,7 +92,9 @@ def planar(
 
     `noise_px`: standard deviation of each coordinate. Options: `window_s` (1.2), `size_px` (size of the
     figure, by default that of the points), `carry` (lengths through windows in which the figure is lost),
-    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80).
+    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points where they are joints
+    (`RKN`, `right_knee`): joint limits then tell limbs from their mirrors; `scales` (T,) of the frames;
+    `focal_px`, to be told what perspective costs.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
     return PlanarFigure(**_memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options))
@@ -106,25 +114,53 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     if len(rows) < 2:
         raise ValueError(f"{path}: no header and rows of numbers")
     header, body = [name.strip() for name in rows[0]], rows[1:]
-    try:
-        table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in body])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-    if table.ndim != 2 or table.shape[1] != len(header):
-        raise ValueError(f"{path}: rows are not as long as the header ({len(header)} columns)")
+    for name in header:
+        if header.count(name) > 1:
+            raise ValueError(f"{path}: column {name} occurs {header.count(name)} times")
+    table = np.full((len(body), len(header)), np.nan)
+    for number, row in enumerate(body):
+        if len(row) != len(header):
+            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
+        for index, cell in enumerate(row):
+            table[number, index] = _number(path, number, header[index], cell)
     column = {name: index for index, name in enumerate(header)}
     known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
     for axes in known:
-        suffix = f"_{axes[0]}"
-        names = [name.removesuffix(suffix) for name in header if name.endswith(suffix)]
-        names = [name for name in names if name and all(f"{name}_{axis}" in column for axis in axes)]
-        if names:
-            picked = [[column[f"{name}_{axis}"] for axis in axes] for name in names]
-            positions = table[:, np.array(picked)]
-            short = [_SHORT.get(name, name) for name in names]
-            return Points(short, _times(path, column, table, comments, rate_hz), positions)
+        names = list(
+            dict.fromkeys(
+                name.removesuffix(f"_{axis}")
+                for axis in axes
+                for name in header
+                if name.endswith(f"_{axis}") and name != f"_{axis}"
+            )
+        )
+        if not names:
+            continue
+        for name in names:
+            absent = [f"{name}_{axis}" for axis in axes if f"{name}_{axis}" not in column]
+            if absent:
+                raise ValueError(f"{path}: point {name} has no column {absent[0]}")
+        picked = [[column[f"{name}_{axis}"] for axis in axes] for name in names]
+        scales = table[:, column["scale"]] if "scale" in column else None
+        times_s = _times(path, column, table, comments, rate_hz)
+        return Points([_SHORT.get(name, name) for name in names], times_s, table[:, np.array(picked)], scales)
     wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
-    raise ValueError(f"{path}: no columns {wanted}")
+    raise ValueError(f"{path}: no columns {wanted}; it has {', '.join(header[:6])}")
+
+
+def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
+    """A cell's number, NaN where it is empty; words only where no point is."""
+    if not cell.strip():
+        return np.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "scale"):
+            return np.nan
+        raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
+    if np.isinf(value):
+        raise ValueError(f"{path}: row {row}, column {column}: infinite; leave unseen points empty")
+    return value
 
 
 def _times(
@@ -135,7 +171,11 @@ def _times(
     rate_hz: float | None,
 ) -> Array:
     if rate_hz is None and "time_s" in column:
-        return table[:, column["time_s"]]
+        times_s = table[:, column["time_s"]]
+        late = np.flatnonzero(~(np.diff(times_s) > 0))
+        if len(late):
+            raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
+        return times_s
     stated = re.search(r"([0-9.]+) *Hz", " ".join(comments))
     rate_hz = rate_hz or (float(stated.group(1)) if stated else None)
     if not rate_hz or not rate_hz > 0:
@@ -167,7 +207,9 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
             values = [chain[key] for key in ("tilt_deg", "residual", "motion", "statistic", "threshold")]
             angles = chain["angle_deg"]
             bend = [np.nanmin(angles), np.nanmax(angles)] if np.isfinite(angles).any() else [np.nan] * 2
-            chains.append([str(number), label, chain["verdict"], *_cells([*chain["slope"], *values, *bend])])
+            margin = chain["reflection_margin_deg"]
+            numbers = [*chain["slope"], *values, *bend, np.nan if margin is None else margin]
+            chains.append([str(number), label, chain["verdict"], *_cells(numbers)])
             for link in chain["links"]:
                 a, b = link["points"]
                 numbers = [link[key] for key in ("length", "length_sd", "margin", "confidence")]
@@ -178,6 +220,7 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
     _write(written[1], ["window", "status", "a", "b", *link_numbers], links)
     chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]
     chain_header = ["window", "chain", "verdict", *chain_numbers, "least_angle_deg", "most_angle_deg"]
+    chain_header.append("reflection_margin_deg")
     _write(written[2], chain_header, chains)
     space = np.concatenate([points.positions, figure.depth[..., None]], axis=2)
     header = ["frame", "time_s", "source", *(f"{n}_{axis}_px" for n in points.names for axis in "uvz")]

@@ -16,7 +16,13 @@ from memo.figure import PlanarFigure, Points
 from memo.files import complete_file
 from memo.overlay import _h264
 
-__all__ = ["plot_linkage", "write_display_video", "write_linkage_png", "write_turned_video"]
+__all__ = [
+    "plot_linkage",
+    "write_display_video",
+    "write_linkage_png",
+    "write_turned_png",
+    "write_turned_video",
+]
 
 COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444")
 
@@ -75,15 +81,10 @@ def write_turned_video(
     """The display left, and right the limbs found in it seen from `turn_deg` to the side.
 
     Each chain's first point is drawn at depth 0: depths of chains against each other are not known, and
-    each chain may be reflected.
+    each open chain may be reflected.
     """
-    tracks, depth = points.positions, figure.depth
-    centre = np.nanmean(tracks, axis=1, keepdims=True)
-    level = np.nanmean(centre, axis=0, keepdims=True)
-    flat = tracks - centre + level * [0, 1]
-    turn = np.deg2rad(turn_deg)
-    turned = np.stack([flat[..., 0] * np.cos(turn) - depth * np.sin(turn), flat[..., 1]], axis=-1)
-    links_at = _links_by_frame(figure, len(tracks))
+    flat, turned = _turned(points, figure, turn_deg)
+    links_at = _links_by_frame(figure, len(flat))
     drawing = Figure(figsize=(9.6, 5.4), layout="constrained", facecolor="black")
     canvas = FigureCanvasAgg(drawing)
     left, right = drawing.subplots(1, 2)
@@ -99,7 +100,7 @@ def write_turned_video(
     left.set_title("as seen", color="white")
     (dots,) = left.plot([], [], "o", color="white", markersize=5)
     with complete_file(path) as temporary, _h264(str(temporary), _rate(points.times_s)) as write:
-        for frame in progress(range(len(tracks))):
+        for frame in progress(range(len(flat))):
             dots.set_data(flat[frame, :, 0], flat[frame, :, 1])
             for line in list(right.lines):
                 line.remove()
@@ -109,6 +110,40 @@ def write_turned_video(
             right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
             canvas.draw()
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
+
+
+def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any, Any]:
+    """The points held in place horizontally (T, K, 2), as seen and turned about the vertical."""
+    tracks, depth = points.positions, figure.depth
+    centre = np.nanmean(tracks, axis=1, keepdims=True)
+    flat = tracks - centre + np.nanmean(centre, axis=0, keepdims=True) * [0, 1]
+    turn = np.deg2rad(turn_deg)
+    return flat, np.stack([flat[..., 0] * np.cos(turn) - depth * np.sin(turn), flat[..., 1]], axis=-1)
+
+
+def write_turned_png(
+    path: str | PathLike[str], points: Points, figure: PlanarFigure, *, turn_deg: float = 50.0
+) -> None:
+    """Five instants of the first interpreted window: above as seen, below the limbs from `turn_deg` aside."""
+    flat, turned = _turned(points, figure, turn_deg)
+    window = figure.interpreted[0]
+    links_at = _links_by_frame(figure, len(flat))
+    drawing = Figure(figsize=(10, 6.5), layout="constrained")
+    FigureCanvasAgg(drawing)
+    grid = drawing.subplots(2, 5, sharex=True, sharey=True)
+    for column, frame in enumerate(np.linspace(window["start"], window["end"] - 1, 5).astype(int)):
+        for ax, places in zip(grid[:, column], (flat, turned), strict=True):
+            for index, a, b in links_at[frame]:
+                ends = places[frame, [a, b]]
+                ax.plot(ends[:, 0], ends[:, 1], "o-", color=COLOURS[index % len(COLOURS)], markersize=4)
+            ax.set(aspect="equal")
+            ax.set_axis_off()
+        grid[0, column].plot(flat[frame, :, 0], flat[frame, :, 1], "o", color="black", markersize=3)
+        grid[0, column].set_title(f"{points.times_s[frame]:.2f} s")
+        grid[1, column].set_title(f"turned {turn_deg:g} deg")
+    grid[0, 0].invert_yaxis()
+    with complete_file(path) as temporary:
+        drawing.savefig(temporary, dpi=110, format="png")
 
 
 def _links_by_frame(figure: PlanarFigure, frames: int) -> list[list[tuple[int, int, int]]]:

@@ -24,12 +24,13 @@ mod _memo {
     use super::camera::PyCamera;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    #[pymodule_export]
     use super::keypoints::{
         follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
         stick_joints,
     };
     #[pymodule_export]
-    use super::planar::planar;
+    use super::planar::{planar, planar_hinges, planar_rods};
     #[pymodule_export]
     use super::pointlight::{pointlight, walker_motion};
     #[pymodule_export]

@@ -5,20 +5,60 @@ use crate::error::value_error;
 use glam::DVec2;
 use memo_core::planar::{
     Chain, DepthSource, EvidenceOptions, FalseTargetRate, Figure, FigureOptions, FitOptions, Interpretation,
-    Method, Status, Undecided, Verdict, interpret_figure,
+    Method, Status, Undecided, Verdict, at_one_scale, hinge_depths, interpret_figure, interpret_named_figure,
+    joint_of, perspective_of_figure_px, rod_depths,
 };
+use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+/// z1, z2, z3 of N rods from three views each (N, 3, 2), image vectors from pivot to end; NaN where there is none.
+#[pyfunction]
+pub fn planar_rods<'py>(py: Python<'py>, views: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let (points, count, each) = motion_from_numpy::<2>(views)?;
+    if each != 3 {
+        return Err(PyValueError::new_err(format!("wanted three views of each rod, (N, 3, 2); got {each}")));
+    }
+    let problems: Vec<[DVec2; 3]> =
+        points.chunks_exact(3).map(|d| [0, 1, 2].map(|i| DVec2::from(d[i]))).collect();
+    let mut depths = vec![[0.0; 3]; count];
+    py.detach(|| rod_depths(&problems, &mut depths));
+    numpy_from_flat(py, depths.into_flattened(), vec![count, 3])
+}
+
+/// Depths of N hinges from two views each (N, 4, 2): image vectors from the pivot to the first end in both views, then
+/// to the second. (N, 4) in the same order; NaN where there is none.
+#[pyfunction]
+pub fn planar_hinges<'py>(
+    py: Python<'py>,
+    views: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let (points, count, each) = motion_from_numpy::<2>(views)?;
+    if each != 4 {
+        return Err(PyValueError::new_err(format!("wanted two ends in two views, (N, 4, 2); got {each}")));
+    }
+    let problems: Vec<[[DVec2; 2]; 2]> = points
+        .chunks_exact(4)
+        .map(|d| [[d[0], d[1]], [d[2], d[3]]].map(|end| end.map(DVec2::from)))
+        .collect();
+    let mut depths = vec![[0.0; 4]; count];
+    py.detach(|| hinge_depths(&problems, &mut depths));
+    numpy_from_flat(py, depths.into_flattened(), vec![count, 4])
+}
+
 /// Reads unnamed tracks (T, K, 2), NaN for unseen, as a linkage of limbs in planar motion.
 ///
+/// `names`: those of the points where they are joints (`RKN` or `right_knee`), so that joint limits tell limbs from
+/// their mirrors. `scales` (T,): scale of each frame, divided out. `focal_px`: focal length in pixels.
+///
 /// Returns windows (a list of dicts), depth (T, K) against the first point of each chain with NaN where unknown,
-/// and sources (T,) of "planar", "carried", "unknown".
+/// sources (T,) of "planar", "carried", "unknown", and perspective_px: by how much perspective moves a point at
+/// most, None without `focal_px`.
 #[pyfunction]
 #[pyo3(signature = (
     tracks, times_s, noise_px=0.0, *, window_s=1.2, size_px=None, carry=false, false_target_rate=0.01,
-    max_tilt_deg=80.0
+    max_tilt_deg=80.0, names=None, scales=None, focal_px=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keyword options")]
 pub fn planar<'py>(
@@ -31,6 +71,9 @@ pub fn planar<'py>(
     carry: bool,
     false_target_rate: f64,
     max_tilt_deg: f64,
+    names: Option<Vec<String>>,
+    scales: Option<Vec<f64>>,
+    focal_px: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (points, frames, count) = motion_from_numpy::<2>(tracks)?;
     let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
@@ -46,10 +89,24 @@ pub fn planar<'py>(
         carries_structure: carry,
         ..FigureOptions::default()
     };
-    let tracks: Vec<Vec<DVec2>> =
+    let mut tracks: Vec<Vec<DVec2>> =
         (0..count).map(|k| (0..frames).map(|t| DVec2::from(points[t * count + k])).collect()).collect();
-    let found = py.detach(|| interpret_figure(&tracks, &times_s, &options)).map_err(value_error)?;
-    dict_of(py, found, frames, count)
+    if let Some(scales) = scales {
+        for track in &mut tracks {
+            *track = at_one_scale(track, &scales).map_err(value_error)?;
+        }
+    }
+    let joints: Option<Vec<_>> = names.map(|names| names.iter().map(|name| joint_of(name)).collect());
+    let found = py
+        .detach(|| match &joints {
+            Some(joints) => interpret_named_figure(&tracks, joints, &times_s, &options),
+            None => interpret_figure(&tracks, &times_s, &options),
+        })
+        .map_err(value_error)?;
+    let perspective_px = focal_px.map(|focal_px| perspective_of_figure_px(&tracks, &found.depth, focal_px));
+    let result = dict_of(py, found, frames, count)?;
+    result.set_item("perspective_px", perspective_px)?;
+    Ok(result)
 }
 
 fn dict_of(
@@ -115,6 +172,7 @@ fn chain<'py>(py: Python<'py>, chain: &Chain) -> PyResult<Bound<'py, PyDict>> {
     row.set_item("slope", (chain.plane.p, chain.plane.q))?;
     row.set_item("tilt_deg", chain.plane.tilt_rad().to_degrees())?;
     row.set_item("residual", chain.residual_rms)?;
+    row.set_item("reflection_margin_deg", chain.reflection_margin_deg)?;
     row.set_item("verdict", verdict(chain.evidence.verdict))?;
     row.set_item("statistic", chain.evidence.statistic)?;
     row.set_item("threshold", chain.evidence.threshold)?;

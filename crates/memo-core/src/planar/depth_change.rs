@@ -132,6 +132,24 @@ pub fn perspective_error_px(offset_px: f64, depth_m: f64, distance_m: f64) -> f6
     }
 }
 
+/// By how much perspective moves a point of a figure at most, pixels: [`perspective_error_px`] of all points whose
+/// depth is known (T x K), about the middle of the figure, whose direction is that of the parallel rays.
+///
+/// In pixels at the figure's scale its distance **is** the focal length, so that is all that is asked for. NaN if
+/// no depth is known.
+pub fn perspective_of_figure_px(tracks: &[Vec<DVec2>], depth: &[f64], focal_px: f64) -> f64 {
+    let count = tracks.len().max(1);
+    let errors = depth.chunks(count).enumerate().flat_map(|(t, row)| {
+        let seen = || tracks.iter().filter_map(move |track| track.get(t)).filter(|p| p.is_finite());
+        let middle = seen().sum::<DVec2>() / seen().count().max(1) as f64;
+        tracks.iter().zip(row).filter_map(move |(track, z)| {
+            let offset = track.get(t)?.distance(middle);
+            Some(perspective_error_px(offset, *z, focal_px)).filter(|error| !error.is_nan())
+        })
+    });
+    errors.fold(f64::NAN, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,6 +216,9 @@ mod tests {
             let error: f64 = central_px - parallel_px;
             assert!((bound / error.abs() - 1.0).abs() < 0.07, "{bound} {error}");
         }
+        let tracks = [vec![DVec2::ZERO], vec![DVec2::new(80.0, 0.0)]];
+        assert!((perspective_of_figure_px(&tracks, &[0.0, 50.0], 1000.0) - 2.0).abs() < 1e-12);
+        assert!(perspective_of_figure_px(&tracks, &[f64::NAN; 2], 1000.0).is_nan());
         assert_eq!(perspective_error_px(100.0, 0.2, 0.0), f64::INFINITY);
         assert!(perspective_error_px(f64::NAN, 0.2, 3.0).is_nan());
     }

@@ -18,7 +18,10 @@ pub mod plane;
 pub mod rod;
 
 pub use batch::{hinge_depths, rod_depths};
-pub use depth_change::{RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px};
+pub use depth_change::{
+    RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px,
+    perspective_of_figure_px,
+};
 pub use evidence::{
     Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
     rod_evidence,

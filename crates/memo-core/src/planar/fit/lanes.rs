@@ -117,69 +117,106 @@ struct Terms<S: Simd> {
     m_y: Lanes<S>,
 }
 
+/// The slope, and constants, in every lane.
+struct At<S: Simd> {
+    p: Lanes<S>,
+    q: Lanes<S>,
+    floor: Lanes<S>,
+    half: Lanes<S>,
+    two: Lanes<S>,
+    four: Lanes<S>,
+}
+
+impl<S: Simd> At<S> {
+    /// Of image vectors (x, y) with a weight and a squared length c.
+    #[inline(always)]
+    fn terms(&self, [x, y, weight]: [Lanes<S>; 3], c: Lanes<S>) -> Terms<S> {
+        let (p, q) = (self.p, self.q);
+        let depth = p.times_plus(x, q * y);
+        let (m_x, m_y) = (depth.times_plus(p, x), depth.times_plus(q, y));
+        let by_w = self.half * m_x.times_plus(m_x, m_y.times_plus(m_y, self.floor)).inverse_root();
+        let r = (x.times_plus(x, y.times_plus(y, depth * depth)) - c) * by_w;
+        let (r_by, along) = (r * self.four * by_w, m_x.times_plus(p, m_y * q));
+        let (twice, by_w) = (self.two * depth, by_w * weight);
+        let by_p = (twice * x - r_by * along.times_plus(x, depth * m_x)) * by_w;
+        let by_q = (twice * y - r_by * along.times_plus(y, depth * m_y)) * by_w;
+        Terms { r: r * weight, by_p, by_q, by_c: self.floor - self.floor - by_w, m_x, m_y }
+    }
+}
+
+/// The sums so far.
+struct Total<S: Simd> {
+    cost: Lanes<S>,
+    right: [Lanes<S>; 4],
+    /// Lower triangle.
+    normal: [[Lanes<S>; 4]; 4],
+}
+
+impl<S: Simd> Total<S> {
+    /// Adds residuals and their derivatives by the first `unknowns` unknowns.
+    #[inline(always)]
+    fn add(&mut self, r: Lanes<S>, row: [Lanes<S>; 4], unknowns: usize) {
+        self.cost = r.times_plus(r, self.cost);
+        for i in 0..unknowns {
+            for j in 0..=i {
+                self.normal[i][j] = row[i].times_plus(row[j], self.normal[i][j]);
+            }
+            self.right[i] = self.right[i] - row[i] * r;
+        }
+    }
+}
+
 impl<const K: usize> pulp::WithSimd for Sums<'_, K> {
     type Output = NormalEquations;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> NormalEquations {
-        let all = |value: f64| Lanes::all(simd, value);
-        let (p, q, floor) = (all(self.solution.g.x), all(self.solution.g.y), all(self.floor_sq));
-        let (half, two, four) = (all(0.5), all(2.0), all(4.0));
-        let c = self.solution.c.map(all);
-        let columns: [[&[S::f64s]; 3]; K] = std::array::from_fn(|k| {
+        let zero = Lanes::all(simd, 0.0);
+        let at = At {
+            p: Lanes::all(simd, self.solution.g.x),
+            q: Lanes::all(simd, self.solution.g.y),
+            floor: Lanes::all(simd, self.floor_sq),
+            half: Lanes::all(simd, 0.5),
+            two: Lanes::all(simd, 2.0),
+            four: Lanes::all(simd, 4.0),
+        };
+        let (one, last) = (Lanes::all(simd, 1.0), K - 1);
+        let columns = [0, last].map(|k| {
             let Column { x, y, weight } = &self.columns.0[k];
-            [x, y, weight].map(|values| S::as_simd_f64s(values).0)
+            [S::as_simd_f64s(x).0, S::as_simd_f64s(y).0, S::as_simd_f64s(weight).0]
         });
-        // Inlined by force: a call would pass vectors through memory.
-        let terms = #[inline(always)]
-        |k: usize, i: usize| {
-            let [x, y, weight] = columns[k].map(|column| Lanes(simd, column[i]));
-            let depth = p.times_plus(x, q * y);
-            let (m_x, m_y) = (depth.times_plus(p, x), depth.times_plus(q, y));
-            let by_w = half * m_x.times_plus(m_x, m_y.times_plus(m_y, floor)).inverse_root();
-            let r = (x.times_plus(x, y.times_plus(y, depth * depth)) - c[k]) * by_w;
-            let (w_by, along) = (four * by_w, m_x.times_plus(p, m_y * q));
-            let (twice, by_w) = (two * depth, by_w * weight);
-            let by_p = (twice * x - r * w_by * along.times_plus(x, depth * m_x)) * by_w;
-            let by_q = (twice * y - r * w_by * along.times_plus(y, depth * m_y)) * by_w;
-            Terms { r: r * weight, by_p, by_q, by_c: all(0.0) - by_w, m_x, m_y }
-        };
-        let (mut cost, mut right, mut normal) = (all(0.0), [all(0.0); 4], [[all(0.0); 4]; 4]);
-        let mut add = #[inline(always)]
-        |r: Lanes<S>, row: [Lanes<S>; 4], unknowns: usize| {
-            cost = r.times_plus(r, cost);
-            for i in 0..unknowns {
-                for j in 0..=i {
-                    normal[i][j] = row[i].times_plus(row[j], normal[i][j]);
-                }
-                right[i] = right[i] - row[i] * r;
-            }
-        };
+        let c = [Lanes::all(simd, self.solution.c[0]), Lanes::all(simd, self.solution.c[last])];
+        let mut total = Total { cost: zero, right: [zero; 4], normal: [[zero; 4]; 4] };
         for i in 0..columns[0][0].len() {
-            let first = terms(0, i);
-            let first_row = [first.by_p, first.by_q, first.by_c, all(0.0)];
-            add(first.r, first_row, 3);
+            let [x, y, weight] = columns[0];
+            let a = at.terms([Lanes(simd, x[i]), Lanes(simd, y[i]), Lanes(simd, weight[i])], c[0]);
+            total.add(a.r, [a.by_p, a.by_q, a.by_c, zero], 3);
             if K == 2 {
-                let second = terms(1, i);
-                let correlation =
-                    two * first.m_x.times_plus(second.m_x, first.m_y * second.m_y) * first.by_c * second.by_c;
-                let sharpen = (all(1.0) - correlation * correlation).inverse_root();
-                let whitened = #[inline(always)]
-                |second: Lanes<S>, first: Lanes<S>| (second - correlation * first) * sharpen;
-                let row = [second.by_p, second.by_q, all(0.0), second.by_c];
+                let [x, y, weight] = columns[1];
+                let b = at.terms([Lanes(simd, x[i]), Lanes(simd, y[i]), Lanes(simd, weight[i])], c[1]);
+                let correlation = at.two * a.m_x.times_plus(b.m_x, a.m_y * b.m_y) * a.by_c * b.by_c;
+                let sharpen = (one - correlation * correlation).inverse_root();
                 let row = [
-                    whitened(row[0], first_row[0]),
-                    whitened(row[1], first_row[1]),
-                    whitened(row[2], first_row[2]),
-                    row[3] * sharpen,
+                    (b.by_p - correlation * a.by_p) * sharpen,
+                    (b.by_q - correlation * a.by_q) * sharpen,
+                    (zero - correlation * a.by_c) * sharpen,
+                    b.by_c * sharpen,
                 ];
-                add(whitened(second.r, first.r), row, 4);
+                total.add((b.r - correlation * a.r) * sharpen, row, 4);
             }
         }
-        let mut matrix = Matrix4::from_fn(|i, j| normal[i.max(j)][i.min(j)].sum());
+        let mut matrix = Matrix4::zeros();
+        let mut right = Vector4::zeros();
+        for i in 0..4 {
+            for j in 0..=i {
+                matrix[(i, j)] = total.normal[i][j].sum();
+                matrix[(j, i)] = matrix[(i, j)];
+            }
+            right[i] = total.right[i].sum();
+        }
         if K == 1 {
             matrix[(3, 3)] = 1.0;
         }
-        (cost.sum(), matrix, Vector4::from_fn(|i, _| right[i].sum()))
+        (total.cost.sum(), matrix, right)
     }
 }
