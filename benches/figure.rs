@@ -30,7 +30,7 @@ fn tracks(points: usize, frames: usize) -> (Vec<Vec<DVec2>>, Vec<f64>) {
 }
 
 fn figure(c: &mut Criterion) {
-    let fit = FitOptions { noise_sd: 1.0, ..FitOptions::default() };
+    let fit = FitOptions { noise_sd: 1.0, ..FigureOptions::default().fit };
     let evidence = EvidenceOptions::default();
     let options = FigureOptions { fit, ..FigureOptions::default() };
     for points in [12, 14, 16] {

@@ -155,7 +155,7 @@ fn links(figure: &Figure, shown: &[usize]) -> Vec<[usize; 2]> {
 }
 
 fn options(noise_px: f64) -> FigureOptions {
-    let fit = FitOptions { noise_sd: noise_px, ..FitOptions::default() };
+    let fit = FitOptions { noise_sd: noise_px, ..FigureOptions::default().fit };
     // One window whatever the stride.
     FigureOptions { fit, window_s: 100.0, ..FigureOptions::default() }
 }

@@ -38,7 +38,7 @@ fn named_limbs_have_the_reflection_of_the_walker() {
                 let tracks: Vec<Vec<DVec2>> =
                     seen.image.iter().map(|t| noisy(&in_px(t), noise_px, &mut random)).collect();
                 let times_s: Vec<f64> = (0..60).map(|t| t as f64 * walk.stride_s() / 60.0).collect();
-                let fit = FitOptions { noise_sd: noise_px, ..FitOptions::default() };
+                let fit = FitOptions { noise_sd: noise_px, ..FigureOptions::default().fit };
                 let options = FigureOptions { fit, window_s: 100.0, ..FigureOptions::default() };
                 let found = interpret_named_figure(&tracks, &joints, &times_s, &options).unwrap();
                 for chain in &found.windows[0].figure.chains {
@@ -150,7 +150,7 @@ fn seen_from(azimuth_rad: f64, elevation_rad: f64, random: &mut Random) -> (usiz
         let longest = (0..66).map(|t| clean[a][t].distance(clean[b][t])).fold(0.0, f64::max);
         longest / length([a, b])
     };
-    let fit = FitOptions { noise_sd: 1.0, ..FitOptions::default() };
+    let fit = FitOptions { noise_sd: 1.0, ..FigureOptions::default().fit };
     let options = FigureOptions { fit, ..FigureOptions::default() };
     let found = interpret_figure(&tracks, motion.times_s(), &options).unwrap();
     let links: Vec<_> = found.windows[0].figure.links().filter(|l| limbs.contains(&l.points)).collect();

@@ -82,7 +82,7 @@ pub fn planar<'py>(
         return Err(PyValueError::new_err(message));
     };
     let options = FigureOptions {
-        fit: FitOptions { noise_sd: noise_px, max_tilt_deg, ..FitOptions::default() },
+        fit: FitOptions { noise_sd: noise_px, max_tilt_deg, ..FigureOptions::default().fit },
         evidence: EvidenceOptions { rate, ..EvidenceOptions::default() },
         size: size_px,
         window_s,

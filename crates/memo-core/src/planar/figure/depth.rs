@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn a_spin_is_lost_and_found_again() {
         let (tracks, times_s, _) = walker(264, spin, 0.5);
-        let fit = FitOptions { noise_sd: 0.5, ..FitOptions::default() };
+        let fit = FitOptions { noise_sd: 0.5, ..FigureOptions::default().fit };
         let options = FigureOptions { fit, window_s: 0.9, ..FigureOptions::default() };
         let found = interpret_figure(&tracks, &times_s, &options).unwrap();
         let mut seen = Vec::new();

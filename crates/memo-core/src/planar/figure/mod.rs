@@ -22,6 +22,7 @@ mod depth;
 #[cfg(test)]
 mod example;
 mod group;
+mod jump;
 mod linkage;
 mod reflection;
 
@@ -35,6 +36,7 @@ use crate::posture::skeleton::Joint;
 use depth::depth_over_time;
 use glam::DVec2;
 use group::best_figure;
+use jump::without_jumps;
 use rayon::prelude::*;
 use reflection::reflect_by_anatomy;
 use thiserror::Error;
@@ -139,7 +141,8 @@ impl Default for Costs {
 /// How tracks are read as a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FigureOptions {
-    /// Options of the fits; `noise_sd` in the unit of the tracks.
+    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are taken out of the tracks
+    /// before, so that by default no fit seeks outliers again.
     pub fit: FitOptions,
     /// Rate of false targets of the verdicts.
     pub evidence: EvidenceOptions,
@@ -160,7 +163,7 @@ pub struct FigureOptions {
 impl Default for FigureOptions {
     fn default() -> Self {
         Self {
-            fit: FitOptions::default(),
+            fit: FitOptions { max_outlier_fraction: 0.0, ..FitOptions::default() },
             evidence: EvidenceOptions::default(),
             costs: Costs::default(),
             size: None,
@@ -226,11 +229,13 @@ pub fn interpret_figure(
     if !(size > 0.0 && size.is_finite()) {
         return Err(FigureError::NoExtent);
     }
+    let clean: Vec<Vec<DVec2>> =
+        tracks.iter().map(|track| without_jumps(track, options.fit.noise_sd)).collect();
     let ranges = windows(times_s, options.window_s);
     let windows: Vec<FigureWindow> = ranges
         .into_par_iter()
         .map(|(start, end)| {
-            let part: Vec<&[DVec2]> = tracks.iter().map(|track| &track[start..end]).collect();
+            let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
             let figure = best_figure(&part, size, options);
             let planar = figure.count(|v| v == Verdict::Planar);
             let refuted = figure.count(|v| v == Verdict::NotPlanar);
@@ -367,7 +372,7 @@ mod tests {
     fn threads_and_runs_do_not_change_the_figure() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 1.0);
         let options = FigureOptions {
-            fit: FitOptions { noise_sd: 1.0, ..FitOptions::default() },
+            fit: FitOptions { noise_sd: 1.0, ..FigureOptions::default().fit },
             ..FigureOptions::default()
         };
         let with = |threads| {

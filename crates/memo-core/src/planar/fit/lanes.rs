@@ -121,6 +121,7 @@ struct Terms<S: Simd> {
 struct At<S: Simd> {
     p: Lanes<S>,
     q: Lanes<S>,
+    zero: Lanes<S>,
     floor: Lanes<S>,
     half: Lanes<S>,
     two: Lanes<S>,
@@ -140,7 +141,7 @@ impl<S: Simd> At<S> {
         let (twice, by_w) = (self.two * depth, by_w * weight);
         let by_p = (twice * x - r_by * along.times_plus(x, depth * m_x)) * by_w;
         let by_q = (twice * y - r_by * along.times_plus(y, depth * m_y)) * by_w;
-        Terms { r: r * weight, by_p, by_q, by_c: self.floor - self.floor - by_w, m_x, m_y }
+        Terms { r: r * weight, by_p, by_q, by_c: self.zero - by_w, m_x, m_y }
     }
 }
 
@@ -175,6 +176,7 @@ impl<const K: usize> pulp::WithSimd for Sums<'_, K> {
         let at = At {
             p: Lanes::all(simd, self.solution.g.x),
             q: Lanes::all(simd, self.solution.g.y),
+            zero,
             floor: Lanes::all(simd, self.floor_sq),
             half: Lanes::all(simd, 0.5),
             two: Lanes::all(simd, 2.0),
