@@ -43,11 +43,12 @@ fn closed_forms(c: &mut Criterion) {
             black_box(&mut copies);
         });
     });
-    let hinges: Vec<[[DVec2; 2]; 2]> =
-        problems.iter().map(|[a, b, c]| [[*a, *b], [*c, 1.3 * *a + 0.2 * *c]]).collect();
+    let arrays: Vec<[[f64; 2]; 3]> = problems.iter().map(|d| d.map(|d| d.to_array())).collect();
+    let hinges: Vec<[[f64; 2]; 4]> =
+        problems.iter().map(|[a, b, c]| [*a, *b, *c, 1.3 * *a + 0.2 * *c].map(|d| d.to_array())).collect();
     let mut depths = vec![[0.0f64; 3]; PROBLEMS];
     group.bench_function("rods, bare depths", |b| {
-        b.iter(|| rod_depths(black_box(&problems), black_box(&mut depths)));
+        b.iter(|| rod_depths(black_box(&arrays), black_box(&mut depths)));
     });
     let mut hinge_rows = vec![[0.0f64; 4]; PROBLEMS];
     group.bench_function("hinges, bare depths", |b| {

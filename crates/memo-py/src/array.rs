@@ -4,8 +4,8 @@ use crate::error::value_error;
 use glam::DVec2;
 use memo_core::image::{Frame, Image, Mask};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
-    PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -165,6 +165,17 @@ pub fn motion_from_numpy<const D: usize>(
         frames,
         count,
     ))
+}
+
+/// Image vectors of shape (N, `each`, 2) in numpy's own memory, which must be contiguous.
+pub fn rows_from_numpy<'py>(points: &Bound<'py, PyAny>, each: usize) -> PyResult<PyReadonlyArray3<'py, f64>> {
+    let wanted =
+        format!("wanted image vectors: contiguous numpy array of shape (N, {each}, 2), dtype float64");
+    let array = points.cast::<PyArray3<f64>>().ok();
+    let Some(array) = array.filter(|a| a.shape()[1..] == [each, 2] && a.is_c_contiguous()) else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    Ok(array.try_readonly()?)
 }
 
 /// Flat values as an array of a shape.

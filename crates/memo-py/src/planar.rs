@@ -1,6 +1,6 @@
 //! Figures from planar motion.
 
-use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat};
+use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat, rows_from_numpy};
 use crate::error::value_error;
 use glam::DVec2;
 use memo_core::planar::{
@@ -16,15 +16,12 @@ use pyo3::types::{PyDict, PyList};
 /// z1, z2, z3 of N rods from three views each (N, 3, 2), image vectors from pivot to end; NaN where there is none.
 #[pyfunction]
 pub fn planar_rods<'py>(py: Python<'py>, views: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let (points, count, each) = motion_from_numpy::<2>(views)?;
-    if each != 3 {
-        return Err(PyValueError::new_err(format!("wanted three views of each rod, (N, 3, 2); got {each}")));
-    }
-    let problems: Vec<[DVec2; 3]> =
-        points.chunks_exact(3).map(|d| [0, 1, 2].map(|i| DVec2::from(d[i]))).collect();
-    let mut depths = vec![[0.0; 3]; count];
-    py.detach(|| rod_depths(&problems, &mut depths));
-    numpy_from_flat(py, depths.into_flattened(), vec![count, 3])
+    let views = rows_from_numpy(views, 3)?;
+    let views = views.as_slice()?;
+    let (problems, _) = views.as_chunks::<2>().0.as_chunks::<3>();
+    let mut depths = vec![[0.0; 3]; problems.len()];
+    py.detach(|| rod_depths(problems, &mut depths));
+    numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 3])
 }
 
 /// Depths of N hinges from two views each (N, 4, 2): image vectors from the pivot to the first end in both views, then
@@ -34,17 +31,12 @@ pub fn planar_hinges<'py>(
     py: Python<'py>,
     views: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let (points, count, each) = motion_from_numpy::<2>(views)?;
-    if each != 4 {
-        return Err(PyValueError::new_err(format!("wanted two ends in two views, (N, 4, 2); got {each}")));
-    }
-    let problems: Vec<[[DVec2; 2]; 2]> = points
-        .chunks_exact(4)
-        .map(|d| [[d[0], d[1]], [d[2], d[3]]].map(|end| end.map(DVec2::from)))
-        .collect();
-    let mut depths = vec![[0.0; 4]; count];
-    py.detach(|| hinge_depths(&problems, &mut depths));
-    numpy_from_flat(py, depths.into_flattened(), vec![count, 4])
+    let views = rows_from_numpy(views, 4)?;
+    let views = views.as_slice()?;
+    let (problems, _) = views.as_chunks::<2>().0.as_chunks::<4>();
+    let mut depths = vec![[0.0; 4]; problems.len()];
+    py.detach(|| hinge_depths(problems, &mut depths));
+    numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 4])
 }
 
 /// Reads unnamed tracks (T, K, 2), NaN for unseen, as a linkage of limbs in planar motion.

@@ -14,32 +14,29 @@
 //! [`hinge_from_two_views`](super::hinge_from_two_views). NaN says that there is no interpretation, or that the
 //! plane is parallel to the image, or that two views say the same.
 
-use glam::DVec2;
-
 /// Problems worked on together: their columns stay in the cache.
 const BLOCK: usize = 64;
 
-/// z1, z2, z3 of rods, `views[i]` from pivot to end in view i; NaN (all) where there is no rod. Or all with the
-/// other sign.
+/// z1, z2, z3 of rods, (x, y) from pivot to end view by view; NaN (all) where there is no rod. Or all with the other
+/// sign.
 ///
 /// # Panics
 /// If there are not as many depths as problems.
-pub fn rod_depths(problems: &[[DVec2; 3]], depths: &mut [[f64; 3]]) {
+pub fn rod_depths(problems: &[[[f64; 2]; 3]], depths: &mut [[f64; 3]]) {
     assert_eq!(problems.len(), depths.len(), "a row of depths for every problem");
-    let pairs = |d: &[DVec2; 3]| [d[0], d[1], d[0], d[2]];
-    let lift = |g: DVec2, d: &[DVec2; 3]| [g.dot(d[0]), g.dot(d[1]), g.dot(d[2])];
+    let pairs = |d: &[[f64; 2]; 3]| [d[0], d[1], d[0], d[2]];
+    let lift = |[p, q]: [f64; 2], d: &[[f64; 2]; 3]| d.map(|[x, y]| p * x + q * y);
     pulp::Arch::new().dispatch(Blocks { problems, depths, pairs, lift });
 }
 
-/// Depths of hinges, `[end][view]` from the pivot, in the same order: both views of the first end, then of the
-/// second; NaN (all) where there is no hinge. Or all with the other sign.
+/// Depths of hinges, (x, y) from the pivot to the first end in both views, then to the second, in the same order; NaN (all) where there is no hinge. Or all with the other sign.
 ///
 /// # Panics
 /// If there are not as many depths as problems.
-pub fn hinge_depths(problems: &[[[DVec2; 2]; 2]], depths: &mut [[f64; 4]]) {
+pub fn hinge_depths(problems: &[[[f64; 2]; 4]], depths: &mut [[f64; 4]]) {
     assert_eq!(problems.len(), depths.len(), "a row of depths for every problem");
-    let pairs = |[a, b]: &[[DVec2; 2]; 2]| [a[0], a[1], b[0], b[1]];
-    let lift = |g: DVec2, [a, b]: &[[DVec2; 2]; 2]| [g.dot(a[0]), g.dot(a[1]), g.dot(b[0]), g.dot(b[1])];
+    let pairs = |d: &[[f64; 2]; 4]| *d;
+    let lift = |[p, q]: [f64; 2], d: &[[f64; 2]; 4]| d.map(|[x, y]| p * x + q * y);
     pulp::Arch::new().dispatch(Blocks { problems, depths, pairs, lift });
 }
 
@@ -51,7 +48,7 @@ struct Blocks<'a, P, Z, Pairs, Lift> {
     lift: Lift,
 }
 
-impl<P, Z, Pairs: Fn(&P) -> [DVec2; 4], Lift: Fn(DVec2, &P) -> Z> pulp::WithSimd
+impl<P, Z, Pairs: Fn(&P) -> [[f64; 2]; 4], Lift: Fn([f64; 2], &P) -> Z> pulp::WithSimd
     for Blocks<'_, P, Z, Pairs, Lift>
 {
     type Output = ();
@@ -62,14 +59,14 @@ impl<P, Z, Pairs: Fn(&P) -> [DVec2; 4], Lift: Fn(DVec2, &P) -> Z> pulp::WithSimd
         let mut slopes = [[0.0f64; BLOCK]; 2];
         for (problems, depths) in self.problems.chunks(BLOCK).zip(self.depths.chunks_mut(BLOCK)) {
             for (i, problem) in problems.iter().enumerate() {
-                for (k, d) in (self.pairs)(problem).into_iter().enumerate() {
-                    columns[2 * k][i] = d.x;
-                    columns[2 * k + 1][i] = d.y;
+                for (k, [x, y]) in (self.pairs)(problem).into_iter().enumerate() {
+                    columns[2 * k][i] = x;
+                    columns[2 * k + 1][i] = y;
                 }
             }
             slopes_of_columns(&columns, &mut slopes);
             for (i, (problem, z)) in problems.iter().zip(depths).enumerate() {
-                *z = (self.lift)(DVec2::new(slopes[0][i], slopes[1][i]), problem);
+                *z = (self.lift)([slopes[0][i], slopes[1][i]], problem);
             }
         }
     }
@@ -105,9 +102,10 @@ mod tests {
     use super::*;
     use crate::planar::{hinge_from_two_views, rod_from_three_views};
     use crate::synth::Random;
+    use glam::DVec2;
 
-    fn vectors<const N: usize>(random: &mut Random) -> [DVec2; N] {
-        [(); N].map(|()| DVec2::from_array(random.normal_pair().map(f64::from)))
+    fn vectors<const N: usize>(random: &mut Random) -> [[f64; 2]; N] {
+        [(); N].map(|()| random.normal_pair().map(f64::from))
     }
 
     /// Depths over the size of the problem against those of the careful solution, up to the mirror.
@@ -119,12 +117,12 @@ mod tests {
     #[test]
     fn rods_are_those_of_the_careful_solution() {
         let mut random = Random::new(4);
-        let problems: Vec<[DVec2; 3]> = (0..5003).map(|_| vectors(&mut random)).collect();
+        let problems: Vec<[[f64; 2]; 3]> = (0..5003).map(|_| vectors(&mut random)).collect();
         let mut depths = vec![[0.0; 3]; problems.len()];
         rod_depths(&problems, &mut depths);
         let (mut same, mut refused) = (0, 0);
         for (problem, z) in problems.iter().zip(&depths) {
-            match rod_from_three_views(problem) {
+            match rod_from_three_views(&problem.map(DVec2::from)) {
                 Ok(rod) if rod.condition < 1e4 => {
                     assert!(is_near(z, &rod.depth, 1e-9 * rod.length), "{problem:?} {z:?} {rod:?}");
                     same += 1;
@@ -142,14 +140,14 @@ mod tests {
     #[test]
     fn hinges_are_those_of_the_careful_solution() {
         let mut random = Random::new(5);
-        let mut hinge = || -> [[DVec2; 2]; 2] { [vectors(&mut random), vectors(&mut random)] };
-        let mut problems: Vec<[[DVec2; 2]; 2]> = (0..5000).map(|_| hinge()).collect();
-        problems.push([[DVec2::NAN; 2], [DVec2::ONE; 2]]);
-        problems.push([[DVec2::ZERO; 2]; 2]);
+        let mut problems: Vec<[[f64; 2]; 4]> = (0..5000).map(|_| vectors(&mut random)).collect();
+        problems.push([[f64::NAN; 2], [1.0; 2], [2.0; 2], [0.0, 1.0]]);
+        problems.push([[0.0; 2]; 4]);
         let mut depths = vec![[0.0; 4]; problems.len()];
         hinge_depths(&problems, &mut depths);
-        for ([first, second], z) in problems.iter().zip(&depths) {
-            match hinge_from_two_views(first, second) {
+        for (problem, z) in problems.iter().zip(&depths) {
+            let [first, second] = [0, 2].map(|k| [problem[k], problem[k + 1]].map(DVec2::from));
+            match hinge_from_two_views(&first, &second) {
                 Ok(hinge) if hinge.condition < 1e4 => {
                     let [before, after] = hinge.depth;
                     let truth = [before[0], after[0], before[1], after[1]];

@@ -12,8 +12,9 @@ const JUMP: f64 = 10.0;
 
 /// The same track without jumps; `noise_sd` of each coordinate.
 ///
-/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A wrong position disturbs
-/// its neighbours' distances by half of its own, so the largest goes first.
+/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A foot that lands has a large
+/// one, but of at most half of |p_t+1 - p_t-1|: a jump is farther off than its neighbours are apart. A wrong position
+/// disturbs its neighbours' distances by half of its own, so the largest goes first.
 pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     let mut clean = track.to_vec();
     let off = |track: &[DVec2], t: usize| {
@@ -33,7 +34,9 @@ pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     let limit = JUMP * usual.max(1.44 * noise_sd);
     // Where a tenth would have to go, the track is rough, not wrong.
     for _ in 0..track.len() / 10 {
-        let distances = (0..clean.len()).map(|t| (off(&clean, t), t)).filter(|(d, _)| *d > limit);
+        let turns_back = |t: usize, d: f64| d > clean[t - 1].distance(clean[t + 1]);
+        let distances =
+            (0..clean.len()).map(|t| (off(&clean, t), t)).filter(|&(d, t)| d > limit && turns_back(t, d));
         let Some((_, worst)) = distances.max_by(|a, b| a.0.total_cmp(&b.0)) else { return clean };
         clean[worst] = DVec2::NAN;
     }
@@ -45,6 +48,12 @@ mod tests {
     use super::*;
     use crate::planar::figure::example::walker;
     use crate::synth::Random;
+
+    #[test]
+    fn a_foot_that_lands_is_no_jump() {
+        let track: Vec<DVec2> = (0..40).map(|t| DVec2::new(8.0 * f64::from(t.clamp(10, 20)), 0.0)).collect();
+        assert_eq!(without_jumps(&track, 0.0), track);
+    }
 
     #[test]
     fn jumps_go_and_walks_stay() {
