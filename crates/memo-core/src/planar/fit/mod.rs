@@ -210,8 +210,11 @@ impl<'a, const K: usize> Problem<'a, K> {
             return best;
         }
         // The moments' cost favours the limit more than the exact one does: look inside as well.
-        let inside = [0.55, 0.15].map(|part| self.refine(self.at_slope(part * best.g), 12));
-        inside.into_iter().fold(best, |best, other| if other.cost < best.cost { other } else { best })
+        let inside = [0.55, 0.15].map(|part| self.refine(self.at_slope(part * best.g), 4));
+        let rival = if inside[1].cost < inside[0].cost { inside[1] } else { inside[0] };
+        // What is still far off after some steps does not overtake.
+        let rival = if rival.cost < 1.5 * best.cost { self.refine(rival, 8) } else { rival };
+        if rival.cost < best.cost { rival } else { best }
     }
 
     /// Levenberg-Marquardt on (u, c) with g = limit u / sqrt(1 + |u|^2), which keeps the slope within its limit.
@@ -259,7 +262,7 @@ impl<'a, const K: usize> Problem<'a, K> {
                 (cost, normal, right) = (next_cost, next_normal, next_right);
                 best = Solution { cost, ..next };
                 damping = (0.1 * damping).max(1e-15);
-                if gain < 1e-5 {
+                if gain < 1e-4 {
                     break;
                 }
             } else {
