@@ -75,6 +75,72 @@ def test_points_files_are_read_as_written(tmp_path):
         figure.read_points_csv(tmp_path / "dots.csv", 3)
 
 
+def test_names_tell_limbs_from_their_mirrors():
+    shown = display(azimuth_deg=30, noise_sd_px=0.5)
+    tracks = shown["positions_px"][:, :12]
+    names = walk()["names"][:12]
+    found = memo.planar(tracks, shown["times_s"], 0.5, names=names, focal_px=1500.0)
+    chains = found.windows[0]["chains"]
+    assert all(chain["reflection_margin_deg"] > 0 for chain in chains)
+    # Seen from the walker's right and rear: who walks to the right also walks away.
+    assert all(chain["slope"][0] * chains[0]["slope"][0] > 0 for chain in chains)
+    assert 0 < found.perspective_px < 20
+    # The mirror image of a walker is a walker with the sides exchanged.
+    exchanged = [("L" if name[0] == "R" else "R") + name[1:] for name in names]
+    again = memo.planar(tracks * [-1, 1], shown["times_s"], 0.5, names=exchanged).windows[0]["chains"]
+    assert all(chain["slope"][0] * chains[0]["slope"][0] < 0 for chain in again)
+    with pytest.raises(ValueError, match="11 names"):
+        memo.planar(tracks, shown["times_s"], 0.5, names=names[:11])
+
+
+def test_scales_are_divided_out():
+    shown = display(azimuth_deg=30)
+    scales = np.linspace(0.8, 1.25, 66)
+    plain = memo.planar(shown["positions_px"], shown["times_s"])
+    scaled = memo.planar(shown["positions_px"] * scales[:, None, None], shown["times_s"], scales=scales)
+    assert [link[:2] for link in plain.links()] == [link[:2] for link in scaled.links()]
+    assert np.allclose([link[2] for link in plain.links()], [link[2] for link in scaled.links()], rtol=1e-6)
+    with pytest.raises(ValueError, match="scale"):
+        memo.planar(shown["positions_px"], shown["times_s"], scales=scales[:5])
+
+
+def test_closed_forms_lift_planted_rods_and_hinges():
+    angles = np.random.default_rng(3).uniform(0, 2 * np.pi, (500, 4))
+    points = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    plane = np.array([0.6, -0.9])
+    normal = np.sqrt(1 + plane @ plane)
+    along = plane / np.linalg.norm(plane)
+    views = points - np.outer((points @ along).ravel(), along).reshape(points.shape) * (1 - 1 / normal)
+    for depth, given in (
+        (memo.planar_rods(views[:, :3].copy()), views[:, :3]),
+        (memo.planar_hinges(views), views),
+    ):
+        truth = given @ plane
+        error = np.minimum(np.abs(depth - truth).max(axis=1), np.abs(depth + truth).max(axis=1))
+        assert np.nanmedian(error) < 1e-10
+        assert np.isnan(error).mean() < 0.02
+    with pytest.raises(ValueError, match=r"\(N, 3, 2\)"):
+        memo.planar_rods(views)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("time_s,a_u_px,a_v_px\n0,1,x\n", "column a_v_px: x is no number"),
+        ("time_s,a_u_px,a_v_px\n0,1,2\n0,1,2\n", "column time_s: times must increase"),
+        ("time_s,a_u_px,b_v_px\n0,1,2\n", "point a has no column a_v_px"),
+        ("time_s,a_u_px,a_v_px\n0,1\n", "row 0 has 2 cells"),
+        ("time_s,a_u_px,a_v_px\n0,1,inf\n", "row 0, column a_v_px: infinite"),
+        ("time_s,a,b\n0,1,2\n", "no columns NAME_u_px"),
+        ("time_s,a_u_px,a_u_px\n0,1,2\n", "column a_u_px occurs 2 times"),
+    ],
+)
+def test_bad_tracks_are_named(tmp_path, text, part):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(ValueError, match=part):
+        figure.read_points_csv(tmp_path / "bad.csv", 2)
+
+
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "memo.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
