@@ -169,6 +169,18 @@ pub struct HingeFit {
     pub at_tilt_limit: bool,
 }
 
+impl HingeFit {
+    /// Standard deviation of the depth of an end at an image vector from the pivot (first order): of the plane, and
+    /// of the noise `noise_sd` of each coordinate of both points.
+    pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
+        let c = &self.covariance;
+        let of_plane = c[(0, 0)] * image.x * image.x
+            + 2.0 * c[(0, 1)] * image.x * image.y
+            + c[(1, 1)] * image.y * image.y;
+        (of_plane + 2.0 * noise_sd * noise_sd * self.plane.slope().length_squared()).sqrt()
+    }
+}
+
 /// Fits a hinge in planar motion to views of its ends and pivot (any translation; NaN = not seen).
 ///
 /// # Errors

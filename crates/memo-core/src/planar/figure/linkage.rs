@@ -44,7 +44,7 @@ pub struct Chain {
     /// Or all with the other sign.
     pub depth: Vec<Vec<f64>>,
     /// By how many degrees its joints keep their ranges better than those of its mirror; `None` where the
-    /// reflection is open. See [`reflection`](super::joint_of).
+    /// reflection is open. See [`interpret_named_figure`](super::interpret_named_figure).
     pub reflection_margin_deg: Option<f64>,
     /// Angle at the pivot frame by frame, radians, π = straight; empty for a rod. The mirror has the same.
     pub angle_rad: Vec<f64>,

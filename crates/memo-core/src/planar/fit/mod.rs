@@ -456,7 +456,7 @@ mod tests {
         let mut random = Random::new(5);
         let sd = 0.004;
         let mut squares = [0.0; 4];
-        let mut residual = 0.0;
+        let (mut residual, mut depth) = (0.0, 0.0);
         let draws = 400;
         for _ in 0..draws {
             let slope = random.uniform(0.5, 1.5) * DVec2::from_angle(random.uniform(-1.4, 1.4));
@@ -473,10 +473,15 @@ mod tests {
             for (i, (square, error)) in squares.iter_mut().zip(errors).enumerate() {
                 *square += error * error / fit.covariance[(i, i)] / draws as f64;
             }
+            let image = b[0] - o[0];
+            let error = (sign * fit.plane.slope() - slope).dot(image);
+            depth += (error / fit.depth_sd(image, 0.0)).powi(2) / draws as f64;
+            assert!(fit.depth_sd(image, sd) > fit.depth_sd(image, 0.0));
             residual += fit.residual_rms * fit.residual_rms / (2.0 * sd * sd) / draws as f64;
         }
         println!("normalised variances of p, q, lengths: {squares:?}; of residuals {residual}");
         assert!(squares.iter().all(|s| (0.75..1.3).contains(s)), "{squares:?}");
+        assert!((0.75..1.3).contains(&depth), "{depth}");
         // 80 residuals, 4 unknowns, correlated by half at most.
         assert!((0.88..1.0).contains(&residual), "{residual}");
     }
