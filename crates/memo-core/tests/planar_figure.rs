@@ -1,10 +1,11 @@
 //! Unnamed joints of real walks, linked by planar motion.
 //!
-//! Motion capture seen orthographically from 15 to 60 degrees off the side at 200 px/m, windows of a stride, with
-//! 0, 1 and 2 px of noise; also with two unrelated points added, or one joint missing. The eight limb links
-//! count; links inside the trunk (shoulders, hips, head) count neither way. The data are not part of this
-//! repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`; without it the tests say so and
-//! pass. `MEMO_FULL=1` takes all walks, views and windows instead of every fourth; `--nocapture` prints the table.
+//! Motion capture seen orthographically from 15 to 60 degrees off the side at 200 px/m, windows of a stride,
+//! with 0, 1 and 2 px of noise; also with two unrelated points added, or one joint missing. The eight limb
+//! links count; links inside the trunk (shoulders, hips, head) count neither way. The data are not part of
+//! this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`; without it the tests say
+//! so and pass. `MEMO_FULL=1` takes all walks, views and windows instead of every fourth; `--nocapture`
+//! prints the table.
 
 mod mocap;
 

@@ -1,4 +1,5 @@
-//! Legs of motion capture, one stride, orthographic, 15 to 60 degrees off the side: lengths, depths and links.
+//! Legs of motion capture, one stride, orthographic, 15 to 60 degrees off the side: lengths, depths and
+//! links.
 //!
 //! Run with `--nocapture` for the figures.
 

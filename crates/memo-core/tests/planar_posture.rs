@@ -1,8 +1,8 @@
-//! What the planarity assumption gives on recorded motion beyond links: the reflection of named limbs, arms that
-//! leave their planes, limbs that never reach full extension.
+//! What the planarity assumption gives on recorded motion beyond links: the reflection of named limbs, arms
+//! that leave their planes, limbs that never reach full extension.
 //!
-//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`; without
-//! it the tests say so and pass. `--nocapture` prints the figures.
+//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`;
+//! without it the tests say so and pass. `--nocapture` prints the figures.
 
 mod mocap;
 
@@ -134,8 +134,8 @@ fn punching_arms_get_no_interpretation() {
     }
 }
 
-/// The model walking seen from a direction, 1 px of noise: limb links found, relative errors of their lengths, and
-/// the longest image of a limb over its length.
+/// The model walking seen from a direction, 1 px of noise: limb links found, relative errors of their
+/// lengths, and the longest image of a limb over its length.
 fn seen_from(azimuth_rad: f64, elevation_rad: f64, random: &mut Random) -> (usize, Vec<f64>, f64) {
     let body = Body::from_height(1.75).unwrap();
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };

@@ -1,8 +1,9 @@
 //! Rates at which hinges and rods pass as planar: unrelated points, true limbs, false groups of one body.
 //!
-//! The thresholds of `planar::evidence` were chosen on other draws: strides, directions, joints and offsets of the
-//! same four walkers, all pairs. The table keeps the pairs of one laboratory each apart from the other four.
-//! Four walkers are few, so a rate is good to about one part in three. Run with `--nocapture` for the tables.
+//! The thresholds of `planar::evidence` were chosen on other draws: strides, directions, joints and offsets
+//! of the same four walkers, all pairs. The table keeps the pairs of one laboratory each apart from the other
+//! four. Four walkers are few, so a rate is good to about one part in three. Run with `--nocapture` for the
+//! tables.
 
 mod mocap;
 

@@ -1,24 +1,25 @@
 //! Depths of many rods from three views each, or hinges from two, and nothing else.
 //!
-//! Hoffman and Flinchbaugh 1982, Propositions 1 and 2, by Horn's ellipse (footnote 14). Both give two pairs of image
-//! vectors of which each belongs to one length: |a|^2 + (g.a)^2 = |b|^2 + (g.b)^2. So M = I + g g' is
-//! perpendicular to two differences of (x^2, 2 x y, y^2), and
+//! Hoffman and Flinchbaugh 1982, Propositions 1 and 2, by Horn's ellipse (footnote 14). Both give two pairs
+//! of image vectors of which each belongs to one length: |a|^2 + (g.a)^2 = |b|^2 + (g.b)^2. So M = I + g g'
+//! is perpendicular to two differences of (x^2, 2 x y, y^2), and
 //!
 //! ```text
 //! (A, B, C) = k (1 + p^2, p q, 1 + q^2)    k = (A + C)/2 - sqrt((A - C)^2/4 + B^2), its smaller eigenvalue
 //! g = (A - k, B) / sqrt(k (A - k)) = (B, C - k) / sqrt(k (C - k))
 //! ```
 //!
-//! Not polished, with no word on conditioning: k cancels where the plane is seen nearly edge-on (three times the
-//! digits that the problem loses). Where that matters take [`rod_from_three_views`](super::rod_from_three_views) and
-//! [`hinge_from_two_views`](super::hinge_from_two_views). NaN says that there is no interpretation, or that the
-//! plane is parallel to the image, or that two views say the same.
+//! Not polished, with no word on conditioning: k cancels where the plane is seen nearly edge-on (three times
+//! the digits that the problem loses). Where that matters take
+//! [`rod_from_three_views`](super::rod_from_three_views) and
+//! [`hinge_from_two_views`](super::hinge_from_two_views). NaN says that there is no interpretation, or that
+//! the plane is parallel to the image, or that two views say the same.
 
 /// Problems worked on together: their columns stay in the cache.
 const BLOCK: usize = 64;
 
-/// z1, z2, z3 of rods, (x, y) from pivot to end view by view; NaN (all) where there is no rod. Or all with the other
-/// sign.
+/// z1, z2, z3 of rods, (x, y) from pivot to end view by view; NaN (all) where there is no rod. Or all with
+/// the other sign.
 ///
 /// # Panics
 /// If there are not as many depths as problems.
@@ -29,7 +30,8 @@ pub fn rod_depths(problems: &[[[f64; 2]; 3]], depths: &mut [[f64; 3]]) {
     pulp::Arch::new().dispatch(Blocks { problems, depths, pairs, lift });
 }
 
-/// Depths of hinges, (x, y) from the pivot to the first end in both views, then to the second, in the same order; NaN (all) where there is no hinge. Or all with the other sign.
+/// Depths of hinges, (x, y) from the pivot to the first end in both views, then to the second, in the same
+/// order; NaN (all) where there is no hinge. Or all with the other sign.
 ///
 /// # Panics
 /// If there are not as many depths as problems.

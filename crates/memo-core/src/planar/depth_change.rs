@@ -116,9 +116,9 @@ pub fn fit_hinge_in_depth(
 
 /// Error of a joint's image, pixels, from taking central projection for scaled parallel projection.
 ///
-/// A joint that lies `depth_m` behind or before its pivot at `distance_m`, seen `offset_px` from the principal
-/// point: X f / (Z + z) against X f / Z differ by offset z / Z. Compare it with the noise: where it is larger,
-/// expect residuals of that size.
+/// A joint that lies `depth_m` behind or before its pivot at `distance_m`, seen `offset_px` from the
+/// principal point: X f / (Z + z) against X f / Z differ by offset z / Z. Compare it with the noise: where it
+/// is larger, expect residuals of that size.
 ///
 /// First order in depth over distance. Infinite for distances that are not positive; NaN for NaN.
 pub fn perspective_error_px(offset_px: f64, depth_m: f64, distance_m: f64) -> f64 {
@@ -132,11 +132,12 @@ pub fn perspective_error_px(offset_px: f64, depth_m: f64, distance_m: f64) -> f6
     }
 }
 
-/// By how much perspective moves a point of a figure at most, pixels: [`perspective_error_px`] of all points whose
-/// depth is known (T x K), about the middle of the figure, whose direction is that of the parallel rays.
+/// By how much perspective moves a point of a figure at most, pixels: [`perspective_error_px`] of all points
+/// whose depth is known (T x K), about the middle of the figure, whose direction is that of the parallel
+/// rays.
 ///
-/// In pixels at the figure's scale its distance **is** the focal length, so that is all that is asked for. NaN if
-/// no depth is known.
+/// In pixels at the figure's scale its distance **is** the focal length, so that is all that is asked for.
+/// NaN if no depth is known.
 pub fn perspective_of_figure_px(tracks: &[Vec<DVec2>], depth: &[f64], focal_px: f64) -> f64 {
     let count = tracks.len().max(1);
     let errors = depth.chunks(count).enumerate().flat_map(|(t, row)| {

@@ -11,8 +11,8 @@
 //! limbs leave their plane, relative to that motion. A tolerance relative to the length instead would accept
 //! every point that hardly moves.
 //!
-//! The rates are against **unrelated** motions: joints of different walkers, one stride, 8 to 60 views. Points of
-//! one body are related, and some false triples of one body are nearly planar hinges (see
+//! The rates are against **unrelated** motions: joints of different walkers, one stride, 8 to 60 views.
+//! Points of one body are related, and some false triples of one body are nearly planar hinges (see
 //! `tests/planar_rates.rs` for both rates): which of several readings of a body holds is for the whole figure
 //! to say.
 
@@ -111,9 +111,9 @@ struct Calibration {
     five_percent: f64,
 }
 
-/// From strides of pairs of walkers and 0 to 2 px of noise at 200 px/m, 3000 draws for each number of views and
-/// noise: 0.1 to 0.9 % (0.3 to 3.6 %) of unrelated triples pass, most at 2 px and 8 or 15 views; true hinges
-/// pass in 60 to 80 % (75 to 91 %) at 0 and 1 px or 60 views, in 55 % (85 %) of 15 views at 2 px.
+/// From strides of pairs of walkers and 0 to 2 px of noise at 200 px/m, 3000 draws for each number of views
+/// and noise: 0.1 to 0.9 % (0.3 to 3.6 %) of unrelated triples pass, most at 2 px and 8 or 15 views; true
+/// hinges pass in 60 to 80 % (75 to 91 %) at 0 and 1 px or 60 views, in 55 % (85 %) of 15 views at 2 px.
 const HINGE: Calibration = Calibration {
     departure: 0.09,
     motion_by_noise: 2.5,

@@ -1,7 +1,7 @@
 //! The first two steps of the interpretation scheme: all groups of two and three points, each tested.
 //!
-//! Hoffman and Flinchbaugh 1982, section 6: "(1) divide the image into groups of two or three elements each, (2) test
-//! each group for pairwise-rigid planar motion, (3) combine the results". Combining is
+//! Hoffman and Flinchbaugh 1982, section 6: "(1) divide the image into groups of two or three elements each,
+//! (2) test each group for pairwise-rigid planar motion, (3) combine the results". Combining is
 //! [`interpret_figure`](super::interpret_figure).
 
 use super::{

@@ -1,17 +1,17 @@
 //! A hinge: three points, two rods that share a pivot and a plane.
 //!
-//! Source: Hoffman and Flinchbaugh 1982, Proposition 2 and appendix 2, eqs. (1)-(8); the paper leaves the proof
-//! of uniqueness out. With the plane z = p x + q y, eqs. (7) and (8) hold by themselves, and (5), (6) become
-//! two quadratic forms in (p, q), one a rod, a_1 and a_2 being the image vectors of the two views:
+//! Source: Hoffman and Flinchbaugh 1982, Proposition 2 and appendix 2, eqs. (1)-(8); the paper leaves the
+//! proof of uniqueness out. With the plane z = p x + q y, eqs. (7) and (8) hold by themselves, and (5), (6)
+//! become two quadratic forms in (p, q), one a rod, a_1 and a_2 being the image vectors of the two views:
 //!
 //! ```text
 //! (1 + p^2) X + 2 p q Y + (1 + q^2) Z = 0    X = x1^2 - x2^2, Y = x1 y1 - x2 y2, Z = y1^2 - y2^2
 //! ```
 //!
-//! Taking X + Z of one times the other away leaves one homogeneous quadratic in (p, q). Written in the ellipse
-//! (A, B, C) = (1 + p^2, p q, 1 + q^2) both are linear and homogeneous, so (A, B, C) is the cross product of
-//! the two rows (X, 2 Y, Z): one plane up to the mirror, or none if the form is indefinite, unless the rows are
-//! parallel. That is the proof.
+//! Taking X + Z of one times the other away leaves one homogeneous quadratic in (p, q). Written in the
+//! ellipse (A, B, C) = (1 + p^2, p q, 1 + q^2) both are linear and homogeneous, so (A, B, C) is the cross
+//! product of the two rows (X, 2 Y, Z): one plane up to the mirror, or none if the form is indefinite, unless
+//! the rows are parallel. That is the proof.
 //!
 //! What it cannot do: two views have as many equations as unknowns, and a third of unrelated triples get an
 //! interpretation: two views are evidence of nothing. [`fit_hinge`] takes more.
@@ -84,8 +84,8 @@ impl Hinge {
     }
 }
 
-/// The hinge of two views of three points: `first` and `second` hold each end's image vector from the pivot in
-/// the two views.
+/// The hinge of two views of three points: `first` and `second` hold each end's image vector from the pivot
+/// in the two views.
 ///
 /// # Errors
 /// A [`HingeRefusal`].
@@ -170,8 +170,8 @@ pub struct HingeFit {
 }
 
 impl HingeFit {
-    /// Standard deviation of the depth of an end at an image vector from the pivot (first order): of the plane, and
-    /// of the noise `noise_sd` of each coordinate of both points.
+    /// Standard deviation of the depth of an end at an image vector from the pivot (first order): of the
+    /// plane, and of the noise `noise_sd` of each coordinate of both points.
     pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
         let c = &self.covariance;
         let of_plane = c[(0, 0)] * image.x * image.x
@@ -288,8 +288,8 @@ mod tests {
 
     /// All planes by brute force: the zeros of the two quadratic forms along every direction of slope.
     ///
-    /// Along the direction u the first form fixes |g|^2 = -(X + Z) / (X ux^2 + 2 Y ux uy + Z uy^2); a plane is a
-    /// change of sign of the second form there.
+    /// Along the direction u the first form fixes |g|^2 = -(X + Z) / (X ux^2 + 2 Y ux uy + Z uy^2); a plane
+    /// is a change of sign of the second form there.
     fn planes_by_brute_force(first: &[DVec2; 2], second: &[DVec2; 2]) -> Vec<DVec2> {
         let form = |rod: &[DVec2; 2], g: DVec2| {
             let h = |d: DVec2| d.length_squared() + g.dot(d).powi(2);

@@ -1,19 +1,19 @@
 //! The same structure from positions and velocities instead of several views.
 //!
-//! Source: the continuous kind of input in fig. 2 of Hoffman and Flinchbaugh 1982, which the paper leaves open;
-//! the derivation is this. A rod's image vector d has d' M d = length^2 with M = I + g g', g = (p, q). Its time
-//! derivative has no length in it:
+//! Source: the continuous kind of input in fig. 2 of Hoffman and Flinchbaugh 1982, which the paper leaves
+//! open; the derivation is this. A rod's image vector d has d' M d = length^2 with M = I + g g', g = (p, q).
+//! Its time derivative has no length in it:
 //!
 //! ```text
 //! d' M v = 0:    (1 + p^2) x vx + p q (x vy + y vx) + (1 + q^2) y vy = 0
 //! ```
 //!
-//! One linear, homogeneous equation in (1 + p^2, p q, 1 + q^2) for every rod and instant. Two of them determine
-//! the plane up to its mirror: **one instant of a hinge, or two of a rod**, as two views of a hinge and three of
-//! a rod. A rod's two instants must differ in direction.
+//! One linear, homogeneous equation in (1 + p^2, p q, 1 + q^2) for every rod and instant. Two of them
+//! determine the plane up to its mirror: **one instant of a hinge, or two of a rod**, as two views of a hinge
+//! and three of a rod. A rod's two instants must differ in direction.
 //!
-//! What it cannot do: two equations are as many as unknowns and evidence of nothing. Velocities are differences
-//! of noisy positions: where views are at hand, [`fit_hinge`](super::fit_hinge) uses them better.
+//! What it cannot do: two equations are as many as unknowns and evidence of nothing. Velocities are
+//! differences of noisy positions: where views are at hand, [`fit_hinge`](super::fit_hinge) uses them better.
 
 use super::Plane;
 use super::fit::{form, slope_from_form};

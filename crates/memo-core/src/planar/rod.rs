@@ -10,13 +10,13 @@
 //! ```
 //!
 //! Two solutions are given: [`rod_by_paper`] eliminates as the paper does and meets its divisions by zero;
-//! [`rod_from_three_views`] orders the views so that they do not occur. [`rod_from_ellipse`] is Horn's: the end
-//! lies on A x^2 + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and
+//! [`rod_from_three_views`] orders the views so that they do not occur. [`rod_from_ellipse`] is Horn's: the
+//! end lies on A x^2 + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and
 //! |cos tilt| as the ratio of the axes. [`fit_rod`] takes any number of noisy views.
 //!
-//! The ellipse through three points is unique unless two of them are equal or opposite, and every plane has its
-//! own: so there is one plane up to the mirror. k1 = k2, which the paper counts as degenerate, is not: of the
-//! two roots x = 1 and x = -1 exactly one is real.
+//! The ellipse through three points is unique unless two of them are equal or opposite, and every plane has
+//! its own: so there is one plane up to the mirror. k1 = k2, which the paper counts as degenerate, is not: of
+//! the two roots x = 1 and x = -1 exactly one is real.
 //!
 //! What it cannot do: three views have as many equations as unknowns. About a third of unrelated point pairs
 //! have a "planar" interpretation, so three views are evidence of nothing.
@@ -117,9 +117,9 @@ pub const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// First-order bound of depth error over length, per relative error of the coordinates.
 ///
 /// Each of two equations, divided by length^2, errs by at most 4; so the slope errs by 4 sqrt(2) |J^-1|, and
-/// z = g . d by |d| times that plus |g| |d|. `rows` is J by the slope. The second derivatives are at most 4, so
-/// Kantorovich's condition for the first order to bound anything is 16 sqrt(2) |J^-1|^2 ROUNDING < 1/2; where
-/// it fails the bound is infinite.
+/// z = g . d by |d| times that plus |g| |d|. `rows` is J by the slope. The second derivatives are at most 4,
+/// so Kantorovich's condition for the first order to bound anything is 16 sqrt(2) |J^-1|^2 ROUNDING < 1/2;
+/// where it fails the bound is infinite.
 pub(super) fn condition(rows: [DVec2; 2], plane: Plane) -> f64 {
     let size = (rows[0].length_squared() + rows[1].length_squared()).sqrt();
     let slope_error = 4.0 * std::f64::consts::SQRT_2 * size / rows[0].perp_dot(rows[1]).abs();
@@ -129,7 +129,8 @@ pub(super) fn condition(rows: [DVec2; 2], plane: Plane) -> f64 {
 
 /// The rod of three views of two points, `views[i]` from pivot to end: eqs. (4)-(14).
 ///
-/// The views are ordered so that |k3| is largest, then of (4) and (5) the one with the larger constant is used.
+/// The views are ordered so that |k3| is largest, then of (4) and (5) the one with the larger constant is
+/// used.
 ///
 /// # Errors
 /// A [`RodRefusal`] other than K1Zero and K3Zero.
@@ -164,8 +165,8 @@ pub fn rod_by_paper(views: &[DVec2; 3]) -> Result<Rod, RodRefusal> {
     Rod::from_plane(views, Plane::from_slope(eliminate(views)?))
 }
 
-/// The rod of three views by Horn's ellipse: its form is perpendicular to (x_i^2 - x_j^2, 2 (x_i y_i - x_j y_j),
-/// y_i^2 - y_j^2) for two pairs of views.
+/// The rod of three views by Horn's ellipse: its form is perpendicular to (x_i^2 - x_j^2, 2 (x_i y_i - x_j
+/// y_j), y_i^2 - y_j^2) for two pairs of views.
 ///
 /// # Errors
 /// A [`RodRefusal`] other than K1Zero and K3Zero.
@@ -178,9 +179,9 @@ pub fn rod_from_ellipse(views: &[DVec2; 3]) -> Result<Rod, RodRefusal> {
 
 /// The slope whose ellipse gives both vectors of each pair the same length; none if there is none.
 ///
-/// The form is the cross product of the pairs' differences of (x^2, 2 x y, y^2). Near edge-on all image vectors
-/// nearly share a line; they are turned to it and stretched across it first, or the product loses three times
-/// the digits that the problem does.
+/// The form is the cross product of the pairs' differences of (x^2, 2 x y, y^2). Near edge-on all image
+/// vectors nearly share a line; they are turned to it and stretched across it first, or the product loses
+/// three times the digits that the problem does.
 pub(super) fn slope_of_pairs(pairs: [[DVec2; 2]; 2]) -> Option<DVec2> {
     let vectors = || pairs.iter().flatten();
     let longest =
@@ -200,8 +201,8 @@ pub(super) fn slope_of_pairs(pairs: [[DVec2; 2]; 2]) -> Option<DVec2> {
     Some(slope.x * along + slope.y * along.perp())
 }
 
-/// Newton steps on the two equations |a|^2 - |b|^2 + (g . a)^2 - (g . b)^2 = 0 while they help: the eliminations'
-/// products of squares cost digits that the equations have, most of them near edge-on.
+/// Newton steps on the two equations |a|^2 - |b|^2 + (g . a)^2 - (g . b)^2 = 0 while they help: the
+/// eliminations' products of squares cost digits that the equations have, most of them near edge-on.
 pub(super) fn polish(pairs: [[DVec2; 2]; 2], mut g: DVec2) -> DVec2 {
     let errors = |g: DVec2| {
         let error = |[a, b]: [DVec2; 2]| difference_of_squares(a, b) + g.dot(a - b) * g.dot(a + b);

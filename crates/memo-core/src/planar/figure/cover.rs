@@ -1,7 +1,7 @@
 //! Exact cover: the best way of dividing points into pieces, and how sure each piece is.
 //!
-//! Every subset of the points is looked at once (dynamic programming over bit masks), so both the least cost and
-//! the sum over all covers are exact. Time and memory grow with 2^points.
+//! Every subset of the points is looked at once (dynamic programming over bit masks), so both the least cost
+//! and the sum over all covers are exact. Time and memory grow with 2^points.
 
 /// Most points that are covered.
 pub const MOST_POINTS: usize = 16;

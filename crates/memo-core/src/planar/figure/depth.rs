@@ -56,8 +56,8 @@ fn same_chain(window: &FigureWindow, chain: &Chain) -> Option<usize> {
     window.figure.chains.iter().position(|other| other.points == chain.points)
 }
 
-/// For each chain of each window the sign that fits the same points in the window before where they overlap. What
-/// joint limits have told stays.
+/// For each chain of each window the sign that fits the same points in the window before where they overlap.
+/// What joint limits have told stays.
 fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
     let mut signs: Vec<Vec<f64>> = Vec::with_capacity(windows.len());
     for (index, window) in windows.iter().enumerate() {
@@ -81,13 +81,13 @@ fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
     signs
 }
 
-/// Goes on with the lengths of the chains that did not leave their planes through the frames before, between and
-/// after the windows.
+/// Goes on with the lengths of the chains that did not leave their planes through the frames before, between
+/// and after the windows.
 ///
-/// A link of length L and image vector d has |z| = sqrt(L^2 - |d|^2), or 0 where the image is too long. The signs
-/// are those of the path from the depths before to those after that accelerates least (sum of squared second
-/// differences). Where both ends are known they also choose the reflection after the gap, unless joint limits
-/// have. Where a link passes parallel to the image the two signs meet and the path may choose wrongly.
+/// A link of length L and image vector d has |z| = sqrt(L^2 - |d|^2), or 0 where the image is too long. The
+/// signs are those of the path from the depths before to those after that accelerates least (sum of squared
+/// second differences). Where both ends are known they also choose the reflection after the gap, unless joint
+/// limits have. Where a link passes parallel to the image the two signs meet and the path may choose wrongly.
 fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], depth: &mut [f64]) {
     let frames = tracks[0].len();
     for after in 0..=read.len() {
@@ -223,7 +223,8 @@ fn smoothest(sizes: &[f64], start: [f64; 2], end: Option<[f64; 2]>) -> (Vec<f64>
         choices.push([size, -size]);
     }
     choices.extend(end.into_iter().flatten().map(|z| [z; 2]));
-    // costs[i][j]: of the best path whose last two choices are i and j; came[t][i][j]: the choice before them.
+    // costs[i][j]: of the best path whose last two choices are i and j; came[t][i][j]: the choice before
+    // them.
     let mut costs = [[0.0f64; 2]; 2];
     let mut came: Vec<[[usize; 2]; 2]> = Vec::with_capacity(choices.len());
     for window in choices.windows(3) {

@@ -1,5 +1,5 @@
-//! The groups of a window: all rods and hinges that may be part of the figure, what they cost, and the division
-//! into groups that costs least.
+//! The groups of a window: all rods and hinges that may be part of the figure, what they cost, and the
+//! division into groups that costs least.
 
 use super::FigureOptions;
 use super::cover::{MOST_POINTS, Piece, best_cover};
@@ -240,8 +240,8 @@ fn angle(fit: &HingeFit, [a, pivot, b]: [DVec2; 3], frame: usize) -> f64 {
 
 /// Links by a minimum spanning tree over rods; each a chain of its own.
 ///
-/// A rod weighs its residual and twice the cover's cost of its length: rods alone leave more to the length than
-/// hinges do. (Residual times length loses a few limbs more at 0 px and many at 2 px.)
+/// A rod weighs its residual and twice the cover's cost of its length: rods alone leave more to the length
+/// than hinges do. (Residual times length loses a few limbs more at 0 px and many at 2 px.)
 fn forest(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) -> Figure {
     let points = tracks.len();
     let mut edges = Vec::new();

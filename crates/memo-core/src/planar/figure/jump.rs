@@ -1,7 +1,8 @@
 //! Positions that jump away from their track and back: wrong detections, taken out before groups are fitted.
 //!
-//! A group's fit can leave views out as well ([`FitOptions::max_outlier_fraction`](crate::planar::FitOptions)),
-//! which costs it ten times the time; here order in time is known, and a track is looked at once.
+//! A group's fit can leave views out as well
+//! ([`FitOptions::max_outlier_fraction`](crate::planar::FitOptions)), which costs it ten times the time; here
+//! order in time is known, and a track is looked at once.
 //!
 //! What it cannot do: tell a wrong position that stays for several frames.
 
@@ -12,9 +13,9 @@ const JUMP: f64 = 10.0;
 
 /// The same track without jumps; `noise_sd` of each coordinate.
 ///
-/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A foot that lands has a large
-/// one, but of at most half of |p_t+1 - p_t-1|: a jump is farther off than its neighbours are apart. A wrong position
-/// disturbs its neighbours' distances by half of its own, so the largest goes first.
+/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A foot that lands has
+/// a large one, but of at most half of |p_t+1 - p_t-1|: a jump is farther off than its neighbours are apart.
+/// A wrong position disturbs its neighbours' distances by half of its own, so the largest goes first.
 pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     let mut clean = track.to_vec();
     let off = |track: &[DVec2], t: usize| {

@@ -20,8 +20,8 @@ pub struct Link {
     pub length: f64,
     /// Its standard deviation (first order).
     pub length_sd: f64,
-    /// By how much the best figure without this link costs more, in the unit of the tracks; infinite if there is
-    /// none.
+    /// By how much the best figure without this link costs more, in the unit of the tracks; infinite if there
+    /// is none.
     pub margin: f64,
     /// Share of the weight of all figures that have this link, in [0, 1]; NaN for a forest.
     pub confidence: f64,

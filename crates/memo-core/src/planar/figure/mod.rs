@@ -1,21 +1,21 @@
 //! From unnamed moving points to a linkage: which points are joined, in which planes they swing, how long the
 //! limbs are.
 //!
-//! Hoffman and Flinchbaugh 1982, section 6: divide the points into groups of two and three, test each group for
-//! planar motion, combine. They leave "combine" open, and with real walking the test alone does not do: joints
-//! of one body are related, so several false groups fit as well as the true ones. Here the groups compete: the
-//! figure is the least costly division of all points into hinges (three points), rods (two) and points left
-//! alone (exact cover). A group costs what its plane leaves unexplained, a little for its length,
-//! and what sets it apart from the nearest rest of the body: the end of a limb sits on a trunk that hardly moves
-//! against other trunk points, whereas the pieces of a limb cut wrongly do not. Where there are too many points,
-//! a minimum spanning tree over rods (`Method::Forest`) takes its place: with little noise it finds nine limbs in ten, with
-//! false links among them, at 2 px eight in ten.
+//! Hoffman and Flinchbaugh 1982, section 6: divide the points into groups of two and three, test each group
+//! for planar motion, combine. They leave "combine" open, and with real walking the test alone does not do:
+//! joints of one body are related, so several false groups fit as well as the true ones. Here the groups
+//! compete: the figure is the least costly division of all points into hinges (three points), rods (two) and
+//! points left alone (exact cover). A group costs what its plane leaves unexplained, a little for its length,
+//! and what sets it apart from the nearest rest of the body: the end of a limb sits on a trunk that hardly
+//! moves against other trunk points, whereas the pieces of a limb cut wrongly do not. Where there are too
+//! many points, a minimum spanning tree over rods (`Method::Forest`) takes its place: with little noise it
+//! finds nine limbs in ten, with false links among them, at 2 px eight in ten.
 //!
 //! Costs are in units of the figure's size and were chosen on four walks (see `tests/planar_figure.rs`).
 //!
 //! What it cannot do: tell a chain from its mirror; give the depth of one chain against another; read figures
-//! whose limbs leave their planes (turning, spinning): such windows are reported lost. A limb that hardly moves
-//! in the image is joined by its shortness alone; its links say so by their confidence.
+//! whose limbs leave their planes (turning, spinning): such windows are reported lost. A limb that hardly
+//! moves in the image is joined by its shortness alone; its links say so by their confidence.
 
 mod cover;
 mod depth;
@@ -113,8 +113,8 @@ pub enum FigureError {
 /// Fewest frames of a window.
 const FEWEST_FRAMES: usize = 8;
 
-/// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about 0.42 m for
-/// a person).
+/// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about
+/// 0.42 m for a person).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Costs {
     /// Of each unit of length, without a unit. 0.02: true links are shorter than false ones that fit as well;
@@ -141,8 +141,8 @@ impl Default for Costs {
 /// How tracks are read as a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FigureOptions {
-    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are taken out of the tracks
-    /// before, so that by default no fit seeks outliers again.
+    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are taken out of the
+    /// tracks before, so that by default no fit seeks outliers again.
     pub fit: FitOptions,
     /// Rate of false targets of the verdicts.
     pub evidence: EvidenceOptions,
@@ -154,7 +154,8 @@ pub struct FigureOptions {
     /// Length of the windows in time, seconds. 1.2, about a stride; half a stride still does, less does not.
     /// Tracks of up to one and a half windows are read as one.
     pub window_s: f64,
-    /// Most points that are divided by exact cover, at most [`MOST_POINTS`]; more are linked by a spanning tree.
+    /// Most points that are divided by exact cover, at most [`MOST_POINTS`]; more are linked by a spanning
+    /// tree.
     pub most_covered: usize,
     /// Whether a figure's lengths are carried through windows in which it is lost.
     pub carries_structure: bool,
@@ -252,8 +253,8 @@ pub fn interpret_figure(
     Ok(over_time(windows, tracks, options))
 }
 
-/// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint limits
-/// tell each limb from its mirror ([`Chain::reflection_margin_deg`]).
+/// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint
+/// limits tell each limb from its mirror ([`Chain::reflection_margin_deg`]).
 ///
 /// # Errors
 /// Those of [`interpret_figure`]; not as many names as tracks.

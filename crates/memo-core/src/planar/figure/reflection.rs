@@ -1,14 +1,15 @@
 //! Which of its two reflections each limb has, where the points are known by name.
 //!
-//! Hoffman and Flinchbaugh 1982 leave every limb's reflection about the image plane open. A body does not: knees
-//! bend backwards, elbows forwards, thighs and upper arms keep to their ranges (Lee and Chen 1985, Table 1, as
-//! in [`crate::posture::limits`]). That needs to know where the body faces, which the same points tell: a body
-//! that faces away from the camera shows its right hip and shoulder on the right. Among the facings on that side
-//! the one is taken in which the limbs, each in its better reflection, keep their ranges best and, among equals,
-//! swing nearest to the sagittal plane.
+//! Hoffman and Flinchbaugh 1982 leave every limb's reflection about the image plane open. A body does not:
+//! knees bend backwards, elbows forwards, thighs and upper arms keep to their ranges (Lee and Chen 1985,
+//! Table 1, as in [`crate::posture::limits`]). That needs to know where the body faces, which the same points
+//! tell: a body that faces away from the camera shows its right hip and shoulder on the right. Among the
+//! facings on that side the one is taken in which the limbs, each in its better reflection, keep their ranges
+//! best and, among equals, swing nearest to the sagittal plane.
 //!
-//! What it cannot do: seen from the side the reflections of a sagittal plane are one, and from the front hips do
-//! not tell which way; the margins say so. The image's v axis is taken for the vertical of an upright trunk.
+//! What it cannot do: seen from the side the reflections of a sagittal plane are one, and from the front hips
+//! do not tell which way; the margins say so. The image's v axis is taken for the vertical of an upright
+//! trunk.
 
 use super::{Figure, FigureWindow, Verdict};
 use crate::posture::angles::{abduction_rad, elbow_rad, knee_rad, swing_rad};
@@ -64,7 +65,8 @@ impl Limb {
         find([a, b, c], true).or_else(|| find([c, b, a], false))
     }
 
-    /// Mean cost of a reflection, degrees squared, for a body of these axes; the chain's points in space by frame.
+    /// Mean cost of a reflection, degrees squared, for a body of these axes; the chain's points in space by
+    /// frame.
     fn cost(&self, frames: &[[DVec3; 3]], sign: f64, axes: &DMat3, limits: &Limits) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for points in frames {
@@ -79,7 +81,8 @@ impl Limb {
                 (limits.shoulder_swing, limits.elbow.excess(elbow_rad(axes, u, v)))
             };
             let sideways = if self.is_leg { limits.hip_abduction } else { limits.shoulder_abduction };
-            // The fold's full angle where it goes the wrong way: as far as it leaves the sagittal plane it does not.
+            // The fold's full angle where it goes the wrong way: as far as it leaves the sagittal plane it
+            // does not.
             let excess = [
                 swing.excess(swing_rad(axes, u)),
                 sideways.excess(abduction_rad(axes, u, self.side)),
@@ -112,8 +115,8 @@ fn right_of_left(tracks: &[&[DVec2]], joints: &[Option<Joint>]) -> Option<f64> {
     (!apart.is_empty()).then(|| apart.iter().sum::<f64>() / apart.len() as f64)
 }
 
-/// Takes of every named limb of a window the reflection that a body can do; its margin into the chain. Limbs that
-/// leave their planes stay open.
+/// Takes of every named limb of a window the reflection that a body can do; its margin into the chain. Limbs
+/// that leave their planes stay open.
 fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], limits: &Limits) {
     let Some(apart) = right_of_left(tracks, joints) else { return };
     let mut limbs: Vec<(usize, Limb, Vec<[DVec3; 3]>)> = Vec::new();
@@ -152,7 +155,8 @@ fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], l
     }
 }
 
-/// Takes of every limb the reflection that a body can do, given which joint each point is. A chain whose margin is `None` stays open.
+/// Takes of every limb the reflection that a body can do, given which joint each point is. A chain whose
+/// margin is `None` stays open.
 pub(super) fn reflect_by_anatomy(
     windows: &mut [FigureWindow],
     tracks: &[Vec<DVec2>],

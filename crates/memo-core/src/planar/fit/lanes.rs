@@ -76,7 +76,8 @@ struct Column {
 #[derive(Debug, Clone)]
 pub(super) struct Columns<const K: usize>([Column; K]);
 
-/// Cost, normal matrix and right side of the least squares, in the order (p, q, c of the first rod, of the second).
+/// Cost, normal matrix and right side of the least squares, in the order (p, q, c of the first rod, of the
+/// second).
 pub(super) type NormalEquations = (f64, Matrix4<f64>, Vector4<f64>);
 
 impl<const K: usize> Columns<K> {

@@ -1,22 +1,23 @@
 //! Least squares for one plane shared by one or two rods, over any number of views.
 //!
 //! Hoffman and Flinchbaugh 1982 prove what the fewest views determine; this is the same constraint with more
-//! views and noise. A rod's image vector d_i = (x_i, y_i), from its pivot, has depth g . d_i with g = (p, q), so
+//! views and noise. A rod's image vector d_i = (x_i, y_i), from its pivot, has depth g . d_i with g = (p, q),
+//! so
 //!
 //! ```text
 //! h_i(g) = |d_i|^2 + (g . d_i)^2 = d_i' M d_i = c,    M = I + g g',  c = length^2
 //! ```
 //!
-//! The residual is the error of h_i over the length of its gradient in the image, 2 |M d_i|: a distance in the
-//! image (Sampson). Two rods share g and each has its c. The pivot's noise is in both of a hinge's rods:
+//! The residual is the error of h_i over the length of its gradient in the image, 2 |M d_i|: a distance in
+//! the image (Sampson). Two rods share g and each has its c. The pivot's noise is in both of a hinge's rods:
 //! their residuals correlate by (M a . M b) / (2 |M a| |M b|), which the fit takes into account.
 //!
-//! Starts come from moments of (x^2, 2 x y, y^2), in which the cost of a plane takes a constant time: a coarse
-//! grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
+//! Starts come from moments of (x^2, 2 x y, y^2), in which the cost of a plane takes a constant time: a
+//! coarse grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
 //!
 //! What it cannot do: tell a rod from its mirror; see depth from a plane parallel to the image (the slope's
-//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit). Far from
-//! planar the cost has several minima, and a second best may be returned (1 of 30 draws, 12 % dearer).
+//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit). Far
+//! from planar the cost has several minima, and a second best may be returned (1 of 30 draws, 12 % dearer).
 
 #[cfg(test)]
 mod example;
@@ -177,8 +178,8 @@ impl<'a, const K: usize> Problem<'a, K> {
 
     /// Cost, normal matrix and right side at a solution; residuals of a hinge whitened.
     ///
-    /// With w the gradient's length, dw/dp = 4 (M d) . (x g + depth e_x) / w. Residuals of a hinge's rods correlate through the noise of the pivot, by 2 (M a . M b) da/dc db/dc in
-    /// [-1/2, 1/2].
+    /// With w the gradient's length, dw/dp = 4 (M d) . (x g + depth e_x) / w. Residuals of a hinge's rods
+    /// correlate through the noise of the pivot, by 2 (M a . M b) da/dc db/dc in [-1/2, 1/2].
     fn normal_equations(&self, s: &Solution<K>) -> NormalEquations {
         self.columns.normal_equations(s, self.floor_sq)
     }
@@ -217,7 +218,8 @@ impl<'a, const K: usize> Problem<'a, K> {
         if rival.cost < best.cost { rival } else { best }
     }
 
-    /// Levenberg-Marquardt on (u, c) with g = limit u / sqrt(1 + |u|^2), which keeps the slope within its limit.
+    /// Levenberg-Marquardt on (u, c) with g = limit u / sqrt(1 + |u|^2), which keeps the slope within its
+    /// limit.
     fn refine(&self, start: Solution<K>, iterations: usize) -> Solution<K> {
         let limit = self.slope_limit;
         let mut best = Solution { g: start.g.clamp_length_max(0.9999 * limit), ..start };

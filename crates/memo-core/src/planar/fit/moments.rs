@@ -52,8 +52,8 @@ impl Moments {
         v.dot(self.s * v) / v.dot(self.n * v)
     }
 
-    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v' N v
-    /// and near a minimum so is the Hessian.
+    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v'
+    /// N v and near a minimum so is the Hessian.
     fn descend(&self, mut g: DVec2, slope_limit: f64) -> (f64, DVec2) {
         let mut cost = self.cost(g);
         for _ in 0..10 {
@@ -86,7 +86,8 @@ impl Moments {
         (cost, g)
     }
 
-    /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a grid.
+    /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a
+    /// grid.
     pub(super) fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 2] {
         let grid = grid(slope_limit);
         let costs = grid.map(|row| row.map(|g| self.cost(g)));

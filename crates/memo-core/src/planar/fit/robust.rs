@@ -55,8 +55,8 @@ impl<const K: usize> Problem<'_, K> {
         (outliers.iter().filter(|o| **o).count() as f64 <= most).then_some((solution, outliers))
     }
 
-    /// [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the views with a
-    /// residual beyond.
+    /// [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the views
+    /// with a residual beyond.
     fn outliers(&self, solution: &Solution<K>) -> (f64, Vec<bool>) {
         let residuals: Vec<[f64; K]> =
             self.views.iter().map(|v| self.residuals(v, solution).map(f64::abs)).collect();
