@@ -18,7 +18,7 @@ fn sequence() -> (Vec<LinkFrame>, SegmentLengths, LinkOptions) {
     let mut random = Random::new(4);
     // The walker's axes: x forward, y up, z to the right. Camera axes: turned, y down, 4 m away.
     let turn = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_4);
-    let camera_from_walker = |v: DVec3| turn * DVec3::new(v.z, -v.y, -v.x);
+    let camera_from_walker = |v: DVec3| turn * DVec3::new(-v.z, -v.y, -v.x);
     let frames = (0..FRAMES)
         .map(|t| {
             let time_s = t as f64 / 25.0;

@@ -22,6 +22,7 @@ from memo._memo import (
 )
 from memo.figure import PlanarFigure, planar
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
+from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
 from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
@@ -32,6 +33,7 @@ __all__ = [
     "Keypoints",
     "KeypointsError",
     "PlanarFigure",
+    "Postures",
     "SideRepair",
     "Track",
     "Tracker",
@@ -46,7 +48,9 @@ __all__ = [
     "planar_hinges",
     "planar_rods",
     "pointlight",
+    "posture",
     "read_keypoints",
+    "read_lengths",
     "silhouettes",
     "similarity",
     "stick_joints",

@@ -31,6 +31,8 @@ __all__ = [
     "planar_hinges",
     "planar_rods",
     "pointlight",
+    "posture",
+    "segment_names",
     "side_pairs",
     "silhouettes",
     "similarity",
@@ -66,6 +68,7 @@ class Camera:
     def size(self) -> tuple[int, int]: ...
     @property
     def position(self) -> tuple[float, float, float]: ...
+    def camera_from_world(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
     def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
     def ground_points(
         self, pixels: Sequence[tuple[float, float]], z_m: float = 0.0
@@ -258,8 +261,28 @@ def unswap(
     partial_stay_nats: float | None = None,
     decided_at: float | None = None,
 ) -> dict[str, Any]: ...
+def posture(
+    times_s: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    weights: npt.NDArray[np.float64],
+    camera: Camera,
+    *,
+    lengths: dict[str, float] | None = None,
+    height_m: float | None = None,
+    noise_px: float = 2.0,
+    rules: str = "walking",
+    strength: str = "measured",
+    anchor: str = "auto",
+    distance_m: float | Sequence[float] | npt.NDArray[np.float64] | None = None,
+    distance_sd_m: float | None = None,
+    moving_direction: Sequence[float] | None = None,
+    head_points: npt.NDArray[np.float64] | None = None,
+    group_m: float = 0.10,
+    max_groups: int = 64,
+) -> dict[str, Any]: ...
 def joint_names() -> list[str]: ...
-def lee_chen_counts(sequence: str, merge_m: float = 0.04) -> dict[str, Any]: ...
+def segment_names() -> list[str]: ...
+def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...
 def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
 def lee_chen_head() -> list[dict[str, Any]]: ...
-def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = 0.04) -> list[dict[str, Any]]: ...
+def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = ...) -> list[dict[str, Any]]: ...

@@ -1,4 +1,4 @@
-"""The tables results are written to, `track.csv`, `events.csv` and `flips.csv`, and calibrations in XML.
+"""The files of results, among them `track.csv`, `events.csv` and `flips.csv`, and calibrations in XML.
 
 The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
 it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete.
@@ -7,6 +7,8 @@ it says `_deg`; an empty cell for a value that is not known. A file appears unde
 from __future__ import annotations
 
 import csv
+import json
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -24,11 +26,14 @@ __all__ = [
     "JOINTS",
     "TRACK_COLUMNS",
     "complete_file",
+    "plain",
     "read_events_csv",
     "read_track_csv",
     "read_tsai_xml",
+    "write_columns_csv",
     "write_events_csv",
     "write_flips_csv",
+    "write_json",
     "write_track_csv",
 ]
 
@@ -62,6 +67,7 @@ _DIGITS = {
     "_deg": 2,
     "_rad": 5,
     "_s": 6,
+    "_nats": 3,
     "phase": 5,
     "p_swapped": 6,
     "probability": 6,
@@ -82,6 +88,29 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
     if len(set(lengths.values())) > 1:
         raise ValueError(f"track columns of different lengths: {lengths}")
     _write_rows(path, TRACK_COLUMNS, zip(*texts, strict=True))
+
+
+def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
+    """Writes columns of one length in their order; the end of a name says how many digits are written."""
+    texts = [_texts(name, np.asarray(values)) for name, values in columns.items()]
+    _write_rows(path, columns, zip(*texts, strict=True))
+
+
+def write_json(path: str | PathLike[str], value: Any) -> None:
+    """Writes a value as JSON, null for what is not finite."""
+    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
+        json.dump(plain(value), file, separators=(",", ":"))
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON knows it: no numpy types, and null for what is not finite."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:

@@ -23,7 +23,8 @@ from matplotlib.figure import Figure
 
 from memo import _memo
 from memo.files import complete_file
-from memo.plot import LEFT, NEUTRAL, RIGHT
+from memo.plot import LEFT, RIGHT
+from memo.posture_plot import draw_figure
 
 __all__ = ["EXPERIMENTS", "Reproduction", "lee_chen", "plot_posture", "plot_superposition"]
 
@@ -39,12 +40,6 @@ NOT_REPRODUCED = """What cannot be reproduced
   Table 2, to its digits: Table A.2 (b) is printed with five digits, which is too few for the linear solution.
   From the projections before rounding it is met to the 0.03 cm by which it differs from its own geometry.
   Figs. 6-8, line for line, for the same reasons; they are drawn in depth and height without perspective."""
-
-TRUNK = (
-    *(("neck", joint) for joint in ("right_shoulder", "left_shoulder", "pelvis")),
-    *((joint, "pelvis") for joint in ("right_shoulder", "left_shoulder", "right_hip", "left_hip")),
-)
-ARM, LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 
 Points = npt.NDArray[np.float64]
 
@@ -230,14 +225,7 @@ def _write_csv(path: Path, header: Iterable[Any], rows: Iterable[Iterable[Any]])
 def plot_posture(ax: Axes, joints: Points, *, alpha: float = 1.0) -> Axes:
     """A posture (14, 3) in camera axes from the side: depth to the right, height upwards; right limbs solid,
     left dashed."""
-    at = dict(zip(_memo.joint_names(), np.column_stack([joints[:, 2], -joints[:, 1]]), strict=True))
-    for start, end in TRUNK:
-        ax.plot(*np.transpose([at[start], at[end]]), color=NEUTRAL, linewidth=1, alpha=alpha)
-    for side, colour, style, width in (("right", RIGHT, "-", 1.8), ("left", LEFT, (0, (3, 2)), 1.2)):
-        for limb in (ARM, LEG):
-            chain = np.transpose([at[f"{side}_{joint}"] for joint in limb])
-            ax.plot(*chain, color=colour, linestyle=style, linewidth=width, alpha=alpha)
-    ax.plot(*at["neck"], marker="o", markersize=4, color=NEUTRAL)
+    draw_figure(ax, np.column_stack([joints[:, 2], -joints[:, 1]]), alpha=alpha)
     ax.set_aspect("equal")
     return ax
 

@@ -3,6 +3,7 @@
 use crate::error::value_error;
 use glam::DVec2;
 use memo_core::image::{Frame, Image, Mask};
+use memo_core::posture::skeleton::{JOINT_COUNT, StickFigure};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
@@ -93,12 +94,12 @@ pub fn numpy_from_image<'py, T: numpy::Element + Copy>(
 }
 
 /// Rows of N numbers each as an array of shape (rows, N).
-pub fn numpy_from_rows<const N: usize>(
+pub fn numpy_from_rows<T: numpy::Element, const N: usize>(
     py: Python<'_>,
-    rows: Vec<[f64; N]>,
-) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    rows: Vec<[T; N]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     let count = rows.len();
-    rows.into_iter().flatten().collect::<Vec<f64>>().into_pyarray(py).reshape([count, N])
+    rows.into_iter().flatten().collect::<Vec<T>>().into_pyarray(py).reshape([count, N])
 }
 
 /// Line segments as an array of shape (segments, 2, 2): start and end, each (u, v).
@@ -252,26 +253,21 @@ pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.readonly().as_array().iter().copied().collect())
 }
 
-/// Joints over time of shape (T, K, 2), px, frame after frame; T and K.
-pub fn joints_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<(Vec<[f64; 2]>, [usize; 2])> {
-    let wanted = "wanted joints over time: numpy array of shape (T, K, 2), dtype float64";
-    let array = points.cast::<PyArray3<f64>>().ok().filter(|array| array.shape()[2] == 2);
-    let Some(array) = array else {
+/// The six points of the head over time, of shape (T, 6, 2).
+pub fn head_points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[DVec2; 6]>> {
+    let track = track_from_numpy(points)?;
+    if track.joints != 6 {
+        let wanted = "wanted points of the head: numpy array of shape (T, 6, 2), dtype float64";
         return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
-    };
-    let array = array.readonly();
-    let view = array.as_array();
-    let (frames, joints, _) = view.dim();
-    let at = |i: usize| [0, 1].map(|axis| view[[i / joints, i % joints, axis]]);
-    Ok(((0..frames * joints).map(at).collect(), [frames, joints]))
+    }
+    Ok(track.points_px.chunks_exact(6).map(|row| std::array::from_fn(|i| row[i])).collect())
 }
 
-/// Scores of joints over time, of the joints' shape (T, K), frame after frame.
-pub fn joint_scores_from_numpy(scores: &Bound<'_, PyAny>, shape: [usize; 2]) -> PyResult<Vec<f64>> {
-    let array = scores.cast::<PyArray2<f64>>().ok().filter(|array| array.shape() == shape);
-    let Some(array) = array else {
-        let wanted = format!("wanted scores: numpy array of shape {shape:?}, dtype float64");
-        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(scores)?)));
-    };
-    Ok(array.readonly().as_array().iter().copied().collect())
+/// Figures of 14 joints as an array of shape (figures, 14, 3).
+pub fn numpy_from_figures<'py>(
+    py: Python<'py>,
+    figures: &[StickFigure],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat: Vec<f64> = figures.iter().flat_map(|figure| figure.0).flat_map(|p| p.to_array()).collect();
+    flat.into_pyarray(py).reshape([figures.len(), JOINT_COUNT, 3])
 }

@@ -85,6 +85,16 @@ impl PyCamera {
         numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(pixel).collect())
     }
 
+    /// World points (N, 3), metres, in the camera's axes: x right, y down, z forward.
+    fn camera_from_world<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let in_camera = |p: [f64; 3]| self.0.camera_from_world(DVec3::from(p)).to_array();
+        numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(in_camera).collect())
+    }
+
     /// Where the rays of pixels (N, 2) meet the plane `z_m` metres above the ground, (N, 3); NaN where they
     /// do not.
     #[pyo3(signature = (pixels, z_m=0.0))]

@@ -7,6 +7,7 @@ mod image;
 mod keypoints;
 mod planar;
 mod pointlight;
+mod posture;
 mod reproduce;
 mod score;
 mod synth;
@@ -33,9 +34,10 @@ mod _memo {
     use super::planar::{planar, planar_hinges, planar_rods};
     #[pymodule_export]
     use super::pointlight::{pointlight, walker_motion};
+    use super::posture::posture;
     #[pymodule_export]
     use super::reproduce::{
-        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage,
+        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage, segment_names,
     };
     #[pymodule_export]
     use super::score::similarity;

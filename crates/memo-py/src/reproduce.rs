@@ -1,10 +1,11 @@
 //! The papers' experiments.
 
+use crate::array::numpy_from_figures;
 use crate::error::value_error;
 use memo_core::posture::experiment::{self, Counts, LevelCounts, Reading, Sequence};
 use memo_core::posture::head::{HeadPoint, HeadTableColumn, table_2};
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, StickFigure};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
+use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,6 +19,12 @@ fn sequence_of(name: &str) -> PyResult<Sequence> {
 #[pyfunction]
 pub fn joint_names() -> Vec<&'static str> {
     Joint::ALL.map(Joint::name).to_vec()
+}
+
+/// Names of the 17 segment lengths, such as `right_hip_to_right_knee`.
+#[pyfunction]
+pub fn segment_names() -> Vec<String> {
+    SegmentLengths::lee_chen().named().map(|(name, _)| name).collect()
 }
 
 /// Table 3 (SEQ1) or 4 (SEQ2) on the walker made anew, beside the printed one: `phases`, and for each of
@@ -88,19 +95,14 @@ pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<
         .detach(|| experiment::frame_survivors(sequence, &experiment::table_walker(), 0))
         .map_err(value_error)?;
     let dict = PyDict::new(py);
-    dict.set_item("figures", figures_array(py, &left.figures)?)?;
-    dict.set_item("truth", figures_array(py, &[left.truth])?.reshape([JOINT_COUNT, 3])?)?;
+    dict.set_item("figures", numpy_from_figures(py, &left.figures)?)?;
+    dict.set_item("truth", numpy_from_figures(py, &[left.truth])?.reshape([JOINT_COUNT, 3])?)?;
     let groups: Vec<(usize, Vec<usize>)> =
         left.groups.into_iter().map(|group| (group.representative, group.members)).collect();
     dict.set_item("groups", groups)?;
     dict.set_item("true_one", left.true_one)?;
     dict.set_item("passes", left.passes)?;
     Ok(dict)
-}
-
-fn figures_array<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let flat: Vec<f64> = figures.iter().flat_map(|figure| figure.0).flat_map(|p| p.to_array()).collect();
-    flat.into_pyarray(py).reshape([figures.len(), JOINT_COUNT, 3])
 }
 
 /// Table 2 by each method: a list of dicts with `method`, `transform` (4, 3), `rotation` (3, 3), `focal`,

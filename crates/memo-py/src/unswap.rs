@@ -1,6 +1,6 @@
 //! Repair of exchanged left and right labels.
 
-use crate::array::{joint_scores_from_numpy, joints_from_numpy, numpy_from_column, times_from_numpy};
+use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track_from_numpy};
 use crate::error::value_error;
 use memo_core::posture::unswap::{
     GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, Unswapped, unswap as core_unswap,
@@ -30,8 +30,9 @@ pub fn unswap<'py>(
     decided_at: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let times_s = times_from_numpy(times_s)?;
-    let (points_px, shape) = joints_from_numpy(points)?;
-    let scores = scores.map(|scores| joint_scores_from_numpy(scores, shape)).transpose()?;
+    let track = track_from_numpy(points)?;
+    let points_px: Vec<[f64; 2]> = track.points_px.iter().map(|point| point.to_array()).collect();
+    let scores = scores.map(|scores| scores_from_numpy(scores, &track)).transpose()?;
     let groups = groups_from_dict(groups)?;
     let default = UnswapOptions::default();
     let options = UnswapOptions {
@@ -40,10 +41,14 @@ pub fn unswap<'py>(
         partial_stay_nats: partial_stay_nats.unwrap_or(default.partial_stay_nats),
         decided_at: decided_at.unwrap_or(default.decided_at),
     };
-    let keypoints =
-        Keypoints { times_s: &times_s, joints: shape[1], points_px: &points_px, scores: scores.as_deref() };
+    let keypoints = Keypoints {
+        times_s: &times_s,
+        joints: track.joints,
+        points_px: &points_px,
+        scores: scores.as_deref(),
+    };
     let found = py.detach(|| core_unswap(&keypoints, &groups, &options)).map_err(value_error)?;
-    dict_from_unswapped(py, found, &groups, shape)
+    dict_from_unswapped(py, found, &groups, [track.frames, track.joints])
 }
 
 /// Limbs in the order given.
@@ -100,7 +105,7 @@ fn dict_from_group<'py>(
     result.set_item("decided", flags(|v| v.decided))?;
     let probability = verdicts.iter().map(|v| v.probability).collect();
     result.set_item("p_flipped", numpy_from_column(py, probability))?;
-    let reasons: Vec<String> = verdicts.iter().map(|v| v.reason.describe(v.flipped, group)).collect();
+    let reasons: Vec<String> = verdicts.iter().map(|v| v.describe(group)).collect();
     result.set_item("reason", reasons)?;
     let levels: Vec<&str> = group.levels.iter().map(|level| level.name.as_str()).collect();
     result.set_item("levels", levels)?;

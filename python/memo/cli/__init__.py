@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `unswap`, `reproduce`, `demo`, `pointlight`, `planar`.
+"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -14,6 +14,7 @@ from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
 from memo.cli.pointlight import add_pointlight
+from memo.cli.posture import add_posture
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import EXIT_CODES, add_track
 from memo.cli.unswap import add_unswap
@@ -60,6 +61,7 @@ def _app() -> "typer.Typer":
 
     add_track(app)
     add_unswap(app)
+    add_posture(app)
     add_demo(app)
     add_reproduce(app)
     add_pointlight(app)

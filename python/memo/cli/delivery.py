@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import signal
 import sys
@@ -18,7 +17,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from memo.files import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +31,7 @@ class Exit(IntEnum):
     TRACKED = 0
     DONE = 0  # where nobody is to be tracked
     BAD_INPUT = 1
-    NOBODY = 3
+    NOBODY = 3  # or no posture of anybody
     NO_EXTRA = 4
     INTERRUPTED = 130
 
@@ -86,17 +85,6 @@ def guarded(work: Callable[[], Exit]) -> Exit:
 
 def complain(message: str) -> None:
     print(f"memo: {message}", file=sys.stderr)
-
-
-def plain(value: Any) -> Any:
-    """The value as JSON knows it: no numpy types, and null for what is not finite."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def with_progress(

@@ -71,6 +71,9 @@ pub struct PartAngles {
 }
 
 impl PartAngles {
+    pub(crate) const UNKNOWN: Self =
+        Self { flexion_rad: f64::NAN, rotation_rad: f64::NAN, bending_rad: f64::NAN };
+
     /// Angles at the pelvis joint.
     ///
     /// Flexion is bending of the torso towards the front of the hips; the hip part's normal then points up

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::constraint::{Constraint, Violation};
 use super::placed::{Placed, PlacedFigure};
-use super::skeleton::{Joint, Side};
+use super::skeleton::{Joint, PerJoint, Side};
 
 /// Radii of the parts of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,36 +47,51 @@ impl Collisions {
         use Constraint as C;
         match constraint {
             C::UpperArmTorso(s) => {
-                let elbow = &figure[s.elbow()];
+                let elbow = figure[s.elbow()];
                 let shoulder = figure[s.shoulder()].point;
                 let start = shoulder.lerp(elbow.point, self.shoulder_part);
                 self.check_torso(constraint, figure, start, elbow.point, elbow, None)
             }
             C::ForearmTorso(s) => {
-                let [elbow, wrist] = [&figure[s.elbow()], &figure[s.wrist()]];
+                let [elbow, wrist] = [figure[s.elbow()], figure[s.wrist()]];
                 self.check_torso(constraint, figure, elbow.point, wrist.point, elbow, Some(wrist))
             }
-            C::ThighThigh => {
-                let pairs = [(Side::Right.knee(), Side::Left.knee())];
-                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
+            _ => self.check_limbs(constraint, figure, self.limbs(constraint)?),
+        }
+    }
+
+    /// The segments that must not meet, by the joints they end at: one or two of a limb and one of another;
+    /// and the sum of their radii.
+    fn limbs(&self, constraint: Constraint) -> Option<([Option<Joint>; 2], Joint, f64)> {
+        use Constraint as C;
+        let arm = |side: Side| [Some(side.elbow()), Some(side.wrist())];
+        let of_legs = 2.0 * self.leg_m;
+        let of_both = self.arm_m + self.leg_m;
+        Some(match constraint {
+            C::ThighThigh => ([Some(Side::Right.knee()), None], Side::Left.knee(), of_legs),
+            C::ShankThigh(s) => ([Some(s.ankle()), None], s.other().knee(), of_legs),
+            C::ShankShank => ([Some(Side::Right.ankle()), None], Side::Left.ankle(), of_legs),
+            C::ArmThigh { arm: a, leg } => (arm(a), leg.knee(), of_both),
+            C::ArmShank { arm: a, leg } => (arm(a), leg.ankle(), of_both),
+            _ => return None,
+        })
+    }
+
+    /// Whether the rays of a view keep two parts of the body so far apart that no choice of roots can break
+    /// the constraint.
+    pub(crate) fn is_out_of_reach(&self, constraint: Constraint, spans: &PerJoint<Span>) -> bool {
+        use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
+        let segment = |end: Joint| [end.start().unwrap_or(end), end].map(|joint| spans[joint]);
+        let torso = [RightShoulder, LeftShoulder, LeftHip, RightHip].map(|joint| spans[joint]);
+        match constraint {
+            Constraint::UpperArmTorso(s) => {
+                apart(&segment(s.elbow()), self.shoulder_part, &torso, self.torso_m)
             }
-            C::ShankThigh(s) => {
-                let pairs = [(s.ankle(), s.other().knee())];
-                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
-            }
-            C::ShankShank => {
-                let pairs = [(Side::Right.ankle(), Side::Left.ankle())];
-                self.check_limbs(constraint, figure, &pairs, 2.0 * self.leg_m)
-            }
-            C::ArmThigh { arm, leg } => {
-                let pairs = [(arm.elbow(), leg.knee()), (arm.wrist(), leg.knee())];
-                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
-            }
-            C::ArmShank { arm, leg } => {
-                let pairs = [(arm.elbow(), leg.ankle()), (arm.wrist(), leg.ankle())];
-                self.check_limbs(constraint, figure, &pairs, self.arm_m + self.leg_m)
-            }
-            _ => None,
+            Constraint::ForearmTorso(s) => apart(&segment(s.wrist()), 0.0, &torso, self.torso_m),
+            _ => self.limbs(constraint).is_some_and(|(ends, other, radii_m)| {
+                let other = segment(other);
+                ends.into_iter().flatten().all(|end| apart(&segment(end), 0.0, &other, radii_m))
+            }),
         }
     }
 
@@ -100,6 +115,10 @@ impl Collisions {
         if self.torso_m <= 0.0 && passes_beside(&corners, start, end) {
             return None;
         }
+        let crosses = |triangle| crossing(triangle, start, end).is_some();
+        if self.torso_m <= 0.0 && !triangles(&corners).iter().any(crosses) {
+            return None;
+        }
         let clearance = quadrilateral_clearance(&corners, start, end);
         if clearance >= self.torso_m {
             return None;
@@ -112,10 +131,9 @@ impl Collisions {
         &self,
         constraint: Constraint,
         figure: &PlacedFigure,
-        pairs: &[(Joint, Joint)],
-        radii_m: f64,
+        (ends_of_one, b, radii_m): ([Option<Joint>; 2], Joint, f64),
     ) -> Option<Violation> {
-        let worst = |&(a, b): &(Joint, Joint)| {
+        let violation = |a: Joint| {
             let [[a0, a1], [b0, b1]] = [a, b].map(|end| ends(figure, end));
             // Spheres about the segments first: most pairs are far apart.
             let apart_sq = 0.25 * (a0 + a1 - b0 - b1).length_squared();
@@ -134,19 +152,56 @@ impl Collisions {
             };
             Violation::under(constraint, distance, radii_m - slack)
         };
-        pairs.iter().filter_map(worst).max_by(|a, b| a.excess.total_cmp(&b.excess))
+        ends_of_one.into_iter().flatten().filter_map(violation).max_by(|a, b| a.excess.total_cmp(&b.excess))
     }
 
     /// Spread of the segment that ends at a joint.
     fn limb_spread(&self, figure: &PlacedFigure, end: Joint) -> f64 {
         match end {
             Joint::RightElbow | Joint::LeftElbow | Joint::RightKnee | Joint::LeftKnee => {
-                self.spread(&figure[end], None)
+                self.spread(figure[end], None)
             }
-            _ => self.spread(&figure[end.start().unwrap_or(end)], Some(&figure[end])),
+            _ => self.spread(figure[end.start().unwrap_or(end)], Some(figure[end])),
         }
     }
 }
+
+/// How far along its ray a joint can be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    pub ray: DVec3,
+    pub near_m: f64,
+    pub far_m: f64,
+}
+
+impl Span {
+    /// Least and greatest component along a vector.
+    fn along(&self, direction: DVec3) -> [f64; 2] {
+        let [a, b] = [self.near_m, self.far_m].map(|k| k * self.ray.dot(direction));
+        [a.min(b), a.max(b)]
+    }
+}
+
+/// Whether a segment without its first part is farther than a distance from a polygon or other segment,
+/// wherever their corners are on their rays: whether they are apart along the normal of a plane through the
+/// camera and two corners.
+fn apart([start, end]: &[Span; 2], part: f64, other: &[Span], least_m: f64) -> bool {
+    let edges = (0..other.len()).map(|i| [&other[i], &other[(i + 1) % other.len()]]);
+    std::iter::once([start, end]).chain(edges).any(|[a, b]| {
+        let normal = a.ray.cross(b.ray).normalize_or_zero();
+        let [[start_low, start_high], [low, high]] = [start, end].map(|span| span.along(normal));
+        let others = || other.iter().map(|span| span.along(normal));
+        let other_low = others().fold(f64::INFINITY, |least, [low, _]| least.min(low));
+        let other_high = others().fold(f64::NEG_INFINITY, |most, [_, high]| most.max(high));
+        let from = |start: f64, end: f64| start + part * (end - start);
+        let above = low.min(from(start_low, low)) - other_high;
+        let below = other_low - high.max(from(start_high, high));
+        above.max(below) > least_m + ROUNDING_M
+    })
+}
+
+/// More than what rounding can do to a distance.
+const ROUNDING_M: f64 = 1e-9;
 
 /// The two ends of the segment that ends at a joint.
 fn ends(figure: &PlacedFigure, end: Joint) -> [DVec3; 2] {

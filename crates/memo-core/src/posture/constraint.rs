@@ -126,6 +126,18 @@ pub enum ConstraintKind {
     Rule,
 }
 
+impl ConstraintKind {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::Distance => "distance",
+            Self::Collision => "collision",
+            Self::Rule => "rule",
+        }
+    }
+}
+
 use Constraint as C;
 use Side::{Left, Right};
 
@@ -342,6 +354,20 @@ impl Constraint {
         Self::ALL.into_iter().find(|constraint| constraint.name() == name)
     }
 
+    /// What breaks it, as one plain sentence without numbers.
+    pub fn description(self) -> String {
+        let sentence = self.sentence();
+        let what = sentence.trim_end_matches(" by").trim_end_matches(": clearance");
+        match self.kind() {
+            ConstraintKind::Distance => {
+                format!("{} is not that of the rigid body", what.trim_end_matches(" wrong"))
+            }
+            ConstraintKind::Angle => format!("{what} farther than a body can"),
+            ConstraintKind::Collision => what.to_owned(),
+            ConstraintKind::Rule => format!("{what} more than the rules of the motion allow"),
+        }
+    }
+
     /// What is measured, as the start of a sentence that a value follows.
     fn sentence(self) -> String {
         match self {
@@ -405,7 +431,7 @@ impl Constraint {
 }
 
 /// A set of joints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct JointSet(pub u16);
 
 impl JointSet {
@@ -419,6 +445,11 @@ impl JointSet {
 
     pub fn contains(self, other: Self) -> bool {
         other.0 & !self.0 == 0
+    }
+
+    /// The joints, by level.
+    pub fn iter(self) -> impl Iterator<Item = Joint> {
+        Joint::ALL.into_iter().filter(move |&joint| self.0 >> joint as u16 & 1 == 1)
     }
 
     /// The joint of the highest level; the neck for the empty set.

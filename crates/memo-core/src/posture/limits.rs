@@ -21,7 +21,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DMat3, DVec3};
 
-use super::angles::{PartAngles, abduction_rad, elbow_rad, knee_rad, swing_rad};
+use super::angles::{PartAngles, abduction_rad, elbow_rad, knee_rad};
 use super::constraint::{Constraint, Unit, Violation};
 use super::placed::{Placed, PlacedFigure, Trunk};
 use super::skeleton::{RigidDistance, SegmentLengths, Side};
@@ -186,27 +186,27 @@ impl Limits {
                 self.check_neck(constraint, trunk, head?)
             }
             C::PelvisFlexion | C::PelvisExtension | C::PelvisRotation | C::PelvisBending => {
-                self.check_pelvis(constraint, trunk)
+                self.check_pelvis(constraint, figure, trunk)
             }
             C::ShoulderFlexion(s) | C::ShoulderExtension(s) => {
-                self.check_swing(constraint, self.shoulder_swing, &figure[s.elbow()], trunk)
+                self.check_swing(constraint, self.shoulder_swing, figure[s.elbow()], trunk)
             }
             C::HipFlexion(s) | C::HipExtension(s) => {
-                self.check_swing(constraint, self.hip_swing, &figure[s.knee()], trunk)
+                self.check_swing(constraint, self.hip_swing, figure[s.knee()], trunk)
             }
             C::HipFlexionStraight(s) => self.check_straight_leg(constraint, s, figure, trunk),
             C::ShoulderAbduction(s) | C::ShoulderAdduction(s) => {
-                self.check_abduction(constraint, self.shoulder_abduction, &figure[s.elbow()], trunk, s)
+                self.check_abduction(constraint, self.shoulder_abduction, figure[s.elbow()], trunk, s)
             }
             C::HipAbduction(s) | C::HipAdduction(s) => {
-                self.check_abduction(constraint, self.hip_abduction, &figure[s.knee()], trunk, s)
+                self.check_abduction(constraint, self.hip_abduction, figure[s.knee()], trunk, s)
             }
             C::ElbowFlexion(s) | C::ElbowExtension(s) => {
-                let [u, v] = [s.elbow(), s.wrist()].map(|joint| &figure[joint]);
+                let [u, v] = [s.elbow(), s.wrist()].map(|joint| figure[joint]);
                 self.check_hinge(constraint, self.elbow, u, v, trunk, 1.0)
             }
             C::KneeFlexion(s) | C::KneeExtension(s) => {
-                let [u, v] = [s.knee(), s.ankle()].map(|joint| &figure[joint]);
+                let [u, v] = [s.knee(), s.ankle()].map(|joint| figure[joint]);
                 self.check_hinge(constraint, self.knee, u, v, trunk, -1.0)
             }
             _ => None,
@@ -226,7 +226,7 @@ impl Limits {
         figure: &PlacedFigure,
         lengths: &SegmentLengths,
     ) -> Option<Violation> {
-        let [a, b] = distance.joints().map(|joint| &figure[joint]);
+        let [a, b] = distance.joints().map(|joint| figure[joint]);
         let between = b.point - a.point;
         let length = between.length();
         let deviation = (length - lengths.rigid[distance as usize]).abs();
@@ -256,7 +256,7 @@ impl Limits {
         trunk: &Trunk,
     ) -> Option<Violation> {
         let axes = &trunk.torso;
-        let excess = range.excess(swing_rad(axes, limb.unit));
+        let excess = range.excess(trunk.swing_rad(limb));
         let flexion = matches!(constraint, Constraint::ShoulderFlexion(_) | Constraint::HipFlexion(_));
         if excess == 0.0 || flexion != (excess > 0.0) {
             return None;
@@ -349,15 +349,15 @@ impl Limits {
         figure: &PlacedFigure,
         trunk: &Trunk,
     ) -> Option<Violation> {
-        let [thigh, shank] = [&figure[side.knee()], &figure[side.ankle()]];
-        let swing = swing_rad(&trunk.torso, thigh.unit);
+        let [thigh, shank] = [figure[side.knee()], figure[side.ankle()]];
+        let swing = trunk.swing_rad(thigh);
         let excess = swing - self.hip_flexion_straight_rad;
         if excess <= 0.0 {
             return None;
         }
         let hinge_sd = thigh.worst_direction_sd().hypot(shank.worst_direction_sd());
         let slack = if self.noise_factor > 0.0 { self.noise_factor * hinge_sd } else { 0.0 };
-        if knee_rad(&trunk.torso, thigh.unit, shank.unit) + slack > self.straight_knee_rad {
+        if trunk.knee_rad(thigh, shank) + slack > self.straight_knee_rad {
             return None;
         }
         let excess = self.turn(excess, trunk.torso.z_axis.dot(thigh.unit));
@@ -365,16 +365,19 @@ impl Limits {
         self.beyond(constraint, self.hip_flexion_straight_rad, excess, sd)
     }
 
-    fn check_pelvis(&self, constraint: Constraint, trunk: &Trunk) -> Option<Violation> {
-        let angles = PartAngles::of_hips(&trunk.torso, &trunk.hips);
-        let sd = DVec3::new(
-            trunk.torso_sd.x.hypot(trunk.hips_sd.x),
-            trunk.torso_sd.y.hypot(trunk.hips_sd.y),
-            trunk.torso_sd.z.hypot(trunk.hips_sd.z),
-        );
+    fn check_pelvis(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        trunk: &Trunk,
+    ) -> Option<Violation> {
+        let sd = || {
+            let [torso, hips] = [trunk.torso_sd, trunk.hips_sd(figure)];
+            DVec3::new(torso.x.hypot(hips.x), torso.y.hypot(hips.y), torso.z.hypot(hips.z))
+        };
         self.check_part(
             constraint,
-            &angles,
+            &trunk.hip_angles,
             self.pelvis_flexion,
             [self.pelvis_rotation_rad, self.pelvis_bending_rad],
             sd,
@@ -388,7 +391,7 @@ impl Limits {
             &angles,
             self.neck_flexion,
             [self.neck_rotation_rad, self.neck_bending_rad],
-            trunk.torso_sd,
+            || trunk.torso_sd,
         )
     }
 
@@ -398,22 +401,24 @@ impl Limits {
         angles: &PartAngles,
         flexion: AngleRange,
         [rotation_rad, bending_rad]: [f64; 2],
-        sd: DVec3,
+        sd: impl Fn() -> DVec3,
     ) -> Option<Violation> {
         use Constraint as C;
         let excess = flexion.excess(angles.flexion_rad);
+        let rotation_excess = angles.rotation_rad.abs() - rotation_rad;
+        let bending_excess = angles.bending_rad.abs() - bending_rad;
         match constraint {
             C::PelvisFlexion | C::NeckFlexion if excess > 0.0 => {
-                self.beyond(constraint, flexion.max_rad, excess, sd.z)
+                self.beyond(constraint, flexion.max_rad, excess, sd().z)
             }
             C::PelvisExtension | C::NeckExtension if excess < 0.0 => {
-                self.beyond(constraint, -flexion.min_rad, -excess, sd.z)
+                self.beyond(constraint, -flexion.min_rad, -excess, sd().z)
             }
-            C::PelvisRotation | C::NeckRotation => {
-                self.beyond(constraint, rotation_rad, angles.rotation_rad.abs() - rotation_rad, sd.y)
+            C::PelvisRotation | C::NeckRotation if rotation_excess > 0.0 => {
+                self.beyond(constraint, rotation_rad, rotation_excess, sd().y)
             }
-            C::PelvisBending | C::NeckBending => {
-                self.beyond(constraint, bending_rad, angles.bending_rad.abs() - bending_rad, sd.x)
+            C::PelvisBending | C::NeckBending if bending_excess > 0.0 => {
+                self.beyond(constraint, bending_rad, bending_excess, sd().x)
             }
             _ => None,
         }

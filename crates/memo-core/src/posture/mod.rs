@@ -17,6 +17,7 @@ pub mod person;
 pub(crate) mod placed;
 pub mod prior;
 pub mod rules;
+pub mod sequence;
 pub mod skeleton;
 pub mod smooth;
 pub mod tree;

@@ -5,9 +5,11 @@
 //! its ending joint and `lateral_m` across it, independent. A direction then has the standard deviation
 //! hypot(lateral, sd (r·g)) / length towards a unit vector g perpendicular to it.
 
+use std::cell::Cell;
+
 use glam::{DMat3, DVec3};
 
-use super::angles::{hip_axes, trunk_axes};
+use super::angles::{PartAngles, hip_axes, knee_rad, swing_rad, trunk_axes};
 use super::constraint::JointSet;
 use super::lift::{RootKind, Roots};
 use super::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
@@ -27,7 +29,12 @@ pub(crate) struct Placed {
     /// Standard deviation of the segment across the ray.
     pub lateral_m: f64,
     pub kind: RootKind,
+    /// Tells places apart that are asked about on one trunk, below [`MOST_PLACES`].
+    pub number: u8,
 }
+
+/// More than the places that all choices of roots give the joints of one view.
+pub(crate) const MOST_PLACES: usize = 96;
 
 impl Placed {
     pub const UNKNOWN: Self = Self {
@@ -38,6 +45,7 @@ impl Placed {
         sd_m: f64::NAN,
         lateral_m: f64::NAN,
         kind: RootKind::Degenerate,
+        number: 0,
     };
 
     /// The joint at one of the roots of its segment.
@@ -46,7 +54,7 @@ impl Placed {
         let length_m = segment.length();
         let lateral_m = std::f64::consts::SQRT_2 * noise_rad * point.length();
         let unit = segment / length_m;
-        Self { point, ray, unit, length_m, sd_m: roots.sd_m, lateral_m, kind: roots.kind }
+        Self { point, ray, unit, length_m, sd_m: roots.sd_m, lateral_m, kind: roots.kind, number: 0 }
     }
 
     /// Standard deviation of the segment's direction towards a unit vector perpendicular to it, radians.
@@ -67,30 +75,27 @@ impl Placed {
     }
 }
 
+/// The joints of a figure known in space without noise, in any axes.
+pub(crate) fn placed_points(figure: &StickFigure) -> PerJoint<Placed> {
+    PerJoint(Joint::ALL.map(|joint| {
+        let point = figure[joint];
+        let segment = figure.segment(joint);
+        let length_m = segment.length();
+        let ray = point.normalize_or_zero();
+        let unit = segment / length_m;
+        let number = joint as u8;
+        Placed { point, ray, unit, length_m, number, sd_m: 0.0, lateral_m: 0.0, kind: RootKind::Degenerate }
+    }))
+}
+
 /// All joints in their places.
-pub(crate) type PlacedFigure = PerJoint<Placed>;
+pub(crate) type PlacedFigure<'a> = PerJoint<&'a Placed>;
 
-impl PlacedFigure {
-    pub(crate) const UNKNOWN_PLACES: Self = Self([Placed::UNKNOWN; JOINT_COUNT]);
+impl<'a> PlacedFigure<'a> {
+    pub(crate) const UNKNOWN_PLACES: Self = Self([&Placed::UNKNOWN; JOINT_COUNT]);
 
-    /// A figure of joints known in space without noise, in any axes.
-    pub(crate) fn of_points(figure: &StickFigure) -> Self {
-        let mut placed = Self::UNKNOWN_PLACES;
-        for joint in Joint::ALL {
-            let point = figure[joint];
-            let segment = figure.segment(joint);
-            let length_m = segment.length();
-            placed[joint] = Placed {
-                point,
-                ray: point.normalize_or_zero(),
-                unit: segment / length_m,
-                length_m,
-                sd_m: 0.0,
-                lateral_m: 0.0,
-                kind: RootKind::Degenerate,
-            };
-        }
-        placed
+    pub(crate) fn of(placed: &'a PerJoint<Placed>) -> Self {
+        Self(placed.0.each_ref())
     }
 
     pub(crate) fn points(&self) -> StickFigure {
@@ -99,8 +104,8 @@ impl PlacedFigure {
 
     /// The joints that are known.
     pub(crate) fn known(&self) -> JointSet {
-        let known: Vec<Joint> = Joint::ALL.into_iter().filter(|&j| self[j].point.is_finite()).collect();
-        JointSet::of(&known)
+        let known = Joint::ALL.into_iter().filter(|&joint| self[joint].point.is_finite());
+        known.fold(JointSet::default(), |known, joint| known.with(JointSet::of(&[joint])))
     }
 }
 
@@ -149,14 +154,15 @@ impl Bearings {
 }
 
 /// Axes of a figure's trunk, how well they are known, and the directions of its motion.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Trunk {
     /// Columns x, y, z; NaN where unknown.
     pub torso: DMat3,
     /// Standard deviation of a turn of the torso about its x, y, z, radians.
     pub torso_sd: DVec3,
     pub hips: DMat3,
-    pub hips_sd: DVec3,
+    /// Of the hips against the torso.
+    pub hip_angles: PartAngles,
     pub up: DVec3,
     /// Across the moving direction, level.
     pub lateral: DVec3,
@@ -164,19 +170,44 @@ pub(crate) struct Trunk {
     pub lateral_sd: f64,
     /// Normal of the plane of the body without swing, forward: perpendicular to the trunk (rule 3).
     pub body_normal: DVec3,
+    /// Angles of limbs on it, once asked for.
+    swings: Memo,
+    knees: Memo,
+}
+
+/// A number of each place, NaN where not yet known.
+#[derive(Debug, Clone)]
+struct Memo([Cell<f64>; MOST_PLACES]);
+
+impl Memo {
+    fn empty() -> Self {
+        Self([const { Cell::new(f64::NAN) }; MOST_PLACES])
+    }
+
+    fn get(&self, place: &Placed, compute: impl FnOnce() -> f64) -> f64 {
+        let known = &self.0[usize::from(place.number) % MOST_PLACES];
+        if known.get().is_nan() {
+            known.set(compute());
+        }
+        known.get()
+    }
 }
 
 impl Trunk {
-    pub const UNKNOWN: Self = Self {
-        torso: DMat3::NAN,
-        torso_sd: DVec3::NAN,
-        hips: DMat3::NAN,
-        hips_sd: DVec3::NAN,
-        up: DVec3::NAN,
-        lateral: DVec3::NAN,
-        lateral_sd: f64::NAN,
-        body_normal: DVec3::NAN,
-    };
+    pub fn unknown() -> Self {
+        Self {
+            torso: DMat3::NAN,
+            torso_sd: DVec3::NAN,
+            hips: DMat3::NAN,
+            hip_angles: PartAngles::UNKNOWN,
+            up: DVec3::NAN,
+            lateral: DVec3::NAN,
+            lateral_sd: f64::NAN,
+            body_normal: DVec3::NAN,
+            swings: Memo::empty(),
+            knees: Memo::empty(),
+        }
+    }
 
     /// Of shoulders and pelvis, without the hips.
     pub fn of_torso(figure: &PlacedFigure, bearings: &Bearings) -> Self {
@@ -194,26 +225,38 @@ impl Trunk {
         Self {
             torso,
             torso_sd,
-            hips: DMat3::NAN,
-            hips_sd: DVec3::NAN,
             up,
             lateral: up.cross(forward).try_normalize().unwrap_or(DVec3::NAN),
             lateral_sd: if source == HeadingSource::Trunk { torso_sd.y } else { 0.0 },
             body_normal: normal.try_normalize().unwrap_or(DVec3::NAN),
+            ..Self::unknown()
         }
     }
 
     /// The same with hips.
-    pub fn with_hips(mut self, figure: &PlacedFigure) -> Self {
-        let points = figure.points();
-        self.hips = hip_axes(&points).unwrap_or(DMat3::NAN);
+    pub fn with_hips(&self, figure: &PlacedFigure) -> Self {
+        let hips = hip_axes(&figure.points()).unwrap_or(DMat3::NAN);
+        Self { hips, hip_angles: PartAngles::of_hips(&self.torso, &hips), ..self.clone() }
+    }
+
+    /// Standard deviation of a turn of the hips about their x, y, z, radians.
+    pub fn hips_sd(&self, figure: &PlacedFigure) -> DVec3 {
         let [right, left] = [figure[Joint::RightHip], figure[Joint::LeftHip]];
         let drop = (0.5 * (right.point + left.point) - figure[Joint::Pelvis].point).length();
         let width = right.point.distance(left.point);
         let both = |g: DVec3| right.along(g).hypot(left.along(g));
         let [x, z] = [self.hips.x_axis, self.hips.z_axis];
-        self.hips_sd = DVec3::new(0.5 * both(z) / drop, both(x) / width, 0.5 * both(x) / drop);
-        self
+        DVec3::new(0.5 * both(z) / drop, both(x) / width, 0.5 * both(x) / drop)
+    }
+
+    /// Flexion (+) or extension of a limb against the torso.
+    pub fn swing_rad(&self, limb: &Placed) -> f64 {
+        self.swings.get(limb, || swing_rad(&self.torso, limb.unit))
+    }
+
+    /// Flexion (+) or extension at a knee; the shank's place must tell that of the thigh.
+    pub fn knee_rad(&self, thigh: &Placed, shank: &Placed) -> f64 {
+        self.knees.get(shank, || knee_rad(&self.torso, thigh.unit, shank.unit))
     }
 
     pub fn of(figure: &PlacedFigure, bearings: &Bearings) -> Self {
@@ -222,8 +265,8 @@ impl Trunk {
 }
 
 fn torso_sd(figure: &PlacedFigure, torso: &DMat3) -> DVec3 {
-    let pelvis = &figure[Joint::Pelvis];
-    let [right, left] = [&figure[Joint::RightShoulder], &figure[Joint::LeftShoulder]];
+    let pelvis = figure[Joint::Pelvis];
+    let [right, left] = [figure[Joint::RightShoulder], figure[Joint::LeftShoulder]];
     let [x, z] = [torso.x_axis, torso.z_axis];
     let width = right.point.distance(left.point);
     DVec3::new(pelvis.direction_sd(z), right.along(x).hypot(left.along(x)) / width, pelvis.direction_sd(x))

@@ -130,24 +130,34 @@ impl MotionPrior {
             independence_s: 0.08,
         }
     }
+
     /// Anybody doing anything: what joints allow, a trunk more upright than not, and inertia.
+    ///
+    /// Swings are wide, with their middles between the limits of the joints (thighs and arms go farther
+    /// forwards than back, and outwards than across); link without moving direction, so that they are of the
+    /// trunk's own.
     pub fn any() -> Self {
-        let segment = |acceleration_mps2| SegmentPrior {
-            swing: Soft::FREE,
-            outward: Soft::FREE,
+        let segment = |swing: Soft, outward: Soft, acceleration_mps2| SegmentPrior {
+            swing,
+            outward,
             outward_per_swing: 0.0,
             acceleration_mps2,
             length_sd: 0.025,
         };
         Self {
-            segments: [8.0, 15.0, 8.0, 15.0].map(segment),
+            segments: [
+                segment(Soft::degrees(30.0, 80.0), Soft::degrees(20.0, 60.0), 8.0),
+                segment(Soft::FREE, Soft::FREE, 15.0),
+                segment(Soft::degrees(25.0, 45.0), Soft::degrees(10.0, 25.0), 8.0),
+                segment(Soft::FREE, Soft::FREE, 15.0),
+            ],
             least_bend: [Soft::degrees(0.0, 15.0), Soft::degrees(0.0, 10.0)],
             opposition: [Soft::FREE; 2],
             same_side: Soft::FREE,
             trunk_lean: Soft::degrees(0.0, 25.0),
             trunk_roll: Soft::degrees(0.0, 15.0),
             shoulder_turn: Soft::FREE,
-            hip_turn: Soft::FREE,
+            hip_turn: Soft::degrees(0.0, 20.0),
             ..Self::walking()
         }
     }

@@ -14,7 +14,6 @@
 
 use glam::DVec3;
 
-use super::angles::{knee_rad, swing_rad};
 use super::constraint::{Constraint, Unit, Violation};
 use super::placed::{Placed, PlacedFigure, Trunk};
 use super::skeleton::{Joint, Side};
@@ -274,13 +273,17 @@ impl MotionModel {
             C::HipKnee(s) => self.joint_against_limb(constraint, tolerance, figure, trunk, s.knee()),
             C::ElbowWrist(s) => self.apart(constraint, angle, figure, trunk, [s.elbow(), s.wrist()]),
             C::KneeAnkle(s) => self.apart(constraint, angle, figure, trunk, [s.knee(), s.ankle()]),
-            C::UpperArmPlane(s) => self.out_of_plane(constraint, angle, &figure[s.elbow()], trunk),
-            C::ForearmPlane(s) => self.out_of_plane(constraint, angle, &figure[s.wrist()], trunk),
-            C::ThighPlane(s) => self.out_of_plane(constraint, angle, &figure[s.knee()], trunk),
-            C::ShankPlane(s) => self.out_of_plane(constraint, angle, &figure[s.ankle()], trunk),
+            C::UpperArmPlane(s) => self.out_of_plane(constraint, angle, figure[s.elbow()], trunk),
+            C::ForearmPlane(s) => self.out_of_plane(constraint, angle, figure[s.wrist()], trunk),
+            C::ThighPlane(s) => self.out_of_plane(constraint, angle, figure[s.knee()], trunk),
+            C::ShankPlane(s) => self.out_of_plane(constraint, angle, figure[s.ankle()], trunk),
             C::OneKneeFlexed => {
-                let [a, b] = Side::BOTH.map(|side| self.sure_flexion(figure, trunk, side, angle));
-                self.over(constraint, a.min(b), angle)
+                let right = self.sure_flexion(figure, trunk, Side::Right, angle);
+                if right <= angle {
+                    return None;
+                }
+                let left = self.sure_flexion(figure, trunk, Side::Left, angle);
+                self.over(constraint, right.min(left), angle)
             }
             C::OtherLegUpright => self.other_leg(constraint, angle, figure, trunk),
             C::LegUpright(s) => self.upright(constraint, angle, figure, trunk, s),
@@ -304,13 +307,13 @@ impl MotionModel {
     fn sure_swing(&self, limb: &Placed, trunk: &Trunk) -> f64 {
         let axes = &trunk.torso;
         let towards = axes.z_axis.cross(limb.unit).normalize_or_zero();
-        self.sure(swing_rad(axes, limb.unit), limb.direction_sd(towards).hypot(trunk.torso_sd.z))
+        self.sure(trunk.swing_rad(limb), limb.direction_sd(towards).hypot(trunk.torso_sd.z))
     }
 
     /// A knee's flexion drawn towards 0 by its noise; as it is where that does not pass a tolerance anyway.
     fn sure_flexion(&self, figure: &PlacedFigure, trunk: &Trunk, side: Side, tolerance: f64) -> f64 {
-        let [thigh, shank] = [&figure[side.knee()], &figure[side.ankle()]];
-        let flexion = knee_rad(&trunk.torso, thigh.unit, shank.unit);
+        let [thigh, shank] = [figure[side.knee()], figure[side.ankle()]];
+        let flexion = trunk.knee_rad(thigh, shank);
         if flexion <= tolerance {
             return flexion;
         }
@@ -327,8 +330,8 @@ impl MotionModel {
         a: Joint,
         b: Joint,
     ) -> Option<Violation> {
-        let limbs = [a, b].map(|joint| &figure[joint]);
-        let [a, b] = limbs.map(|limb| swing_rad(&trunk.torso, limb.unit));
+        let limbs = [a, b].map(|joint| figure[joint]);
+        let [a, b] = limbs.map(|limb| trunk.swing_rad(limb));
         if a * b <= 0.0 || a.abs().min(b.abs()) <= tolerance {
             return None;
         }
@@ -345,8 +348,8 @@ impl MotionModel {
         trunk: &Trunk,
         joints: [Joint; 2],
     ) -> Option<Violation> {
-        let limbs = joints.map(|joint| &figure[joint]);
-        let [a, b] = limbs.map(|limb| swing_rad(&trunk.torso, limb.unit));
+        let limbs = joints.map(|joint| figure[joint]);
+        let [a, b] = limbs.map(|limb| trunk.swing_rad(limb));
         if a * b >= 0.0 || a.abs().min(b.abs()) <= tolerance {
             return None;
         }
@@ -363,8 +366,8 @@ impl MotionModel {
         trunk: &Trunk,
         end: Joint,
     ) -> Option<Violation> {
-        let limb = &figure[end];
-        let start = &figure[end.start()?];
+        let limb = figure[end];
+        let start = figure[end.start()?];
         let normal = trunk.body_normal;
         let ahead = (start.unit * start.length_m).dot(normal);
         if ahead.abs() <= tolerance.distance_m {
@@ -428,7 +431,7 @@ impl MotionModel {
     ) -> Option<Violation> {
         let leg: DVec3 = figure[side.ankle()].point - figure[side.hip()].point;
         let lean = leg.normalize_or_zero().dot(-trunk.up).clamp(-1.0, 1.0).acos();
-        let [thigh, shank] = [&figure[side.knee()], &figure[side.ankle()]];
+        let [thigh, shank] = [figure[side.knee()], figure[side.ankle()]];
         let sd = thigh.sd_m.hypot(shank.sd_m) / leg.length();
         self.over(constraint, self.sure(lean, sd), tolerance)
     }

@@ -120,7 +120,7 @@ impl Joint {
     ];
 
     /// The starting joint of the segment that ends here; none for the neck.
-    pub fn start(self) -> Option<Self> {
+    pub const fn start(self) -> Option<Self> {
         Some(match self {
             Self::Neck => return None,
             Self::RightShoulder | Self::LeftShoulder | Self::Pelvis => Self::Neck,

@@ -32,6 +32,8 @@ pub const MAX_LEVELS: usize = 4;
 const MAX_PX: f64 = 1e7;
 /// Least time between frames, s.
 const MIN_STEP_S: f64 = 1e-6;
+/// A level parts from the most telling one where that is twice as likely as not.
+const LEVEL_PARTS: f64 = 2.0 / 3.0;
 /// A run is as sure as this of its bits relative to its first frame.
 const RUN_SURE: f64 = 0.95;
 /// Doubt for so many frames ends a run; fewer are a moment in which the joints coincide.
@@ -282,26 +284,32 @@ pub struct Unswapped {
     pub groups: Vec<GroupResult>,
 }
 
-impl Reason {
-    /// In words, with the names of the group's levels.
-    pub fn describe(&self, flipped: bool, group: &LimbGroup) -> String {
-        let done = if flipped { "flipped" } else { "kept" };
-        match self {
-            Self::Continuity { levels, gain_nats } => {
+impl Verdict {
+    /// The reason in words, with the names of the group's levels.
+    pub fn describe(&self, group: &LimbGroup) -> String {
+        let done = match (self.partial, self.flipped) {
+            (true, _) => "flipped in part",
+            (false, true) => "flipped",
+            (false, false) => "kept",
+        };
+        match &self.reason {
+            Reason::Continuity { levels, gain_nats } => {
                 let names: Vec<&str> =
                     levels.iter().filter_map(|&l| group.levels.get(l)).map(|l| l.name.as_str()).collect();
                 let names = if names.is_empty() { "the levels together".into() } else { names.join(", ") };
                 format!("{done}: continuity of {names}, gain {gain_nats:.1}")
             }
-            Self::UnseenCrossing { gap_s } => format!("undecided: crossing unseen in a gap of {gap_s:.2} s"),
-            Self::Coincide { distance_px } => {
+            Reason::UnseenCrossing { gap_s } => {
+                format!("undecided: crossing unseen in a gap of {gap_s:.2} s")
+            }
+            Reason::Coincide { distance_px } => {
                 format!("undecided: joints coincide within {distance_px:.1} px")
             }
-            Self::Unclear => "undecided: motion fits both labels".into(),
-            Self::GlobalLabel => {
+            Reason::Unclear => "undecided: motion fits both labels".into(),
+            Reason::GlobalLabel => {
                 "undecided: labels agree with one another, no majority for either side".into()
             }
-            Self::NothingSeen => "kept: nothing seen".into(),
+            Reason::NothingSeen => "kept: nothing seen".into(),
         }
     }
 }
@@ -545,11 +553,16 @@ impl<'a> Limb<'a> {
             let flipped = bits >> telling & 1 == 1;
             let right = self.probability_of_path(solution, step, telling);
             let decided = right >= options.decided_at;
+            // Where both joints of a level coincide it goes along with the most telling level.
+            let sure = |level: usize| self.probability_of_path(solution, step, level) >= LEVEL_PARTS;
+            let level_flipped: Vec<bool> =
+                sources.iter().map(|&l| if sure(l) { bits >> l & 1 == 1 } else { flipped }).collect();
+            let differs = |level: usize| seen >> level & 1 == 1 && level_flipped[level] != flipped;
             verdicts[t] = Verdict {
-                level_flipped: sources.iter().map(|level| bits >> level & 1 == 1).collect(),
+                partial: (0..self.levels).any(differs),
+                level_flipped,
                 level_probability: sources.iter().map(|&level| p(level)).collect(),
                 flipped,
-                partial: bits & seen != 0 && bits & seen != seen,
                 probability: p(telling),
                 decided,
                 reason: if decided {
@@ -784,8 +797,9 @@ mod tests {
         assert!(found.points_px[83][0].is_nan());
         let flipped: Vec<usize> = (0..50).filter(|&t| found.groups[0].verdicts[t].flipped).collect();
         assert_eq!(flipped, [20]);
-        let reason = &found.groups[0].verdicts[20].reason;
-        assert!(reason.describe(true, &group[0]).starts_with("flipped: continuity of knee, gain"));
+        assert!(
+            found.groups[0].verdicts[20].describe(&group[0]).starts_with("flipped: continuity of knee, gain")
+        );
     }
 
     #[test]

@@ -150,16 +150,21 @@ pub fn triangulated(trc: &str) -> Vec<StickFigure> {
     lines[5..].iter().filter(|l| !l.trim().is_empty()).map(figure).collect()
 }
 
-/// The first person's joints in pixels, score below 0.3 not seen.
-pub fn detected(json: &str) -> PerJoint<DVec2> {
+/// The first person's keypoints: u, v in pixels and score.
+pub fn keypoints(json: &str) -> Vec<[f64; 3]> {
     let start = json.find("\"pose_keypoints_2d\": [").unwrap() + 22;
     let list = &json[start..start + json[start..].find(']').unwrap()];
     let values: Vec<f64> = list.split(',').map(|v| v.trim().parse().unwrap()).collect();
+    values.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect()
+}
+
+/// The first person's joints in pixels, score below 0.3 not seen.
+pub fn detected(json: &str) -> PerJoint<DVec2> {
+    let values = keypoints(json);
     let mut pixels = PerJoint([DVec2::NAN; 14]);
     for (joint, index, _) in BODY_25B {
-        if let [u, v, score] = values[3 * index..3 * index + 3]
-            && score > 0.3
-        {
+        let [u, v, score] = values[index];
+        if score > 0.3 {
             pixels[joint] = DVec2::new(u, v);
         }
     }

@@ -48,6 +48,15 @@ pub enum AnchorSource {
 }
 
 impl AnchorSource {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Given, Self::Head, Self::Ground, Self::Trunk, Self::Extent, Self::Combined];
+
+    /// The source of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|source| source.name() == name)
+    }
+
     /// The name in files and messages.
     pub fn name(self) -> &'static str {
         match self {

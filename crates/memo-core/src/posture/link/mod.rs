@@ -114,6 +114,13 @@ pub struct Alternative {
     pub margin: f64,
 }
 
+impl Alternative {
+    /// Its probability where it and the best are all there is, 0 to 0.5.
+    pub fn probability(&self) -> f64 {
+        1.0 / (1.0 + self.margin.exp())
+    }
+}
+
 /// A linked sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkedPath {
@@ -384,5 +391,154 @@ impl LinkedPath {
                 }
             }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::stick_walker::StickWalker;
+    use glam::DQuat;
+
+    const FRAMES: usize = 60;
+
+    /// The truth in camera axes, 4 m away, and what a sequence at 25 frames a second shows of it.
+    fn sequence(yaw_rad: f64) -> (Vec<StickFigure>, Vec<LinkFrame>, SegmentLengths, LinkOptions) {
+        let walker = StickWalker::lee_chen();
+        let turn = DQuat::from_rotation_y(yaw_rad);
+        let camera_from_walker = |v: DVec3| turn * DVec3::new(-v.z, -v.y, -v.x);
+        let truth: Vec<StickFigure> = (0..FRAMES)
+            .map(|t| walker.posed(t as f64 / 25.0, DVec3::ZERO))
+            .map(|figure| PerJoint(figure.0.map(|p| camera_from_walker(p) + DVec3::new(0.0, -0.3, 4.0))))
+            .collect();
+        let frames = truth
+            .iter()
+            .enumerate()
+            .map(|(t, figure)| LinkFrame {
+                time_s: t as f64 / 25.0,
+                rays: JointRays::from_points(figure),
+                neck: figure[Joint::Neck],
+            })
+            .collect();
+        let options = LinkOptions {
+            up: Some(-DVec3::Y),
+            moving_direction: Some(camera_from_walker(DVec3::X)),
+            ..LinkOptions::default()
+        };
+        (truth, frames, *walker.lengths(), options)
+    }
+
+    /// Share of joints within 10 cm of the truth.
+    fn share(figures: &[StickFigure], truth: &[StickFigure]) -> f64 {
+        let near = |(a, b): (&StickFigure, &StickFigure)| {
+            Joint::ALL.iter().filter(|&&joint| a[joint].distance(b[joint]) < 0.10).count()
+        };
+        figures.iter().zip(truth).map(near).sum::<usize>() as f64 / (figures.len() * JOINT_COUNT) as f64
+    }
+
+    #[test]
+    fn a_walk_is_found_from_all_sides() {
+        for yaw_deg in [0.0, 30.0, 60.0, 90.0, 135.0, 180.0_f64] {
+            let (truth, frames, lengths, options) = sequence(yaw_deg.to_radians());
+            let path = link(&frames, &lengths, &options).unwrap();
+            let near = share(&path.smoothed, &truth);
+            assert!(near >= 0.99, "{yaw_deg} deg: {near}");
+            // Joints stay on their rays.
+            for (figure, frame) in path.smoothed.iter().zip(&frames) {
+                for joint in Joint::ALL {
+                    assert!(
+                        figure[joint].cross(frame.rays.ray[joint]).length() < 1e-9,
+                        "{yaw_deg} {joint:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_second_reading_is_another_and_keeps_lengths() {
+        let (_, frames, lengths, options) = sequence(std::f64::consts::FRAC_PI_4);
+        let path = link(&frames, &lengths, &options).unwrap();
+        let second = path.second.unwrap();
+        assert!(second.margin > 0.0 && second.to - second.from == second.figures.len());
+        let least = path.margin.iter().copied().fold(f64::INFINITY, f64::min);
+        assert_eq!(second.margin, least);
+        let apart = second.figures.iter().zip(&path.figures[second.from..]).map(|(other, best)| {
+            Joint::ALL.iter().map(|&joint| other[joint].distance(best[joint])).fold(0.0, f64::max)
+        });
+        assert!(apart.fold(0.0, f64::max) > 0.10);
+        for figure in &second.figures {
+            for joint in Joint::ALL.into_iter().skip(1) {
+                let start = joint.start().unwrap();
+                assert!((figure[joint].distance(figure[start]) - lengths.to[joint]).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn unseen_joints_and_frames_cost_only_themselves() {
+        let (truth, mut frames, lengths, options) = sequence(0.8);
+        for frame in &mut frames[20..40] {
+            frame.rays.ray[Joint::RightElbow] = DVec3::NAN;
+        }
+        frames[50].neck = DVec3::NAN;
+        let path = link(&frames, &lengths, &options).unwrap();
+        for t in 0..FRAMES {
+            let below = (20..40).contains(&t);
+            for joint in Joint::ALL {
+                let arm = matches!(joint, Joint::RightElbow | Joint::RightWrist);
+                let known = t != 50 && !(below && arm);
+                assert_eq!(path.figures[t][joint].is_finite(), known, "frame {t} {joint:?}");
+            }
+        }
+        assert!(path.margin[50].is_nan());
+        let whole: Vec<usize> = (0..20).chain(40..50).chain(51..FRAMES).collect();
+        let pick = |figures: &[StickFigure]| whole.iter().map(|&t| figures[t]).collect::<Vec<_>>();
+        assert!(share(&pick(&path.smoothed), &pick(&truth)) >= 0.97);
+    }
+
+    #[test]
+    fn short_sequences_are_answered() {
+        let (_, frames, lengths, options) = sequence(0.8);
+        for n in 0..4 {
+            let path = link(&frames[..n], &lengths, &options).unwrap();
+            assert_eq!(path.figures.len(), n);
+            assert!(path.figures.iter().all(|figure| figure.0.iter().all(|p| p.is_finite())));
+        }
+        let mut blind = frames;
+        blind.iter_mut().for_each(|frame| frame.neck = DVec3::NAN);
+        let path = link(&blind, &lengths, &options).unwrap();
+        assert!(path.second.is_none() && path.figures.iter().all(|figure| figure[Joint::Neck].is_nan()));
+    }
+
+    #[test]
+    fn wrong_input_is_named() {
+        let (_, frames, lengths, options) = sequence(0.8);
+        let with = |change: &dyn Fn(&mut LinkFrame)| {
+            let mut frames = frames.clone();
+            change(&mut frames[7]);
+            link(&frames, &lengths, &options)
+        };
+        let behind = with(&|frame| frame.neck.z = -1.0);
+        assert!(matches!(behind, Err(LinkError::Neck { frame: 7, .. })));
+        assert!(matches!(with(&|frame| frame.neck.x = f64::INFINITY), Err(LinkError::Neck { frame: 7, .. })));
+        assert!(matches!(with(&|frame| frame.time_s = 0.2), Err(LinkError::Times { frame: 7, .. })));
+        assert!(matches!(with(&|frame| frame.time_s = f64::NAN), Err(LinkError::Times { .. })));
+        let level = LinkOptions { up: Some(DVec3::ZERO), ..options.clone() };
+        let found = link(&frames, &lengths, &level);
+        assert!(matches!(found, Err(LinkError::Direction { parameter: "up", .. })));
+        let mut short = lengths;
+        short.to[Joint::LeftKnee] = -0.4;
+        assert!(matches!(link(&frames, &short, &options), Err(LinkError::Lengths(_))));
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_nothing() {
+        let (_, frames, lengths, options) = sequence(0.3);
+        let [one, two] = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| link(&frames, &lengths, &options).unwrap())
+        });
+        assert_eq!(one, two);
     }
 }

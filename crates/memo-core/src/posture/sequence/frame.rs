@@ -1,0 +1,137 @@
+//! What one frame allows: its tree, and its surviving postures in groups.
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::figure_in_world;
+use super::neck::Scene;
+use crate::posture::constraint::Constraint;
+use crate::posture::group::group;
+use crate::posture::skeleton::{Joint, StickFigure};
+use crate::posture::tree::{Interpretations, TreeError, TreeOptions, View};
+
+/// Why a frame says nothing.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FrameProblem {
+    /// Everything hangs on the neck.
+    #[error("the neck is not seen")]
+    NeckNotSeen,
+    /// Nor is there a posture without its distance.
+    #[error("the distance of the neck is not known")]
+    NoDistance,
+    /// The tree refuses the view.
+    #[error(transparent)]
+    Tree(TreeError),
+}
+
+/// Postures that look alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RepresentedGroup {
+    /// The member in their middle, world axes, metres.
+    pub figure: StickFigure,
+    /// Number of members.
+    pub size: usize,
+    /// Largest distance of a joint between two members, metres.
+    pub diameter_m: f64,
+}
+
+/// What a frame allows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameReading {
+    /// The tree: counts of the levels, reasons of the cuts, ways to all survivors and, where there are none,
+    /// the posture nearest to surviving. Its figures are in camera axes.
+    pub tree: Interpretations,
+    /// Survivors that look alike, largest groups first, at most [`super::SequenceOptions::max_groups`].
+    pub groups: Vec<RepresentedGroup>,
+    /// Number of all groups; none where more than [`MOST_GROUPED`] postures survive and the groups are of
+    /// so many of them, evenly spaced.
+    pub group_count: Option<usize>,
+}
+
+impl FrameReading {
+    /// Number of surviving postures.
+    pub fn survivors(&self) -> usize {
+        self.tree.survivors.len()
+    }
+
+    /// Where nothing survives, what the posture nearest to surviving breaks, a sentence each.
+    pub fn cut_all(&self) -> Option<Vec<String>> {
+        let least = self.tree.least_violating.as_ref()?;
+        Some(least.violations.iter().map(ToString::to_string).collect())
+    }
+}
+
+/// Postures that are grouped; comparing them costs the square of their number.
+pub const MOST_GROUPED: usize = 1024;
+
+/// The tree of a frame and its groups.
+pub(super) fn read(
+    scene: &Scene,
+    options: &TreeOptions,
+    neck: DVec3,
+    neck_sd_m: f64,
+    t: usize,
+) -> Result<FrameReading, FrameProblem> {
+    let rays = scene.rays[t];
+    if !rays.sees(Joint::Neck) {
+        return Err(FrameProblem::NeckNotSeen);
+    }
+    if neck.is_nan() {
+        return Err(FrameProblem::NoDistance);
+    }
+    let view = View {
+        neck_sd_m,
+        length_sd_m: scene.lengths.own_sd_m,
+        ..View::new(rays, neck, scene.lengths.lengths)
+    };
+    let tree = view.interpret(options).map_err(FrameProblem::Tree)?;
+    let (groups, group_count) = groups(scene, &tree);
+    Ok(FrameReading { tree, groups, group_count })
+}
+
+fn groups(scene: &Scene, tree: &Interpretations) -> (Vec<RepresentedGroup>, Option<usize>) {
+    let step = tree.survivors.len().div_ceil(MOST_GROUPED).max(1);
+    let figures: Vec<StickFigure> =
+        tree.survivors.iter().step_by(step).map(|&path| tree.view.interpretation(path).figure).collect();
+    let mut found = group(&figures, scene.options.group_m);
+    let count = (step == 1).then_some(found.len());
+    // Stable: groups of one size stay in the order of the walk.
+    found.sort_by_key(|group| std::cmp::Reverse(group.members.len()));
+    let represented = found.iter().take(scene.options.max_groups).map(|group| RepresentedGroup {
+        figure: figure_in_world(&figures[group.representative], scene.camera),
+        size: group.members.len(),
+        diameter_m: group.diameter_m,
+    });
+    (represented.collect(), count)
+}
+
+/// What one constraint did over the whole sequence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReasonTotal {
+    /// The constraint; [`Constraint::description`] says what it is.
+    pub constraint: Constraint,
+    /// The level at which it cuts.
+    pub joint: Joint,
+    /// Branches it cut in all frames.
+    pub branches: u64,
+    /// Frames in which it cut any.
+    pub frames: usize,
+}
+
+/// Sums the reasons of all frames, most branches first.
+pub fn reason_totals(frames: &[Result<FrameReading, FrameProblem>]) -> Vec<ReasonTotal> {
+    let mut totals: Vec<ReasonTotal> = Constraint::ALL
+        .into_iter()
+        .map(|constraint| ReasonTotal { constraint, joint: constraint.level(), branches: 0, frames: 0 })
+        .collect();
+    for cut in frames.iter().flatten().flat_map(|frame| &frame.tree.reasons) {
+        let place = Constraint::ALL.iter().position(|&constraint| constraint == cut.constraint);
+        if let Some(total) = place.map(|place| &mut totals[place]) {
+            total.branches += u64::from(cut.branches);
+            total.frames += 1;
+        }
+    }
+    totals.retain(|total| total.branches > 0);
+    totals.sort_by_key(|total| std::cmp::Reverse(total.branches));
+    totals
+}

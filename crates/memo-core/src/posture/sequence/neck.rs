@@ -1,0 +1,397 @@
+//! Distance of the neck in every frame, from the sources that were asked for, followed over time.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::heading::Heading;
+use super::lengths::SequenceLengths;
+use super::{AnchorChoice, KeypointSequence, SequenceError, SequenceOptions};
+use crate::model::camera::Camera;
+use crate::posture::anchor::{
+    Anchor, AnchorError, AnchorOptions, AnchorSource, Conflict, DepthMode, Ground, combine, from_extent,
+    from_given, from_ground, from_trunk, smooth,
+};
+use crate::posture::head::{
+    HeadModel, HeadOptions, HeadSolution, LEE_CHEN_BODY_HEIGHT_M, head_pose_in_image,
+};
+use crate::posture::lift::JointRays;
+use crate::posture::placed::Bearings;
+use crate::posture::skeleton::{Joint, SegmentLengths};
+
+/// What all stages look at.
+pub(super) struct Scene<'a> {
+    pub sequence: &'a KeypointSequence<'a>,
+    pub camera: &'a Camera,
+    /// None where the camera is not above the ground.
+    pub ground: Option<Ground>,
+    pub rays: &'a [JointRays],
+    pub lengths: &'a SequenceLengths,
+    pub options: &'a SequenceOptions,
+}
+
+impl Scene<'_> {
+    /// The world's upward direction in camera axes.
+    pub fn up(&self) -> DVec3 {
+        self.camera.rotation.z_axis
+    }
+
+    /// Vertical, moving direction and head of a frame, camera axes.
+    pub fn bearings(&self, heading: &Heading, head: Option<&Head>) -> Bearings {
+        Bearings {
+            up: Some(self.up()),
+            heading: heading.direction.map(|direction| self.camera.rotation * direction),
+            head: head.and_then(|head| head.axes),
+        }
+    }
+}
+
+/// From where the distance of a frame was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NeckFrom {
+    /// Its own image, by this source, and its neighbours.
+    Source(AnchorSource),
+    /// Its neighbours alone: it gives none, or was not asked, as most frames of long sequences.
+    Neighbours,
+    /// There is none.
+    Nothing,
+}
+
+impl NeckFrom {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Source(source) => source.name(),
+            Self::Neighbours => "neighbours",
+            Self::Nothing => "none",
+        }
+    }
+}
+
+/// Two sources that contradict each other in some frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SourceConflict {
+    /// The sources.
+    pub sources: [AnchorSource; 2],
+    /// Frames in which they contradict each other.
+    pub frames: usize,
+    /// Frames with several sources.
+    pub of: usize,
+    /// Medians of their distances in these frames, metres.
+    pub distances_m: [f64; 2],
+    /// Median of the difference over its standard deviation.
+    pub sigmas: f64,
+}
+
+impl fmt::Display for SourceConflict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [(a, a_m), (b, b_m)] = [0, 1].map(|i| (self.sources[i].name(), self.distances_m[i]));
+        write!(
+            f,
+            "the neck's distance is {a_m:.2} m by the {a} but {b_m:.2} m by the {b} ({:.1} standard deviations, \
+             {} of {} frames)",
+            self.sigmas, self.frames, self.of
+        )
+    }
+}
+
+/// The neck over the sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeckTrack {
+    /// Distance along the neck's ray, metres; NaN where it is not known.
+    pub distance_m: Vec<f64>,
+    /// Its standard deviation, metres.
+    pub sd_m: Vec<f64>,
+    /// What it rests on.
+    pub from: Vec<NeckFrom>,
+    /// Sources that contradict each other.
+    pub conflicts: Vec<SourceConflict>,
+    /// The part of `sd_m` that all frames share, metres.
+    pub common_sd_m: f64,
+    /// The part of `sd_m` that is due to the scale of the lengths, relative to the distance.
+    pub scale_sd: f64,
+}
+
+impl NeckTrack {
+    /// The neck of each frame, camera axes, metres; NaN where it is not seen or its distance is not known.
+    pub fn places(&self, rays: &[JointRays]) -> Vec<DVec3> {
+        let place = |(rays, &distance_m): (&JointRays, &f64)| match distance_m > 0.0 {
+            true => rays.ray[Joint::Neck] * distance_m,
+            false => DVec3::NAN,
+        };
+        rays.iter().zip(&self.distance_m).map(place).collect()
+    }
+}
+
+/// The head of one frame.
+#[derive(Debug, Clone)]
+pub(super) struct Head {
+    /// The neck's distance, metres, and its standard deviation.
+    distance_m: f64,
+    sd_m: f64,
+    /// Axes x forward, y down, z left in camera axes, where the facing is known well.
+    pub axes: Option<DMat3>,
+}
+
+/// Relative standard deviation of the size of heads of people of one height, and of where a detector puts
+/// nose, eyes and ears on them.
+const HEAD_SIZE_SD: f64 = 0.05;
+/// A facing less certain than this decides nothing, radians: 10 degrees, of limits of 40 to 70.
+const FACING_SD_RAD: f64 = 0.175;
+
+/// The heads of all frames that show one.
+pub(super) fn heads(scene: &Scene) -> Vec<Option<Head>> {
+    let frames = scene.sequence.times_s.len();
+    let Some(points_px) = scene.sequence.head_points_px else { return vec![None; frames] };
+    let height_m = scene.options.height_m.unwrap_or_else(|| height_m(&scene.lengths.lengths));
+    let Ok(model) = HeadModel::lee_chen_for_height(height_m) else { return vec![None; frames] };
+    let noise_px = scene.options.noise_px;
+    let options = HeadOptions { image_sd: (noise_px > 0.0).then_some(noise_px), ..HeadOptions::default() };
+    let head = |points_px: &[glam::DVec2; 6]| {
+        let seen: Vec<usize> = (0..6).filter(|&i| points_px[i].is_finite()).collect();
+        let points: Vec<DVec3> = seen.iter().map(|&i| model.points_m[i]).collect();
+        let pixels: Vec<_> = seen.iter().map(|&i| points_px[i]).collect();
+        let found = head_pose_in_image(scene.camera, &points, &pixels, &options).ok()?;
+        Some(head_of(&found, &model))
+    };
+    points_px.par_iter().map(head).collect()
+}
+
+/// The body height that goes with segment lengths by the proportions of Table A.1.
+fn height_m(lengths: &SegmentLengths) -> f64 {
+    let legs = |l: &SegmentLengths| l.to[Joint::RightKnee] + l.to[Joint::RightAnkle];
+    LEE_CHEN_BODY_HEIGHT_M * legs(lengths) / legs(&SegmentLengths::lee_chen())
+}
+
+/// The neck over all poses by their probabilities, the facing of the only one.
+fn head_of(found: &HeadSolution, model: &HeadModel) -> Head {
+    let mut total = 0.0;
+    let mut sums = [0.0; 2];
+    for pose in &found.poses {
+        let neck = pose.point_in_camera(model.points_m[0]);
+        let distance_m = neck.position.length();
+        let ray = neck.position / distance_m;
+        let variance = ray.dot(neck.covariance * ray);
+        total += pose.probability;
+        sums[0] += pose.probability * distance_m;
+        sums[1] += pose.probability * (variance + distance_m * distance_m);
+    }
+    let distance_m = sums[0] / total;
+    let sd_m = (sums[1] / total - distance_m * distance_m).max(0.0).sqrt();
+    let best = found.best();
+    let is_certain = !found.is_ambiguous() && best.facing().sd_rad() < FACING_SD_RAD;
+    let [x, y, z] = [best.rotation.x_axis, -best.rotation.y_axis, -best.rotation.z_axis];
+    Head { distance_m, sd_m, axes: is_certain.then(|| DMat3::from_cols(x, y, z)) }
+}
+
+/// What one frame says about the neck's distance.
+struct FrameAnchor {
+    anchor: Result<Anchor, AnchorError>,
+    conflicts: Vec<Conflict>,
+    /// Whether several sources were there.
+    is_combined: bool,
+}
+
+/// The neck's distance over the sequence.
+pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, SequenceError> {
+    if let AnchorChoice::Given { distance_m, sd_m } = &scene.options.anchor {
+        return given(scene.rays, distance_m, *sd_m);
+    }
+    let options = scene.lengths.anchor_options(&scene.options.anchor_options);
+    let times_s = scene.sequence.times_s;
+    // 1. Each frame alone.
+    let asked = asked(times_s);
+    let found: Vec<FrameAnchor> =
+        asked.par_iter().map(|&t| frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref())).collect();
+    let conflicts = conflicts(&found);
+    let mut error = AnchorError::Empty;
+    let anchors: Vec<Option<Anchor>> =
+        found.into_iter().map(|f| f.anchor.map_err(|e| error = e).ok()).collect();
+    if anchors.iter().all(Option::is_none) {
+        return Err(match error {
+            AnchorError::NotPositive { .. } => SequenceError::Anchor(error),
+            other => SequenceError::NoNeck(other),
+        });
+    }
+    // 2. All together.
+    let asked_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
+    let track = smooth(&asked_s, &anchors, &scene.options.smooth_options)?;
+    let mut from = vec![NeckFrom::Neighbours; times_s.len()];
+    for (&t, anchor) in asked.iter().zip(&anchors) {
+        from[t] = anchor.as_ref().map_or(NeckFrom::Neighbours, |anchor| NeckFrom::Source(anchor.source));
+    }
+    let mut of_scale: Vec<f64> = anchors.iter().flatten().map(|a| a.sd_scale_m / a.distance_m).collect();
+    of_scale.sort_by(f64::total_cmp);
+    Ok(NeckTrack {
+        from,
+        distance_m: interpolated(times_s, &asked_s, &track.distance_m),
+        sd_m: interpolated(times_s, &asked_s, &track.sd_m),
+        conflicts,
+        common_sd_m: track.common_sd_m,
+        scale_sd: of_scale[of_scale.len() / 2],
+    })
+}
+
+/// Up to so many frames each one is asked; of longer sequences one each [`ANCHOR_INTERVAL_S`].
+const ALL_ASKED: usize = 500;
+/// Postures, and with them the errors of the sources, are alike within a fraction of a step, seconds.
+const ANCHOR_INTERVAL_S: f64 = 0.2;
+
+/// Frames whose images are asked for the neck's distance, ascending, the first and the last among them.
+fn asked(times_s: &[f64]) -> Vec<usize> {
+    if times_s.len() <= ALL_ASKED {
+        return (0..times_s.len()).collect();
+    }
+    let mut asked = vec![0];
+    let mut last_s = times_s[0];
+    for (t, &time_s) in times_s.iter().enumerate() {
+        if time_s - last_s >= ANCHOR_INTERVAL_S - 1e-9 || t + 1 == times_s.len() {
+            asked.push(t);
+            last_s = time_s;
+        }
+    }
+    asked
+}
+
+/// Values at all times from those at some, ascending, the first and the last among them; linear between.
+fn interpolated(times_s: &[f64], known_s: &[f64], known: &[f64]) -> Vec<f64> {
+    let at = |&time_s: &f64| {
+        let after = known_s.partition_point(|&s| s < time_s).min(known_s.len() - 1);
+        let before = after.saturating_sub(usize::from(known_s[after] > time_s));
+        let span_s = known_s[after] - known_s[before];
+        let share = if span_s > 0.0 { (time_s - known_s[before]) / span_s } else { 0.0 };
+        known[before] + share * (known[after] - known[before])
+    };
+    times_s.iter().map(at).collect()
+}
+
+/// Known distances are taken as they are.
+fn given(rays: &[JointRays], distance_m: &[f64], sd_m: f64) -> Result<NeckTrack, SequenceError> {
+    let distance = |t: usize| distance_m[t.min(distance_m.len() - 1)];
+    let mut error = AnchorError::Empty;
+    let known: Vec<Option<f64>> = rays
+        .iter()
+        .enumerate()
+        .map(|(t, rays)| from_given(rays, distance(t), sd_m).map_err(|e| error = e).ok())
+        .map(|anchor| anchor.map(|anchor| anchor.distance_m))
+        .collect();
+    if known.iter().all(Option::is_none) {
+        return Err(SequenceError::NoNeck(error));
+    }
+    let source = NeckFrom::Source(AnchorSource::Given);
+    Ok(NeckTrack {
+        distance_m: known.iter().map(|d| d.unwrap_or(f64::NAN)).collect(),
+        sd_m: known.iter().map(|d| d.map_or(f64::NAN, |_| sd_m)).collect(),
+        from: known.iter().map(|d| d.map_or(NeckFrom::Nothing, |_| source)).collect(),
+        conflicts: Vec::new(),
+        common_sd_m: sd_m,
+        scale_sd: 0.0,
+    })
+}
+
+/// One frame: the source that was asked for, or those that the frame gives together.
+fn frame_anchor(
+    scene: &Scene,
+    options: &AnchorOptions,
+    rays: &JointRays,
+    head: Option<&Head>,
+) -> FrameAnchor {
+    use AnchorSource::{Combined, Extent, Given, Trunk};
+    let lengths = &scene.lengths.lengths;
+    let up = Some(scene.up());
+    let by = |source: AnchorSource| match source {
+        AnchorSource::Ground => match &scene.ground {
+            Some(ground) => from_ground(rays, lengths, ground, options),
+            None => Err(AnchorError::NotSeen { source_name: source, missing: "ground below the camera" }),
+        },
+        Trunk => from_trunk(rays, lengths, up, options).map(|fit| fit.anchor),
+        AnchorSource::Head => from_head(rays, head),
+        Extent | Combined | Given => from_extent(rays, lengths, up, options),
+    };
+    let (asked, or_head) = match scene.options.anchor {
+        AnchorChoice::Source(source) if ![Combined, Given].contains(&source) => (vec![source], false),
+        AnchorChoice::Source(_) => (vec![AnchorSource::Ground, Trunk, Extent], false),
+        _ => (vec![AnchorSource::Ground, Trunk, Extent], true),
+    };
+    let mut error = AnchorError::Empty;
+    let mut found: Vec<Anchor> =
+        asked.into_iter().filter_map(|source| by(source).map_err(|e| error = e).ok()).collect();
+    if found.is_empty() && or_head {
+        found.extend(by(AnchorSource::Head).ok());
+    }
+    if found.is_empty() {
+        return FrameAnchor { anchor: Err(error), conflicts: Vec::new(), is_combined: false };
+    }
+    let is_combined = found.len() > 1;
+    match combine(&found) {
+        Ok(combination) => {
+            FrameAnchor { anchor: Ok(combination.anchor), conflicts: combination.conflicts, is_combined }
+        }
+        Err(error) => FrameAnchor { anchor: Err(error), conflicts: Vec::new(), is_combined },
+    }
+}
+
+fn from_head(rays: &JointRays, head: Option<&Head>) -> Result<Anchor, AnchorError> {
+    let source_name = AnchorSource::Head;
+    let Some(head) = head else {
+        return Err(AnchorError::NotSeen { source_name, missing: "four of the six points of the head" });
+    };
+    if !rays.sees(Joint::Neck) {
+        return Err(AnchorError::NotSeen { source_name, missing: "neck" });
+    }
+    let distance_m = head.distance_m;
+    let sd_scale_m = HEAD_SIZE_SD * distance_m;
+    let sd_depth_m = head.sd_m.hypot(sd_scale_m);
+    if !(sd_depth_m.is_finite() && distance_m > 0.0) {
+        return Err(AnchorError::NotPositive { what: "distance of the neck by the head", value: distance_m });
+    }
+    Ok(Anchor {
+        neck: rays.ray[Joint::Neck] * distance_m,
+        distance_m,
+        sd_depth_m,
+        sd_scale_m,
+        source: source_name,
+        modes: vec![DepthMode { distance_m, sd_m: sd_depth_m, probability: 1.0 }],
+    })
+}
+
+/// Conflicts of all frames by the pairs of their sources.
+fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
+    let of = found.iter().filter(|frame| frame.is_combined).count();
+    let mut pairs: BTreeMap<[AnchorSource; 2], Vec<&Conflict>> = BTreeMap::new();
+    for conflict in found.iter().flat_map(|frame| &frame.conflicts) {
+        pairs.entry(conflict.sources).or_default().push(conflict);
+    }
+    let median = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let pair = |(sources, list): ([AnchorSource; 2], Vec<&Conflict>)| SourceConflict {
+        sources,
+        frames: list.len(),
+        of,
+        distances_m: [0, 1].map(|i| median(list.iter().map(|c| c.distances_m[i]).collect())),
+        sigmas: median(list.iter().map(|c| c.sigmas).collect()),
+    };
+    pairs.into_iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sequences_are_asked_now_and_then() {
+        let times_s: Vec<f64> = (0..1001).map(|t| f64::from(t) / 50.0).collect();
+        let asked = asked(&times_s);
+        assert_eq!(asked.len(), 101);
+        assert_eq!([asked[0], asked[1], asked[100]], [0, 10, 1000]);
+        let known_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
+        let line: Vec<f64> = known_s.iter().map(|s| 3.0 + 2.0 * s).collect();
+        let all = interpolated(&times_s, &known_s, &line);
+        assert!(all.iter().zip(&times_s).all(|(value, s)| (value - 3.0 - 2.0 * s).abs() < 1e-9));
+        assert_eq!(super::asked(&times_s[..500]).len(), 500);
+    }
+}

@@ -1,0 +1,300 @@
+//! What a reader should know before trusting the postures of a sequence.
+
+use std::fmt;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::frame::{FrameProblem, FrameReading};
+use super::heading::HeadingFrom;
+use super::neck::{NeckTrack, Scene, SourceConflict};
+use super::{AnchorChoice, Motion, Strength};
+use crate::posture::constraint::ConstraintKind;
+use crate::posture::link::LinkedPath;
+use crate::posture::skeleton::{Joint, PerJoint};
+use crate::posture::tree::TreeOptions;
+
+/// Something that casts doubt on a result, as a sentence with its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// Joints were left out for their weight.
+    LightJoints {
+        /// How many.
+        light: usize,
+        /// Of how many points.
+        all: usize,
+        /// The least weight asked for.
+        min_weight: f64,
+    },
+    /// Joints lie where the lens shows nothing.
+    OutsideLens {
+        /// How many.
+        outside: usize,
+        /// Of how many points.
+        all: usize,
+    },
+    /// The camera is not above the ground.
+    NoGround {
+        /// Its height, metres.
+        camera_height_m: f64,
+    },
+    /// Lengths are those of the proportions alone.
+    LengthsNotSeen {
+        /// Why.
+        reason: String,
+    },
+    /// Lengths have the scale of an adult of assumed height.
+    ScaleAssumed {
+        /// Relative standard deviation of the scale.
+        scale_sd: f64,
+    },
+    /// A segment is seen longer than it can be.
+    SegmentTooShort {
+        /// Its name.
+        segment: String,
+        /// Its length, metres.
+        length_m: f64,
+        /// The least length that explains it, median, metres.
+        seen_m: f64,
+        /// Frames in which it is.
+        frames: usize,
+        /// Frames in which it is seen.
+        of: usize,
+    },
+    /// Sources of the neck's distance contradict each other in many frames.
+    Conflict(SourceConflict),
+    /// There is no moving direction to which the rules of a motion could be held.
+    NoTravel {
+        /// Way over the ground, metres; NaN if not known.
+        travelled_m: f64,
+        /// What stands for it.
+        from: HeadingFrom,
+    },
+    /// The person turns.
+    Turns {
+        /// Between the first and the second half of the way, degrees.
+        turn_deg: f64,
+    },
+    /// Frames say nothing.
+    SilentFrames {
+        /// How many.
+        silent: usize,
+        /// Of how many.
+        of: usize,
+        /// Why the first one says nothing.
+        reason: FrameProblem,
+    },
+    /// Many segments are seen longer than they are.
+    WithoutRoot {
+        /// Their share.
+        share: f64,
+        /// The share explained by the noise that was stated, at most.
+        usual: f64,
+    },
+    /// Points jump more than the noise that was stated.
+    Noisy {
+        /// Standard deviation of a coordinate by the points' own jumps, pixels.
+        seen_px: f64,
+        /// What was stated, pixels.
+        stated_px: f64,
+    },
+    /// In most frames no posture survives the limits of bodies.
+    NothingPossible {
+        /// How many frames.
+        frames: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// The rules of the motion leave no posture, in frames in which a body could have one.
+    AgainstRules {
+        /// The motion.
+        motion: Motion,
+        /// Their strength.
+        strength: Strength,
+        /// Frames in which the rules leave nothing.
+        frames: usize,
+        /// Frames in which bodies can be.
+        of: usize,
+        /// Linked postures that break a rule, share.
+        linked: f64,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |part: usize, of: usize| 100.0 * part as f64 / of.max(1) as f64;
+        match self {
+            Self::LightJoints { light, all, min_weight } => {
+                write!(f, "{light} of {all} points count as missing, for their weight is below {min_weight}")
+            }
+            Self::OutsideLens { outside, all } => {
+                write!(f, "{outside} of {all} points lie where this lens shows nothing and count as missing")
+            }
+            Self::NoGround { camera_height_m } => write!(
+                f,
+                "the camera is at a height of {camera_height_m:.2} m, not above the ground: the ground tells nothing"
+            ),
+            Self::LengthsNotSeen { reason } => {
+                write!(f, "lengths are those of average proportions, not of this person: {reason}")
+            }
+            Self::ScaleAssumed { scale_sd } => write!(
+                f,
+                "neither lengths, height nor distance are known: all sizes and distances may be wrong by \
+                 {:.0} % together",
+                100.0 * scale_sd
+            ),
+            Self::SegmentTooShort { segment, length_m, seen_m, frames, of } => write!(
+                f,
+                "{segment} is taken as {length_m:.3} m, but in {frames} of {of} frames it looks at least \
+                 {seen_m:.3} m long: a wrong length or wrong points"
+            ),
+            Self::Conflict(conflict) => conflict.fmt(f),
+            Self::NoTravel { travelled_m, from } => write!(
+                f,
+                "the person begins and ends {travelled_m:.2} m apart, too little for a moving direction: that \
+                 of the {} stands for it",
+                from.name()
+            ),
+            Self::Turns { turn_deg } => {
+                write!(f, "the way turns by {turn_deg:.0} degrees; the rules are of straight walking")
+            }
+            Self::SilentFrames { silent, of, reason } => {
+                write!(f, "{silent} of {of} frames say nothing; in the first of them {reason}")
+            }
+            Self::WithoutRoot { share, usual } => write!(
+                f,
+                "{:.0} % of the segments look longer than they are (no real root; {:.0} % at most by noise): \
+                 points noisier than stated, wrong lengths or a wrong distance",
+                100.0 * share,
+                100.0 * usual
+            ),
+            Self::Noisy { seen_px, stated_px } => write!(
+                f,
+                "points jump from frame to frame as by a noise of {seen_px:.1} px, but noise_px is {stated_px:.1}"
+            ),
+            Self::NothingPossible { frames, of } => write!(
+                f,
+                "in {frames} of {of} frames ({:.0} %) no posture is possible for a body: look at the violations",
+                percent(*frames, *of)
+            ),
+            Self::AgainstRules { motion, strength, frames, of, linked } => write!(
+                f,
+                "the rules of {} ({}) leave no posture in {frames} of {of} frames and {:.0} % of the linked \
+                 postures break one: this does not look like {}",
+                motion.name(),
+                strength.name(),
+                100.0 * linked,
+                motion.noun()
+            ),
+        }
+    }
+}
+
+/// Share of segments without real root that noise explains at the most: 36 % at 8 px, measured on walks.
+const USUAL_WITHOUT_ROOT: f64 = 0.36;
+/// A conflict in more frames than this share is worth a warning.
+const MANY_CONFLICTS: f64 = 0.1;
+
+/// All results, figures in camera axes.
+pub(super) struct Found<'a> {
+    /// What cut, frame by frame.
+    pub trees: &'a [TreeOptions],
+    pub frames: &'a [Result<FrameReading, FrameProblem>],
+    pub linked: &'a LinkedPath,
+    pub neck: &'a NeckTrack,
+}
+
+/// Looks at all results.
+pub(super) fn judge(scene: &Scene, found: &Found, warnings: &mut Vec<Warning>) {
+    let Found { frames, linked, neck, .. } = found;
+    let many = |conflict: &&SourceConflict| conflict.frames as f64 > MANY_CONFLICTS * conflict.of as f64;
+    warnings.extend(neck.conflicts.iter().filter(many).map(|&conflict| Warning::Conflict(conflict)));
+    let silent = frames.iter().filter(|frame| frame.is_err()).count();
+    if let Some(reason) = frames.iter().find_map(|frame| frame.as_ref().err()) {
+        warnings.push(Warning::SilentFrames { silent, of: frames.len(), reason: reason.clone() });
+    }
+    warnings.extend(without_root(&linked.gap_m));
+    warnings.extend(noisy(scene));
+    warnings.extend(rejected(scene, found));
+}
+
+fn without_root(gap_m: &[PerJoint<f64>]) -> Option<Warning> {
+    let gaps: Vec<f64> =
+        gap_m.iter().flat_map(|gaps| gaps.0[1..].iter().copied()).filter(|gap| !gap.is_nan()).collect();
+    let share = gaps.iter().filter(|&&gap| gap > 0.0).count() as f64 / gaps.len().max(1) as f64;
+    (share > USUAL_WITHOUT_ROOT).then_some(Warning::WithoutRoot { share, usual: USUAL_WITHOUT_ROOT })
+}
+
+/// A coordinate over three frames at even times: its second difference has √6 of its noise. Medians, for the
+/// limbs that move fast and the joints that jump to the other side are few.
+fn noisy(scene: &Scene) -> Option<Warning> {
+    let (points_px, times_s) = (scene.sequence.points_px, scene.sequence.times_s);
+    let mut jumps_px = Vec::new();
+    for t in 2..times_s.len() {
+        let [before_s, after_s] = [times_s[t - 1] - times_s[t - 2], times_s[t] - times_s[t - 1]];
+        let share = before_s / (before_s + after_s);
+        // x₁ - (1-s) x₀ - s x₂: variance 1 + (1-s)² + s².
+        let factor = (1.0 + share * share + (1.0 - share) * (1.0 - share)).sqrt();
+        for joint in Joint::ALL.into_iter().filter(|&joint| (t - 2..=t).all(|t| scene.rays[t].sees(joint))) {
+            let [a, b, c]: [DVec2; 3] = [2, 1, 0].map(|back| points_px[t - back][joint]);
+            let jump = (b - a.lerp(c, share)) / factor;
+            jumps_px.extend([jump.x.abs(), jump.y.abs()]);
+        }
+    }
+    if jumps_px.is_empty() {
+        return None;
+    }
+    jumps_px.sort_by(f64::total_cmp);
+    let seen_px = 1.4826 * jumps_px[jumps_px.len() / 2];
+    let stated_px = scene.options.noise_px;
+    // Half a pixel: rounding.
+    (seen_px > 2.0 * stated_px + 0.5).then_some(Warning::Noisy { seen_px, stated_px })
+}
+
+/// Whether limits or rules reject most frames.
+fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
+    let frames: Vec<(usize, &FrameReading)> =
+        found.frames.iter().enumerate().filter_map(|(t, frame)| Some((t, frame.as_ref().ok()?))).collect();
+    let of = frames.len();
+    let empty: Vec<_> = frames.iter().filter(|(_, frame)| frame.survivors() == 0).collect();
+    let has_rules = scene.options.motion != Motion::Physical;
+    let is_impossible = |&&&(t, frame): &&&(usize, &FrameReading)| {
+        let body = TreeOptions { motion: None, ..found.trees[t].clone() };
+        !has_rules || frame.tree.view.interpret(&body).is_ok_and(|tree| tree.survivors.is_empty())
+    };
+    let impossible = empty.par_iter().filter(is_impossible).count();
+    let mut warnings = Vec::new();
+    if 2 * impossible > of {
+        warnings.push(Warning::NothingPossible { frames: impossible, of });
+    }
+    if !has_rules {
+        return warnings;
+    }
+    let breaks_rule = |&&(t, frame): &&(usize, &FrameReading)| {
+        let view = &frame.tree.view;
+        let path = view.nearest_path(&found.linked.figures[t]);
+        let broken = view.violations(path, &found.trees[t]);
+        broken.iter().any(|violation| violation.constraint.kind() == ConstraintKind::Rule)
+    };
+    let linked = frames.iter().filter(breaks_rule).count() as f64 / of.max(1) as f64;
+    let (against, possible) = (empty.len() - impossible, of - impossible);
+    if 2 * against > possible || linked > 0.5 {
+        let (motion, strength) = (scene.options.motion, scene.options.strength);
+        warnings.push(Warning::AgainstRules { motion, strength, frames: against, of: possible, linked });
+    }
+    warnings
+}
+
+/// What is known before anything is looked at.
+pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let camera_height_m = scene.camera.position().z;
+    if scene.ground.is_none() {
+        warnings.push(Warning::NoGround { camera_height_m });
+    }
+    let is_given = matches!(scene.options.anchor, AnchorChoice::Given { .. });
+    if !is_given && scene.lengths.scale_name() == "assumed" {
+        warnings.push(Warning::ScaleAssumed { scale_sd: scene.lengths.scale_sd });
+    }
+    warnings
+}

@@ -1,0 +1,101 @@
+//! What a tree is pruned by.
+
+use crate::posture::collision::Collisions;
+use crate::posture::constraint::{Constraint, ConstraintKind, Violation};
+use crate::posture::limits::Limits;
+use crate::posture::placed::{Bearings, PlacedFigure, Trunk};
+use crate::posture::rules::{MotionModel, Rule};
+use crate::posture::skeleton::SegmentLengths;
+
+/// What cuts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TreeOptions {
+    /// Limits of angles and rigid distances.
+    pub limits: Option<Limits>,
+    /// Collisions of parts of the body.
+    pub collisions: Option<Collisions>,
+    /// Rules of a motion.
+    pub motion: Option<MotionModel>,
+    /// Vertical, moving direction and head, camera axes.
+    pub bearings: Bearings,
+    /// Whether to return every cut branch with its reason.
+    pub keep_cuts: bool,
+}
+
+impl TreeOptions {
+    /// Physical constraints at limits that real people keep; no motion model.
+    pub fn physical() -> Self {
+        Self {
+            limits: Some(Limits::measured()),
+            collisions: Some(Collisions::measured()),
+            motion: None,
+            bearings: Bearings::default(),
+            keep_cuts: false,
+        }
+    }
+
+    /// Physical constraints as the paper prints them.
+    pub fn physical_paper() -> Self {
+        Self { limits: Some(Limits::paper()), collisions: Some(Collisions::paper()), ..Self::physical() }
+    }
+
+    /// With the rules of a motion.
+    pub fn with_motion(self, motion: MotionModel) -> Self {
+        Self { motion: Some(motion), ..self }
+    }
+
+    /// With bearings in camera axes.
+    pub fn with_bearings(self, bearings: Bearings) -> Self {
+        Self { bearings, ..self }
+    }
+
+    /// The same limits with no room for noise.
+    pub fn without_noise(&self) -> Self {
+        let mut options = self.clone();
+        options.limits.iter_mut().for_each(|limits| limits.noise_factor = 0.0);
+        options.collisions.iter_mut().for_each(|collisions| collisions.noise_factor = 0.0);
+        options.motion.iter_mut().for_each(|motion| motion.noise_factor = 0.0);
+        options
+    }
+
+    /// Whether a constraint is asked for.
+    pub fn asks(&self, constraint: Constraint) -> bool {
+        use Constraint::{NeckBending, NeckExtension, NeckFlexion, NeckRotation};
+        match constraint.kind() {
+            ConstraintKind::Distance => self.limits.is_some(),
+            ConstraintKind::Angle => {
+                let neck = [NeckFlexion, NeckExtension, NeckRotation, NeckBending].contains(&constraint);
+                self.limits.is_some() && (!neck || self.bearings.head.is_some())
+            }
+            ConstraintKind::Collision => self.collisions.is_some(),
+            ConstraintKind::Rule => {
+                let rule = Rule::of(constraint);
+                self.motion.as_ref().zip(rule).is_some_and(|(motion, rule)| motion.tolerance(rule).is_some())
+            }
+        }
+    }
+
+    /// Checks one constraint; None where it holds or is not asked for.
+    pub(super) fn check(
+        &self,
+        constraint: Constraint,
+        figure: &PlacedFigure,
+        trunk: &Trunk,
+        lengths: &SegmentLengths,
+    ) -> Option<Violation> {
+        match constraint.kind() {
+            ConstraintKind::Collision => self.collisions.as_ref()?.check(constraint, figure),
+            ConstraintKind::Rule => self.motion.as_ref()?.check(constraint, figure, trunk),
+            ConstraintKind::Angle | ConstraintKind::Distance => {
+                let head = self.bearings.head.as_ref();
+                self.limits.as_ref()?.check(constraint, figure, trunk, lengths, head)
+            }
+        }
+    }
+}
+
+impl Default for TreeOptions {
+    fn default() -> Self {
+        Self::physical()
+    }
+}

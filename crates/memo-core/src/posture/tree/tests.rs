@@ -1,0 +1,241 @@
+//! The tree against one that asks every constraint of every leaf anew.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::*;
+use crate::posture::placed::Bearings;
+use crate::posture::rules::{MotionModel, Rule, Tolerance};
+use crate::posture::skeleton::Side;
+use crate::synth::Random;
+
+/// Someone upright in camera axes, 4 m away, every segment turned at random by up to `spread_rad`.
+fn figure(lengths: &SegmentLengths, facing_rad: f64, spread_rad: f64, random: &mut Random) -> StickFigure {
+    let turn = glam::DQuat::from_rotation_y(facing_rad);
+    let rest = |joint: Joint| match joint {
+        Joint::RightShoulder => DVec3::new(-1.0, 0.0, 0.1),
+        Joint::LeftShoulder => DVec3::new(1.0, 0.0, 0.1),
+        Joint::RightHip => DVec3::new(-0.85, 0.5, 0.0),
+        Joint::LeftHip => DVec3::new(0.85, 0.5, 0.0),
+        _ => DVec3::Y,
+    };
+    let mut figure = StickFigure::UNKNOWN;
+    figure[Joint::Neck] = DVec3::new(random.uniform(-0.3, 0.3), -0.3, 4.0);
+    for joint in Joint::ALL.into_iter().skip(1) {
+        let spread = if joint < Joint::RightElbow { 0.2 * spread_rad } else { spread_rad };
+        let mut angle = || random.uniform(-spread, spread);
+        let bend = glam::DQuat::from_euler(glam::EulerRot::XYZ, angle(), angle(), angle());
+        let direction = turn * bend * rest(joint).normalize();
+        figure[joint] = figure[joint.start().unwrap()] + lengths.to[joint] * direction;
+    }
+    figure
+}
+
+fn view_of(seed: u64, noise_rad: f64) -> View {
+    let lengths = SegmentLengths::lee_chen();
+    let mut random = Random::new(seed);
+    let facing_rad = random.uniform(-3.0, 3.0);
+    let spread_rad = random.uniform(0.05, 0.5);
+    let figure = figure(&lengths, facing_rad, spread_rad, &mut random);
+    let mut rays = JointRays::from_points(&figure);
+    for ray in &mut rays.ray.0 {
+        let [a, b] = random.normal_pair().map(f64::from);
+        *ray = (*ray + noise_rad * DVec3::new(a, b, 0.0)).normalize();
+    }
+    rays.noise_rad = noise_rad;
+    View::new(rays, figure[Joint::Neck], lengths)
+}
+
+fn every_rule() -> MotionModel {
+    Rule::ALL.into_iter().fold(MotionModel::walking(), |model, rule| {
+        let tolerance = model.tolerance(rule).unwrap_or(Tolerance::from_deg(35.0));
+        model.with(rule, tolerance)
+    })
+}
+
+/// What the walk must give, by looking at every one of the 2^13 leaves alone and asking every constraint
+/// on the way down to it anew.
+#[derive(Default)]
+struct Plain {
+    survivors: BTreeSet<Path>,
+    reached: [BTreeSet<Path>; JOINT_COUNT],
+    survived: [BTreeSet<Path>; JOINT_COUNT],
+    cuts: BTreeMap<(usize, Path), String>,
+}
+
+fn plain(view: &View, options: &TreeOptions) -> Plain {
+    let mut plain = Plain::default();
+    'leaf: for bits in 0..1u16 << 13 {
+        let leaf = Path(bits << 1);
+        let mut placed = PerJoint([Placed::UNKNOWN; JOINT_COUNT]);
+        placed[Joint::Neck] = view.root();
+        let mut way = Vec::new();
+        for joint in Joint::ALL.into_iter().skip(1) {
+            let (candidates, count) = view.candidates(placed[joint.start().unwrap()].point, joint);
+            if count == 1 && leaf.is_far(joint) {
+                continue 'leaf;
+            }
+            placed[joint] = candidates[usize::from(leaf.is_far(joint))];
+            let path = Path(leaf.0 & ((1u32 << (joint as u32 + 1)) - 1) as u16);
+            let figure = PlacedFigure::of(&placed);
+            let known = figure.known();
+            let trunk = Trunk::of(&figure, &options.bearings);
+            let broken = Constraint::ALL.into_iter().find(|&constraint| {
+                constraint.level() == joint
+                    && options.asks(constraint)
+                    && known.contains(constraint.joints())
+                    && options.check(constraint, &figure, &trunk, &view.lengths).is_some()
+            });
+            if let Some(constraint) = broken {
+                plain.cuts.insert((joint as usize, path), constraint.name());
+                continue 'leaf;
+            }
+            plain.reached[joint as usize].insert(path);
+            way.push((joint as usize, path));
+        }
+        plain.survivors.insert(leaf);
+        for (level, path) in way {
+            plain.survived[level].insert(path);
+        }
+    }
+    plain
+}
+
+fn assert_same(view: &View, options: &TreeOptions) -> usize {
+    let found = view.interpret(options).unwrap();
+    let plain = plain(view, options);
+    let survivors: BTreeSet<Path> = found.survivors.iter().copied().collect();
+    assert_eq!(survivors, plain.survivors);
+    assert_eq!(survivors.len(), found.survivors.len());
+    for joint in Joint::ALL.into_iter().skip(1) {
+        let level = joint as usize;
+        assert_eq!(found.counts[joint].reached as usize, plain.reached[level].len(), "{joint:?}");
+        assert_eq!(found.counts[joint].survived as usize, plain.survived[level].len(), "{joint:?}");
+    }
+    let mut reasons = BTreeMap::<String, u32>::new();
+    plain.cuts.values().for_each(|name| *reasons.entry(name.clone()).or_default() += 1);
+    let found_reasons = found.reasons.iter().map(|r| (r.constraint.name(), r.branches)).collect();
+    assert_eq!(reasons, found_reasons);
+    let cuts: BTreeMap<(usize, Path), String> = found
+        .cuts
+        .iter()
+        .map(|cut| ((cut.violation.joint as usize, cut.path), cut.violation.constraint.name()))
+        .collect();
+    assert_eq!(cuts, plain.cuts);
+    found.survivors.len()
+}
+
+#[test]
+fn the_walk_is_the_plain_tree() {
+    let bearings = Bearings {
+        up: Some(DVec3::new(0.02, -1.0, 0.05).normalize()),
+        heading: None,
+        head: Some(glam::DMat3::from_rotation_y(0.4)),
+    };
+    let mut survivors = Vec::new();
+    for seed in 0..14 {
+        let mut view = view_of(seed, [0.0, 1e-3, 3e-3][seed as usize % 3]);
+        view.merge_m = [0.0, 0.04][seed as usize % 2];
+        let mut options = match seed % 4 {
+            0 => TreeOptions::physical(),
+            1 => TreeOptions::physical_paper().with_motion(MotionModel::walking_general_paper()),
+            2 => TreeOptions::physical().with_motion(every_rule()),
+            _ => TreeOptions { limits: None, ..TreeOptions::physical().with_motion(every_rule()) },
+        };
+        options.keep_cuts = true;
+        if seed % 3 == 1 {
+            options.bearings = bearings;
+        }
+        if seed % 5 == 4 {
+            view.rays.ray[Joint::LeftElbow] = DVec3::NAN;
+        }
+        if seed == 13 {
+            view.rays.ray[Joint::RightHip] = DVec3::NAN;
+        }
+        survivors.push(assert_same(&view, &options));
+    }
+    assert!(survivors.iter().filter(|&&n| n > 0).count() >= 6, "{survivors:?}");
+}
+
+#[test]
+fn without_constraints_every_leaf_survives() {
+    let options = TreeOptions { limits: None, collisions: None, ..TreeOptions::physical() };
+    // Beyond a wrong root the next segment may have none, so not every view has all 2^13 leaves.
+    let full = |view: &View| view.interpret(&options).unwrap().survivors.len() == 8192;
+    let view = (0..50).map(|seed| view_of(seed, 0.0)).find(full).unwrap();
+    let found = view.interpret(&options).unwrap();
+    for joint in Joint::ALL {
+        assert_eq!(found.counts[joint].reached, 1 << joint as u32);
+        assert_eq!(found.counts[joint].survived, 1 << joint as u32);
+    }
+    assert!(found.reasons.is_empty() && found.least_violating.is_none());
+    for interpretation in found.interpretations().take(100) {
+        for joint in Joint::ALL.into_iter().skip(1) {
+            let length = interpretation.figure.segment(joint).length();
+            assert!((length - view.lengths.to[joint]).abs() < 1e-9);
+        }
+    }
+}
+
+/// The least violating posture is that of an exhaustive search, and it breaks what it is said to break.
+#[test]
+fn the_least_violating_posture_has_no_better() {
+    let mut tried = 0;
+    for seed in 0..40 {
+        let view = view_of(seed, 0.0);
+        let options = TreeOptions::physical_paper().with_motion(MotionModel::walking_paper());
+        let found = view.interpret(&options).unwrap();
+        let Some(least) = &found.least_violating else {
+            assert!(!found.survivors.is_empty());
+            continue;
+        };
+        tried += 1;
+        let total = |path| view.violations(path, &options).iter().map(|v| v.severity().powi(2)).sum::<f64>();
+        let exhaustive = (0..1u16 << 13).map(|bits| total(Path(bits << 1))).fold(f64::MAX, f64::min);
+        assert!((least.total - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
+        assert!((total(least.interpretation.path) - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
+        assert!(!least.violations.is_empty());
+        if tried == 3 {
+            break;
+        }
+    }
+    assert_eq!(tried, 3);
+}
+
+#[test]
+fn unseen_joints_are_left_open_with_all_that_hangs_on_them() {
+    let mut view = view_of(5, 0.0);
+    view.rays.ray[Joint::RightElbow] = DVec3::NAN;
+    let found = view.interpret(&TreeOptions::physical()).unwrap();
+    assert!(found.open.contains(&Constraint::ElbowExtension(Side::Right)));
+    assert!(!found.open.contains(&Constraint::ElbowExtension(Side::Left)));
+    let first = found.interpretations().next();
+    let interpretation = first.or(found.least_violating.map(|l| l.interpretation));
+    let interpretation = interpretation.unwrap();
+    assert!(interpretation.figure[Joint::RightWrist].is_nan());
+    assert!(interpretation.kinds[Joint::RightWrist].is_none());
+    assert!(interpretation.figure[Joint::RightKnee].is_finite());
+
+    view.rays.ray = PerJoint([DVec3::NAN; JOINT_COUNT]);
+    let nothing = view.interpret(&TreeOptions::physical()).unwrap();
+    assert_eq!(nothing.survivors, [Path::default()]);
+    assert!(nothing.reasons.is_empty() && !nothing.open.is_empty());
+}
+
+#[test]
+fn bad_input_is_refused_with_its_values() {
+    let view = view_of(1, 0.0);
+    let options = TreeOptions::physical();
+    let refused = |change: &dyn Fn(&mut View)| {
+        let mut view = view;
+        change(&mut view);
+        view.interpret(&options).unwrap_err().to_string()
+    };
+    assert!(refused(&|view| view.neck.z = -1.0).contains("neck"));
+    assert!(refused(&|view| view.neck.x = f64::NAN).contains("neck"));
+    assert!(refused(&|view| view.rays.ray[Joint::LeftKnee] *= 2.0).contains("left_knee"));
+    assert!(refused(&|view| view.rays.noise_rad = f64::NAN).contains("noise_rad"));
+    assert!(refused(&|view| view.merge_m = -0.1).contains("merge_m"));
+    assert!(refused(&|view| view.lengths.to[Joint::LeftKnee] = 38.0).contains("metres"));
+    let options = options.clone().with_bearings(Bearings { up: Some(DVec3::ZERO), ..Bearings::default() });
+    assert!(view.interpret(&options).unwrap_err().to_string().contains("up"));
+}

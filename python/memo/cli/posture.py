@@ -1,0 +1,251 @@
+"""`memo posture`: all postures that one view leaves, and the likeliest motion, from keypoints.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
+from memo.cli.given import check_writable, checked_height, load_camera
+from memo.cli.unswap import exchanges
+from memo.postures import write_postures
+
+if TYPE_CHECKING:
+    import typer
+
+POSTURE_EXIT_CODES = """Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage;
+3 no posture is left in any frame (the tables say why); 4 the app extra is not installed;
+130 interrupted (no file is left half written)."""
+
+_DRAWN = "postures.png"
+
+_SCALES = {
+    "lengths": "the lengths given",
+    "height": "the height given",
+    "distance": "the distance from the camera",
+    "assumed": "the height of an average adult, assumed",
+}
+_SOURCES = {
+    "given": "as given",
+    "ground": "by the ground",
+    "trunk": "by the trunk",
+    "extent": "by the whole figure",
+    "head": "by the head",
+    "combined": "by several sources together",
+    "neighbours": "by the frames around",
+}
+
+
+class Rules(StrEnum):
+    """What a posture must satisfy beside the body: `memo.postures.RULES`."""
+
+    PHYSICAL = "physical"
+    WALKING = "walking"
+    WALKING_GENERAL = "walking-general"
+    RUNNING = "running"
+    STANDING = "standing"
+
+
+class Strength(StrEnum):
+    """How strict the limits are: `memo.postures.STRENGTHS`."""
+
+    MEASURED = "measured"
+    PAPER = "paper"
+
+
+class Anchor(StrEnum):
+    """Where the distance comes from: `memo.postures.ANCHORS`."""
+
+    AUTO = "auto"
+    GROUND = "ground"
+    TRUNK = "trunk"
+    EXTENT = "extent"
+    HEAD = "head"
+    COMBINED = "combined"
+
+
+def add_posture(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=POSTURE_EXIT_CODES)
+    def posture(
+        keypoints: Annotated[
+            Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
+        ],
+        camera: Annotated[Path, typer.Option(help="Calibration: TOML, or Tsai XML.")],
+        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        lengths: Annotated[
+            Path | None, typer.Option(help="The 17 segment lengths, metres: CSV, JSON or a postures.json.")
+        ] = None,
+        height: Annotated[
+            float | None, typer.Option(help="Without --lengths: height of the person, metres.")
+        ] = None,
+        rules: Annotated[Rules, typer.Option(help="What the person does.")] = Rules.WALKING,
+        strength: Annotated[
+            Strength, typer.Option(help="Limits as measured on people, or as printed in the paper.")
+        ] = Strength.MEASURED,
+        anchor: Annotated[Anchor, typer.Option(help="What the distance is taken from.")] = Anchor.AUTO,
+        distance: Annotated[
+            float | None, typer.Option(help="Distance of the neck from the camera, metres, where known.")
+        ] = None,
+        noise_px: Annotated[
+            float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
+        ] = 2.0,
+        fps: Annotated[
+            float | None, typer.Option(help="Frame rate; needed where no times are given.")
+        ] = None,
+        layout: Annotated[
+            str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
+        ] = None,
+        person: Annotated[
+            int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
+        ] = None,
+        unswap: Annotated[
+            bool, typer.Option(help="First exchange right and left where they were confused.")
+        ] = True,
+        frame: Annotated[
+            int | None, typer.Option(help="Which frame is drawn; else one with as many as most.")
+        ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
+        plots: Annotated[bool, typer.Option(help="Write postures.png.")] = True,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Finds the postures in 3D that KEYPOINTS allow, and the likeliest motion through them."""
+        folder = out or Path("memo-out") / keypoints.resolve().stem
+        delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
+        reading = {"fps": fps, "layout": layout, "person": person}
+        options = {
+            "rules": rules.value,
+            "strength": strength.value,
+            "anchor": anchor.value,
+            "unswap": unswap,
+            "noise_px": noise_px,
+        }
+
+        def work() -> Exit:
+            scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
+            calibrated = load_camera(camera, camera_name)
+            return _posture(keypoints, reading, calibrated, scale | options, frame, delivery)
+
+        raise typer.Exit(guarded(work))
+
+
+def _posture(
+    path: Path,
+    reading: dict[str, Any],
+    camera: Any,
+    options: dict[str, Any],
+    frame: int | None,
+    delivery: Delivery,
+) -> Exit:
+    check_writable(delivery.out)
+    with with_elapsed("finding postures", delivery):
+        keypoints = memo.read_keypoints(path, **reading)
+        row = None if frame is None else _row(keypoints, frame)
+        postures = memo.posture(keypoints, camera, **options)
+        (delivery.out / _DRAWN).unlink(missing_ok=True)  # of an earlier run: it would belong to other tables
+        written = write_postures(postures, delivery.out)
+        if delivery.plots and postures.found.any():
+            from memo.posture_plot import write_posture_plot
+
+            written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
+    delivery.tell(postures.summary, _lines(postures), written)
+    return Exit.DONE if (postures.survivors > 0).any() else Exit.NOBODY
+
+
+# What the user gave, checked before any work.
+
+
+def _scale(lengths: Path | None, height_m: float | None) -> dict[str, Any]:
+    if lengths is not None and height_m is not None:
+        raise InputError("--lengths already hold the height: leave --height out")
+    if lengths is not None:
+        return {"lengths": memo.read_lengths(lengths)}
+    return {} if height_m is None else {"height_m": checked_height(height_m)}
+
+
+def _checked_distance(distance_m: float | None) -> float | None:
+    if distance_m is not None and not 0.1 <= distance_m <= 1000:
+        raise InputError(f"--distance {distance_m:g} is not a distance in metres (0.1 to 1000)")
+    return distance_m
+
+
+def _row(keypoints: memo.Keypoints, frame: int) -> int:
+    first, last = int(keypoints.frames[0]), int(keypoints.frames[-1])
+    if not first <= frame <= last:
+        raise InputError(f"--frame {frame} is not among the frames {first} to {last}")
+    return frame - first
+
+
+# What is said.
+
+
+def _lines(postures: memo.Postures) -> list[str]:
+    """At most five lines; that of the files comes sixth."""
+    lines = [_frames_line(postures), *_reason_line(postures), _scale_line(postures), _second_line(postures)]
+    return lines + [f"Look before use: {'; '.join(postures.warnings)}"] * bool(postures.warnings)
+
+
+def _frames_line(postures: memo.Postures) -> str:
+    left = postures.survivors > 0
+    line = f"{_counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
+    if left.any():
+        groups = _counted(round(np.median(postures.group_counts[left])), "group")
+        more = "" if np.median(postures.all_groups_given[left]) else " or more"
+        line += f", median {np.median(postures.survivors[left]):.0f} in {groups}{more}"
+    else:
+        line += _why_none(postures)
+    if postures.repair is not None and any(postures.repair.exchanged.values()):
+        line += f"; right and left exchanged: {exchanges(postures.repair)}"
+    return f"{line}."
+
+
+def _why_none(postures: memo.Postures) -> str:
+    why = next((why for why in postures.cut_all if why), None)
+    return "" if why is None else f": what is nearest to one, in the first, breaks {', '.join(why)}"
+
+
+def _reason_line(postures: memo.Postures) -> list[str]:
+    most = max(postures.reason_totals, key=lambda total: total.branches, default=None)
+    if most is None:
+        return []
+    name, sentence = most.constraint.replace("_", " "), most.sentence.rstrip(".")
+    cut = f"{_counted(most.branches, 'branch', 'branches')} in {_counted(most.frames, 'frame')}"
+    return [f"Most is cut by {name}: {cut} ({sentence})."]
+
+
+def _scale_line(postures: memo.Postures) -> str:
+    known = np.isfinite(postures.anchor_m)
+    line = f"Sizes rest on {_SCALES.get(postures.scale_from, postures.scale_from)}"
+    if known.any():
+        sources = [source for source, there in zip(postures.anchor_source, known, strict=True) if there]
+        usual = max(dict.fromkeys(sources), key=sources.count)
+        distance_m, sd_m = np.median(postures.anchor_m[known]), np.median(postures.anchor_sd_m[known])
+        line += f"; the neck is {distance_m:.2f} ± {sd_m:.2f} m away, {_SOURCES.get(usual, usual)}"
+    return f"{line}."
+
+
+def _second_line(postures: memo.Postures) -> str:
+    second = postures.second
+    if second is None:
+        return "No other motion is there: which way the limbs point in depth is decided."
+    joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
+    undecided = f"{postures.undecided.sum()} of {_counted(len(postures.frames), 'frame')}"
+    where = f"frames {second.first_frame} to {second.last_frame}"
+    if second.first_frame == second.last_frame:
+        where = f"frame {second.first_frame}"
+    return (
+        f"Near and far: {joints} mirrored in depth in {where} has"
+        f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
+        f" at this noise some joint is undecided in {undecided}."
+    )
+
+
+def _counted(count: int, one: str, several: str | None = None) -> str:
+    return f"{count} {one if count == 1 else several or one + 's'}"

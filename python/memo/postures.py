@@ -1,0 +1,578 @@
+"""Postures from one view: keypoints and a camera in, all possible postures and the likeliest motion out.
+
+The postures are the core's (Lee and Chen 1985, with what makes them usable on a detector's points). This file
+hands it the keypoints as 14 joints, names what comes back, and writes it.
+
+What it cannot do: measure sizes without a scale. Without lengths, height, ground or distance there is none.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo, sides
+from memo.files import write_columns_csv, write_json
+from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+
+__all__ = ["Postures", "Reason", "ReasonTotal", "SecondBest", "posture", "read_lengths", "write_postures"]
+
+RULES = ("physical", "walking", "walking-general", "running", "standing")
+STRENGTHS = ("measured", "paper")
+ANCHORS = ("auto", "ground", "trunk", "extent", "head", "combined")
+
+_MAX_LENGTHS_FILE_BYTES = 64 << 20
+
+_UNDECIDED_NATS = math.log(4)  # probabilities 0.8 and 0.2
+
+Array = npt.NDArray[np.float64]
+Whole = npt.NDArray[np.int64]
+
+
+class Reason(NamedTuple):
+    """What one constraint cut in one frame."""
+
+    constraint: str
+    joint: str
+    """The joint at whose level of the tree it cut."""
+    branches: int
+    """How many branches, each with all that would have hung on it."""
+
+
+class ReasonTotal(NamedTuple):
+    """What one constraint cut in all frames: a row of `reasons.csv`."""
+
+    constraint: str
+    kind: str
+    """What sort of constraint: an angle, a distance, a collision or a rule."""
+    joint: str
+    branches: int
+    frames: int
+    """In how many frames it cut any."""
+    sentence: str
+    """What the constraint is."""
+
+
+@dataclass(frozen=True)
+class SecondBest:
+    """The likeliest other motion: where it differs, and how much less likely it is."""
+
+    joints: tuple[str, ...]
+    """The joints at the ends of the segments mirrored in depth."""
+    first_frame: int
+    last_frame: int
+    """Frame numbers, both included."""
+    postures_m: Array
+    """(n, 14, 3) world, metres, in the frames from first to last."""
+    margin_nats: float
+    """Natural logarithm of how many times likelier the best motion is."""
+    p: float
+    """Probability of this one against the best."""
+
+
+@dataclass(frozen=True)
+class Postures:
+    """The postures of one person over T frames. World: right-handed, Z up, metres; NaN where unknown."""
+
+    frames: Whole
+    """(T,) frame numbers of the keypoints."""
+    times_s: Array
+    """(T,) seconds."""
+    joints: tuple[str, ...]
+    """Names of the 14 joints, in the order of the levels of the tree and of every axis of 14."""
+    camera: _memo.Camera
+    points_px: Array
+    """(T, 14, 2) what was seen: pixels, u right, v down; NaN where not."""
+    weights: Array
+    """(T, 14) the detector's confidence, 0 to 1."""
+    lengths_m: dict[str, float]
+    """The 17 segment lengths, metres."""
+    length_sd_m: dict[str, float]
+    """Their standard deviations, metres."""
+    length_basis: dict[str, str]
+    """What each length rests on."""
+    scale_from: str
+    """What the size of everything rests on."""
+    anchor_m: Array
+    """(T,) distance of the neck from the camera's centre, where the tree begins, metres."""
+    anchor_sd_m: Array
+    """(T,) its standard deviation, metres."""
+    anchor_source: tuple[str, ...]
+    """(T,) where it comes from."""
+    anchor_conflicts: tuple[str, ...]
+    """Where sources of the distance contradict each other, in sentences."""
+    level_reached: Whole
+    """(T, 14) nodes of the tree at each level that no constraint cut."""
+    level_survived: Whole
+    """(T, 14) those of them that lead to a posture left."""
+    level_without_root: Whole
+    """(T, 14) nodes whose segment is too short to reach the joint's ray: the nearest point is taken."""
+    reasons: tuple[tuple[Reason, ...], ...]
+    """(T,) what was cut in each frame, and by what."""
+    reason_totals: tuple[ReasonTotal, ...]
+    """The same over all frames."""
+    survivors: Whole
+    """(T,) postures left in each frame."""
+    groups_m: tuple[Array, ...]
+    """(T,) of (G, 14, 3) metres: one posture of each group of similar ones, the largest groups at most."""
+    group_sizes: tuple[Whole, ...]
+    """(T,) of (G,): how many postures each group holds."""
+    cut_all: tuple[tuple[str, ...] | None, ...]
+    """(T,) where nothing is left: what the least violating posture violates, in sentences; else None."""
+    linked_m: Array
+    """(T, 14, 3) metres: the likeliest motion through the frames."""
+    smoothed_m: Array
+    """(T, 14, 3) metres: the same, smoothed."""
+    sd_m: Array
+    """(T, 14) standard deviation of each joint of the smoothed motion, metres."""
+    gap_m: Array
+    """(T, 14) by how much a segment was too short to reach the joint's ray, metres."""
+    margin_nats: Array
+    """(T,) how much likelier the motion is than the best other one in this frame; infinite without one."""
+    second: SecondBest | None
+    """The likeliest other motion, if there is one to speak of."""
+    heading_source: str
+    """Where the direction of walking comes from."""
+    warnings: tuple[str, ...]
+    """What should be known before the numbers are used."""
+    repair: sides.SideRepair | None
+    """What was done to right and left before; None where nobody asked."""
+
+    @property
+    def found(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether any joint of the motion is known."""
+        known = np.isfinite(self.smoothed_m).all(axis=-1)
+        return np.asarray(np.any(known, axis=1), np.bool_)
+
+    @property
+    def group_counts(self) -> Whole:
+        """(T,) how many groups are given in each frame."""
+        return np.array([len(sizes) for sizes in self.group_sizes], np.int64)
+
+    @property
+    def all_groups_given(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether there are no more groups than those given."""
+        members = np.array([sizes.sum() for sizes in self.group_sizes], np.int64)
+        return np.asarray(members == self.survivors, np.bool_)
+
+    @property
+    def undecided(self) -> npt.NDArray[np.bool_]:
+        """(T,) whether some joint may well be elsewhere: another motion has a probability over 0.2."""
+        return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
+
+    def in_camera(self, points_m: Array) -> Array:
+        """World points (..., 3) in the camera's axes: x right, y down, z forward, metres."""
+        flat = np.ascontiguousarray(points_m, np.float64).reshape(-1, 3)
+        return self.camera.camera_from_world(flat).reshape(np.shape(points_m))
+
+    def typical_row(self) -> int:
+        """The first row with as many survivors as the median frame, of those with a posture."""
+        rows = np.flatnonzero(self.found & (self.survivors > 0))
+        if not len(rows):
+            rows = np.flatnonzero(self.found)
+        if not len(rows):
+            return 0
+        counts = self.survivors[rows]
+        return int(rows[np.argmin(np.abs(counts - np.median(counts)))])
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The figures of the whole: counts, medians, scale, the second best, warnings."""
+        left = self.survivors[self.survivors > 0]
+        most = max(self.reason_totals, key=lambda total: total.branches, default=None)
+        second = self.second
+        return {
+            "frames": len(self.frames),
+            "frames_with_survivors": len(left),
+            "frames_in_motion": int(self.found.sum()),
+            "survivors_median": float(np.median(left)) if len(left) else 0.0,
+            "scale_from": self.scale_from,
+            "heading_source": self.heading_source,
+            "undecided_frames": int(self.undecided.sum()),
+            "most_cut": None if most is None else most._asdict(),
+            "second": None
+            if second is None
+            else {
+                "joints": list(second.joints),
+                "first_frame": second.first_frame,
+                "last_frame": second.last_frame,
+                "margin_nats": second.margin_nats,
+                "p": second.p,
+            },
+            "exchanged": {} if self.repair is None else self.repair.exchanged,
+            "warnings": list(self.warnings),
+        }
+
+
+def posture(
+    keypoints: Keypoints | str | PathLike[str],
+    camera: _memo.Camera,
+    lengths: Mapping[str, float] | str | PathLike[str] | None = None,
+    height_m: float | None = None,
+    *,
+    rules: str = "walking",
+    strength: str = "measured",
+    anchor: str = "auto",
+    distance_m: float | Sequence[float] | Array | None = None,
+    distance_sd_m: float | None = None,
+    moving_direction: Sequence[float] | None = None,
+    unswap: bool = True,
+    noise_px: float = 2.0,
+    group_m: float = 0.10,
+    max_groups: int = 64,
+    fps: float | None = None,
+    layout: str | None = None,
+    person: int | None = None,
+) -> Postures:
+    """All postures of a person that a view allows, and the likeliest motion through them.
+
+    `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
+    `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
+    to sole, refined by the frames; with neither they are estimated, with the ground as scale.
+    `rules`: "physical", "walking", "walking-general" (what people do who walk in whatever way), "running" or
+    "standing"; `strength`: "measured" limits or those of the "paper".
+    `anchor`: where the distance of the neck comes from, "auto", "ground", "trunk", "extent", "head" or
+    "combined"; or `distance_m`, one number or (T,), with its standard deviation `distance_sd_m`.
+    `moving_direction`: (3,) world, where the person walks; else seen from the motion.
+    `unswap`: exchange right and left first where a detector confused them.
+    `noise_px`: standard deviation of a keypoint. `group_m`: postures are one group if no joint differs by
+    more; `max_groups`: so many groups a frame are given.
+
+    Raises ValueError, with one line, for what cannot be used.
+    """
+    _check_known("rules", rules.replace("_", "-"), RULES)
+    _check_known("strength", strength, STRENGTHS)
+    _check_known("anchor", anchor, (*ANCHORS, "given"))
+    if lengths is not None and height_m is not None:
+        raise ValueError("give either lengths or a height")
+    if distance_m is None and anchor == "given":
+        raise ValueError("the anchor given needs a distance")
+    if distance_m is not None and anchor not in ("auto", "given"):
+        raise ValueError(f"a distance is given: leave the anchor {anchor} out")
+    if isinstance(lengths, str | PathLike):
+        lengths = read_lengths(lengths)
+    elif lengths is not None:
+        lengths = _checked_lengths("lengths", lengths)
+    if not isinstance(keypoints, Keypoints):
+        keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
+    elif not fps is layout is person is None:
+        raise ValueError("fps, layout and person are for keypoints that are still to be read")
+    _check_joints_there(keypoints)
+    _check_camera_fits(keypoints, camera)
+    repair = sides.unswap(keypoints) if unswap else None
+    used = keypoints if repair is None else repair.keypoints
+    points_px, weights, head_px = _stick_points(used)
+    found = _memo.posture(
+        used.times_s,
+        points_px,
+        weights,
+        camera,
+        lengths=lengths,
+        height_m=height_m,
+        noise_px=noise_px,
+        rules=rules.replace("-", "_"),
+        strength=strength,
+        anchor="given" if distance_m is not None else anchor,
+        distance_m=distance_m,
+        distance_sd_m=distance_sd_m,
+        moving_direction=moving_direction,
+        head_points=head_px,
+        group_m=group_m,
+        max_groups=max_groups,
+    )
+    return _named(found, used, camera, points_px, weights, repair)
+
+
+def _check_known(what: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise ValueError(f"{what} must be one of {', '.join(known)}, got {value}")
+
+
+def _detector(keypoints: Keypoints) -> str | list[str]:
+    return list(keypoints.names) if keypoints.layout is None else keypoints.layout
+
+
+def _check_joints_there(keypoints: Keypoints) -> None:
+    """Refuses keypoints in which a joint of the figure has no point to come from."""
+    count = len(keypoints.names)
+    everywhere, _ = _memo.stick_joints(_detector(keypoints), np.ones((1, count, 2)), np.ones((1, count)))
+    joints = _memo.joint_names()
+    absent = [name for name, point in zip(joints, everywhere[0], strict=True) if np.isnan(point).any()]
+    if absent:
+        raise KeypointsError(
+            f"{keypoints.source.path}: no point for {', '.join(absent)}; it has {', '.join(keypoints.names)}"
+        )
+
+
+def _check_camera_fits(keypoints: Keypoints, camera: _memo.Camera) -> None:
+    if keypoints.image_size is None or keypoints.image_size == tuple(camera.size):
+        return
+    (width, height), (own_width, own_height) = camera.size, keypoints.image_size
+    raise ValueError(
+        f"the camera is for {width}x{height} pixels, the keypoints are of {own_width}x{own_height}"
+    )
+
+
+def _stick_points(keypoints: Keypoints) -> tuple[Array, Array, Array | None]:
+    """The 14 joints (T, 14, 2), their weights (T, 14), and the points of the head, where any is seen."""
+    # AlphaPose's older scores go to 6; the core weights within 0 to 1.
+    scores = np.clip(keypoints.scores, 0, 1)
+    points_px, weights = _memo.stick_joints(_detector(keypoints), keypoints.points, scores)
+    head_px, _ = _memo.head_points(_detector(keypoints), keypoints.points, scores)
+    return points_px, weights, head_px if np.isfinite(head_px[:, 1:]).any() else None
+
+
+def _named(
+    found: dict[str, Any],
+    keypoints: Keypoints,
+    camera: _memo.Camera,
+    points_px: Array,
+    weights: Array,
+    repair: sides.SideRepair | None,
+) -> Postures:
+    second = found["second"]
+    return Postures(
+        frames=keypoints.frames,
+        times_s=keypoints.times_s,
+        joints=tuple(_memo.joint_names()),
+        camera=camera,
+        points_px=points_px,
+        weights=weights,
+        lengths_m=dict(found["lengths"]),
+        length_sd_m=dict(found["length_sd"]),
+        length_basis=dict(found["length_basis"]),
+        scale_from=found["scale_from"],
+        anchor_m=found["anchor_m"],
+        anchor_sd_m=found["anchor_sd_m"],
+        anchor_source=tuple(found["anchor_source"]),
+        anchor_conflicts=tuple(found["anchor_conflicts"]),
+        level_reached=_whole(found["level_reached"]),
+        level_survived=_whole(found["level_survived"]),
+        level_without_root=_whole(found["level_without_root"]),
+        reasons=tuple(tuple(Reason(*row) for row in frame) for frame in found["reasons"]),
+        reason_totals=tuple(ReasonTotal(*row) for row in found["reason_totals"]),
+        survivors=_whole(found["survivors"]),
+        groups_m=tuple(np.asarray(groups).reshape(-1, 14, 3) for groups in found["groups"]),
+        group_sizes=tuple(_whole(sizes) for sizes in found["group_sizes"]),
+        cut_all=tuple(None if why is None else tuple(why) for why in found["cut_all"]),
+        linked_m=found["linked"],
+        smoothed_m=found["smoothed"],
+        sd_m=found["sd_m"],
+        gap_m=found["gap_m"],
+        margin_nats=found["margin"],
+        second=None
+        if second is None
+        else SecondBest(
+            joints=tuple(second["joints"]),
+            first_frame=int(keypoints.frames[second["from"]]),
+            last_frame=int(keypoints.frames[second["from"] + len(second["postures"]) - 1]),
+            postures_m=second["postures"],
+            margin_nats=second["margin"],
+            p=second["p"],
+        ),
+        heading_source=found["heading_source"],
+        warnings=tuple(found["warnings"]),
+        repair=repair,
+    )
+
+
+def _whole(numbers: npt.ArrayLike) -> Whole:
+    return np.asarray(numbers, np.int64)
+
+
+# Lengths.
+
+
+def read_lengths(path: str | PathLike[str]) -> dict[str, float]:
+    """The 17 segment lengths of a file, metres, by name, such as `right_hip_to_right_knee`.
+
+    A table (CSV) with a name and a length in each row, or JSON `{name: length}`; also a `postures.json`,
+    whose lengths then serve for other sequences of the same person.
+    """
+    path = Path(path)
+    try:
+        if path.is_file() and path.stat().st_size > _MAX_LENGTHS_FILE_BYTES:
+            raise ValueError(f"{path}: too large for a file of lengths")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: not a text file") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
+    named = _json_lengths(path, text) if text.lstrip()[:1] == "{" else _csv_lengths(path, text)
+    return _checked_lengths(str(path), named)
+
+
+def _json_lengths(path: Path, text: str) -> dict[str, Any]:
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: not JSON: {error}") from None
+    lengths = data.get("lengths", data)
+    if not isinstance(lengths, dict):
+        raise ValueError(f"{path}: `lengths` is not an object of names and lengths")
+    return {
+        name: value.get("length_m") if isinstance(value, dict) else value for name, value in lengths.items()
+    }
+
+
+def _csv_lengths(path: Path, text: str) -> dict[str, Any]:
+    named: dict[str, Any] = {}
+    known = set(_memo.segment_names())
+    for line, row in enumerate(csv.reader(io.StringIO(text, newline="")), start=1):
+        cells = [cell.strip() for cell in row]
+        if not any(cells) or (line == 1 and cells[0] not in known):  # blank, or the header
+            continue
+        if len(cells) < 2:
+            raise ValueError(f"{path}: row {line} has no length beside the name")
+        if cells[0] in named:
+            raise ValueError(f"{path}: row {line}: {cells[0]} stands there twice")
+        named[cells[0]] = cells[1]
+    return named
+
+
+def _checked_lengths(where: str, lengths: Mapping[str, Any]) -> dict[str, float]:
+    names = _memo.segment_names()
+    absent = [name for name in names if name not in lengths]
+    unknown = [str(name)[:60] for name in lengths if name not in names]
+    if unknown:
+        raise ValueError(f"{where}: no segment {', '.join(unknown[:3])}; there are {', '.join(names)}")
+    if absent:
+        raise ValueError(f"{where}: {len(absent)} of 17 lengths missing: {', '.join(absent)}")
+    return {name: _length_m(where, name, lengths[name]) for name in names}
+
+
+def _length_m(where: str, name: str, value: Any) -> float:
+    try:
+        length_m = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        length_m = math.nan
+    if not 0 < length_m < math.inf:
+        raise ValueError(f"{where}: {name} is {str(value)[:60]}, not a length in metres")
+    return length_m
+
+
+# What is written.
+
+_TENTH_MM = 4
+"""Digits of metres in postures.json."""
+
+
+def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
+    """Writes postures.csv, postures_camera.csv, levels.csv, reasons.csv and postures.json into a folder."""
+    out = Path(out)
+    tables: dict[str, Callable[[Postures], dict[str, npt.ArrayLike]]] = {
+        "postures.csv": _posture_columns,
+        "postures_camera.csv": _camera_columns,
+        "levels.csv": _level_columns,
+        "reasons.csv": _reason_columns,
+    }
+    for name, columns in tables.items():
+        write_columns_csv(out / name, columns(postures))
+    write_json(out / "postures.json", _document(postures))
+    return [*(out / name for name in tables), out / "postures.json"]
+
+
+def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
+    """A row a frame: the smoothed motion in the world, and how sure it is."""
+    columns: dict[str, npt.ArrayLike] = {
+        "frame": postures.frames,
+        "time_s": postures.times_s,
+        "survivors": postures.survivors,
+        "groups": postures.group_counts,
+        "margin_nats": postures.margin_nats,
+        "anchor_m": postures.anchor_m,
+        "anchor_sd_m": postures.anchor_sd_m,
+    }
+    for k, joint in enumerate(postures.joints):
+        columns |= {f"{joint}_{axis}_m": postures.smoothed_m[:, k, i] for i, axis in enumerate("xyz")}
+        columns[f"{joint}_sd_m"] = postures.sd_m[:, k]
+    return columns
+
+
+def _camera_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
+    """A row a frame: the smoothed motion in the camera's axes (x right, y down, z forward)."""
+    in_camera = postures.in_camera(postures.smoothed_m)
+    columns: dict[str, npt.ArrayLike] = {"frame": postures.frames, "time_s": postures.times_s}
+    for k, joint in enumerate(postures.joints):
+        columns |= {f"{joint}_{axis}_m": in_camera[:, k, i] for i, axis in enumerate("xyz")}
+    return columns
+
+
+def _level_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
+    """A row a frame and level of the tree."""
+    count = len(postures.joints)
+    return {
+        "frame": np.repeat(postures.frames, count),
+        "time_s": np.repeat(postures.times_s, count),
+        "level": np.tile(np.arange(count), len(postures.frames)),
+        "joint": np.tile(postures.joints, len(postures.frames)),
+        "reached": postures.level_reached.ravel(),
+        "survived": postures.level_survived.ravel(),
+        "without_root": postures.level_without_root.ravel(),
+    }
+
+
+def _reason_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
+    """A row a constraint, what cut most first."""
+    totals = sorted(postures.reason_totals, key=lambda total: -total.branches)
+    columns = {name: [getattr(total, name) for total in totals] for name in ReasonTotal._fields}
+    return {name: np.array(values, dtype=object) for name, values in columns.items()}
+
+
+def _document(postures: Postures) -> dict[str, Any]:
+    """Everything, as postures.json has it."""
+    second = postures.second
+    return {
+        **postures.summary,
+        "joints": postures.joints,
+        "lengths": {
+            name: {
+                "length_m": length_m,
+                "sd_m": postures.length_sd_m.get(name),
+                "basis": postures.length_basis.get(name),
+            }
+            for name, length_m in postures.lengths_m.items()
+        },
+        "anchor_conflicts": postures.anchor_conflicts,
+        "reason_totals": [total._asdict() for total in postures.reason_totals],
+        "second": None
+        if second is None
+        else {**postures.summary["second"], "postures_m": np.round(second.postures_m, _TENTH_MM)},
+        "flips": [] if postures.repair is None else postures.repair.flips,
+        "per_frame": [_frame_document(postures, row) for row in range(len(postures.frames))],
+    }
+
+
+def _frame_document(postures: Postures, row: int) -> dict[str, Any]:
+    return {
+        "frame": postures.frames[row],
+        "time_s": postures.times_s[row],
+        "points_px": np.round(postures.points_px[row], 2),
+        "weights": np.round(postures.weights[row], 3),
+        "anchor_m": postures.anchor_m[row],
+        "anchor_sd_m": postures.anchor_sd_m[row],
+        "anchor_source": postures.anchor_source[row],
+        "level_reached": postures.level_reached[row],
+        "level_survived": postures.level_survived[row],
+        "level_without_root": postures.level_without_root[row],
+        "reasons": [reason._asdict() for reason in postures.reasons[row]],
+        "survivors": postures.survivors[row],
+        "group_sizes": postures.group_sizes[row],
+        "groups_m": np.round(postures.groups_m[row], _TENTH_MM),
+        "cut_all": postures.cut_all[row],
+        "margin_nats": postures.margin_nats[row],
+        "linked_m": np.round(postures.linked_m[row], _TENTH_MM),
+        "smoothed_m": np.round(postures.smoothed_m[row], _TENTH_MM),
+        "sd_m": np.round(postures.sd_m[row], _TENTH_MM),
+        "gap_m": np.round(postures.gap_m[row], _TENTH_MM),
+    }

@@ -1,0 +1,475 @@
+"""Postures as they are called: walkers drawn with numpy alone are found again, files say the same, mistakes
+are told in one line."""
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+
+import memo
+import numpy as np
+import pytest
+from conftest import SHARED_DATA
+from memo import cli
+from scipy.spatial.transform import Rotation
+
+SIDES = ("right", "left")
+#: The levels of the tree.
+JOINTS = [
+    *("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip"),
+    *(f"{side}_{joint}" for joint in ("elbow", "wrist", "knee", "ankle") for side in SIDES),
+]
+AT = {name: place for place, name in enumerate(JOINTS)}
+LIMB_JOINTS = [name for name in JOINTS if name not in ("neck", "pelvis")]
+RATE_HZ, FRAMES = 25, 40
+NOISE_PX = 1.0
+
+#: Metres. Neck and pelvis lie on the middle line, as a detector's do.
+SHOULDER, HIP, TRUNK, UPPER_ARM, FOREARM, THIGH, SHANK = 0.19, 0.09, 0.50, 0.3, 0.25, 0.43, 0.42
+ANKLE_HEIGHT = 0.08
+PELVIS_ON_TRUNK = 45.98 / (45.98 + 10.09)
+
+SIZE, FOCAL_PX = (1280, 720), 1100.0
+CAMERA_AT = np.array([0.0, -5.0, 1.3])
+#: Rows: the camera's x, y and z in the world. It looks along world y, 4 degrees downwards.
+DOWN = math.radians(4)
+TURN = np.array([[1, 0, 0], [0, -math.sin(DOWN), -math.cos(DOWN)], [0, math.cos(DOWN), -math.sin(DOWN)]])
+
+
+def walker(heading_deg=25.0, frames=FRAMES):
+    """(T, 14, 3) world, metres: a walker with rigid limbs, the lower foot always on the ground."""
+    heading = math.radians(heading_deg)
+    ahead = np.array([math.cos(heading), math.sin(heading), 0])
+    left = np.array([-ahead[1], ahead[0], 0])
+    up = np.array([0, 0, 1.0])
+    cycle_hz, swing = 0.9, math.radians(25)
+    speed_mps = 2 * cycle_hz * 2 * (THIGH + SHANK) * math.sin(swing) * 0.95
+
+    def hanging(angle):
+        return math.sin(angle) * ahead - math.cos(angle) * up
+
+    figures = np.empty((frames, 14, 3))
+    for t in range(frames):
+        phase = 2 * math.pi * cycle_hz * t / RATE_HZ + 0.4
+        figure = dict.fromkeys(JOINTS, np.zeros(3))
+        hips = np.zeros(3)
+        figure["neck"] = hips + TRUNK * up
+        figure["pelvis"] = hips + (1 - PELVIS_ON_TRUNK) * TRUNK * up
+        for side, sign, own in (("right", -1, phase), ("left", 1, phase + math.pi)):
+            thigh = swing * math.sin(own) + math.radians(4)
+            knee = math.radians(6) + math.radians(48) * max(0.0, math.cos(own)) ** 2
+            arm = -math.radians(20) * math.sin(own)
+            elbow = math.radians(25) - math.radians(10) * math.sin(own)
+            figure[f"{side}_hip"] = hips + sign * HIP * left
+            figure[f"{side}_knee"] = figure[f"{side}_hip"] + THIGH * hanging(thigh)
+            figure[f"{side}_ankle"] = figure[f"{side}_knee"] + SHANK * hanging(thigh - knee)
+            figure[f"{side}_shoulder"] = figure["neck"] + sign * SHOULDER * left
+            figure[f"{side}_elbow"] = figure[f"{side}_shoulder"] + UPPER_ARM * hanging(arm)
+            figure[f"{side}_wrist"] = figure[f"{side}_elbow"] + FOREARM * hanging(arm + elbow)
+        joints = np.array([figure[name] for name in JOINTS])
+        along = speed_mps * (t - (frames - 1) / 2) / RATE_HZ * ahead
+        figures[t] = joints + along + (ANKLE_HEIGHT - joints[:, 2].min()) * up
+    return figures
+
+
+def project(points):
+    """Pixels (..., 2) of world points (..., 3), written out."""
+    in_camera = (points - CAMERA_AT) @ TURN.T
+    centre = (np.array(SIZE) - 1) / 2
+    return FOCAL_PX * in_camera[..., :2] / in_camera[..., 2:] + centre
+
+
+def true_lengths(figures):
+    """Name -> metres, by the names alone: `a_to_b` is from a to b."""
+    ends = {name: name.split("_to_") for name in memo._memo.segment_names()}
+    figure = figures[0]
+    return {name: float(np.linalg.norm(figure[AT[a]] - figure[AT[b]])) for name, (a, b) in ends.items()}
+
+
+def write_camera(path):
+    centre = [(length - 1) / 2 for length in SIZE]
+    turn = Rotation.from_matrix(TURN).as_rotvec().tolist()
+    shift = (-TURN @ CAMERA_AT).tolist()
+    path.write_text(
+        f"[side]\nname = 'side'\nsize = {list(map(float, SIZE))}\n"
+        f"matrix = [[{FOCAL_PX}, 0.0, {centre[0]}], [0.0, {FOCAL_PX}, {centre[1]}], [0.0, 0.0, 1.0]]\n"
+        f"distortions = [0.0, 0.0, 0.0, 0.0]\nrotation = {turn}\ntranslation = {shift}\n"
+    )
+    return path
+
+
+def write_table(path, figures, noise_px=NOISE_PX, without=()):
+    pixels = project(figures) + np.random.default_rng(3).normal(0, noise_px, (*figures.shape[:2], 2))
+    names = [name for name in LIMB_JOINTS if name not in without]
+    header = ["frame", *(f"{name}_{axis}" for name in names for axis in "xy")]
+    rows = [[t, *(f"{x:.3f}" for name in names for x in frame[AT[name]])] for t, frame in enumerate(pixels)]
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])
+    return path
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A folder with walk.csv, camera.toml and lengths.csv, and the truth."""
+    folder, truth = tmp_path_factory.mktemp("scene"), walker()
+    write_table(folder / "walk.csv", truth)
+    write_camera(folder / "camera.toml")
+    lengths = "".join(f"{name},{length_m:.4f}\n" for name, length_m in true_lengths(truth).items())
+    (folder / "lengths.csv").write_text("segment,length_m\n" + lengths)
+    return folder, truth
+
+
+@pytest.fixture(scope="module")
+def found(scene):
+    """What the Python call finds in the scene, with the lengths known and the ground as anchor."""
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    return memo.posture(folder / "walk.csv", camera, folder / "lengths.csv", fps=RATE_HZ, noise_px=NOISE_PX)
+
+
+@pytest.fixture
+def memo_posture(monkeypatch, capsys):
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["memo", "posture", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out, said.err
+
+    return run
+
+
+def errors_m(estimated, truth):
+    return np.linalg.norm(estimated - truth, axis=-1)
+
+
+def read_table(path):
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return rows, {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def joints_of(columns):
+    cells = [[columns[f"{name}_{axis}_m"] for axis in "xyz"] for name in JOINTS]
+    return np.array([[[float(x or "nan") for x in axis] for axis in joint] for joint in cells]).transpose(
+        2, 0, 1
+    )
+
+
+def test_the_camera_of_the_test_is_that_of_the_package(scene):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    np.testing.assert_allclose(camera.position, CAMERA_AT, atol=1e-9)
+    np.testing.assert_allclose(camera.project(truth[0]), project(truth[0]), atol=1e-6)
+    np.testing.assert_allclose(camera.camera_from_world(truth[0]), (truth[0] - CAMERA_AT) @ TURN.T, atol=1e-9)
+
+
+def test_a_walk_is_found_again(found, scene):
+    """Ray directions are known to 1 px in 1100, distances through the ground and the trunk."""
+    _, truth = scene
+    error_m = errors_m(found.smoothed_m, truth)
+    assert np.isfinite(error_m).all()
+    assert np.median(error_m) < 0.06 and np.percentile(error_m, 95) < 0.15
+    shape_m = errors_m(found.smoothed_m - found.smoothed_m[:, :1], truth - truth[:, :1])
+    assert np.median(shape_m) < 0.05, "postures apart from where the neck is"
+    assert np.median(error_m / found.sd_m) < 2.5, "the standard deviations stated are of this size"
+
+
+def test_the_true_posture_is_among_those_left(found, scene):
+    """Within what a group joins (0.10 m) and where the neck is believed to be."""
+    _, truth = scene
+    near = 0
+    for t, groups in enumerate(found.groups_m):
+        if len(groups):
+            shape = groups - groups[:, :1] - (truth[t] - truth[t, :1])
+            near += np.linalg.norm(shape, axis=-1).max(axis=1).min() < 0.15
+    assert near >= 0.9 * len(truth)
+
+
+def test_a_given_distance_is_kept(scene):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    distance_m = np.linalg.norm(truth[:, 0] - CAMERA_AT, axis=1)
+    known = {"lengths": true_lengths(truth), "distance_m": distance_m, "noise_px": NOISE_PX}
+    found = memo.posture(folder / "walk.csv", camera, **known, fps=RATE_HZ)
+    np.testing.assert_allclose(
+        np.linalg.norm(found.linked_m[:, 0] - CAMERA_AT, axis=1), distance_m, atol=1e-6
+    )
+    assert np.median(errors_m(found.smoothed_m, truth)) < 0.03
+
+
+def test_height_alone_and_nothing_at_all_are_enough(scene):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    for scale in ({"height_m": 1.75}, {}):
+        found = memo.posture(folder / "walk.csv", camera, **scale, fps=RATE_HZ)
+        assert set(found.lengths_m) == set(memo._memo.segment_names()) == set(found.length_basis)
+        assert np.median(errors_m(found.smoothed_m, truth)) < 0.15, scale
+        assert found.scale_from
+
+
+def test_what_is_found_fits_what_was_seen(found):
+    pixels = found.camera.project(found.linked_m.reshape(-1, 3)).reshape(*found.points_px.shape)
+    misses_px = np.linalg.norm(pixels - found.points_px, axis=-1)[found.gap_m == 0]
+    assert np.nanmedian(misses_px) < 0.5 and misses_px.size > 200
+
+
+def test_the_command_says_what_the_call_says(found, scene, tmp_path, memo_posture):
+    folder, _ = scene
+    out = tmp_path / "out"
+    arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv")
+    code, said, complaint = memo_posture(*arguments, "--fps", RATE_HZ, "--out", out)
+    assert (code, complaint) == (0, "")
+    assert 4 <= len(said.splitlines()) <= 6 and said.startswith(f"{FRAMES} frames, postures left in ")
+    assert {path.name for path in out.iterdir()} == {
+        *("postures.csv", "postures_camera.csv", "levels.csv", "reasons.csv", "postures.json", "postures.png")
+    }
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    called = memo.posture(folder / "walk.csv", camera, folder / "lengths.csv", fps=RATE_HZ)
+    rows, columns = read_table(out / "postures.csv")
+    assert [int(row["frame"]) for row in rows] == list(range(FRAMES))
+    np.testing.assert_allclose(np.array(columns["time_s"], float), np.arange(FRAMES) / RATE_HZ, atol=1e-6)
+    np.testing.assert_allclose(joints_of(columns), called.smoothed_m, atol=1e-4)
+    _, in_camera = read_table(out / "postures_camera.csv")
+    np.testing.assert_allclose(joints_of(in_camera), (called.smoothed_m - CAMERA_AT) @ TURN.T, atol=1e-4)
+    assert [int(n) for n in columns["survivors"]] == called.survivors.tolist()
+
+
+def test_tables_and_document_agree(scene, tmp_path, memo_posture):
+    folder, _ = scene
+    arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--height", "1.75", "--no-plots")
+    code, said, _ = memo_posture(*arguments, "--fps", RATE_HZ, "--out", tmp_path, "--json")
+    summary, document = json.loads(said), json.loads((tmp_path / "postures.json").read_text())
+    assert code == 0 and all(Path(file).is_file() for file in summary["files"])
+    assert not (tmp_path / "postures.png").exists()
+    assert summary["frames"] == FRAMES and summary["warnings"] == document["warnings"]
+    levels, _ = read_table(tmp_path / "levels.csv")
+    assert len(levels) == FRAMES * 14 and [row["joint"] for row in levels[:14]] == JOINTS
+    reasons, columns = read_table(tmp_path / "reasons.csv")
+    assert list(columns) == ["constraint", "kind", "joint", "branches", "frames", "sentence"]
+    totals: dict[tuple[str, str], int] = {}
+    for t, frame in enumerate(document["per_frame"]):
+        assert frame["frame"] == t and np.shape(frame["smoothed_m"]) == (14, 3)
+        assert sum(frame["group_sizes"]) <= frame["survivors"]
+        assert np.shape(frame["groups_m"])[:1] == (len(frame["group_sizes"]),)
+        assert [int(row["reached"]) for row in levels[14 * t : 14 * t + 14]] == frame["level_reached"]
+        assert [int(row["survived"]) for row in levels[14 * t : 14 * t + 14]] == frame["level_survived"]
+        assert (frame["cut_all"] is None) == (frame["survivors"] > 0)
+        for reason in frame["reasons"]:
+            key = reason["constraint"], reason["joint"]
+            totals[key] = totals.get(key, 0) + reason["branches"]
+    assert totals == {(row["constraint"], row["joint"]): int(row["branches"]) for row in reasons}
+    assert all(row["sentence"] for row in reasons)
+    again = memo.read_lengths(tmp_path / "postures.json")
+    assert again == {name: length["length_m"] for name, length in document["lengths"].items()}
+
+
+def test_a_chosen_frame_is_drawn_and_quiet_is_quiet(scene, tmp_path, memo_posture):
+    folder, _ = scene
+    arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--out", tmp_path)
+    pictures = []
+    for frame in (3, 30):
+        assert memo_posture(*arguments, "--frame", frame, "--quiet") == (0, "", "")
+        pictures.append((tmp_path / "postures.png").read_bytes())
+    assert pictures[0] != pictures[1] and pictures[0][:4] == b"\x89PNG"
+
+
+def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
+    """In mid-stride nobody stands."""
+    folder, truth = scene
+    spread = np.linalg.norm(truth[:, AT["right_ankle"]] - truth[:, AT["left_ankle"]], axis=1)
+    path = write_table(tmp_path / "strides.csv", truth[spread > 0.65])
+    arguments = (path, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
+    code, said, _ = memo_posture(*arguments, "--rules", "standing", "--out", tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "postures.json").read_text())
+    assert code == 3 and "postures left in 0: what is nearest to one" in said
+    assert all(frame["cut_all"] and not frame["groups_m"] for frame in document["per_frame"])
+    assert document["frames_in_motion"] == len(document["per_frame"]) > 3
+
+
+def test_exchanged_sides_are_put_right_first(scene, tmp_path):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    wrong = truth.copy()
+    right, left = (
+        [AT[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")] for side in ("right", "left")
+    )
+    for t in (9, 10, 28):
+        wrong[t, right], wrong[t, left] = truth[t, left], truth[t, right]
+    path = write_table(tmp_path / "wrong.csv", wrong)
+    put_right, as_is = (
+        memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ, unswap=unswap)
+        for unswap in (True, False)
+    )
+    assert put_right.repair is not None and put_right.repair.exchanged["legs"] == 3 and as_is.repair is None
+    np.testing.assert_array_equal(put_right.points_px[9][right], as_is.points_px[9][left])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["absent.csv"], "absent.csv: no such file or folder"),
+        (["legless.csv"], "no point for right_knee, left_knee"),
+        (["walk.csv", "--camera", "absent.toml"], "absent.toml: no such camera file"),
+        (["walk.csv", "--camera", "walk.csv"], "walk.csv"),
+        (["walk.csv", "--camera-name", "top"], "no camera `top` in the file"),
+        (["walk.csv", "--height", "175"], "looks like centimetres: give --height 1.75"),
+        (["walk.csv", "--height", "-1"], "not the height of a person"),
+        (["walk.csv", "--height", "nan"], "not the height of a person"),
+        (["walk.csv", "--lengths", "absent.csv"], "absent.csv: cannot be read: No such file"),
+        (["walk.csv", "--lengths", "."], "cannot be read"),
+        (["walk.csv", "--lengths", "negative.csv"], "neck_to_pelvis is -0.4, not a length in metres"),
+        (["walk.csv", "--lengths", "missing.csv"], "1 of 17 lengths missing: neck_to_pelvis"),
+        (["walk.csv", "--lengths", "unknown.json"], "no segment tail"),
+        (["walk.csv", "--lengths", "broken.json"], "broken.json: not JSON"),
+        (["walk.csv", "--lengths", "twice.csv"], "neck_to_pelvis stands there twice"),
+        (["walk.csv", "--lengths", "short.csv"], "row 2 has no length beside the name"),
+        (["walk.csv", "--lengths", "image.png"], "not a text file"),
+        (["walk.csv", "--lengths", "lengths.csv", "--height", "1.8"], "leave --height out"),
+        (["walk.csv", "--distance", "0"], "--distance 0 is not a distance in metres"),
+        (["walk.csv", "--distance", "nan"], "--distance nan is not a distance in metres"),
+        (["walk.csv", "--distance", "4", "--anchor", "ground"], "leave the anchor ground out"),
+        (["walk.csv", "--anchor", "head"], "six points"),
+        (["walk.csv", "--frame", "40"], "--frame 40 is not among the frames 0 to 39"),
+        (["walk.csv", "--fps", "0"], "frame rate must be positive"),
+        (["walk.csv", "--layout", "BODY_25"], "leave the layout BODY_25 out"),
+        (["walk.csv", "--person", "3"], "no frame has a person 3"),
+        (["walk.csv", "--out", "walk.csv"], "cannot be written to"),
+    ],
+    ids=lambda value: "_".join(value[1:]) if isinstance(value, list) else "",
+)
+def test_mistakes_are_told_in_one_line(scene, tmp_path, monkeypatch, memo_posture, arguments, reason):
+    folder, truth = scene
+    for name in ("walk.csv", "lengths.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    write_table(tmp_path / "legless.csv", truth, without=("right_knee", "left_knee"))
+    lengths = (folder / "lengths.csv").read_text().splitlines()
+    rows = [line for line in lengths if not line.startswith("neck_to_pelvis,")]
+    (tmp_path / "negative.csv").write_text("\n".join([*rows, "neck_to_pelvis,-0.4"]))
+    (tmp_path / "missing.csv").write_text("\n".join(rows))
+    (tmp_path / "twice.csv").write_text("\n".join([*lengths, "neck_to_pelvis,0.4"]))
+    (tmp_path / "short.csv").write_text("segment\nneck_to_pelvis\n")
+    (tmp_path / "unknown.json").write_text(json.dumps(true_lengths(truth) | {"tail": 0.3}))
+    (tmp_path / "broken.json").write_text('{"neck_to_pelvis": ')
+    (tmp_path / "image.png").write_bytes(b"\x89PNG\xff\xfe")
+    monkeypatch.chdir(tmp_path)
+    defaults = {"--camera": folder / "camera.toml", "--fps": RATE_HZ, "--out": "out"}
+    for name, value in defaults.items():
+        if name not in arguments:
+            arguments = [*arguments, name, value]
+    code, said, complaint = memo_posture(*arguments)
+    assert (code, said) == (1, "")
+    assert complaint.startswith("memo: ") and complaint.count("\n") == 1 and reason in complaint
+    assert not list(tmp_path.glob("out/postures*"))
+
+
+def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
+    folder, _ = scene
+    walk, camera = folder / "walk.csv", folder / "camera.toml"
+    assert memo_posture(walk)[0] == 2
+    assert memo_posture(walk, "--camera", camera, "--rules", "flying")[0] == 2
+    assert memo_posture(walk, "--camera", camera, "--anchor", "moon")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"rules": "flying"}, "rules must be one of physical"),
+        ({"strength": "weak"}, "strength must be one of"),
+        ({"anchor": "moon"}, "anchor must be one of"),
+        ({"anchor": "given"}, "needs a distance"),
+        ({"lengths": {}, "height_m": 1.8}, "either lengths or a height"),
+        ({"lengths": {"neck_to_pelvis": 0.4}}, "16 of 17 lengths missing"),
+        ({"height_m": 180.0}, "centimetres"),
+        ({"height_m": math.nan}, "height"),
+        ({"noise_px": -1.0}, "noise_px"),
+        ({"group_m": math.nan}, "group_m"),
+        ({"moving_direction": (0.0, 0.0, 1.0)}, "moving_direction"),
+        ({"distance_m": [4.0, 5.0]}, "40 times need as many distances"),
+    ],
+    ids=lambda value: "_".join(value) if isinstance(value, dict) else "",
+)
+def test_mistakes_in_python(scene, options, reason):
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    with pytest.raises(ValueError, match=reason) as raised:
+        memo.posture(folder / "walk.csv", camera, fps=RATE_HZ, **options)
+    assert "\n" not in str(raised.value)
+
+
+def test_keypoints_read_before_are_taken_too(scene):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    keypoints = memo.read_keypoints(folder / "walk.csv", fps=RATE_HZ)
+    first = memo.posture(keypoints, camera, true_lengths(truth))
+    again = memo.posture(folder / "walk.csv", camera, true_lengths(truth), fps=RATE_HZ)
+    np.testing.assert_array_equal(first.smoothed_m, again.smoothed_m)
+    with pytest.raises(ValueError, match="still to be read"):
+        memo.posture(keypoints, camera, fps=RATE_HZ)
+
+
+def test_missing_joints_stay_unknown_and_the_others_are_found(scene, tmp_path):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    keypoints = memo.read_keypoints(folder / "walk.csv", fps=RATE_HZ)
+    points = keypoints.points.copy()
+    points[:, keypoints.names.index("left_wrist")] = np.nan
+    found = memo.posture(keypoints.replaced(points, keypoints.scores), camera, true_lengths(truth))
+    others = [place for name, place in AT.items() if name != "left_wrist"]
+    assert np.isnan(found.smoothed_m[:, AT["left_wrist"]]).all()
+    assert np.median(errors_m(found.smoothed_m, truth)[:, others]) < 0.08
+    assert not np.isnan(found.sd_m[:, others]).any()
+
+
+def test_a_camera_of_another_picture_is_refused(tmp_path, scene):
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    annotations = {
+        "images": [{"id": 0, "width": 640, "height": 480, "frame_id": 0}],
+        "annotations": [{"image_id": 0, "category_id": 1, "keypoints": [100.0, 100.0, 2] * 17}],
+        "categories": [{"id": 1, "name": "person"}],
+    }
+    (tmp_path / "coco.json").write_text(json.dumps(annotations))
+    with pytest.raises(ValueError, match="640x480"):
+        memo.posture(tmp_path / "coco.json", camera, fps=25)
+
+
+@pytest.mark.parametrize("camera", ["02", "04"])
+def test_real_detections(tmp_path, memo_posture, camera):
+    """A balancing person, BODY_25B of one camera, against the triangulation of four: the true one is among
+    those left, and it is said that another motion is as likely."""
+    folder = SHARED_DATA / "keypoints" / "pose2sim_balancing"
+    if not folder.is_dir():
+        pytest.skip(f"no keypoints in {folder} (set MEMO_SHARED_DATA)")
+    code, said, complaint = memo_posture(
+        folder / f"cam{camera}_json",
+        *("--camera", folder / "Calib_qualisys.toml", "--camera-name", f"cam_{camera}", "--fps", "60"),
+        *("--rules", "physical", "--out", tmp_path),
+    )
+    assert (code, complaint) == (0, "") and len(said.splitlines()) <= 6
+    document = json.loads((tmp_path / "postures.json").read_text())
+    truth = triangulated(folder / "S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc")
+    assert len(document["per_frame"]) == len(truth) == 100
+    found = zip(document["per_frame"], truth, strict=True)
+    nearest_m = [nearest_group_m(frame["groups_m"], true) for frame, true in found]
+    assert np.median(nearest_m) < 0.12 and max(nearest_m) < 0.2
+    assert document["second"]["p"] > 0.2
+    assert "has probability" in said and "mirrored in depth" in said
+
+
+def nearest_group_m(groups_m, true):
+    """Mean distance of the limb joints, both about the middle of the shoulders, in the nearest group."""
+    limbs = np.array(groups_m, float)[:, [AT[name] for name in LIMB_JOINTS]]
+    shape, true_shape = (points - points[..., :2, :].mean(axis=-2, keepdims=True) for points in (limbs, true))
+    return np.nanmean(np.linalg.norm(shape - true_shape, axis=-1), axis=-1).min()
+
+
+def triangulated(path):
+    """(T, 12, 3) world, metres, of the limb joints in a TRC, whose y points up."""
+    lines = path.read_text().splitlines()
+    markers = [cell for cell in lines[3].split("\t") if cell.strip()][2:]
+    values = np.array([[float(cell) for cell in line.split("\t") if cell.strip()] for line in lines[5:]])
+    points = values[:, 2:].reshape(len(values), -1, 3)[..., [2, 0, 1]]
+    short = [f"{name[0].upper()}{name.split('_')[1].capitalize()}" for name in LIMB_JOINTS]
+    return points[:, [markers.index(name) for name in short]]
