@@ -34,6 +34,7 @@ mod _memo {
     use super::planar::{planar, planar_hinges, planar_rods};
     #[pymodule_export]
     use super::pointlight::{pointlight, walker_motion};
+    #[pymodule_export]
     use super::posture::posture;
     #[pymodule_export]
     use super::reproduce::{
