@@ -11,11 +11,16 @@ from memo._memo import (
     edge_segments,
     head_points,
     moving_regions,
+    planar_hinges,
+    planar_rods,
+    pointlight,
     silhouettes,
     similarity,
     stick_joints,
     velocity_field,
+    walker_motion,
 )
+from memo.figure import PlanarFigure, planar
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
@@ -27,6 +32,7 @@ __all__ = [
     "DemoScene",
     "Keypoints",
     "KeypointsError",
+    "PlanarFigure",
     "Postures",
     "SideRepair",
     "Track",
@@ -38,6 +44,10 @@ __all__ = [
     "head_points",
     "layouts",
     "moving_regions",
+    "planar",
+    "planar_hinges",
+    "planar_rods",
+    "pointlight",
     "posture",
     "read_keypoints",
     "read_lengths",
@@ -47,4 +57,5 @@ __all__ = [
     "track",
     "unswap",
     "velocity_field",
+    "walker_motion",
 ]

@@ -27,6 +27,10 @@ __all__ = [
     "lee_chen_head",
     "lee_chen_last_stage",
     "moving_regions",
+    "planar",
+    "planar_hinges",
+    "planar_rods",
+    "pointlight",
     "posture",
     "segment_names",
     "side_pairs",
@@ -35,6 +39,7 @@ __all__ = [
     "stick_joints",
     "unswap",
     "velocity_field",
+    "walker_motion",
 ]
 
 __version__: str
@@ -173,6 +178,60 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+def walker_motion(
+    frames: int = 60,
+    *,
+    rate_hz: float = 60.0,
+    speed_mps: float = 1.3,
+    heading_deg: float = 0.0,
+    phase: float = 0.0,
+    height_m: float = 1.75,
+) -> dict[str, Any]: ...
+def pointlight(
+    positions: npt.NDArray[np.float64],
+    times_s: Sequence[float] | npt.NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    azimuth_deg: float = 0.0,
+    elevation_deg: float = 0.0,
+    px_per_m: float = 200.0,
+    camera: Camera | None = None,
+    locomotion: str = "treadmill",
+    inverted: bool = False,
+    mirrored: bool = False,
+    reversed: bool = False,
+    scramble_position: bool = False,
+    scramble_phase: str | None = None,
+    period_s: float | None = None,
+    max_shift_s: float = 0.5,
+    lifetime_frames: int | None = None,
+    life_dots: int = 8,
+    life_sites: str = "limbs",
+    limbs: Sequence[tuple[int, int]] | None = None,
+    synchronous: bool = False,
+    noise_dots: int = 0,
+    noise_kind: str = "scrambled",
+    noise_area: float = 1.5,
+    noise_speed_px_s: float = 60.0,
+    noise_sd_px: float = 0.0,
+    seed: int = 0,
+) -> dict[str, npt.NDArray[Any]]: ...
+def planar(
+    tracks: npt.NDArray[np.float64],
+    times_s: Sequence[float] | npt.NDArray[np.float64],
+    noise_px: float = 0.0,
+    *,
+    window_s: float = 1.2,
+    size_px: float | None = None,
+    carry: bool = False,
+    false_target_rate: float = 0.01,
+    max_tilt_deg: float = 80.0,
+    names: Sequence[str] | None = None,
+    scales: Sequence[float] | npt.NDArray[np.float64] | None = None,
+    focal_px: float | None = None,
+) -> dict[str, Any]: ...
+def planar_rods(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
+def planar_hinges(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 def keypoint_layouts() -> list[str]: ...
 def keypoint_layout(name: str) -> tuple[str, list[str]]: ...
 def guess_layout(points: npt.NDArray[np.float64]) -> str: ...

@@ -12,6 +12,7 @@
 
 pub mod image;
 pub mod model;
+pub mod planar;
 pub mod posture;
 pub mod synth;
 pub mod track;

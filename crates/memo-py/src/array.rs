@@ -5,8 +5,8 @@ use glam::DVec2;
 use memo_core::image::{Frame, Image, Mask};
 use memo_core::posture::skeleton::{JOINT_COUNT, StickFigure};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
-    PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -144,6 +144,48 @@ pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2
     }
     let at = |s: usize, e: usize, k: usize| view[[s, e, k]] as f32;
     Ok((0..view.dim().0).map(|s| [0, 1].map(|e| [at(s, e, 0), at(s, e, 1)])).collect())
+}
+
+/// Points over time of shape (T, K, D): the flat values with T and K.
+pub fn motion_from_numpy<const D: usize>(
+    points: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<[f64; D]>, usize, usize)> {
+    let wanted = format!("wanted points over time: numpy array of shape (T, K, {D}), dtype float64");
+    let Ok(array) = points.cast::<numpy::PyArray3<f64>>() else {
+        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    let array = array.readonly();
+    let view = array.as_array();
+    let (frames, count, dimensions) = view.dim();
+    if dimensions != D {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    }
+    let at = |t: usize, k: usize| std::array::from_fn(|d| view[[t, k, d]]);
+    Ok((
+        (0..frames).flat_map(|t| (0..count).map(move |k| (t, k))).map(|(t, k)| at(t, k)).collect(),
+        frames,
+        count,
+    ))
+}
+
+/// Image vectors of shape (N, `each`, 2) in numpy's own memory, which must be contiguous.
+pub fn rows_from_numpy<'py>(points: &Bound<'py, PyAny>, each: usize) -> PyResult<PyReadonlyArray3<'py, f64>> {
+    let wanted =
+        format!("wanted image vectors: contiguous numpy array of shape (N, {each}, 2), dtype float64");
+    let array = points.cast::<PyArray3<f64>>().ok();
+    let Some(array) = array.filter(|a| a.shape()[1..] == [each, 2] && a.is_c_contiguous()) else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    };
+    Ok(array.try_readonly()?)
+}
+
+/// Flat values as an array of a shape.
+pub fn numpy_from_flat<T: numpy::Element>(
+    py: Python<'_>,
+    flat: Vec<T>,
+    shape: Vec<usize>,
+) -> PyResult<Bound<'_, PyArrayDyn<T>>> {
+    flat.into_pyarray(py).reshape(shape)
 }
 
 /// Image points over time.

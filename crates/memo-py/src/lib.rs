@@ -5,6 +5,8 @@ mod camera;
 mod error;
 mod image;
 mod keypoints;
+mod planar;
+mod pointlight;
 mod posture;
 mod reproduce;
 mod score;
@@ -28,6 +30,10 @@ mod _memo {
         follow_person, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts, side_pairs,
         stick_joints,
     };
+    #[pymodule_export]
+    use super::planar::{planar, planar_hinges, planar_rods};
+    #[pymodule_export]
+    use super::pointlight::{pointlight, walker_motion};
     #[pymodule_export]
     use super::posture::posture;
     #[pymodule_export]

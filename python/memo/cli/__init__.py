@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `memo unswap`, `memo posture`, `memo reproduce`, `memo demo`.
+"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import memo
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
+from memo.cli.planar import add_planar
+from memo.cli.pointlight import add_pointlight
 from memo.cli.posture import add_posture
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import EXIT_CODES, add_track
@@ -62,4 +64,6 @@ def _app() -> "typer.Typer":
     add_posture(app)
     add_demo(app)
     add_reproduce(app)
+    add_pointlight(app)
+    add_planar(app)
     return app

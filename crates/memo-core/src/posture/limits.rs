@@ -46,7 +46,7 @@ impl AngleRange {
     }
 
     /// By how much an angle is above the range; negative: below it; 0 within. The nearer bound counts.
-    fn excess(&self, angle: f64) -> f64 {
+    pub fn excess(&self, angle: f64) -> f64 {
         let width = self.max_rad - self.min_rad;
         let offset = (angle - self.min_rad).rem_euclid(TAU);
         if offset <= width {

@@ -1,9 +1,16 @@
 //! The seeded generator of scenes with ground truth that tests, benches and the demo share.
 
+pub mod motion;
+pub mod pointlight;
 pub mod random;
 pub mod scene;
 pub mod stick_walker;
 
+pub use motion::{Motion, MotionError, WALKER_LIMBS, WalkOptions, limbs_of, sampled_walk};
+pub use pointlight::{
+    DotSource, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay,
+    PointLightError, PointLightOptions, View, point_light_display,
+};
 pub use random::Random;
 pub use scene::{SceneOptions, SynthScene, Truth};
 pub use stick_walker::{StickCamera, StickView, StickWalker};

@@ -180,7 +180,7 @@ impl SynthScene {
 }
 
 /// Stride length at which the stance foot does not slide: the ankle's way back in the body over mid-stance.
-fn stride_length_m(walker: &Walker) -> f64 {
+pub(super) fn stride_length_m(walker: &Walker) -> f64 {
     let ankle = |phase: f64| walker.pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
     (ankle(0.1) - ankle(0.4)) / 0.3
 }

@@ -7,6 +7,8 @@
 
 #![allow(dead_code, reason = "each test uses its own part")]
 
+pub mod stride;
+
 use std::path::PathBuf;
 
 use glam::{DMat3, DVec2, DVec3};
@@ -30,8 +32,12 @@ pub struct Motion {
     pub heading: DVec3,
 }
 
-/// A recorded motion, every fifth frame (20-24 a second).
-pub fn load(name: &str) -> Option<Motion> {
+/// Columns of the joint files, limb by limb from the trunk.
+pub const JOINTS: [&str; 12] =
+    ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN"];
+
+/// The joints of every frame of a recorded motion, metres in the world, NaN where missing; and its rate.
+pub fn joints(name: &str) -> Option<(f64, Vec<[DVec3; 12]>)> {
     let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
@@ -41,21 +47,28 @@ pub fn load(name: &str) -> Option<Motion> {
         println!("skipped: no {} (set MEMO_SHARED_DATA)", file.display());
         return None;
     };
-    // The first frames of this walk are a calibration posture.
-    let skipped = if name == "CMU_12_01" { 10 } else { 0 };
     let mut lines = text.lines();
     let rate_hz = rate_hz(lines.next().unwrap());
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let (mut times_s, mut figures) = (Vec::new(), Vec::new());
-    for (frame, line) in lines.enumerate().skip(skipped).step_by(5) {
+    let at = JOINTS.map(|joint| columns.iter().position(|c| *c == format!("{joint}_x")).unwrap());
+    let row = |line: &str| {
         let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect();
-        let at = |joint: &str| {
-            let column = columns.iter().position(|c| *c == format!("{joint}_x")).unwrap();
-            DVec3::new(values[column], values[column + 1], values[column + 2])
-        };
-        times_s.push(frame as f64 / rate_hz);
-        figures.push(figure(at));
-    }
+        at.map(|c| DVec3::new(values[c], values[c + 1], values[c + 2]))
+    };
+    // The first frames of this walk are a calibration posture.
+    let skipped = if name == "CMU_12_01" { 10 } else { 0 };
+    Some((rate_hz, lines.skip(skipped).map(row).collect()))
+}
+
+/// A recorded motion, every fifth frame (20-24 a second).
+pub fn load(name: &str) -> Option<Motion> {
+    let (rate_hz, frames) = joints(name)?;
+    let skipped = if name == "CMU_12_01" { 10 } else { 0 };
+    let taken = || frames.iter().enumerate().step_by(5);
+    let times_s = taken().map(|(frame, _)| (frame + skipped) as f64 / rate_hz).collect();
+    let figures: Vec<StickFigure> = taken()
+        .map(|(_, row)| figure(|joint| row[JOINTS.iter().position(|j| *j == joint).unwrap()]))
+        .collect();
     let heading = heading(&figures);
     Some(Motion { name: name.to_owned(), times_s, figures, heading })
 }

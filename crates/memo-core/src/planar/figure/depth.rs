@@ -1,0 +1,333 @@
+//! Depths over time: from the planar windows, and carried with known lengths through the others.
+
+use super::{Chain, FigureWindow, Status};
+use crate::planar::Verdict;
+use glam::DVec2;
+
+/// Where the points of a frame in space come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DepthSource {
+    /// From a plane.
+    Planar,
+    /// From lengths of an earlier or later planar period.
+    Carried,
+    /// Not known.
+    Unknown,
+}
+
+/// Depths of all points over all frames: from the interpreted window whose middle is nearest, each chain's
+/// reflection following the window before; then, if asked, carried through the rest.
+pub(super) fn depth_over_time(
+    tracks: &[Vec<DVec2>],
+    windows: &[FigureWindow],
+    carries: bool,
+) -> (Vec<f64>, Vec<DepthSource>) {
+    let (points, frames) = (tracks.len(), tracks[0].len());
+    let mut depth = vec![f64::NAN; points * frames];
+    let mut sources = vec![DepthSource::Unknown; frames];
+    let read: Vec<&FigureWindow> = windows.iter().filter(|w| w.status == Status::Interpreted).collect();
+    let mut signs = reflections(&read);
+    if carries {
+        carry(tracks, &read, &mut signs, &mut depth);
+        for (source, row) in sources.iter_mut().zip(depth.chunks(points)) {
+            if row.iter().any(|z| z.is_finite()) {
+                *source = DepthSource::Carried;
+            }
+        }
+    }
+    let nearest = |frame: usize| {
+        let holding = read.iter().enumerate().filter(|(_, w)| (w.start..w.end).contains(&frame));
+        holding.min_by_key(|(_, w)| (w.start + w.end).abs_diff(2 * frame + 1)).map(|(index, _)| index)
+    };
+    for frame in 0..frames {
+        let Some(index) = nearest(frame) else { continue };
+        sources[frame] = DepthSource::Planar;
+        for (chain, sign) in read[index].figure.chains.iter().zip(&signs[index]) {
+            for (&point, z) in chain.points.iter().zip(&chain.depth[frame - read[index].start]) {
+                depth[frame * points + point] = sign * z;
+            }
+        }
+    }
+    (depth, sources)
+}
+
+/// The chain of a window with the same points in the same order.
+fn same_chain(window: &FigureWindow, chain: &Chain) -> Option<usize> {
+    window.figure.chains.iter().position(|other| other.points == chain.points)
+}
+
+/// For each chain of each window the sign that fits the same points in the window before where they overlap.
+/// What joint limits have told stays.
+fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
+    let mut signs: Vec<Vec<f64>> = Vec::with_capacity(windows.len());
+    for (index, window) in windows.iter().enumerate() {
+        let sign_of = |chain: &Chain| {
+            if chain.reflection_margin_deg.is_some() {
+                return 1.0;
+            }
+            let Some(before) = index.checked_sub(1) else { return 1.0 };
+            let previous = windows[before];
+            let Some(k) = same_chain(previous, chain) else { return 1.0 };
+            let other = &previous.figure.chains[k];
+            let agreement: f64 = (window.start..previous.end.max(window.start))
+                .flat_map(|t| chain.depth[t - window.start].iter().zip(&other.depth[t - previous.start]))
+                .map(|(a, b)| a * b)
+                .filter(|product| product.is_finite())
+                .sum();
+            if agreement * signs[before][k] < 0.0 { -1.0 } else { 1.0 }
+        };
+        signs.push(window.figure.chains.iter().map(sign_of).collect());
+    }
+    signs
+}
+
+/// Goes on with the lengths of the chains that did not leave their planes through the frames before, between
+/// and after the windows.
+///
+/// A link of length L and image vector d has |z| = sqrt(L^2 - |d|^2), or 0 where the image is too long. The
+/// signs are those of the path from the depths before to those after that accelerates least (sum of squared
+/// second differences). Where both ends are known they also choose the reflection after the gap, unless joint
+/// limits have. Where a link passes parallel to the image the two signs meet and the path may choose wrongly.
+fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], depth: &mut [f64]) {
+    let frames = tracks[0].len();
+    for after in 0..=read.len() {
+        let before = after.checked_sub(1);
+        let from = before.map_or(0, |b| read[b].end);
+        let to = read.get(after).map_or(frames, |w| w.start);
+        if from >= to {
+            continue;
+        }
+        let is_kept = |chain: &Chain| chain.evidence.verdict != Verdict::NotPlanar;
+        for k in 0..before.map_or(0, |b| read[b].figure.chains.len()) {
+            let (window, sign) = (read[after - 1], signs[after - 1][k]);
+            let chain = &window.figure.chains[k];
+            if !is_kept(chain) {
+                continue;
+            }
+            let met = read.get(after).and_then(|next| same_chain(next, chain));
+            let gap = Gap { tracks, chain, from, to, is_backwards: false };
+            let last = chain.depth.len();
+            let start = [2, 1].map(|back| row(chain, last.checked_sub(back), sign));
+            let Some(met) = met else {
+                gap.fill(&gap.paths(&start, None).0, depth);
+                continue;
+            };
+            let next = &read[after].figure.chains[met];
+            let reach = |sign: f64| {
+                let end = [0, 1].map(|t| row(next, Some(t), sign));
+                gap.paths(&start, Some(&end))
+            };
+            let sign = signs[after][met];
+            let (kept, turned) = (reach(sign), reach(-sign));
+            if turned.1 < kept.1 && next.reflection_margin_deg.is_none() {
+                for (later, signs) in read[after..].iter().zip(&mut signs[after..]) {
+                    if let Some(same) = same_chain(later, chain) {
+                        signs[same] = -signs[same];
+                    }
+                }
+                gap.fill(&turned.0, depth);
+            } else {
+                gap.fill(&kept.0, depth);
+            }
+        }
+        let Some(next) = read.get(after) else { continue };
+        for (k, chain) in next.figure.chains.iter().enumerate() {
+            let is_new = before.is_none_or(|b| {
+                same_chain(read[b], chain).is_none_or(|same| !is_kept(&read[b].figure.chains[same]))
+            });
+            if is_kept(chain) && is_new {
+                let gap = Gap { tracks, chain, from, to, is_backwards: true };
+                let start = [1, 0].map(|t| row(chain, Some(t), signs[after][k]));
+                gap.fill(&gap.paths(&start, None).0, depth);
+            }
+        }
+    }
+}
+
+/// Depths of a chain in a frame of its window, of one reflection; empty where there is none.
+fn row(chain: &Chain, frame: Option<usize>, sign: f64) -> Vec<f64> {
+    let depths = frame.and_then(|t| chain.depth.get(t));
+    depths.map_or(Vec::new(), |depths| depths.iter().map(|z| sign * z).collect())
+}
+
+/// Frames without a plane, and a chain whose lengths are known.
+struct Gap<'a> {
+    tracks: &'a [Vec<DVec2>],
+    chain: &'a Chain,
+    from: usize,
+    to: usize,
+    /// Whether depths are known after it only.
+    is_backwards: bool,
+}
+
+impl Gap<'_> {
+    /// Paths of all links from two rows of depths to two others, if given, and what they cost. Backwards in
+    /// time the two rows are those after the gap, the later first.
+    fn paths(&self, start: &[Vec<f64>; 2], end: Option<&[Vec<f64>; 2]>) -> (Vec<Vec<f64>>, f64) {
+        let (mut paths, mut total) = (Vec::new(), 0.0);
+        for (k, link) in self.chain.links.iter().enumerate() {
+            let [a, b] = [0, 1].map(|i| &self.tracks[self.chain.points[k + i]]);
+            let size = |t: usize| {
+                (link.length * link.length - (b[t] - a[t]).length_squared()).max(0.0).sqrt()
+                    + if (b[t] - a[t]).is_finite() { 0.0 } else { f64::NAN }
+            };
+            let mut sizes: Vec<f64> = (self.from..self.to).map(size).collect();
+            if self.is_backwards {
+                sizes.reverse();
+            }
+            let of_link = |row: &Vec<f64>| Some(row.get(k + 1)? - row.get(k)?).filter(|z| z.is_finite());
+            let pair = |rows: &[Vec<f64>; 2]| Some([of_link(&rows[0])?, of_link(&rows[1])?]);
+            let (mut path, cost) = match pair(start) {
+                Some(start) => smoothest(&sizes, start, end.and_then(pair)),
+                None => (vec![f64::NAN; sizes.len()], 0.0),
+            };
+            if self.is_backwards {
+                path.reverse();
+            }
+            paths.push(path);
+            total += cost;
+        }
+        (paths, total)
+    }
+
+    fn fill(&self, paths: &[Vec<f64>], depth: &mut [f64]) {
+        let points = self.tracks.len();
+        for t in self.from..self.to {
+            let mut z = 0.0 * paths[0][t - self.from];
+            depth[t * points + self.chain.points[0]] = z;
+            for (path, &point) in paths.iter().zip(&self.chain.points[1..]) {
+                z += path[t - self.from];
+                depth[t * points + point] = z;
+            }
+        }
+    }
+}
+
+/// Signs of `sizes` for the least sum of squared second differences, after two known values and before two
+/// others, if given. Unknown sizes are passed over in a straight line and stay unknown.
+fn smoothest(sizes: &[f64], start: [f64; 2], end: Option<[f64; 2]>) -> (Vec<f64>, f64) {
+    let mut choices: Vec<[f64; 2]> = start.iter().map(|&z| [z; 2]).collect();
+    let known: Vec<usize> = (0..sizes.len()).filter(|&t| sizes[t].is_finite()).collect();
+    for t in 0..sizes.len() {
+        let size = if sizes[t].is_finite() {
+            sizes[t]
+        } else {
+            let after = known.partition_point(|&k| k < t);
+            match (after.checked_sub(1).map(|i| known[i]), known.get(after)) {
+                (Some(a), Some(&b)) => sizes[a] + (sizes[b] - sizes[a]) * (t - a) as f64 / (b - a) as f64,
+                (Some(k), None) => sizes[k],
+                (None, Some(&k)) => sizes[k],
+                (None, None) => 0.0,
+            }
+        };
+        choices.push([size, -size]);
+    }
+    choices.extend(end.into_iter().flatten().map(|z| [z; 2]));
+    // costs[i][j]: of the best path whose last two choices are i and j; came[t][i][j]: the choice before
+    // them.
+    let mut costs = [[0.0f64; 2]; 2];
+    let mut came: Vec<[[usize; 2]; 2]> = Vec::with_capacity(choices.len());
+    for window in choices.windows(3) {
+        let (mut next, mut from) = ([[f64::INFINITY; 2]; 2], [[0; 2]; 2]);
+        for (h, i, j) in [0, 1].iter().flat_map(|h| (0..4).map(move |ij| (*h, ij / 2, ij % 2))) {
+            let second = window[2][j] - 2.0 * window[1][i] + window[0][h];
+            let cost = costs[h][i] + second * second;
+            if cost < next[i][j] {
+                (next[i][j], from[i][j]) = (cost, h);
+            }
+        }
+        costs = next;
+        came.push(from);
+    }
+    let last = (0..4).min_by(|&a, &b| costs[a / 2][a % 2].total_cmp(&costs[b / 2][b % 2])).unwrap_or(0);
+    let (mut i, mut j) = (last / 2, last % 2);
+    let cost = costs[i][j];
+    let mut taken = vec![0; choices.len()];
+    for t in (2..choices.len()).rev() {
+        (taken[t], taken[t - 1]) = (j, i);
+        (i, j) = (came[t - 2][i][j], i);
+    }
+    let path = (0..sizes.len()).map(|t| choices[t + 2][taken[t + 2]] + 0.0 * sizes[t]).collect();
+    (path, cost)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planar::figure::example::{limbs, sorted_links, walker};
+    use crate::planar::{FigureOptions, FitOptions, interpret_figure};
+    use std::f64::consts::TAU;
+
+    /// One full turn between 1.8 and 2.6 s of 4.4 s.
+    fn spin(time_s: f64) -> f64 {
+        TAU * ((time_s - 1.8) / 0.8).clamp(0.0, 1.0)
+    }
+
+    #[test]
+    fn a_spin_is_lost_and_found_again() {
+        let (tracks, times_s, _) = walker(264, spin, 0.5);
+        let fit = FitOptions { noise_sd: 0.5, ..FigureOptions::default().fit };
+        let options = FigureOptions { fit, window_s: 0.9, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let mut seen = Vec::new();
+        for window in &found.windows {
+            let (from, to) = (times_s[window.start], times_s[window.end - 1]);
+            println!("{from:.2} to {to:.2} s: {:?} {:?}", window.status, window.chains);
+            if to < 1.8 || from > 2.6 {
+                assert_eq!(window.status, Status::Interpreted, "{from} to {to} s");
+                assert_eq!(sorted_links(&window.figure), limbs(), "{from} to {to} s");
+            }
+            if from > 1.6 && to < 2.8 || from < 2.0 && to > 2.4 {
+                assert_eq!(window.status, Status::Lost, "{from} to {to} s");
+            }
+            seen.push(window.status);
+        }
+        assert!(seen.contains(&Status::Lost));
+        let middle = (2.2 * 60.0) as usize;
+        assert_eq!(found.sources[middle], DepthSource::Unknown);
+        assert!(found.depth[middle * 12..][..12].iter().all(|z| z.is_nan()));
+        assert_eq!((found.sources[0], found.sources[263]), (DepthSource::Planar, DepthSource::Planar));
+    }
+
+    #[test]
+    fn lengths_are_carried_into_a_turn() {
+        let (tracks, times_s, truth) = walker(264, spin, 0.0);
+        let options = FigureOptions { window_s: 0.9, carries_structure: true, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let carried: Vec<usize> = (0..264).filter(|&t| found.sources[t] == DepthSource::Carried).collect();
+        assert!(carried.len() > 10, "{carried:?}");
+        let limb_depth = |z: &[f64], t: usize, [a, b]: [usize; 2]| z[t * 12 + b] - z[t * 12 + a];
+        let mut errors = Vec::new();
+        for &t in &carried {
+            for [a, b] in limbs() {
+                let depth = |z: &[f64]| z[t * 12 + b] - z[t * 12 + a];
+                let length = (tracks[b][t] - tracks[a][t]).extend(depth(&truth)).length();
+                // Up to the chain's reflection, which is that of the first frame.
+                let sign = (limb_depth(&found.depth, 0, [a, b]) * limb_depth(&truth, 0, [a, b])).signum();
+                errors.push((sign * depth(&found.depth) - depth(&truth)).abs() / length);
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        println!(
+            "carried depth, relative to length: median {:.4}, p90 {:.4}",
+            errors[errors.len() / 2],
+            errors[errors.len() * 9 / 10]
+        );
+        assert!(errors[errors.len() * 9 / 10] < 0.1);
+    }
+
+    #[test]
+    fn the_smoothest_path_goes_through_zero_and_over_what_is_unseen() {
+        let truth = |t: i32| (0.1 * f64::from(t)).sin();
+        let mut sizes: Vec<f64> = (0..60).map(|t| truth(t).abs()).collect();
+        sizes[10] = f64::NAN;
+        let start = [truth(-2), truth(-1)];
+        let (path, _) = smoothest(&sizes, start, None);
+        for t in (0..60).filter(|&t| t != 10) {
+            assert!((path[t] - truth(t as i32)).abs() < 1e-12, "{t}");
+        }
+        assert!(path[10].is_nan());
+        let reach = |sign: f64| smoothest(&sizes, start, Some([60, 61].map(|t| sign * truth(t)))).1;
+        assert!(reach(1.0) < reach(-1.0));
+    }
+}

@@ -1,0 +1,314 @@
+//! The groups of a window: all rods and hinges that may be part of the figure, what they cost, and the
+//! division into groups that costs least.
+
+use super::FigureOptions;
+use super::cover::{MOST_POINTS, Piece, best_cover};
+use super::linkage::{Chain, Contact, Figure, Link, Method};
+use crate::planar::{
+    FitError, HingeFit, RodFit, fit_hinge, hinge_evidence, rod_evidence, test_pairs, test_triples,
+};
+use glam::{DVec2, DVec3};
+
+/// Fits of all rods of a window, and what they cost.
+struct Rods {
+    points: usize,
+    /// Of i < j at i * points + j; `None` where they cannot be fitted.
+    fits: Vec<Option<RodFit>>,
+    /// What sets two points apart, both ways, relative to the size.
+    apart: Vec<f64>,
+}
+
+impl Rods {
+    fn fitted(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Self {
+        let points = tracks.len();
+        let both_ways = |index: usize| (index / points, index % points);
+        let none = || Err(FitError::TooFewViews { found: 0, needed: 0 });
+        let mut results: Vec<Result<RodFit, FitError>> = (0..points * points).map(|_| none()).collect();
+        for pair in test_pairs(tracks, &options.fit, &options.evidence) {
+            results[pair.points[0] * points + pair.points[1]] = pair.tested.map(|(fit, _)| fit);
+        }
+        let apart = (0..points * points).map(|index| {
+            let (i, j) = both_ways(index);
+            match &results[i.min(j) * points + i.max(j)] {
+                Ok(fit) => {
+                    (unexplained(fit.residual_rms, options) + clean_motion(fit.motion, options)) / size
+                }
+                Err(FitError::NoMotion { .. }) => 0.0,
+                Err(_) => f64::INFINITY,
+            }
+        });
+        let apart = apart.collect();
+        Self { points, fits: results.into_iter().map(Result::ok).collect(), apart }
+    }
+
+    fn fit(&self, i: usize, j: usize) -> Option<&RodFit> {
+        self.fits[i.min(j) * self.points + i.max(j)].as_ref()
+    }
+
+    fn apart(&self, i: usize, j: usize) -> f64 {
+        self.apart[i * self.points + j]
+    }
+
+    /// What sets a group apart from the nearest point outside it, by one of its ends.
+    fn detachment(&self, ends: &[usize], group: &[usize], most: f64) -> f64 {
+        let outside = |j: &usize| !group.contains(j);
+        let nearest = |&end: &usize| (0..self.points).filter(outside).map(move |j| self.apart(end, j));
+        ends.iter().flat_map(nearest).fold(most, f64::min)
+    }
+}
+
+/// A residual without (a share of) what noise adds to it.
+fn unexplained(residual_rms: f64, options: &FigureOptions) -> f64 {
+    residual_rms - options.costs.noise * std::f64::consts::SQRT_2 * options.fit.noise_sd
+}
+
+/// RMS motion of an image vector without what noise adds to it: four coordinates.
+fn clean_motion(motion: f64, options: &FigureOptions) -> f64 {
+    (motion * motion - 4.0 * options.fit.noise_sd.powi(2)).max(0.0).sqrt()
+}
+
+/// A hinge of the window that may be part of the figure.
+struct Candidate {
+    /// End, pivot, end; or end, end; or one point.
+    points: Vec<usize>,
+    cost: f64,
+}
+
+/// The figure of least cost in one window.
+pub(super) fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Figure {
+    let rods = Rods::fitted(tracks, size, options);
+    if tracks.len() > options.most_covered.min(MOST_POINTS) {
+        return forest(tracks, &rods, size, options);
+    }
+    let candidates = candidates(tracks, &rods, size, options);
+    let pieces: Vec<Piece> = candidates
+        .iter()
+        .map(|c| Piece { mask: c.points.iter().fold(0, |mask, &p| mask | 1 << p), cost: c.cost })
+        .collect();
+    let cover = best_cover(tracks.len(), &pieces, options.costs.temperature)
+        .expect("single points are among the pieces");
+    let rival = |link: [usize; 2]| {
+        // Every cover has one piece that holds the link's first point.
+        let holds = |c: &Candidate| c.points.contains(&link[0]) && !links_of(&c.points).any(|l| l == link);
+        let others = candidates.iter().zip(&cover.cost_with).filter(|(c, _)| holds(c));
+        others.map(|(_, &cost)| cost).fold(f64::INFINITY, f64::min)
+    };
+    let share = |link: [usize; 2]| {
+        let having =
+            candidates.iter().zip(&cover.share).filter(|(c, _)| links_of(&c.points).any(|l| l == link));
+        having.map(|(_, share)| share).sum::<f64>().min(1.0)
+    };
+    let judge = |link: [usize; 2]| ((rival(link) - cover.cost) * size, share(link));
+    let groups: Vec<Vec<usize>> = cover.chosen.iter().map(|&i| candidates[i].points.clone()).collect();
+    let joints = joints(&groups, &rods, size, options);
+    let chains = groups.iter().filter(|g| g.len() > 1);
+    let chains = chains.filter_map(|group| chain(group, tracks, &rods, &joints, options, &judge)).collect();
+    let alone = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
+    Figure { method: Method::Cover, chains, joints, alone, cost: cover.cost * size, size }
+}
+
+/// The links of a chain's points in order.
+fn links_of(points: &[usize]) -> impl Iterator<Item = [usize; 2]> {
+    points.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
+}
+
+/// All single points, rods and hinges with their costs.
+fn candidates(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) -> Vec<Candidate> {
+    let (points, costs) = (tracks.len(), &options.costs);
+    let most = 3.0 * costs.alone + costs.detached;
+    let mut found: Vec<Candidate> = (0..points)
+        .map(|i| Candidate { points: vec![i], cost: rods.detachment(&[i], &[i], costs.alone) })
+        .collect();
+    for i in 0..points {
+        for j in i + 1..points {
+            let Some(fit) = rods.fit(i, j) else { continue };
+            let own =
+                unexplained(fit.residual_rms, options) / size + costs.length * fit.length / size + costs.rod;
+            let cost = own + rods.detachment(&[i, j], &[i, j], costs.detached);
+            if cost < most {
+                found.push(Candidate { points: vec![i, j], cost });
+            }
+        }
+    }
+    for triple in test_triples(tracks, &options.fit, &options.evidence) {
+        let ([i, pivot, j], Ok((fit, _))) = (triple.points, triple.tested) else { continue };
+        let length = (fit.lengths[0] + fit.lengths[1]) / size;
+        let own = unexplained(fit.residual_rms, options) / size + costs.length * length;
+        let cost = own + rods.detachment(&[i, j], &[i, pivot, j], costs.detached);
+        if cost < most {
+            found.push(Candidate { points: vec![i, pivot, j], cost });
+        }
+    }
+    found
+}
+
+/// How groups sit on each other: the least spanning forest over ends that stay together.
+fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions) -> Vec<Contact> {
+    let ends = |group: &[usize]| [group[0], group[group.len() - 1]];
+    let mut pairs = Vec::new();
+    for (a, first) in groups.iter().enumerate() {
+        for (b, second) in groups.iter().enumerate().skip(a + 1) {
+            let between =
+                ends(first).into_iter().flat_map(|i| ends(second).map(|j| (rods.apart(i, j), i, j)));
+            if let Some((apart, i, j)) = between.min_by(|x, y| x.0.total_cmp(&y.0)) {
+                pairs.push((apart, a, b, [i, j]));
+            }
+        }
+    }
+    pairs.retain(|pair| pair.0 < options.costs.detached);
+    let edges = spanning_forest(groups.len(), &mut pairs);
+    edges.into_iter().map(|(apart, points)| Contact { points, apart: apart * size }).collect()
+}
+
+/// Kruskal's forest over edges (weight, node, node, what), weights and whats returned, lightest first.
+fn spanning_forest(nodes: usize, edges: &mut [(f64, usize, usize, [usize; 2])]) -> Vec<(f64, [usize; 2])> {
+    edges.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.3.cmp(&y.3)));
+    let mut tree: Vec<usize> = (0..nodes).collect();
+    let mut kept = Vec::new();
+    for &(weight, a, b, what) in edges.iter() {
+        let (a, b) = (tree[a], tree[b]);
+        if a != b {
+            tree.iter_mut().filter(|t| **t == b).for_each(|t| *t = a);
+            kept.push((weight, what));
+        }
+    }
+    kept
+}
+
+/// A group of the figure with all that is known about it; `None` if its points cannot be fitted.
+fn chain(
+    group: &[usize],
+    tracks: &[&[DVec2]],
+    rods: &Rods,
+    joints: &[Contact],
+    options: &FigureOptions,
+    judge: &impl Fn([usize; 2]) -> (f64, f64),
+) -> Option<Chain> {
+    let mut points = group.to_vec();
+    let sits_on = |end: usize| {
+        joints.iter().filter(|j| j.points.contains(&end)).map(|j| j.apart).fold(f64::INFINITY, f64::min)
+    };
+    if sits_on(points[points.len() - 1]) < sits_on(points[0]) {
+        points.reverse();
+    }
+    let lengths = |lengths: &[f64], sds: &[f64]| -> Vec<Link> {
+        let of = |(k, pair): (usize, [usize; 2])| {
+            let (margin, confidence) = judge(pair);
+            Link { points: pair, length: lengths[k], length_sd: sds[k], margin, confidence }
+        };
+        links_of(&points).enumerate().map(of).collect()
+    };
+    if let [a, b] = points[..] {
+        let fit = rods.fit(a, b)?;
+        let depth_of = |sign: f64| fit.depth.iter().map(|z| sign * z).collect::<Vec<_>>();
+        // The fit's pivot is the lower index.
+        let depth = depth_of(if a < b { 1.0 } else { -1.0 });
+        return Some(Chain {
+            links: lengths(&[fit.length], &[fit.covariance.z_axis.z.sqrt()]),
+            plane: fit.plane,
+            residual_rms: fit.residual_rms,
+            evidence: rod_evidence(fit, options.fit.noise_sd, &options.evidence),
+            depth: depth.iter().map(|&z| vec![0.0, z]).collect(),
+            reflection_margin_deg: None,
+            angle_rad: Vec::new(),
+            points,
+        });
+    }
+    let [a, pivot, b] = points[..] else { return None };
+    let fit = fit_hinge(tracks[a], tracks[pivot], tracks[b], &options.fit).ok()?;
+    let sd = |k: usize| fit.covariance[(2 + k, 2 + k)].sqrt();
+    Some(Chain {
+        links: lengths(&fit.lengths, &[sd(0), sd(1)]),
+        plane: fit.plane,
+        residual_rms: fit.residual_rms,
+        evidence: hinge_evidence(&fit, options.fit.noise_sd, &options.evidence),
+        depth: fit.depth.iter().map(|[first, second]| vec![0.0, -first, second - first]).collect(),
+        reflection_margin_deg: None,
+        angle_rad: (0..tracks[pivot].len())
+            .map(|t| angle(&fit, [a, pivot, b].map(|p| tracks[p][t]), t))
+            .collect(),
+        points,
+    })
+}
+
+/// Angle at the pivot of a hinge in one frame, radians; NaN where unseen.
+fn angle(fit: &HingeFit, [a, pivot, b]: [DVec2; 3], frame: usize) -> f64 {
+    let [first, second] = fit.depth[frame];
+    let (u, v): (DVec3, DVec3) = ((a - pivot).extend(first), (b - pivot).extend(second));
+    u.cross(v).length().atan2(u.dot(v))
+}
+
+/// Links by a minimum spanning tree over rods; each a chain of its own.
+///
+/// A rod weighs its residual and twice the cover's cost of its length: rods alone leave more to the length
+/// than hinges do. (Residual times length loses a few limbs more at 0 px and many at 2 px.)
+fn forest(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) -> Figure {
+    let points = tracks.len();
+    let mut edges = Vec::new();
+    for i in 0..points {
+        for j in i + 1..points {
+            if let Some(fit) = rods.fit(i, j) {
+                edges.push((fit.residual_rms + 2.0 * options.costs.length * fit.length, i, j, [i, j]));
+            }
+        }
+    }
+    let kept: Vec<[usize; 2]> =
+        spanning_forest(points, &mut edges).into_iter().map(|(_, pair)| pair).collect();
+    let judge = |_: [usize; 2]| (f64::NAN, f64::NAN);
+    let chains: Vec<Chain> =
+        kept.iter().filter_map(|pair| chain(pair, tracks, rods, &[], options, &judge)).collect();
+    let alone = (0..points).filter(|p| !kept.iter().any(|pair| pair.contains(p))).collect();
+    Figure { method: Method::Forest, chains, joints: Vec::new(), alone, cost: f64::NAN, size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planar::figure::example::{limbs, sorted_links, walker};
+    use crate::planar::figure::{FigureOptions, Status, interpret_figure};
+
+    #[test]
+    fn the_model_is_linked_with_its_lengths_depths_and_angles() {
+        let (tracks, times_s, truth) = walker(66, |_| 0.0, 0.0);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let [window] = &found.windows[..] else { panic!("one window") };
+        assert_eq!((window.status, window.chains), (Status::Interpreted, [4, 0, 0]));
+        assert_eq!(sorted_links(&window.figure), limbs());
+        for chain in &window.figure.chains {
+            for link in &chain.links {
+                let [a, b] = link.points;
+                let depth = truth[b] - truth[a];
+                let length = (tracks[b][0] - tracks[a][0]).extend(depth).length();
+                assert!((link.length / length - 1.0).abs() < 1e-3, "{link:?} {length}");
+                assert!(link.confidence > 0.9 && link.margin > 0.0);
+            }
+            let [a, pivot, b] = chain.points[..] else { panic!() };
+            let sign = (chain.depth[0][1] * (truth[pivot] - truth[a])).signum();
+            for t in 0..66 {
+                let at = |k: usize| truth[t * 12 + k] - truth[t * 12 + a];
+                assert!((sign * chain.depth[t][2] - at(b)).abs() < 1.0, "frame {t}");
+                let point = |k: usize| tracks[k][t].extend(truth[t * 12 + k]);
+                let angle = (point(a) - point(pivot)).angle_between(point(b) - point(pivot));
+                assert!((chain.angle_rad[t] - angle).abs() < 0.02);
+            }
+        }
+        // The four chains sit on each other by shoulders and hips.
+        assert_eq!(window.figure.joints.len(), 3);
+        assert!(window.figure.joints.iter().all(|j| j.points.iter().all(|p| p % 3 == 0)));
+    }
+
+    #[test]
+    fn many_points_are_linked_by_a_forest() {
+        let (mut tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        let options = FigureOptions { most_covered: 4, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let links = sorted_links(&found.windows[0].figure);
+        assert_eq!(found.windows[0].figure.method, Method::Forest);
+        assert_eq!(links.len(), 11);
+        tracks.extend(
+            (0..8).map(|i| tracks[i].iter().map(|p| *p + 5.0).collect::<Vec<_>>()).collect::<Vec<_>>(),
+        );
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        assert_eq!(found.windows[0].figure.method, Method::Forest);
+    }
+}

@@ -1,0 +1,79 @@
+//! Positions that jump away from their track and back: wrong detections, taken out before groups are fitted.
+//!
+//! A group's fit can leave views out as well
+//! ([`FitOptions::max_outlier_fraction`](crate::planar::FitOptions)), which costs it ten times the time; here
+//! order in time is known, and a track is looked at once.
+//!
+//! What it cannot do: tell a wrong position that stays for several frames.
+
+use glam::DVec2;
+
+/// A position is a jump when it is this many times the usual distance from the middle of its neighbours.
+const JUMP: f64 = 10.0;
+
+/// The same track without jumps; `noise_sd` of each coordinate.
+///
+/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A foot that lands has
+/// a large one, but of at most half of |p_t+1 - p_t-1|: a jump is farther off than its neighbours are apart.
+/// A wrong position disturbs its neighbours' distances by half of its own, so the largest goes first.
+pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
+    let mut clean = track.to_vec();
+    let off = |track: &[DVec2], t: usize| {
+        if t == 0 || t + 1 >= track.len() {
+            f64::NAN
+        } else {
+            track[t].distance(0.5 * (track[t - 1] + track[t + 1]))
+        }
+    };
+    let mut distances: Vec<f64> = (0..track.len()).map(|t| off(track, t)).filter(|d| !d.is_nan()).collect();
+    if distances.len() < 8 {
+        return clean;
+    }
+    let middle = distances.len() / 2;
+    let usual = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // Noise alone makes a median distance of 1.44 standard deviations.
+    let limit = JUMP * usual.max(1.44 * noise_sd);
+    // Where a tenth would have to go, the track is rough, not wrong.
+    for _ in 0..track.len() / 10 {
+        let turns_back = |t: usize, d: f64| d > clean[t - 1].distance(clean[t + 1]);
+        let distances =
+            (0..clean.len()).map(|t| (off(&clean, t), t)).filter(|&(d, t)| d > limit && turns_back(t, d));
+        let Some((_, worst)) = distances.max_by(|a, b| a.0.total_cmp(&b.0)) else { return clean };
+        clean[worst] = DVec2::NAN;
+    }
+    track.to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planar::figure::example::walker;
+    use crate::synth::Random;
+
+    #[test]
+    fn a_foot_that_lands_is_no_jump() {
+        let track: Vec<DVec2> = (0..40).map(|t| DVec2::new(8.0 * f64::from(t.clamp(10, 20)), 0.0)).collect();
+        assert_eq!(without_jumps(&track, 0.0), track);
+    }
+
+    #[test]
+    fn jumps_go_and_walks_stay() {
+        for noise_px in [0.0, 1.0] {
+            let (tracks, ..) = walker(66, |_| 0.0, noise_px);
+            let mut random = Random::new(2);
+            for track in &tracks {
+                let kept = without_jumps(track, noise_px);
+                assert!(kept.iter().all(|p| p.is_finite()), "nothing of a walk is a jump");
+                let mut wrong = track.clone();
+                for t in [7, 30, 31, 50] {
+                    wrong[t] += 80.0 * DVec2::from_angle(random.uniform(0.0, 6.3));
+                }
+                let kept = without_jumps(&wrong, noise_px);
+                for t in [7, 50] {
+                    assert!(kept[t].is_nan(), "frame {t}");
+                }
+                assert!(kept.iter().filter(|p| p.is_nan()).count() <= 5);
+            }
+        }
+    }
+}

@@ -1,0 +1,432 @@
+//! From unnamed moving points to a linkage: which points are joined, in which planes they swing, how long the
+//! limbs are.
+//!
+//! Hoffman and Flinchbaugh 1982, section 6: divide the points into groups of two and three, test each group
+//! for planar motion, combine. They leave "combine" open, and with real walking the test alone does not do:
+//! joints of one body are related, so several false groups fit as well as the true ones. Here the groups
+//! compete: the figure is the least costly division of all points into hinges (three points), rods (two) and
+//! points left alone (exact cover). A group costs what its plane leaves unexplained, a little for its length,
+//! and what sets it apart from the nearest rest of the body: the end of a limb sits on a trunk that hardly
+//! moves against other trunk points, whereas the pieces of a limb cut wrongly do not. Where there are too
+//! many points, a minimum spanning tree over rods (`Method::Forest`) takes its place: with little noise it
+//! finds nine limbs in ten, with false links among them, at 2 px eight in ten.
+//!
+//! Costs are in units of the figure's size and were chosen on four walks (see `tests/planar_figure.rs`).
+//!
+//! What it cannot do: tell a chain from its mirror; give the depth of one chain against another; read figures
+//! whose limbs leave their planes (turning, spinning): such windows are reported lost. A limb that hardly
+//! moves in the image is joined by its shortness alone; its links say so by their confidence.
+
+mod cover;
+mod depth;
+#[cfg(test)]
+mod example;
+mod group;
+mod jump;
+mod linkage;
+mod reflection;
+
+pub use cover::MOST_POINTS;
+pub use depth::DepthSource;
+pub use linkage::{Chain, Contact, Figure, Link, Method};
+pub use reflection::joint_of;
+
+use super::{EvidenceOptions, FitOptions, Verdict};
+use crate::posture::skeleton::Joint;
+use depth::depth_over_time;
+use glam::DVec2;
+use group::best_figure;
+use jump::without_jumps;
+use rayon::prelude::*;
+use reflection::reflect_by_anatomy;
+use thiserror::Error;
+
+/// More points than this are refused.
+pub const MOST_TRACKS: usize = 200;
+
+/// Why tracks could not be read as a figure.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FigureError {
+    /// Fewer than two points, or too many.
+    #[error("{points} points: between 2 and {MOST_TRACKS} can be linked")]
+    Points {
+        /// Points given.
+        points: usize,
+    },
+    /// A track does not have one position a time.
+    #[error("track {track} has {positions} positions for {times} times")]
+    Lengths {
+        /// The track.
+        track: usize,
+        /// Its positions.
+        positions: usize,
+        /// Times given.
+        times: usize,
+    },
+    /// Not one name a track.
+    #[error("{names} names for {tracks} tracks")]
+    Names {
+        /// Names given.
+        names: usize,
+        /// Tracks given.
+        tracks: usize,
+    },
+    /// Too few frames for any test.
+    #[error("{frames} frames are too few: at least {FEWEST_FRAMES} wanted")]
+    Frames {
+        /// Frames given.
+        frames: usize,
+    },
+    /// A position is infinite or absurd.
+    #[error("track {track} at frame {frame} is at ({u}, {v}): pixels wanted, NaN for unseen")]
+    Position {
+        /// The track.
+        track: usize,
+        /// The frame.
+        frame: usize,
+        /// Column given.
+        u: f64,
+        /// Row given.
+        v: f64,
+    },
+    /// Times do not increase.
+    #[error("times must be finite and increase, frame {frame} does not")]
+    Times {
+        /// First such frame.
+        frame: usize,
+    },
+    /// All points are in one place, or none is ever seen.
+    #[error("the points have no extent: nothing to link")]
+    NoExtent,
+    /// An option makes no sense.
+    #[error("{option} must be {wanted}, got {value}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// What it may be.
+        wanted: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Fewest frames of a window.
+const FEWEST_FRAMES: usize = 8;
+
+/// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about
+/// 0.42 m for a person).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// Of each unit of length, without a unit. 0.02: true links are shorter than false ones that fit as well;
+    /// anything from 0.01 to 0.03 does nearly as well.
+    pub length: f64,
+    /// Of a rod, because limbs have two segments.
+    pub rod: f64,
+    /// Of a point left alone, at most: one that stays close to another point costs what sets them apart.
+    pub alone: f64,
+    /// Of a group that sits on nothing, at most.
+    pub detached: f64,
+    /// Share of the noise's part of the residual that is not counted. Not all: false groups are noisy too.
+    pub noise: f64,
+    /// Scale of the costs at which covers are weighed against each other for the confidence.
+    pub temperature: f64,
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        Self { length: 0.02, rod: 0.018, alone: 0.061, detached: 0.08, noise: 0.6, temperature: 0.0045 }
+    }
+}
+
+/// How tracks are read as a figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FigureOptions {
+    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are taken out of the
+    /// tracks before, so that by default no fit seeks outliers again.
+    pub fit: FitOptions,
+    /// Rate of false targets of the verdicts.
+    pub evidence: EvidenceOptions,
+    /// Costs of the groups.
+    pub costs: Costs,
+    /// Size of the figure in the unit of the tracks (RMS distance of its joints from their middle, about a
+    /// quarter of a person's height); `None` takes that of the points given.
+    pub size: Option<f64>,
+    /// Length of the windows in time, seconds. 1.2, about a stride; half a stride still does, less does not.
+    /// Tracks of up to one and a half windows are read as one.
+    pub window_s: f64,
+    /// Most points that are divided by exact cover, at most [`MOST_POINTS`]; more are linked by a spanning
+    /// tree.
+    pub most_covered: usize,
+    /// Whether a figure's lengths are carried through windows in which it is lost.
+    pub carries_structure: bool,
+}
+
+impl Default for FigureOptions {
+    fn default() -> Self {
+        Self {
+            fit: FitOptions { max_outlier_fraction: 0.0, ..FitOptions::default() },
+            evidence: EvidenceOptions::default(),
+            costs: Costs::default(),
+            size: None,
+            window_s: 1.2,
+            most_covered: MOST_POINTS,
+            carries_structure: false,
+        }
+    }
+}
+
+/// Whether a window could be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// More chains move in planes than leave them.
+    Interpreted,
+    /// As many chains leave their planes as move in them, or more.
+    Lost,
+    /// Hardly anything moves: no chain speaks for or against planes.
+    Still,
+    /// Too little was seen for any chain.
+    Unseen,
+}
+
+/// One window in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FigureWindow {
+    /// First frame.
+    pub start: usize,
+    /// Frame after the last.
+    pub end: usize,
+    /// Whether it could be read.
+    pub status: Status,
+    /// Chains that move in their plane, leave it, and say nothing.
+    pub chains: [usize; 3],
+    /// The best figure, also when lost.
+    pub figure: Figure,
+}
+
+/// What was made of all tracks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interpretation {
+    /// The windows, in order; they overlap by half.
+    pub windows: Vec<FigureWindow>,
+    /// Depth of each point against the first point of its chain, T x K, in the unit of the tracks; NaN where
+    /// not known. The sign follows from window to window while these overlap; each chain may be reflected.
+    pub depth: Vec<f64>,
+    /// By frame.
+    pub sources: Vec<DepthSource>,
+}
+
+/// Reads unnamed tracks (K tracks of T image positions, NaN where unseen) as a figure, window by window.
+///
+/// # Errors
+/// Fewer than two tracks, too many, differing lengths, too few frames, infinite positions, times that do not
+/// increase, senseless options.
+pub fn interpret_figure(
+    tracks: &[Vec<DVec2>],
+    times_s: &[f64],
+    options: &FigureOptions,
+) -> Result<Interpretation, FigureError> {
+    check(tracks, times_s, options)?;
+    let size = options.size.unwrap_or_else(|| size_of(tracks));
+    if !(size > 0.0 && size.is_finite()) {
+        return Err(FigureError::NoExtent);
+    }
+    let clean: Vec<Vec<DVec2>> =
+        tracks.iter().map(|track| without_jumps(track, options.fit.noise_sd)).collect();
+    let ranges = windows(times_s, options.window_s);
+    let windows: Vec<FigureWindow> = ranges
+        .into_par_iter()
+        .map(|(start, end)| {
+            let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
+            let figure = best_figure(&part, size, options);
+            let planar = figure.count(|v| v == Verdict::Planar);
+            let refuted = figure.count(|v| v == Verdict::NotPlanar);
+            let silent = figure.chains.len() - planar - refuted;
+            let status = match (planar, refuted, silent) {
+                (0, 0, 0) => Status::Unseen,
+                (0, 0, _) => Status::Still,
+                _ if planar > refuted => Status::Interpreted,
+                _ => Status::Lost,
+            };
+            FigureWindow { start, end, status, chains: [planar, refuted, silent], figure }
+        })
+        .collect();
+    Ok(over_time(windows, tracks, options))
+}
+
+/// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint
+/// limits tell each limb from its mirror ([`Chain::reflection_margin_deg`]).
+///
+/// # Errors
+/// Those of [`interpret_figure`]; not as many names as tracks.
+pub fn interpret_named_figure(
+    tracks: &[Vec<DVec2>],
+    joints: &[Option<Joint>],
+    times_s: &[f64],
+    options: &FigureOptions,
+) -> Result<Interpretation, FigureError> {
+    if joints.len() != tracks.len() {
+        return Err(FigureError::Names { names: joints.len(), tracks: tracks.len() });
+    }
+    let mut windows = interpret_figure(tracks, times_s, options)?.windows;
+    reflect_by_anatomy(&mut windows, tracks, joints);
+    Ok(over_time(windows, tracks, options))
+}
+
+fn over_time(windows: Vec<FigureWindow>, tracks: &[Vec<DVec2>], options: &FigureOptions) -> Interpretation {
+    let (depth, sources) = depth_over_time(tracks, &windows, options.carries_structure);
+    Interpretation { windows, depth, sources }
+}
+
+fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Result<(), FigureError> {
+    if !(2..=MOST_TRACKS).contains(&tracks.len()) {
+        return Err(FigureError::Points { points: tracks.len() });
+    }
+    let times = times_s.len();
+    if times < FEWEST_FRAMES {
+        return Err(FigureError::Frames { frames: times });
+    }
+    for (track, positions) in tracks.iter().enumerate() {
+        if positions.len() != times {
+            return Err(FigureError::Lengths { track, positions: positions.len(), times });
+        }
+        let is_absurd = |p: &DVec2| p.to_array().iter().any(|x| x.abs() > 1e9);
+        if let Some(frame) = positions.iter().position(is_absurd) {
+            return Err(FigureError::Position { track, frame, u: positions[frame].x, v: positions[frame].y });
+        }
+    }
+    let goes_on =
+        |frame: usize| times_s[frame].is_finite() && (frame == 0 || times_s[frame] > times_s[frame - 1]);
+    if let Some(frame) = (0..times).find(|&frame| !goes_on(frame)) {
+        return Err(FigureError::Times { frame });
+    }
+    let c = &options.costs;
+    for (option, value) in [
+        ("length cost", c.length),
+        ("rod cost", c.rod),
+        ("cost of a point alone", c.alone),
+        ("cost of a detached group", c.detached),
+        ("share of the noise", c.noise),
+    ] {
+        if !(0.0..=1e6).contains(&value) {
+            return Err(FigureError::Option { option, wanted: "between 0 and 1,000,000", value });
+        }
+    }
+    for (option, value) in [
+        ("temperature", c.temperature),
+        ("window_s", options.window_s),
+        ("size", options.size.unwrap_or(1.0)),
+    ] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(FigureError::Option { option, wanted: "positive and finite", value });
+        }
+    }
+    let f = &options.fit;
+    for (option, wanted, value, is_good) in [
+        ("noise_sd", "finite and not negative", f.noise_sd, (0.0..=1e9).contains(&f.noise_sd)),
+        ("max_tilt_deg", "between 0 and 90", f.max_tilt_deg, f.max_tilt_deg > 0.0 && f.max_tilt_deg < 90.0),
+        ("outlier_sd", "positive", f.outlier_sd, f.outlier_sd > 0.0 && f.outlier_sd.is_finite()),
+        (
+            "max_outlier_fraction",
+            "between 0 and 0.5",
+            f.max_outlier_fraction,
+            (0.0..=0.5).contains(&f.max_outlier_fraction),
+        ),
+    ] {
+        if !is_good {
+            return Err(FigureError::Option { option, wanted, value });
+        }
+    }
+    Ok(())
+}
+
+/// RMS distance of the points from their middle, over all frames.
+fn size_of(tracks: &[Vec<DVec2>]) -> f64 {
+    let frames = tracks.first().map_or(0, Vec::len);
+    let (mut squares, mut number) = (0.0, 0.0);
+    for frame in 0..frames {
+        let seen: Vec<DVec2> = tracks.iter().map(|t| t[frame]).filter(|p| p.is_finite()).collect();
+        let middle = seen.iter().sum::<DVec2>() / seen.len().max(1) as f64;
+        squares += seen.iter().map(|p| p.distance_squared(middle)).sum::<f64>();
+        number += seen.len() as f64;
+    }
+    if number > 0.0 { (squares / number).sqrt() } else { 0.0 }
+}
+
+/// Windows of a length in time that overlap by half; the last ends with the tracks.
+fn windows(times_s: &[f64], window_s: f64) -> Vec<(usize, usize)> {
+    let frames = times_s.len();
+    let interval_s = (times_s[frames - 1] - times_s[0]) / (frames - 1) as f64;
+    let long = ((window_s / interval_s).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
+    if 2 * frames <= 3 * long {
+        return vec![(0, frames)];
+    }
+    let steps = (2 * (frames - long)).div_ceil(long).max(1);
+    (0..=steps).map(|i| i * (frames - long) / steps).map(|start| (start, start + long)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::example::{limbs, sorted_links, walker};
+    use super::*;
+
+    #[test]
+    fn threads_and_runs_do_not_change_the_figure() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 1.0);
+        let options = FigureOptions {
+            fit: FitOptions { noise_sd: 1.0, ..FigureOptions::default().fit },
+            ..FigureOptions::default()
+        };
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            format!("{:?}", pool.install(|| interpret_figure(&tracks, &times_s, &options)))
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn missing_points_and_still_figures_are_reported() {
+        let (mut tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        tracks[2] = vec![DVec2::NAN; 66];
+        tracks[8][20..30].fill(DVec2::NAN);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let figure = &found.windows[0].figure;
+        assert!(figure.alone.contains(&2));
+        let mut wanted = limbs();
+        wanted.retain(|l| !l.contains(&2));
+        assert_eq!(sorted_links(figure), wanted);
+        let still: Vec<Vec<DVec2>> = tracks.iter().map(|t| vec![t[0]; 66]).collect();
+        let found = interpret_figure(&still, &times_s, &FigureOptions::default()).unwrap();
+        assert_ne!(found.windows[0].status, Status::Interpreted);
+        let unseen = vec![vec![DVec2::NAN; 66]; 12];
+        assert_eq!(
+            interpret_figure(&unseen, &times_s, &FigureOptions::default()),
+            Err(FigureError::NoExtent)
+        );
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_its_values() {
+        let (tracks, times_s, _) = walker(20, |_| 0.0, 0.0);
+        let fresh = FigureOptions::default;
+        let refused = |tracks: &[Vec<DVec2>], times_s: &[f64], options| {
+            interpret_figure(tracks, times_s, &options).unwrap_err()
+        };
+        assert_eq!(refused(&tracks[..1], &times_s, fresh()), FigureError::Points { points: 1 });
+        assert_eq!(refused(&tracks, &times_s[..3], fresh()), FigureError::Frames { frames: 3 });
+        assert!(matches!(refused(&tracks, &times_s[..12], fresh()), FigureError::Lengths { track: 0, .. }));
+        let backwards: Vec<f64> = times_s.iter().map(|t| -t).collect();
+        assert_eq!(refused(&tracks, &backwards, fresh()), FigureError::Times { frame: 1 });
+        let mut far = tracks.clone();
+        far[3][4].y = f64::INFINITY;
+        assert!(matches!(refused(&far, &times_s, fresh()), FigureError::Position { track: 3, frame: 4, .. }));
+        let one_place = vec![vec![DVec2::ONE; 20]; 3];
+        assert_eq!(refused(&one_place, &times_s, fresh()), FigureError::NoExtent);
+        for bad in [f64::NAN, f64::INFINITY, -1.0] {
+            let options = FigureOptions { window_s: bad, ..fresh() };
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+            let options =
+                FigureOptions { fit: FitOptions { noise_sd: bad, ..FitOptions::default() }, ..fresh() };
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Which of its two reflections each limb has, where the points are known by name.
+//!
+//! Hoffman and Flinchbaugh 1982 leave every limb's reflection about the image plane open. A body does not:
+//! knees bend backwards, elbows forwards, thighs and upper arms keep to their ranges (Lee and Chen 1985,
+//! Table 1, as in [`crate::posture::limits`]). That needs to know where the body faces, which the same points
+//! tell: a body that faces away from the camera shows its right hip and shoulder on the right. Among the
+//! facings on that side the one is taken in which the limbs, each in its better reflection, keep their ranges
+//! best and, among equals, swing nearest to the sagittal plane.
+//!
+//! What it cannot do: seen from the side the reflections of a sagittal plane are one, and from the front hips
+//! do not tell which way; the margins say so. The image's v axis is taken for the vertical of an upright
+//! trunk.
+
+use super::{Figure, FigureWindow, Verdict};
+use crate::posture::angles::{abduction_rad, elbow_rad, knee_rad, swing_rad};
+use crate::posture::limits::Limits;
+use crate::posture::skeleton::{Joint, Side};
+use glam::{DMat3, DVec2, DVec3};
+
+/// Facings tried, all round.
+const FACINGS: usize = 48;
+
+/// Weight of the angle out of the sagittal plane beside the excess over a range: it only decides where no
+/// range does.
+const SAGITTAL: f64 = 0.3;
+
+/// The joint of a name, as `right_knee` or `RKN`; none for other points.
+pub fn joint_of(name: &str) -> Option<Joint> {
+    let short = |joint: &Joint| {
+        let (side, part) = joint.name().split_once('_')?;
+        let part = match part {
+            "shoulder" => "SH",
+            "elbow" => "EL",
+            "wrist" => "WR",
+            "hip" => "HP",
+            "knee" => "KN",
+            "ankle" => "AN",
+            _ => return None,
+        };
+        Some(format!("{}{part}", side[..1].to_uppercase()))
+    };
+    Joint::from_name(name).or_else(|| Joint::ALL.into_iter().find(|j| short(j).is_some_and(|s| s == name)))
+}
+
+/// What is known of a limb from its joints' names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Limb {
+    side: Side,
+    is_leg: bool,
+    /// Whether the chain starts at the trunk.
+    from_trunk: bool,
+}
+
+impl Limb {
+    fn of(joints: [Option<Joint>; 3]) -> Option<Self> {
+        let find = |joints: [Joint; 3], from_trunk: bool| {
+            Side::BOTH.into_iter().find_map(|side| {
+                let leg = [side.hip(), side.knee(), side.ankle()];
+                let arm = [side.shoulder(), side.elbow(), side.wrist()];
+                (joints == leg || joints == arm).then_some(Self { side, is_leg: joints == leg, from_trunk })
+            })
+        };
+        let [a, b, c] = joints;
+        let (a, b, c) = (a?, b?, c?);
+        find([a, b, c], true).or_else(|| find([c, b, a], false))
+    }
+
+    /// Mean cost of a reflection, degrees squared, for a body of these axes; the chain's points in space by
+    /// frame.
+    fn cost(&self, frames: &[[DVec3; 3]], sign: f64, axes: &DMat3, limits: &Limits) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for points in frames {
+            let [a, b, c] = points.map(|p| DVec3::new(p.x, p.y, sign * p.z));
+            let (trunk, end) = if self.from_trunk { (a, c) } else { (c, a) };
+            let (Some(u), Some(v)) = ((b - trunk).try_normalize(), (end - b).try_normalize()) else {
+                continue;
+            };
+            let (swing, bend) = if self.is_leg {
+                (limits.hip_swing, limits.knee.excess(knee_rad(axes, u, v)))
+            } else {
+                (limits.shoulder_swing, limits.elbow.excess(elbow_rad(axes, u, v)))
+            };
+            let sideways = if self.is_leg { limits.hip_abduction } else { limits.shoulder_abduction };
+            // The fold's full angle where it goes the wrong way: as far as it leaves the sagittal plane it
+            // does not.
+            let excess = [
+                swing.excess(swing_rad(axes, u)),
+                sideways.excess(abduction_rad(axes, u, self.side)),
+                bend,
+                SAGITTAL * axes.z_axis.dot(u).asin(),
+                SAGITTAL * axes.z_axis.dot(v).asin(),
+            ];
+            sum += excess.iter().map(|e| e.to_degrees().powi(2)).sum::<f64>();
+            count += 1;
+        }
+        if count == 0 { f64::NAN } else { sum / f64::from(count) }
+    }
+}
+
+/// Axes of an upright trunk that faces an angle from the image's right away from the camera.
+fn upright(facing_rad: f64) -> DMat3 {
+    let forward = DVec3::new(facing_rad.cos(), 0.0, facing_rad.sin());
+    DMat3::from_cols(forward, DVec3::Y, forward.cross(DVec3::Y))
+}
+
+/// Mean of u of the right less the left of shoulders and hips, over frames; none where neither pair is known.
+fn right_of_left(tracks: &[&[DVec2]], joints: &[Option<Joint>]) -> Option<f64> {
+    let at = |joint: Joint| joints.iter().position(|j| *j == Some(joint)).map(|k| tracks[k]);
+    let pairs = [[Joint::RightShoulder, Joint::LeftShoulder], [Joint::RightHip, Joint::LeftHip]];
+    let known = pairs.into_iter().filter_map(|[right, left]| at(right).zip(at(left)));
+    let apart: Vec<f64> = known
+        .flat_map(|(right, left)| right.iter().zip(left).map(|(r, l)| r.x - l.x))
+        .filter(|x| x.is_finite())
+        .collect();
+    (!apart.is_empty()).then(|| apart.iter().sum::<f64>() / apart.len() as f64)
+}
+
+/// Takes of every named limb of a window the reflection that a body can do; its margin into the chain. Limbs
+/// that leave their planes stay open.
+fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], limits: &Limits) {
+    let Some(apart) = right_of_left(tracks, joints) else { return };
+    let mut limbs: Vec<(usize, Limb, Vec<[DVec3; 3]>)> = Vec::new();
+    for (index, chain) in figure.chains.iter().enumerate() {
+        let [a, b, c] = chain.points[..] else { continue };
+        let Some(limb) = Limb::of([a, b, c].map(|p| joints[p])) else { continue };
+        if chain.evidence.verdict == Verdict::NotPlanar {
+            continue;
+        }
+        let point = |t: usize, k: usize| tracks[chain.points[k]][t].extend(chain.depth[t][k]);
+        let frames = (0..chain.depth.len()).map(|t| [0, 1, 2].map(|k| point(t, k)));
+        limbs.push((index, limb, frames.filter(|f| f.iter().all(|p| p.is_finite())).collect()));
+    }
+    // sin of the facing has the sign of `apart`: away from the camera shows the right on the right.
+    let facings = (0..=FACINGS / 2).map(|i| std::f64::consts::TAU * i as f64 / FACINGS as f64);
+    let costs_at = |facing_rad: f64| -> Vec<[f64; 2]> {
+        let axes = upright(facing_rad.copysign(apart));
+        limbs
+            .iter()
+            .map(|(_, limb, frames)| [1.0, -1.0].map(|s| limb.cost(frames, s, &axes, limits)))
+            .collect()
+    };
+    let total =
+        |costs: &[[f64; 2]]| costs.iter().map(|[a, b]| a.min(*b)).filter(|x| !x.is_nan()).sum::<f64>();
+    let best = facings.map(costs_at).min_by(|a, b| total(a).total_cmp(&total(b)));
+    for ((index, ..), [given, mirrored]) in limbs.iter().zip(best.unwrap_or_default()) {
+        let chain = &mut figure.chains[*index];
+        if given.is_nan() {
+            continue;
+        }
+        if mirrored < given {
+            chain.plane = chain.plane.mirror();
+            chain.depth.iter_mut().flatten().for_each(|z| *z = -*z);
+        }
+        chain.reflection_margin_deg = Some((given.max(mirrored)).sqrt() - (given.min(mirrored)).sqrt());
+    }
+}
+
+/// Takes of every limb the reflection that a body can do, given which joint each point is. A chain whose
+/// margin is `None` stays open.
+pub(super) fn reflect_by_anatomy(
+    windows: &mut [FigureWindow],
+    tracks: &[Vec<DVec2>],
+    joints: &[Option<Joint>],
+) {
+    let limits = Limits::measured();
+    for window in windows {
+        let part: Vec<&[DVec2]> = tracks.iter().map(|track| &track[window.start..window.end]).collect();
+        reflect(&mut window.figure, &part, joints, &limits);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_known_long_and_short() {
+        assert_eq!(joint_of("RKN"), Some(Joint::RightKnee));
+        assert_eq!(joint_of("left_wrist"), Some(Joint::LeftWrist));
+        assert_eq!((joint_of("dot03"), joint_of("")), (None, None));
+        let joints = ["LAN", "LKN", "LHP"].map(joint_of);
+        assert_eq!(Limb::of(joints), Some(Limb { side: Side::Left, is_leg: true, from_trunk: false }));
+        assert_eq!(Limb::of(["LAN", "LKN", "RHP"].map(joint_of)), None);
+    }
+
+    #[test]
+    fn a_knee_bends_backwards_and_an_elbow_forwards() {
+        // Facing the camera: the knee towards it (z < 0), the ankle back; arms the other way round.
+        let leg = vec![[DVec3::ZERO, DVec3::new(2.0, 80.0, -30.0), DVec3::new(3.0, 160.0, 10.0)]; 5];
+        let axes = upright(-std::f64::consts::FRAC_PI_2);
+        let cost = |is_leg: bool, sign: f64| {
+            let limb = Limb { side: Side::Right, is_leg, from_trunk: true };
+            limb.cost(&leg, sign, &axes, &Limits::measured())
+        };
+        assert!(cost(true, 1.0) + 100.0 < cost(true, -1.0));
+        assert!(cost(false, -1.0) + 100.0 < cost(false, 1.0));
+    }
+}

@@ -1,0 +1,126 @@
+//! Views that do not belong: left out if they are few.
+
+use super::moments::grid;
+use super::{Problem, Solution, View, count};
+use glam::DVec2;
+
+/// Median of the numbers among the values; they are reordered.
+fn median(values: &mut Vec<f64>) -> f64 {
+    values.retain(|x| !x.is_nan());
+    let middle = values.len() / 2;
+    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+impl<const K: usize> Problem<'_, K> {
+    /// The fit without outliers and which they are; none if there are none, or too many to tell.
+    ///
+    /// A fit to all views that shows no outlier and a spread like the noise's stands. Else it may be the work
+    /// of outliers: the search starts from the plane of least median residual, and leaves out and fits until
+    /// nothing changes.
+    pub(super) fn without_outliers(&self, needed: usize) -> Option<(Solution<K>, Vec<bool>)> {
+        if self.options.max_outlier_fraction * (self.views.len() as f64) < 1.0 {
+            return None;
+        }
+        let first = self.solve();
+        let mut outliers = vec![false; self.views.len()];
+        let (limit, found) = self.outliers(&first);
+        if limit <= 2.0 * self.options.outlier_sd * self.noise_sq.sqrt() && found == outliers {
+            return Some((first, outliers));
+        }
+        let mut solution = self.least_median();
+        for _ in 0..8 {
+            let (_, found) = self.outliers(&solution);
+            if found == outliers {
+                // Without any from the start the first fit stands.
+                return if found.contains(&true) {
+                    self.few(solution, outliers)
+                } else {
+                    Some((first, outliers))
+                };
+            }
+            let kept: Vec<View<K>> =
+                self.views.iter().zip(&found).filter(|(_, o)| !**o).map(|(v, _)| *v).collect();
+            if (0..K).any(|k| count(&kept, k) <= needed) {
+                return None;
+            }
+            outliers = found;
+            solution = self.of(&kept).solve();
+        }
+        self.few(solution, outliers)
+    }
+
+    /// The fit and its outliers if they are few enough.
+    fn few(&self, solution: Solution<K>, outliers: Vec<bool>) -> Option<(Solution<K>, Vec<bool>)> {
+        let most = self.options.max_outlier_fraction * self.views.len() as f64;
+        (outliers.iter().filter(|o| **o).count() as f64 <= most).then_some((solution, outliers))
+    }
+
+    /// [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the views
+    /// with a residual beyond.
+    fn outliers(&self, solution: &Solution<K>) -> (f64, Vec<bool>) {
+        let residuals: Vec<[f64; K]> =
+            self.views.iter().map(|v| self.residuals(v, solution).map(f64::abs)).collect();
+        let spread = 1.4826 * median(&mut residuals.iter().flatten().copied().collect());
+        let limit = self.options.outlier_sd * spread.max(self.noise_sq.sqrt()).max(1e-12 * self.size);
+        (limit, residuals.iter().map(|r| r.iter().any(|r| *r > limit)).collect())
+    }
+
+    /// The plane of a grid with the least median of |residual|, each rod's length the median of its own.
+    fn least_median(&self) -> Solution<K> {
+        let grid = grid(self.slope_limit);
+        let mut values = Vec::with_capacity(K * self.views.len());
+        let candidates = grid.iter().flatten().map(|&g| {
+            let h = |d: DVec2| d.length_squared() + g.dot(d).powi(2);
+            let c = std::array::from_fn(|k| {
+                values.clear();
+                values.extend(self.views.iter().map(|v| h(v[k])));
+                median(&mut values)
+            });
+            let solution = Solution { g, c, cost: 0.0 };
+            values.clear();
+            values.extend(self.views.iter().flat_map(|v| self.residuals(v, &solution).map(f64::abs)));
+            Solution { cost: median(&mut values), ..solution }
+        });
+        candidates.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("the grid is not empty")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planar::fit::example::{normal, swinging};
+    use crate::planar::{FitOptions, fit_hinge};
+    use crate::synth::Random;
+
+    #[test]
+    fn missing_views_and_outliers_do_no_harm() {
+        let mut random = Random::new(6);
+        let sd = 0.002;
+        let mut false_alarms = 0;
+        for _ in 0..100 {
+            let slope = random.uniform(0.4, 1.5) * DVec2::from_angle(random.uniform(0.0, 6.3));
+            let [mut a, mut o, b] = swinging(slope, 40, sd, &mut random);
+            let wrong = [3, 11, 12, 29];
+            for view in wrong {
+                a[view] += 0.3 * DVec2::from_angle(random.uniform(0.0, 6.3)) + 0.1 * normal(&mut random);
+            }
+            a[7] = DVec2::NAN;
+            o[20].y = f64::NAN;
+            let options = FitOptions { noise_sd: sd, ..FitOptions::default() };
+            let fit = fit_hinge(&a, &o, &b, &options).unwrap();
+            assert!(fit.depth[7][0].is_nan() && !fit.depth[7][1].is_nan() && fit.depth[20][1].is_nan());
+            // An outlier along the rod's own ellipse is none: ask for those that are far off it.
+            let limit = options.outlier_sd * 2.0 * sd;
+            for view in wrong {
+                let far = fit.residuals[view][0].abs() > 2.0 * limit;
+                assert!(fit.outliers[view] || !far, "view {view}: {:?}", fit.residuals[view]);
+            }
+            false_alarms += (0..40).filter(|v| fit.outliers[*v] && !wrong.contains(v)).count();
+            assert!((fit.lengths[0] - 0.4).abs() < 0.03, "{slope} {fit:?}");
+            assert!((fit.lengths[1] - 0.45).abs() < 0.03, "{slope} {fit:?}");
+            let left_out = fit.outliers.iter().filter(|o| **o).count();
+            assert_eq!(fit.redundancy, 80 - 3 - 2 * left_out - 4);
+        }
+        assert!(false_alarms < 20, "{false_alarms}");
+    }
+}

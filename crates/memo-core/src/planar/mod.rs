@@ -1,0 +1,38 @@
+//! Structure from planar motion: limbs that swing in one plane, seen as points under parallel projection.
+//!
+//! Source: Hoffman and Flinchbaugh 1982 ("The interpretation of biological motion", Biological Cybernetics
+//! 42). Image coordinates are metres (or pixels: every length then is in pixels), x right, y down; depth z
+//! points away from the camera. Only differences of points are used, so neither the figure's nor the pivot's
+//! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
+//! (p, q) is (-p, -q).
+
+pub mod batch;
+pub mod depth_change;
+pub mod evidence;
+pub mod figure;
+mod fit;
+pub mod group;
+pub mod hinge;
+pub mod motion;
+pub mod plane;
+pub mod rod;
+
+pub use batch::{hinge_depths, rod_depths};
+pub use depth_change::{
+    RecedingHinge, ScaleError, at_one_scale, fit_hinge_in_depth, perspective_error_px,
+    perspective_of_figure_px,
+};
+pub use evidence::{
+    Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
+    rod_evidence,
+};
+pub use figure::{
+    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation,
+    Link, Method, Status, interpret_figure, interpret_named_figure, joint_of,
+};
+pub use fit::{FitError, FitOptions};
+pub use group::{Pair, Triple, test_pairs, test_triples};
+pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
+pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
+pub use plane::Plane;
+pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};

@@ -1,0 +1,342 @@
+//! Named points moving in space: what a point-light display shows, whether recorded, tracked or synthetic.
+//!
+//! A coordinate that is NaN says that the point is not known at that instant.
+
+use super::scene::stride_length_m;
+use crate::model::body::Part;
+use crate::model::{PosedBody, Walker};
+use glam::DVec3;
+use thiserror::Error;
+
+/// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist; right then left hip, knee,
+/// ankle; head.
+pub const WALKER_NAMES: [&str; 13] =
+    ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN", "HEAD"];
+
+/// The eight limb segments, by name: upper arms, forearms, thighs, shanks.
+pub const WALKER_LIMBS: [[&str; 2]; 8] = [
+    ["RSH", "REL"],
+    ["REL", "RWR"],
+    ["LSH", "LEL"],
+    ["LEL", "LWR"],
+    ["RHP", "RKN"],
+    ["RKN", "RAN"],
+    ["LHP", "LKN"],
+    ["LKN", "LAN"],
+];
+
+/// Why positions over time are not a motion.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum MotionError {
+    /// No frame or no point.
+    #[error("a motion needs frames and points, got {frames} frames of {points} points")]
+    Empty {
+        /// Frames given.
+        frames: usize,
+        /// Points given.
+        points: usize,
+    },
+    /// Lengths disagree.
+    #[error("{positions} positions do not fit {frames} times and {points} names")]
+    Shape {
+        /// Positions given, frames times points wanted.
+        positions: usize,
+        /// Times given.
+        frames: usize,
+        /// Names given.
+        points: usize,
+    },
+    /// Times do not increase or are not finite.
+    #[error("times must be finite and increase: frame {frame} is at {time_s} s after {previous_s} s")]
+    Times {
+        /// The offending frame.
+        frame: usize,
+        /// Its time.
+        time_s: f64,
+        /// The time before.
+        previous_s: f64,
+    },
+    /// A position is infinite or absurdly far away (NaN is allowed and means unknown).
+    #[error("point {name} at frame {frame} is at ({x}, {y}, {z}): metres wanted, NaN for unknown")]
+    Position {
+        /// Name of the point.
+        name: String,
+        /// The frame.
+        frame: usize,
+        /// Coordinate given.
+        x: f64,
+        /// Coordinate given.
+        y: f64,
+        /// Coordinate given.
+        z: f64,
+    },
+    /// Numbers of a synthetic walk that cannot be walked.
+    #[error("a walk with a {parameter} of {value} cannot be sampled")]
+    Walk {
+        /// Its name.
+        parameter: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// Positions farther than this from the origin are refused, metres.
+const FARTHEST_M: f64 = 1e6;
+
+/// More frames than this are not sampled: over four hours at 60 Hz.
+const MOST_FRAMES: usize = 1_000_000;
+
+/// Named points over time in the world, metres, Z up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Positions, frame after frame, in each the points in the order of the names.
+    positions: Vec<DVec3>,
+    names: Vec<String>,
+    times_s: Vec<f64>,
+}
+
+impl Motion {
+    /// From positions (frames x points, frame after frame), names and times.
+    pub fn new(positions: Vec<DVec3>, names: Vec<String>, times_s: Vec<f64>) -> Result<Self, MotionError> {
+        let (frames, points) = (times_s.len(), names.len());
+        if frames == 0 || points == 0 {
+            return Err(MotionError::Empty { frames, points });
+        }
+        if frames.checked_mul(points) != Some(positions.len()) {
+            return Err(MotionError::Shape { positions: positions.len(), frames, points });
+        }
+        for (frame, &time_s) in times_s.iter().enumerate() {
+            let previous_s = if frame == 0 { f64::NEG_INFINITY } else { times_s[frame - 1] };
+            if !(time_s.is_finite() && time_s > previous_s) {
+                return Err(MotionError::Times { frame, time_s, previous_s });
+            }
+        }
+        let is_absurd = |p: &DVec3| p.to_array().iter().any(|x| x.abs() > FARTHEST_M);
+        if let Some(i) = positions.iter().position(is_absurd) {
+            let DVec3 { x, y, z } = positions[i];
+            return Err(MotionError::Position {
+                name: names[i % points].clone(),
+                frame: i / points,
+                x,
+                y,
+                z,
+            });
+        }
+        Ok(Self { positions, names, times_s })
+    }
+
+    /// Number of frames, at least 1.
+    pub fn frames(&self) -> usize {
+        self.times_s.len()
+    }
+
+    /// Number of points, at least 1.
+    pub fn points(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Names of the points.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Times of the frames, seconds, increasing.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// All positions, frame after frame.
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+
+    /// A point at a frame, `None` where it is not known.
+    pub fn at(&self, frame: usize, point: usize) -> Option<DVec3> {
+        let p = *self.positions.get(frame * self.points() + point)?;
+        (!p.is_nan()).then_some(p)
+    }
+
+    /// Index of a name.
+    pub fn index_of(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|n| n == name)
+    }
+
+    /// Mean time between frames, seconds; 0 for a single frame.
+    pub fn frame_interval_s(&self) -> f64 {
+        let last = self.times_s.len() - 1;
+        if last == 0 { 0.0 } else { (self.times_s[last] - self.times_s[0]) / last as f64 }
+    }
+
+    /// Where the body is, frame by frame: the middle of the hips where both are among the points, otherwise
+    /// the mean of the points known throughout, otherwise of those known in the frame. Gaps repeat the place
+    /// before.
+    pub fn pelvis_path(&self) -> Vec<DVec3> {
+        let always = |k: &usize| (0..self.frames()).all(|frame| self.at(frame, *k).is_some());
+        let hips: Vec<usize> = ["RHP", "LHP"].iter().filter_map(|name| self.index_of(name)).collect();
+        let mut anchors = if hips.len() == 2 { hips } else { (0..self.points()).collect() };
+        if anchors.iter().any(&always) {
+            anchors.retain(|k| always(k));
+        }
+        let mut place = DVec3::ZERO;
+        let mean = |frame: usize| {
+            let known: Vec<DVec3> = anchors.iter().filter_map(|&k| self.at(frame, k)).collect();
+            (!known.is_empty()).then(|| known.iter().sum::<DVec3>() / known.len() as f64)
+        };
+        (0..self.frames())
+            .map(|frame| {
+                place = mean(frame).unwrap_or(place);
+                place
+            })
+            .collect()
+    }
+
+    /// The motion with every position replaced by `moved(frame, point, position)`.
+    pub(super) fn map(&self, moved: impl Fn(usize, usize, DVec3) -> DVec3) -> Self {
+        let points = self.points();
+        let positions =
+            self.positions.iter().enumerate().map(|(i, &p)| moved(i / points, i % points, p)).collect();
+        Self { positions, ..self.clone() }
+    }
+
+    /// The first `frames` frames.
+    pub(super) fn truncated(mut self, frames: usize) -> Self {
+        self.positions.truncate(frames * self.points());
+        self.times_s.truncate(frames);
+        self
+    }
+}
+
+/// The limb segments whose two ends are among the names, as indices of names.
+pub fn limbs_of(names: &[String]) -> Vec<[usize; 2]> {
+    let index = |name: &str| names.iter().position(|n| n == name);
+    WALKER_LIMBS.iter().filter_map(|[a, b]| Some([index(a)?, index(b)?])).collect()
+}
+
+/// How the model walks for [`sampled_walk`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WalkOptions {
+    /// Number of frames.
+    pub frames: usize,
+    /// Frames a second. 60, a usual display.
+    pub rate_hz: f64,
+    /// Speed, m/s. 1.3, a comfortable walk; the cycle's duration follows from the stride of the gait.
+    pub speed_mps: f64,
+    /// Heading, radians about world Z, 0 along world X.
+    pub heading_rad: f64,
+    /// Gait phase of the first frame.
+    pub phase: f64,
+}
+
+impl Default for WalkOptions {
+    fn default() -> Self {
+        Self { frames: 60, rate_hz: 60.0, speed_mps: 1.3, heading_rad: 0.0, phase: 0.0 }
+    }
+}
+
+impl WalkOptions {
+    /// Duration of one gait cycle of this walker, seconds.
+    pub fn cycle_s(&self, walker: &Walker) -> f64 {
+        stride_length_m(walker) / self.speed_mps
+    }
+}
+
+/// The model of the body walking straight through the origin at half time, as 13 points: the joints of both
+/// sides and the centre of the head.
+///
+/// The model's limbs swing in planes parallel to the walk: a motion as planar as walking is assumed to be.
+pub fn sampled_walk(walker: &Walker, options: &WalkOptions) -> Result<Motion, MotionError> {
+    let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = *options;
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    let cycle_s = options.cycle_s(walker);
+    for (parameter, value, is_possible) in [
+        ("number of frames", frames as f64, (1..=MOST_FRAMES).contains(&frames)),
+        ("frame rate in Hz", rate_hz, positive(rate_hz)),
+        ("speed in m/s", speed_mps, positive(speed_mps)),
+        ("heading in radians", heading_rad, heading_rad.is_finite()),
+        ("gait phase", phase, phase.is_finite()),
+        ("duration of a cycle in seconds", cycle_s, positive(cycle_s)),
+    ] {
+        if !is_possible {
+            return Err(MotionError::Walk { parameter, value });
+        }
+    }
+    let forward = DVec3::new(heading_rad.cos(), heading_rad.sin(), 0.0);
+    let level = DVec3::Z * walker.level_torso_height_m();
+    let times_s: Vec<f64> = (0..frames).map(|frame| frame as f64 / rate_hz).collect();
+    let middle_s = 0.5 * (frames - 1) as f64 / rate_hz;
+    let positions = times_s.iter().flat_map(|&time_s| {
+        let centre = level + forward * (speed_mps * (time_s - middle_s));
+        points_of(&walker.pose(centre, heading_rad, (phase + time_s / cycle_s).rem_euclid(1.0)))
+    });
+    Motion::new(positions.collect(), WALKER_NAMES.map(String::from).to_vec(), times_s)
+}
+
+/// The points of a posed body in the order of [`WALKER_NAMES`].
+fn points_of(posed: &PosedBody) -> [DVec3; 13] {
+    let (r, l) = (posed.right, posed.left);
+    let head = posed.cylinders[Part::Head as usize].centre();
+    [
+        r.shoulder, r.elbow, r.wrist, l.shoulder, l.elbow, l.wrist, r.hip, r.knee, r.ankle, l.hip, l.knee,
+        l.ankle, head,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Body, Gait, GaitStyle};
+
+    fn walk(options: &WalkOptions) -> Result<Motion, MotionError> {
+        let body = Body::from_height(1.75).unwrap();
+        sampled_walk(&Walker { body, gait: Gait::dense(), style: GaitStyle::default() }, options)
+    }
+
+    #[test]
+    fn limbs_keep_their_lengths_and_the_body_moves_at_its_speed() {
+        let motion = walk(&WalkOptions { heading_rad: 0.8, ..WalkOptions::default() }).unwrap();
+        for [a, b] in limbs_of(motion.names()) {
+            let length = |t| motion.at(t, a).unwrap().distance(motion.at(t, b).unwrap());
+            assert!((0..60).all(|t| (length(t) - length(0)).abs() < 1e-9));
+        }
+        let path = motion.pelvis_path();
+        let travelled = path[59] - path[0];
+        assert!((travelled.truncate().length() - 1.3 * 59.0 / 60.0).abs() < 1e-9);
+        assert!((travelled.y / travelled.x - 0.8f64.tan()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_stance_ankle_stands_nearly_still() {
+        let motion = walk(&WalkOptions::default()).unwrap();
+        let ankle = motion.index_of("RAN").unwrap();
+        // Phase 0.15 to 0.35 of a cycle of a little over a second.
+        let moved = motion.at(20, ankle).unwrap() - motion.at(10, ankle).unwrap();
+        assert!(moved.x.abs() < 0.06, "{moved}");
+    }
+
+    #[test]
+    fn what_is_no_motion_is_refused() {
+        let names = vec!["a".to_owned(), "b".to_owned()];
+        let at = |x: f64| vec![DVec3::splat(x); 4];
+        assert!(matches!(Motion::new(vec![], vec![], vec![]), Err(MotionError::Empty { .. })));
+        assert!(matches!(Motion::new(at(0.0), names.clone(), vec![0.0]), Err(MotionError::Shape { .. })));
+        for times in [vec![0.0, 0.0], vec![1.0, 0.5], vec![0.0, f64::NAN]] {
+            assert!(matches!(Motion::new(at(0.0), names.clone(), times), Err(MotionError::Times { .. })));
+        }
+        for far in [f64::INFINITY, 1e300] {
+            assert!(matches!(
+                Motion::new(at(far), names.clone(), vec![0.0, 1.0]),
+                Err(MotionError::Position { .. })
+            ));
+        }
+        let unknown = Motion::new(at(f64::NAN), names, vec![0.0, 1.0]).unwrap();
+        assert_eq!(unknown.at(0, 0), None);
+        assert_eq!(unknown.pelvis_path(), vec![DVec3::ZERO; 2]);
+        for bad in [f64::NAN, 0.0, f64::INFINITY] {
+            assert!(walk(&WalkOptions { rate_hz: bad, ..WalkOptions::default() }).is_err());
+            assert!(walk(&WalkOptions { speed_mps: bad, ..WalkOptions::default() }).is_err());
+        }
+        assert!(walk(&WalkOptions { frames: 0, ..WalkOptions::default() }).is_err());
+        assert!(walk(&WalkOptions { frames: usize::MAX, ..WalkOptions::default() }).is_err());
+        assert!(walk(&WalkOptions { phase: f64::NAN, ..WalkOptions::default() }).is_err());
+    }
+}

@@ -1,0 +1,120 @@
+//! The points of a motion in the image, and the places they fill.
+
+use super::{DotSource, PointLightError, View};
+use crate::synth::Random;
+use crate::synth::motion::Motion;
+use glam::{DVec2, DVec3};
+
+/// A rectangle of the image.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub low: DVec2,
+    pub high: DVec2,
+}
+
+impl Extent {
+    pub const NOTHING: Self = Self { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
+
+    /// Around all finite points.
+    pub fn of(points: impl Iterator<Item = DVec2>) -> Self {
+        points
+            .filter(|p| p.is_finite())
+            .fold(Self::NOTHING, |e, p| Self { low: e.low.min(p), high: e.high.max(p) })
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.low.x > self.high.x
+    }
+
+    pub fn middle(&self) -> DVec2 {
+        0.5 * (self.low + self.high)
+    }
+
+    pub fn scaled(&self, factor: f64) -> Self {
+        let half = 0.5 * factor * (self.high - self.low);
+        Self { low: self.middle() - half, high: self.middle() + half }
+    }
+
+    pub fn draw(&self, random: &mut Random) -> DVec2 {
+        let (x, y) = (random.uniform(0.0, 1.0), random.uniform(0.0, 1.0));
+        self.low + DVec2::new(x, y) * (self.high - self.low)
+    }
+
+    /// A shift that puts `part` at a random place within this extent, as far as it fits.
+    pub fn draw_shift(&self, part: &Self, random: &mut Random) -> DVec2 {
+        let (least, most) = (self.low - part.low, self.high - part.high);
+        Self { low: least.min(most), high: least.max(most) }.draw(random)
+    }
+}
+
+/// The points of a motion in the image, with the place of the body.
+#[derive(Debug, Clone)]
+pub(super) struct Figure {
+    pub points: usize,
+    /// T x K, NaN where not seen.
+    pub positions: Vec<DVec2>,
+    /// Image of the body's place, T.
+    pub path: Vec<DVec2>,
+}
+
+impl Figure {
+    pub fn seen(motion: &Motion, view: &View) -> Result<Self, PointLightError> {
+        let project =
+            |p: &DVec3| if p.is_nan() { DVec2::NAN } else { view.project(*p).unwrap_or(DVec2::NAN) };
+        let places = motion.pelvis_path();
+        let level = places.iter().map(|p| p.z).sum::<f64>() / places.len() as f64;
+        let positions: Vec<DVec2> = motion.positions().iter().map(project).collect();
+        if positions.iter().all(|p| p.is_nan()) {
+            return Err(PointLightError::NothingSeen);
+        }
+        let frames = places.iter().zip(positions.chunks(motion.points()));
+        let path = frames.map(|(place, seen)| {
+            let body = project(&place.with_z(level));
+            let around = Extent::of(seen.iter().copied());
+            if body.is_finite() || around.is_empty() { body } else { around.middle() }
+        });
+        Ok(Self { points: motion.points(), path: path.collect(), positions })
+    }
+
+    pub fn at(&self, frame: usize, point: usize) -> DVec2 {
+        self.positions[frame * self.points + point]
+    }
+
+    /// Where a point is against the body.
+    pub fn against_body(&self, frame: usize, point: usize) -> DVec2 {
+        self.at(frame, point) - self.path[frame]
+    }
+
+    pub fn trajectory_extent(&self, point: usize) -> Extent {
+        Extent::of((0..self.path.len()).map(|t| self.against_body(t, point)))
+    }
+
+    pub fn body_extent(&self) -> Extent {
+        Extent::of((0..self.positions.len()).map(|i| self.positions[i] - self.path[i / self.points]))
+    }
+
+    pub fn scramble_positions(&mut self, random: &mut Random) {
+        let body = self.body_extent();
+        for k in 0..self.points {
+            let own = self.trajectory_extent(k);
+            let shift = if own.is_empty() { DVec2::ZERO } else { body.draw_shift(&own, random) };
+            self.positions.iter_mut().skip(k).step_by(self.points).for_each(|p| *p += shift);
+        }
+    }
+
+    /// Flips about the middle of all that is shown, by axis where `sign` is -1.
+    pub fn flip(&mut self, sign: DVec2) {
+        let middle = Extent::of(self.positions.iter().copied()).middle();
+        for p in self.positions.iter_mut().chain(&mut self.path) {
+            *p = middle + (*p - middle) * sign;
+        }
+    }
+
+    pub fn place(&self, frame: usize, source: DotSource) -> DVec2 {
+        match source {
+            DotSource::Joint(k) => self.at(frame, k),
+            DotSource::Limb([a, b], fraction) => self.at(frame, a).lerp(self.at(frame, b), fraction),
+            DotSource::Noise(_) => DVec2::NAN,
+        }
+    }
+}

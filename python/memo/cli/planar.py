@@ -1,0 +1,131 @@
+"""`memo planar`: limbs found in unnamed tracks.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import memo
+from memo.cli.delivery import Delivery, Exit, guarded, with_progress
+from memo.cli.given import check_writable
+
+if TYPE_CHECKING:
+    import typer
+
+EXIT_CODES = """Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage;
+3 no window shows planar motion; 4 the app extra is not installed."""
+
+
+def add_planar(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def planar(
+        tracks: Annotated[Path, typer.Argument(help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps).")],
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of the tracks' coordinates.")] = 0.5,
+        window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
+        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has no time_s.")] = None,
+        carry: Annotated[
+            bool, typer.Option(help="Carry lengths through windows in which it is lost.")
+        ] = False,
+        names: Annotated[
+            bool,
+            typer.Option(help="The columns name joints (RKN or right_knee): limbs bend as joints can."),
+        ] = False,
+        focal_px: Annotated[
+            float | None, typer.Option(help="Focal length: says what perspective costs.")
+        ] = None,
+        turn_deg: Annotated[float, typer.Option(help="Viewpoint of turned.mp4 and turned.png.")] = 50.0,
+        video: Annotated[bool, typer.Option(help="Write turned.mp4, the limbs from a new side.")] = True,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    ) -> None:
+        """Links unnamed points into limbs that swing in planes, with lengths and depths."""
+        options = {"window_s": window, "carry": carry, "focal_px": focal_px}
+        delivery = Delivery(out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json)
+        raise typer.Exit(guarded(lambda: _planar(tracks, noise_px, fps, names, turn_deg, options, delivery)))
+
+
+def _planar(
+    tracks: Path,
+    noise_px: float,
+    fps: float | None,
+    names: bool,
+    turn_deg: float,
+    options: dict[str, Any],
+    delivery: Delivery,
+) -> Exit:
+    from memo.figure import read_points_csv, write_figure_csv
+    from memo.figure_plot import write_linkage_png, write_turned_png, write_turned_video
+
+    points, out = read_points_csv(tracks, 2, fps), delivery.out
+    check_writable(out)
+    if delivery.talks:
+        print(
+            f"{len(points.names)} points in {len(points.times_s)} frames: looking for limbs ...", flush=True
+        )
+    named = {"names": points.names} if names else {}
+    figure = memo.planar(points.positions, points.times_s, noise_px, scales=points.scales, **named, **options)
+    written = write_figure_csv(out, figure, points)
+    write_linkage_png(out / "linkage.png", points, figure)
+    written.append(out / "linkage.png")
+    for stale in ("turned.mp4", "turned.png"):  # of an earlier run
+        (out / stale).unlink(missing_ok=True)
+    if figure.interpreted:
+        write_turned_png(out / "turned.png", points, figure, turn_deg=turn_deg)
+        written.append(out / "turned.png")
+    if figure.interpreted and delivery.overlay:
+
+        def progress(frames: Iterable[int]) -> Iterable[int]:
+            return with_progress(cast(Any, frames), "drawing", len(points.times_s), delivery)  # type: ignore[return-value]
+
+        write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=progress)
+        written.append(out / "turned.mp4")
+    links = [
+        {
+            "a": points.names[a],
+            "b": points.names[b],
+            "length_px": length,
+            "confidence": sure,
+            "windows": count,
+        }
+        for a, b, length, sure, count in figure.links()
+    ]
+    states = [window["status"] for window in figure.windows]
+    summary = {"windows": states, "links": links, "perspective_px": figure.perspective_px}
+    delivery.tell(summary, _about_figure(figure, points, noise_px), written)
+    return Exit.DONE if figure.interpreted else Exit.NOBODY
+
+
+def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
+    """What was found, in sentences."""
+    states = [window["status"] for window in figure.windows]
+    told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
+    lines = [f"Windows: {', '.join(told)}."]
+    if not figure.interpreted:
+        return [*lines, "No window shows planar motion: nothing is claimed. The best guess is in links.csv."]
+    for a, b, length, confidence, count in figure.links():
+        where = (
+            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
+        )
+        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
+        lines.append(f"  {points.names[a]} - {points.names[b]}: {length:.0f} px long{sure}{where}")
+    if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
+        lines.append(
+            f"Perspective moves points by up to {figure.perspective_px:.1f} px, more than the noise: "
+            "lengths and depths are off by more than their standard deviations."
+        )
+    chains = [chain for window in figure.interpreted for chain in window["chains"]]
+    fixed = sum(chain["reflection_margin_deg"] is not None for chain in chains)
+    if fixed:
+        lines.append(f"Front and back told by what joints can do in {fixed} of {len(chains)} chains.")
+    if fixed < len(chains):
+        lines.append(
+            "Every other chain may also be its mirror image in depth."
+            if fixed
+            else "Every chain may also be its mirror image in depth."
+        )
+    return [*lines, "Depths of chains against each other are open."]

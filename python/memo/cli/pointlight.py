@@ -1,0 +1,128 @@
+"""`memo pointlight`: a motion as moving dots.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.cli.delivery import Exit, InputError, guarded
+from memo.cli.given import check_writable
+from memo.files import complete_file
+
+if TYPE_CHECKING:
+    import typer
+
+
+def add_pointlight(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command()
+    def pointlight(
+        motion: Annotated[
+            Path | None,
+            typer.Argument(
+                help="CSV of NAME_x, NAME_y, NAME_z in metres, or a folder with track.csv; a walker."
+            ),
+        ] = None,
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
+        azimuth_deg: Annotated[float, typer.Option(help="Viewer about the vertical; 90 = from +x.")] = 0.0,
+        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal.")] = 0.0,
+        px_per_m: Annotated[float, typer.Option(help="Scale.")] = 200.0,
+        locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
+        inverted: Annotated[bool, typer.Option(help="Upside down.")] = False,
+        mirrored: Annotated[bool, typer.Option(help="Facing the other way.")] = False,
+        reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
+        scramble_position: Annotated[
+            bool, typer.Option(help="Every dot's motion at a random place.")
+        ] = False,
+        scramble_phase: Annotated[bool, typer.Option(help="Every dot's motion shifted in time.")] = False,
+        period: Annotated[
+            float | None, typer.Option(help="Period of the motion, seconds; all of it.")
+        ] = None,
+        lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
+        dots: Annotated[int, typer.Option(help="With --lifetime: dots shown.")] = 8,
+        on: Annotated[str, typer.Option(help="With --lifetime: limbs or joints.")] = "limbs",
+        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
+        noise_kind: Annotated[str, typer.Option(help="scrambled, linear or flicker.")] = "scrambled",
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of pixel noise.")] = 0.0,
+        seconds: Annotated[float, typer.Option(help="Without MOTION: duration.")] = 2.4,
+        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
+        seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
+    ) -> None:
+        """Makes a point-light display: dots.csv, labels.csv and display.mp4."""
+        options = {
+            "azimuth_deg": azimuth_deg,
+            "elevation_deg": elevation_deg,
+            "px_per_m": px_per_m,
+            "locomotion": locomotion,
+            "inverted": inverted,
+            "mirrored": mirrored,
+            "reversed": reversed_,
+            "scramble_position": scramble_position,
+            "scramble_phase": "periodic" if scramble_phase else None,
+            "period_s": period,
+            "lifetime_frames": lifetime,
+            "life_dots": dots,
+            "life_sites": on,
+            "noise_dots": noise_dots,
+            "noise_kind": noise_kind,
+            "noise_sd_px": noise_px,
+            "seed": seed,
+        }
+        raise typer.Exit(guarded(lambda: _pointlight(motion, out, seconds, fps, options)))
+
+
+def _pointlight(
+    motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
+) -> Exit:
+    from memo.figure import Points, read_points_csv, write_points_csv
+    from memo.figure_plot import write_display_video
+
+    if motion is None:
+        points = _walker_points(seconds, fps or 60.0)
+    else:
+        points = read_points_csv(motion / "track.csv" if motion.is_dir() else motion, 3, fps)
+    check_writable(out)
+    display = _new_display(points, options)
+    shown, labels = display["positions_px"], display["labels"]
+    stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
+    named = [points.names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
+    write_points_csv(out / "dots.csv", Points(named, display["times_s"], shown))
+    _write_labels(out / "labels.csv", points.names, named, display)
+    write_display_video(out / "display.mp4", display["times_s"], shown)
+    print(f"{shown.shape[1]} dots in {shown.shape[0]} frames.")
+    print(f"Written to {out}: dots.csv, labels.csv, display.mp4.")
+    if stays:
+        print(f"To find the limbs in it again: memo planar {out / 'dots.csv'}")
+    return Exit.DONE
+
+
+def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
+    """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
+    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
+        file.write("frame,dot,shows,limb_end,fraction,visible\n")
+        for frame, row in enumerate(display["labels"]):
+            for dot, label in enumerate(row):
+                end = int(display["limb_ends"][frame, dot])
+                shows = names[label] if label >= 0 else "noise"
+                limb = f"{names[end]},{display['fractions'][frame, dot]:.4f}" if end >= 0 else ","
+                file.write(f"{frame},{dots[dot]},{shows},{limb},{int(display['visible'][frame, dot])}\n")
+
+
+def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
+    positions = np.ascontiguousarray(points.positions, dtype=np.float64)
+    return memo.pointlight(positions, points.times_s, points.names, **options)
+
+
+def _walker_points(seconds: float, rate_hz: float) -> Any:
+    from memo.figure import Points
+
+    if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
+        raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames a second cannot be shown")
+    walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz)
+    return Points(walk["names"], walk["times_s"], walk["positions"])

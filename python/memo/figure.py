@@ -1,0 +1,243 @@
+"""Point-light displays, and the linkage found in unnamed tracks (Hoffman and Flinchbaugh 1982).
+
+Arrays in, arrays out; the numbers come from the core. Tracks are (T, K, 2) pixels with NaN for unseen.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo
+from memo.files import JOINTS, complete_file
+
+__all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
+
+Array = npt.NDArray[np.float64]
+
+_SHORT = {
+    joint: joint[0].upper() + short
+    for joint in JOINTS
+    for long, short in (
+        ("shoulder", "SH"),
+        ("elbow", "EL"),
+        ("wrist", "WR"),
+        ("hip", "HP"),
+        ("knee", "KN"),
+        ("ankle", "AN"),
+    )
+    if joint.endswith(long)
+}
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
+
+    `scales` (T,): scale of each frame, where a person comes nearer or goes away.
+    """
+
+    names: list[str]
+    times_s: Array
+    positions: Array
+    scales: Array | None = None
+
+
+@dataclass(frozen=True)
+class PlanarFigure:
+    """The linkage found in tracks, window by window.
+
+    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen"),
+    the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
+    (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
+    motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
+    where it is open). `depth` (T, K) is each point's depth against the first point of its chain
+    in pixels, NaN where not known, up to a reflection of each open chain; `sources` says by frame where it
+    comes from. `perspective_px`: by how much perspective moves a point at most, if a focal length was given.
+    """
+
+    windows: list[dict[str, Any]]
+    depth: Array
+    sources: list[str]
+    perspective_px: float | None = None
+
+    @property
+    def interpreted(self) -> list[dict[str, Any]]:
+        """The windows that could be read."""
+        return [window for window in self.windows if window["status"] == "interpreted"]
+
+    def links(self) -> list[tuple[int, int, float, float, int]]:
+        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows."""
+        found: dict[tuple[int, int], list[tuple[float, float]]] = {}
+        for window in self.interpreted:
+            for chain in window["chains"]:
+                for link in chain["links"]:
+                    found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
+        rows = [(a, b, *np.mean(seen, axis=0), len(seen)) for (a, b), seen in found.items()]
+        return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
+
+
+def planar(
+    tracks: Array, times_s: Sequence[float] | Array, noise_px: float = 0.0, **options: Any
+) -> PlanarFigure:
+    """Links unnamed tracks (T, K, 2) into limbs that swing in planes.
+
+    `noise_px`: standard deviation of each coordinate. Options: `window_s` (1.2), `size_px` (size of the
+    figure, by default that of the points), `carry` (lengths through windows in which the figure is lost),
+    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points where they are joints
+    (`RKN`, `right_knee`): joint limits then tell limbs from their mirrors; `scales` (T,) of the frames;
+    `focal_px`, to be told what perspective costs.
+    """
+    tracks = np.ascontiguousarray(tracks, dtype=np.float64)
+    return PlanarFigure(**_memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options))
+
+
+def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float | None = None) -> Points:
+    """Points from a CSV file with a header: 2 or 3 columns a point, and `time_s` or a frame rate.
+
+    With 2 `dimensions` the columns of a point are NAME_u_px, NAME_v_px (or NAME_u, NAME_v), with 3 they are
+    NAME_x_m, NAME_y_m, NAME_z_m (or NAME_x, NAME_y, NAME_z). A comment line before the header may hold the
+    frame rate ("100 Hz"). Empty cells are unseen.
+    """
+    with open(path, newline="", encoding="utf-8") as file:
+        lines = file.read().splitlines()
+    comments = [line for line in lines if line.startswith("#")]
+    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    if len(rows) < 2:
+        raise ValueError(f"{path}: no header and rows of numbers")
+    header, body = [name.strip() for name in rows[0]], rows[1:]
+    for name in header:
+        if header.count(name) > 1:
+            raise ValueError(f"{path}: column {name} occurs {header.count(name)} times")
+    table = np.full((len(body), len(header)), np.nan)
+    for number, row in enumerate(body):
+        if len(row) != len(header):
+            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
+        for index, cell in enumerate(row):
+            table[number, index] = _number(path, number, header[index], cell)
+    column = {name: index for index, name in enumerate(header)}
+    known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
+    for axes in known:
+        names = list(
+            dict.fromkeys(
+                name.removesuffix(f"_{axis}")
+                for axis in axes
+                for name in header
+                if name.endswith(f"_{axis}") and name != f"_{axis}"
+            )
+        )
+        if not names:
+            continue
+        for name in names:
+            absent = [f"{name}_{axis}" for axis in axes if f"{name}_{axis}" not in column]
+            if absent:
+                raise ValueError(f"{path}: point {name} has no column {absent[0]}")
+        picked = [[column[f"{name}_{axis}"] for axis in axes] for name in names]
+        scales = table[:, column["scale"]] if "scale" in column else None
+        times_s = _times(path, column, table, comments, rate_hz)
+        return Points([_SHORT.get(name, name) for name in names], times_s, table[:, np.array(picked)], scales)
+    wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
+    raise ValueError(f"{path}: no columns {wanted}; it has {', '.join(header[:6])}")
+
+
+def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
+    """A cell's number, NaN where it is empty; words only where no point is."""
+    if not cell.strip():
+        return np.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "scale"):
+            return np.nan
+        raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
+    if np.isinf(value):
+        raise ValueError(f"{path}: row {row}, column {column}: infinite; leave unseen points empty")
+    return value
+
+
+def _times(
+    path: str | PathLike[str],
+    column: dict[str, int],
+    table: Array,
+    comments: list[str],
+    rate_hz: float | None,
+) -> Array:
+    if rate_hz is None and "time_s" in column:
+        times_s = table[:, column["time_s"]]
+        late = np.flatnonzero(~(np.diff(times_s) > 0))
+        if len(late):
+            raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
+        return times_s
+    stated = re.search(r"([0-9.]+) *Hz", " ".join(comments))
+    rate_hz = rate_hz or (float(stated.group(1)) if stated else None)
+    if not rate_hz or not rate_hz > 0:
+        raise ValueError(f"{path}: no column time_s and no frame rate in a comment: give --fps")
+    return np.arange(len(table)) / rate_hz
+
+
+def write_points_csv(path: str | PathLike[str], points: Points) -> None:
+    """Writes points so that `read_points_csv` reads them."""
+    axes = ("u_px", "v_px") if points.positions.shape[2] == 2 else ("x", "y", "z")
+    header = ["frame", "time_s", *(f"{name}_{axis}" for name in points.names for axis in axes)]
+    rows = (
+        [str(frame), f"{time_s:.6f}", *_cells(row.ravel())]
+        for frame, (time_s, row) in enumerate(zip(points.times_s, points.positions, strict=True))
+    )
+    _write(path, header, rows)
+
+
+def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Path]:
+    """Writes links.csv, chains.csv, windows.csv and points3d.csv; returns their paths."""
+    name = points.names.__getitem__
+    links, chains, windows = [], [], []
+    for number, window in enumerate(figure.windows):
+        start_s, end_s = (float(points.times_s[frame]) for frame in (window["start"], window["end"] - 1))
+        verdicts = [str(window[key]) for key in ("planar", "refuted", "undecided")]
+        windows.append([str(number), f"{start_s:.3f}", f"{end_s:.3f}", window["status"], *verdicts])
+        for chain in window["chains"]:
+            label = "-".join(name(point) for point in chain["points"])
+            values = [chain[key] for key in ("tilt_deg", "residual", "motion", "statistic", "threshold")]
+            angles = chain["angle_deg"]
+            bend = [np.nanmin(angles), np.nanmax(angles)] if np.isfinite(angles).any() else [np.nan] * 2
+            margin = chain["reflection_margin_deg"]
+            numbers = [*chain["slope"], *values, *bend, np.nan if margin is None else margin]
+            chains.append([str(number), label, chain["verdict"], *_cells(numbers)])
+            for link in chain["links"]:
+                a, b = link["points"]
+                numbers = [link[key] for key in ("length", "length_sd", "margin", "confidence")]
+                links.append([str(number), window["status"], name(a), name(b), *_cells(numbers)])
+    written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
+    _write(written[0], ["window", "start_s", "end_s", "status", "planar", "refuted", "undecided"], windows)
+    link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
+    _write(written[1], ["window", "status", "a", "b", *link_numbers], links)
+    chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]
+    chain_header = ["window", "chain", "verdict", *chain_numbers, "least_angle_deg", "most_angle_deg"]
+    chain_header.append("reflection_margin_deg")
+    _write(written[2], chain_header, chains)
+    space = np.concatenate([points.positions, figure.depth[..., None]], axis=2)
+    header = ["frame", "time_s", "source", *(f"{n}_{axis}_px" for n in points.names for axis in "uvz")]
+    rows = (
+        [str(frame), f"{points.times_s[frame]:.6f}", figure.sources[frame], *_cells(space[frame].ravel())]
+        for frame in range(len(space))
+    )
+    _write(written[3], header, rows)
+    return written
+
+
+def _cells(values: Any) -> list[str]:
+    return [f"{value:.4f}" if np.isfinite(value) else "" for value in values]
+
+
+def _write(path: str | PathLike[str], header: Sequence[str], rows: Any) -> None:
+    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)

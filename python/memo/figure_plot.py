@@ -1,0 +1,185 @@
+"""Pictures and animations of point-light displays and of the linkages found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from memo.figure import PlanarFigure, Points
+from memo.files import complete_file
+from memo.overlay import _h264
+
+__all__ = [
+    "plot_linkage",
+    "write_display_video",
+    "write_linkage_png",
+    "write_turned_png",
+    "write_turned_video",
+]
+
+COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444")
+
+
+def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *, names: bool = True) -> Axes:
+    """The points in the middle frame of a window with trails, links and their confidence."""
+    part = figure.windows[window]
+    tracks = points.positions[part["start"] : part["end"]]
+    middle = tracks[len(tracks) // 2]
+    offset = middle[np.isfinite(middle).all(axis=1)].mean(axis=0)
+    against = tracks - np.nanmean(tracks, axis=1, keepdims=True) + offset
+    ax.plot(against[..., 0], against[..., 1], color="#bbbbbb", linewidth=0.6, zorder=1)
+    for index, chain in enumerate(part["chains"]):
+        colour = COLOURS[index % len(COLOURS)]
+        for link in chain["links"]:
+            a, b = link["points"]
+            ends = middle[[a, b]]
+            ax.plot(ends[:, 0], ends[:, 1], color=colour, linewidth=3)
+            if np.isfinite(link["confidence"]):
+                text = f" {link['length']:.0f} px, {link['confidence']:.0%}"
+                ax.annotate(text, ends.mean(axis=0), fontsize=7, color=colour)
+    for a, b, _ in part["joints"]:
+        ax.plot(middle[[a, b], 0], middle[[a, b], 1], color="#888888", linewidth=1, linestyle=":")
+    ax.plot(middle[:, 0], middle[:, 1], "o", color="black", markersize=5)
+    if names:
+        for name, place in zip(points.names, middle, strict=True):
+            ax.annotate(name, place, fontsize=7, xytext=(-4, 4), textcoords="offset points", ha="right")
+    ax.set(aspect="equal", xlabel="u, px", ylabel="v, px")
+    ax.invert_yaxis()
+    start_s, end_s = points.times_s[part["start"]], points.times_s[part["end"] - 1]
+    ax.set_title(f"{start_s:.2f} to {end_s:.2f} s: {part['status']}", loc="left")
+    return ax
+
+
+def write_linkage_png(
+    path: str | PathLike[str], points: Points, figure: PlanarFigure, *, names: bool = True
+) -> None:
+    """The first interpreted window, or the first at all, as a picture."""
+    states = [window["status"] for window in figure.windows]
+    window = states.index("interpreted") if "interpreted" in states else 0
+    drawing = Figure(figsize=(7, 8), layout="constrained")
+    FigureCanvasAgg(drawing)
+    plot_linkage(drawing.subplots(), points, figure, window, names=names)
+    with complete_file(path) as temporary:
+        drawing.savefig(temporary, dpi=120, format="png")
+
+
+def write_turned_video(
+    path: str | PathLike[str],
+    points: Points,
+    figure: PlanarFigure,
+    *,
+    turn_deg: float = 50.0,
+    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+) -> None:
+    """The display left, and right the limbs found in it seen from `turn_deg` to the side.
+
+    Each chain's first point is drawn at depth 0: depths of chains against each other are not known, and
+    each open chain may be reflected.
+    """
+    flat, turned = _turned(points, figure, turn_deg)
+    links_at = _links_by_frame(figure, len(flat))
+    drawing = Figure(figsize=(9.6, 5.4), layout="constrained", facecolor="black")
+    canvas = FigureCanvasAgg(drawing)
+    left, right = drawing.subplots(1, 2)
+    reach = np.nanmax(np.abs(flat - np.nanmean(flat, axis=(0, 1)))) * 1.1
+    for ax in (left, right):
+        ax.set(
+            xlim=(-reach, reach),
+            ylim=(np.nanmean(flat[..., 1]) + reach, np.nanmean(flat[..., 1]) - reach),
+            aspect="equal",
+            facecolor="black",
+        )
+        ax.set_axis_off()
+    left.set_title("as seen", color="white")
+    (dots,) = left.plot([], [], "o", color="white", markersize=5)
+    with complete_file(path) as temporary, _h264(str(temporary), _rate(points.times_s)) as write:
+        for frame in progress(range(len(flat))):
+            dots.set_data(flat[frame, :, 0], flat[frame, :, 1])
+            for line in list(right.lines):
+                line.remove()
+            for index, a, b in links_at[frame]:
+                ends = turned[frame, [a, b]]
+                right.plot(ends[:, 0], ends[:, 1], "o-", color=COLOURS[index % len(COLOURS)], linewidth=3)
+            right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
+            canvas.draw()
+            write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
+
+
+def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any, Any]:
+    """The points held in place horizontally (T, K, 2), as seen and turned about the vertical."""
+    tracks, depth = points.positions, figure.depth
+    centre = np.nanmean(tracks, axis=1, keepdims=True)
+    flat = tracks - centre + np.nanmean(centre, axis=0, keepdims=True) * [0, 1]
+    turn = np.deg2rad(turn_deg)
+    return flat, np.stack([flat[..., 0] * np.cos(turn) - depth * np.sin(turn), flat[..., 1]], axis=-1)
+
+
+def write_turned_png(
+    path: str | PathLike[str], points: Points, figure: PlanarFigure, *, turn_deg: float = 50.0
+) -> None:
+    """Five instants of the first interpreted window: above as seen, below the limbs from `turn_deg` aside."""
+    flat, turned = _turned(points, figure, turn_deg)
+    window = figure.interpreted[0]
+    links_at = _links_by_frame(figure, len(flat))
+    drawing = Figure(figsize=(10, 6.5), layout="constrained")
+    FigureCanvasAgg(drawing)
+    grid = drawing.subplots(2, 5, sharex=True, sharey=True)
+    for column, frame in enumerate(np.linspace(window["start"], window["end"] - 1, 5).astype(int)):
+        for ax, places in zip(grid[:, column], (flat, turned), strict=True):
+            for index, a, b in links_at[frame]:
+                ends = places[frame, [a, b]]
+                ax.plot(ends[:, 0], ends[:, 1], "o-", color=COLOURS[index % len(COLOURS)], markersize=4)
+            ax.set(aspect="equal")
+            ax.set_axis_off()
+        grid[0, column].plot(flat[frame, :, 0], flat[frame, :, 1], "o", color="black", markersize=3)
+        grid[0, column].set_title(f"{points.times_s[frame]:.2f} s")
+        grid[1, column].set_title(f"turned {turn_deg:g} deg")
+    grid[0, 0].invert_yaxis()
+    with complete_file(path) as temporary:
+        drawing.savefig(temporary, dpi=110, format="png")
+
+
+def _links_by_frame(figure: PlanarFigure, frames: int) -> list[list[tuple[int, int, int]]]:
+    """Of each frame, (chain, point, point) of the interpreted window whose middle is nearest."""
+    read = figure.interpreted
+
+    def links(frame: int) -> list[tuple[int, int, int]]:
+        if not read:
+            return []
+        window = min(read, key=lambda w: abs(w["start"] + w["end"] - 2 * frame - 1))
+        return [
+            (index, *link["points"])
+            for index, chain in enumerate(window["chains"])
+            for link in chain["links"]
+        ]
+
+    return [links(frame) for frame in range(frames)]
+
+
+def write_display_video(
+    path: str | PathLike[str], times_s: npt.NDArray[np.float64], positions_px: npt.NDArray[np.float64]
+) -> None:
+    """White discs on black, the display scaled to fit 640 pixels."""
+    low, high = (f(positions_px, axis=(0, 1)) for f in (np.nanmin, np.nanmax))
+    scale = 560 / max(float((high - low).max()), 1e-9)
+    shifted = (positions_px - low) * scale + (640 - (high - low) * scale) / 2
+    v, u = np.mgrid[:640, :640]
+    with complete_file(path) as temporary, _h264(str(temporary), _rate(times_s)) as write:
+        for time_s, dots in zip(times_s, shifted, strict=True):
+            grey = np.zeros((640, 640))
+            for dot in dots[np.isfinite(dots).all(axis=1)]:
+                a, b = (slice(max(int(x) - 9, 0), int(x) + 10) for x in dot[::-1])
+                disc = np.clip(5.5 - np.hypot(u[a, b] - dot[0], v[a, b] - dot[1]), 0, 1)
+                grey[a, b] = np.maximum(grey[a, b], disc)
+            write(np.repeat((255 * grey).astype(np.uint8)[..., None], 3, axis=2), float(time_s))
+
+
+def _rate(times_s: Any) -> float:
+    return 1 / float(np.median(np.diff(times_s))) if len(times_s) > 1 else 25.0

@@ -1,0 +1,160 @@
+"""Point-light displays and the linkage found in them, through the built core."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+memo = pytest.importorskip("memo")
+figure = pytest.importorskip("memo.figure")
+
+LIMBS = {(0, 1), (1, 2), (3, 4), (4, 5), (6, 7), (7, 8), (9, 10), (10, 11)}
+
+
+def walk(frames=66):
+    return memo.walker_motion(frames)
+
+
+def display(**options):
+    points = walk()
+    return memo.pointlight(points["positions"], points["times_s"], points["names"], **options)
+
+
+def test_a_display_has_its_shapes_and_labels():
+    shown = display(noise_dots=5, azimuth_deg=30)
+    assert shown["positions_px"].shape == (66, 18, 2)
+    assert shown["labels"][0].tolist() == [*range(13), *[-1] * 5]
+    assert shown["visible"].all()
+    limited = display(lifetime_frames=2, life_dots=6)
+    assert limited["labels"].shape == (66, 6)
+    assert (limited["limb_ends"] == limited["labels"] + 1).all()
+
+
+def test_the_orthographic_view_is_the_documented_one():
+    points = walk()
+    shown = display(locomotion="translating")["positions_px"]
+    assert np.allclose(shown, points["positions"][..., [0, 2]] * [200, -200])
+
+
+def test_bad_options_are_told():
+    for options, part in (
+        ({"locomotion": "flying"}, "treadmill"),
+        ({"px_per_m": float("nan")}, "pixels per metre"),
+        ({"lifetime_frames": 2, "life_dots": 13, "life_sites": "joints"}, "nowhere to jump"),
+    ):
+        with pytest.raises(ValueError, match=part):
+            display(**options)
+    with pytest.raises(ValueError, match="3 times"):
+        memo.pointlight(walk(4)["positions"], [0.0, 1.0, 2.0], ["a"] * 13)
+
+
+def test_limbs_are_found_again():
+    shown = display(azimuth_deg=30, noise_sd_px=1.0)
+    found = memo.planar(shown["positions_px"], shown["times_s"], 1.0)
+    assert [window["status"] for window in found.windows] == ["interpreted"]
+    assert {(a, b) for a, b, *_ in found.links()} == LIMBS
+    assert found.depth.shape == (66, 13)
+    with pytest.raises(ValueError, match="too few"):
+        memo.planar(shown["positions_px"][:3], shown["times_s"][:3])
+
+
+def test_points_files_are_read_as_written(tmp_path):
+    shown = display()
+    names = [f"dot{i}" for i in range(13)]
+    positions = shown["positions_px"].copy()
+    positions[3, 4] = np.nan
+    points = figure.Points(names, shown["times_s"], positions)
+    figure.write_points_csv(tmp_path / "dots.csv", points)
+    read = figure.read_points_csv(tmp_path / "dots.csv", 2)
+    assert read.names == names
+    assert np.allclose(read.positions, positions, atol=1e-4, equal_nan=True)
+    with pytest.raises(ValueError, match="NAME_x"):
+        figure.read_points_csv(tmp_path / "dots.csv", 3)
+
+
+def test_names_tell_limbs_from_their_mirrors():
+    shown = display(azimuth_deg=30, noise_sd_px=0.5)
+    tracks = shown["positions_px"][:, :12]
+    names = walk()["names"][:12]
+    found = memo.planar(tracks, shown["times_s"], 0.5, names=names, focal_px=1500.0)
+    chains = found.windows[0]["chains"]
+    assert all(chain["reflection_margin_deg"] > 0 for chain in chains)
+    # Seen from the walker's right and rear: who walks to the right also walks away.
+    assert all(chain["slope"][0] * chains[0]["slope"][0] > 0 for chain in chains)
+    assert 0 < found.perspective_px < 20
+    # The mirror image of a walker is a walker with the sides exchanged.
+    exchanged = [("L" if name[0] == "R" else "R") + name[1:] for name in names]
+    again = memo.planar(tracks * [-1, 1], shown["times_s"], 0.5, names=exchanged).windows[0]["chains"]
+    assert all(chain["slope"][0] * chains[0]["slope"][0] < 0 for chain in again)
+    with pytest.raises(ValueError, match="11 names"):
+        memo.planar(tracks, shown["times_s"], 0.5, names=names[:11])
+
+
+def test_scales_are_divided_out():
+    shown = display(azimuth_deg=30)
+    scales = np.linspace(0.8, 1.25, 66)
+    plain = memo.planar(shown["positions_px"], shown["times_s"])
+    scaled = memo.planar(shown["positions_px"] * scales[:, None, None], shown["times_s"], scales=scales)
+    assert [link[:2] for link in plain.links()] == [link[:2] for link in scaled.links()]
+    assert np.allclose([link[2] for link in plain.links()], [link[2] for link in scaled.links()], rtol=1e-6)
+    with pytest.raises(ValueError, match="scale"):
+        memo.planar(shown["positions_px"], shown["times_s"], scales=scales[:5])
+
+
+def test_closed_forms_lift_planted_rods_and_hinges():
+    angles = np.random.default_rng(3).uniform(0, 2 * np.pi, (500, 4))
+    points = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    plane = np.array([0.6, -0.9])
+    normal = np.sqrt(1 + plane @ plane)
+    along = plane / np.linalg.norm(plane)
+    views = points - np.outer((points @ along).ravel(), along).reshape(points.shape) * (1 - 1 / normal)
+    for depth, given in (
+        (memo.planar_rods(views[:, :3].copy()), views[:, :3]),
+        (memo.planar_hinges(views), views),
+    ):
+        truth = given @ plane
+        error = np.minimum(np.abs(depth - truth).max(axis=1), np.abs(depth + truth).max(axis=1))
+        assert np.nanmedian(error) < 1e-10
+        assert np.isnan(error).mean() < 0.02
+    with pytest.raises(ValueError, match=r"\(N, 3, 2\)"):
+        memo.planar_rods(views)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("time_s,a_u_px,a_v_px\n0,1,x\n", "column a_v_px: x is no number"),
+        ("time_s,a_u_px,a_v_px\n0,1,2\n0,1,2\n", "column time_s: times must increase"),
+        ("time_s,a_u_px,b_v_px\n0,1,2\n", "point a has no column a_v_px"),
+        ("time_s,a_u_px,a_v_px\n0,1\n", "row 0 has 2 cells"),
+        ("time_s,a_u_px,a_v_px\n0,1,inf\n", "row 0, column a_v_px: infinite"),
+        ("time_s,a,b\n0,1,2\n", "no columns NAME_u_px"),
+        ("time_s,a_u_px,a_u_px\n0,1,2\n", "column a_u_px occurs 2 times"),
+    ],
+)
+def test_bad_tracks_are_named(tmp_path, text, part):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(ValueError, match=part):
+        figure.read_points_csv(tmp_path / "bad.csv", 2)
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "memo.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_commands_make_and_read_a_display(tmp_path):
+    pytest.importorskip("typer"), pytest.importorskip("av"), pytest.importorskip("matplotlib")
+    made = run("pointlight", "--out", tmp_path, "--azimuth-deg", "30", "--seconds", "1.1")
+    assert made.returncode == 0, made.stderr
+    read = run("planar", tmp_path / "dots.csv", "--out", tmp_path, "--noise-px", "0", "--no-video")
+    assert read.returncode == 0, read.stderr
+    with open(tmp_path / "links.csv", newline="") as file:
+        links = {(row["a"], row["b"]) for row in csv.DictReader(file)}
+    assert ("RHP", "RKN") in links and len(links) == 8
+    assert (tmp_path / "linkage.png").stat().st_size > 1000
+    absent = run("planar", tmp_path / "absent.csv")
+    assert absent.returncode == 1 and absent.stderr.startswith("memo: ")
