@@ -20,8 +20,8 @@ from memo._memo import (
     velocity_field,
     walker_motion,
 )
-from memo.figure import PlanarFigure, planar
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
+from memo.linkage import PlanarFigure, planar
 from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
 from memo.sides import SideRepair, unswap

@@ -58,8 +58,8 @@ def _planar(
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.figure import read_points_csv, write_figure_csv
-    from memo.figure_plot import write_linkage_png, write_turned_png, write_turned_video
+    from memo.linkage import read_points_csv, write_figure_csv
+    from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
     points, out = read_points_csv(tracks, 2, fps), delivery.out
     check_writable(out)

@@ -80,8 +80,8 @@ def add_pointlight(app: "typer.Typer") -> None:
 def _pointlight(
     motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
 ) -> Exit:
-    from memo.figure import Points, read_points_csv, write_points_csv
-    from memo.figure_plot import write_display_video
+    from memo.linkage import Points, read_points_csv, write_points_csv
+    from memo.linkage_plot import write_display_video
 
     if motion is None:
         points = _walker_points(seconds, fps or 60.0)
@@ -120,7 +120,7 @@ def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _walker_points(seconds: float, rate_hz: float) -> Any:
-    from memo.figure import Points
+    from memo.linkage import Points
 
     if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
         raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames a second cannot be shown")

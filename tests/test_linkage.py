@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 memo = pytest.importorskip("memo")
-figure = pytest.importorskip("memo.figure")
+figure = pytest.importorskip("memo.linkage")
 
 LIMBS = {(0, 1), (1, 2), (3, 4), (4, 5), (6, 7), (7, 8), (9, 10), (10, 11)}
 

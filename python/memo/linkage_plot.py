@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.figure import PlanarFigure, Points
 from memo.files import complete_file
+from memo.linkage import PlanarFigure, Points
 from memo.overlay import _h264
 
 __all__ = [
