@@ -131,6 +131,14 @@ struct Solution<const K: usize> {
     cost: f64,
 }
 
+/// A solution under way with the equations of the next step from it.
+#[derive(Debug, Clone, Copy)]
+struct Stand<const K: usize> {
+    at: Solution<K>,
+    normal: Matrix4<f64>,
+    right: Vector4<f64>,
+}
+
 /// Views, and what all steps of a fit to them need.
 struct Problem<'a, const K: usize> {
     views: &'a [View<K>],
@@ -184,8 +192,14 @@ impl<'a, const K: usize> Problem<'a, K> {
         self.columns.normal_equations(s, self.floor_sq)
     }
 
-    /// Squared lengths that fit a slope best, rod by rod.
-    fn at_slope(&self, g: DVec2) -> Solution<K> {
+    fn stand(&self, at: Solution<K>) -> Stand<K> {
+        let (cost, normal, right) = self.normal_equations(&at);
+        Stand { at: Solution { cost, ..at }, normal, right }
+    }
+
+    /// A slope within the limit with the squared lengths that fit it best, rod by rod.
+    fn at_slope(&self, g: DVec2) -> Stand<K> {
+        let g = g.clamp_length_max(0.9999 * self.slope_limit);
         let c = std::array::from_fn(|k| {
             let (mut sum, mut weight) = (0.0, 0.0);
             for d in self.views.iter().map(|v| v[k]).filter(|d| !d.x.is_nan()) {
@@ -196,41 +210,38 @@ impl<'a, const K: usize> Problem<'a, K> {
             }
             sum / weight
         });
-        let mut solution = Solution { g, c, cost: 0.0 };
-        solution.cost = self.normal_equations(&solution).0;
-        solution
+        self.stand(Solution { g, c, cost: 0.0 })
     }
 
     /// Refines the starts a little and the best of them until it stands.
     fn solve(&self) -> Solution<K> {
         let starts = Moments::new(self.views).starts(self.slope_limit);
         let refined = starts.into_iter().flatten().map(|g| self.refine(self.at_slope(g), 3));
-        let best = refined.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("there is always one start");
-        let best = self.refine(best, 12);
-        if best.g.length() < AT_LIMIT * self.slope_limit {
-            return best;
+        let cheaper = |a: &Stand<K>, b: &Stand<K>| a.at.cost.total_cmp(&b.at.cost);
+        let best = self.refine(refined.min_by(cheaper).expect("there is always one start"), 12);
+        if best.at.g.length() < AT_LIMIT * self.slope_limit {
+            return best.at;
         }
         // The moments' cost favours the limit more than the exact one does: look inside as well.
-        let inside = [0.55, 0.15].map(|part| self.refine(self.at_slope(part * best.g), 4));
-        let rival = if inside[1].cost < inside[0].cost { inside[1] } else { inside[0] };
+        let [rival, other] = [0.55, 0.15].map(|part| self.refine(self.at_slope(part * best.at.g), 4));
+        let rival = if other.at.cost < rival.at.cost { other } else { rival };
         // What is still far off after some steps does not overtake.
-        let rival = if rival.cost < 1.5 * best.cost { self.refine(rival, 8) } else { rival };
-        if rival.cost < best.cost { rival } else { best }
+        let rival = if rival.at.cost < 1.5 * best.at.cost { self.refine(rival, 8) } else { rival };
+        if rival.at.cost < best.at.cost { rival.at } else { best.at }
     }
 
     /// Levenberg-Marquardt on (u, c) with g = limit u / sqrt(1 + |u|^2), which keeps the slope within its
     /// limit.
-    fn refine(&self, start: Solution<K>, iterations: usize) -> Solution<K> {
+    fn refine(&self, start: Stand<K>, iterations: usize) -> Stand<K> {
         let limit = self.slope_limit;
-        let mut best = Solution { g: start.g.clamp_length_max(0.9999 * limit), ..start };
+        let mut best = start;
         let mut damping = 1e-4;
-        let (mut cost, mut normal, mut right) = self.normal_equations(&best);
-        best.cost = cost;
         for _ in 0..iterations {
-            let root = (limit * limit - best.g.length_squared()).sqrt();
+            let Stand { at, normal, right } = best;
+            let root = (limit * limit - at.g.length_squared()).sqrt();
             // dg/du, symmetric: root / limit (limit I - g g' / limit)
             let scale = root / limit;
-            let along = best.g / limit;
+            let along = at.g / limit;
             let by_u = Matrix4::new(
                 scale * limit * (1.0 - along.x * along.x),
                 -scale * limit * along.x * along.y,
@@ -255,14 +266,13 @@ impl<'a, const K: usize> Problem<'a, K> {
                 damped[(i, i)] += f64::MIN_POSITIVE;
             }
             let step = damped.cholesky().map_or(Vector4::repeat(f64::NAN), |c| c.solve(&(by_u * right)));
-            let u = best.g / root + DVec2::new(step[0], step[1]);
+            let u = at.g / root + DVec2::new(step[0], step[1]);
             let g = (limit * u / (1.0 + u.length_squared()).sqrt()).clamp_length_max(0.9999 * limit);
-            let next = Solution { g, c: std::array::from_fn(|k| best.c[k] + step[2 + k]), cost: 0.0 };
-            let (next_cost, next_normal, next_right) = self.normal_equations(&next);
-            if next_cost < cost {
-                let gain = (cost - next_cost) / cost;
-                (cost, normal, right) = (next_cost, next_normal, next_right);
-                best = Solution { cost, ..next };
+            let c = std::array::from_fn(|k| at.c[k] + step[2 + k]);
+            let next = self.stand(Solution { g, c, cost: 0.0 });
+            if next.at.cost < at.cost {
+                let gain = (at.cost - next.at.cost) / at.cost;
+                best = next;
                 damping = (0.1 * damping).max(1e-15);
                 if gain < 1e-4 {
                     break;
