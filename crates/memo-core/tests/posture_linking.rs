@@ -8,6 +8,7 @@ mod mocap;
 use glam::DVec3;
 use memo_core::posture::lift::{JointRays, roots};
 use memo_core::posture::link::{LinkFrame, LinkOptions, LinkedPath, link};
+use memo_core::posture::prior::MotionPrior;
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
 
 /// Joints nearer than this count as the same, metres.
@@ -158,6 +159,48 @@ fn each_walk() {
                     one.frames_near_leaf, one.error_cm, one.smoothed_cm
                 );
             }
+        }
+    }
+}
+
+/// Segments mirrored by mistake, by margin: (nats from, segments, mirrored). Only where root and truth are both
+/// clearly on one side.
+fn mirrored(prior: &MotionPrior) -> Option<Vec<(f64, usize, usize)>> {
+    let mut bins = [0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0].map(|from| (from, 0, 0)).to_vec();
+    for name in mocap::WALKS {
+        for azimuth_deg in [0.0, 45.0, 90.0] {
+            for noise_px in [1.0, 3.0] {
+                let mut walk = walk(name, azimuth_deg, noise_px, 7)?;
+                walk.options.prior = prior.clone();
+                let path = link(&walk.frames, &walk.lengths, &walk.options).unwrap();
+                for (t, truth) in walk.truth.iter().enumerate() {
+                    for joint in Joint::ALL.into_iter().skip(1) {
+                        let ray = walk.frames[t].rays.ray[joint];
+                        let [found, true_m] = [&path.figures[t], truth].map(|f| f.segment(joint).dot(ray));
+                        if 2.0 * found.abs().min(true_m.abs()) >= NEAR_M {
+                            let margin = path.mirror_margin[t][joint];
+                            let bin = bins.iter_mut().rev().find(|bin| margin >= bin.0)?;
+                            bin.1 += 1;
+                            bin.2 += usize::from(found * true_m < 0.0);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Some(bins)
+}
+
+/// The odds exp(-margin) were set on these walks, so this says that they hold there, not elsewhere.
+#[test]
+fn margins_are_no_surer_than_right() {
+    for (name, prior) in [("walking", MotionPrior::walking()), ("any", MotionPrior::any())] {
+        let Some(bins) = mirrored(&prior) else { return };
+        for (from, segments, wrong) in bins {
+            let share = wrong as f64 / segments as f64;
+            println!("{name}: margin from {from:3}: {segments:5} segments, {:.1} % mirrored", 100.0 * share);
+            let stated = 1.0 / (1.0 + f64::exp(from));
+            assert!(share < stated + 0.1, "{name}: {share:.2} mirrored at a margin from {from}");
         }
     }
 }

@@ -98,6 +98,9 @@ pub struct MotionPrior {
     /// Height of the lower ankle above that of a foot on the ground, standard deviation, metres: the heel
     /// lifted, and the error of the neck's distance.
     pub support_sd_m: f64,
+    /// By how much differences of cost are too sure of themselves; margins are divided by it. Measured: the
+    /// share of mirrored segments by margin, on four walks in three views at 1 and 3 px.
+    pub overconfidence: f64,
     /// Time after which another frame is new evidence, seconds.
     pub independence_s: f64,
 }
@@ -135,6 +138,7 @@ impl MotionPrior {
             hips_against_torso: 25.0,
             trunk_acceleration_mps2: 3.0,
             support_sd_m: 0.10,
+            overconfidence: 2.0,
             independence_s: 0.08,
         }
     }
@@ -166,6 +170,7 @@ impl MotionPrior {
             trunk_roll: Soft::degrees(0.0, 15.0),
             shoulder_turn: Soft::FREE,
             hip_turn: Soft::degrees(0.0, 20.0),
+            overconfidence: 12.0,
             ..Self::walking()
         }
     }

@@ -114,7 +114,7 @@ pub struct Alternative {
     pub to: usize,
     /// The postures of these frames, camera axes, metres.
     pub figures: Vec<StickFigure>,
-    /// By how much it costs more than the best, nats: exp(-margin) is its odds.
+    /// By how much it costs more than the best, nats, over the prior's overconfidence: exp(-margin) is its odds.
     pub margin: f64,
 }
 
@@ -140,6 +140,10 @@ pub struct LinkedPath {
     pub gap_m: Vec<PerJoint<f64>>,
     /// The cheapest reading that puts a joint elsewhere; none where there is none.
     pub second: Option<Alternative>,
+    /// For each segment, by the joint at its end, the least margin of a reading that mirrors it, alone or with
+    /// others, over some frames; infinite where there is none. What hangs on a mirrored trunk is not linked
+    /// anew for this.
+    pub mirror_margin: Vec<PerJoint<f64>>,
     /// For each frame, what it would cost at least to put one of its joints elsewhere, nats; infinite where
     /// no joint could be.
     pub margin: Vec<f64>,
@@ -296,12 +300,16 @@ impl Problem<'_> {
             (0..seen.len()).map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &[])).collect();
         let readings = trunk.readings().chain(limbs.readings());
         let mut margin = vec![f64::INFINITY; seen.len()];
+        let mut mirror_margin = vec![PerJoint([f64::INFINITY; JOINT_COUNT]); seen.len()];
         let mut second: Option<(Flip, Vec<Joint>)> = None;
         for (flip, joints) in readings {
             let apart = |t: usize| {
                 joints.iter().any(|&joint| 2.0 * leaves[t].extent_m[joint].abs() > self.options.distinct_m)
             };
-            let delta = flip.delta.max(0.0);
+            let delta = flip.delta.max(0.0) / self.options.prior.overconfidence;
+            for margin in &mut mirror_margin[flip.from..flip.to] {
+                joints.iter().for_each(|&joint| margin[joint] = margin[joint].min(delta));
+            }
             let mut distinct = false;
             for t in (flip.from..flip.to).filter(|&t| apart(t)) {
                 margin[t] = margin[t].min(delta);
@@ -317,7 +325,7 @@ impl Problem<'_> {
             figures: (flip.from..flip.to)
                 .map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &joints).figure)
                 .collect(),
-            margin: flip.delta.max(0.0),
+            margin: flip.delta.max(0.0) / self.options.prior.overconfidence,
             joints,
         });
         let mut smoothed = limbs.smoothed.clone();
@@ -335,6 +343,7 @@ impl Problem<'_> {
             sd_m,
             second,
             margin,
+            mirror_margin,
             gap_m: leaves.iter().map(|leaf| leaf.gap_m).collect(),
             figures: leaves.into_iter().map(|leaf| leaf.figure).collect(),
         }
@@ -398,6 +407,7 @@ impl LinkedPath {
             sd_m: at(self.sd_m, known, frames, nothing),
             gap_m: at(self.gap_m, known, frames, nothing),
             margin: at(self.margin, known, frames, f64::NAN),
+            mirror_margin: at(self.mirror_margin, known, frames, nothing),
             second: self.second.map(|second| {
                 let [from, to] = [known[second.from], known[second.to - 1] + 1];
                 let inside: Vec<usize> = (second.from..second.to).map(|t| known[t] - from).collect();

@@ -66,7 +66,7 @@ impl Trunk {
                     .sum()
             },
         );
-        let states: Vec<usize> = path.iter().enumerate().map(|(t, &s)| kept[t][s]).collect();
+        let mut states: Vec<usize> = path.iter().enumerate().map(|(t, &s)| kept[t][s]).collect();
         let chain = Chain {
             times_s: &problem.times_s(),
             acceleration_mps2: &[acceleration; 5],
@@ -75,6 +75,7 @@ impl Trunk {
             extent: &|bit, t, state| readings[t][state].extents[bit],
             cost: &|t, state| readings[t][state].cost,
         };
+        chain.refine(&mut states);
         let flips = chain.flips(&states);
         let extents: Vec<[Measured; 5]> =
             states.iter().enumerate().map(|(t, &state)| readings[t][state].extents).collect();

@@ -498,7 +498,7 @@ fn link_frames(
     link(&link_frames, &scene.lengths.lengths, &options)
 }
 
-/// Standard deviations of the joints of the linked figures.
+/// Standard deviations of the joints of the smoothed figures, as if each frame stood alone.
 fn uncertainty(scene: &neck::Scene, neck: &NeckTrack, linked: &LinkedPath) -> Vec<PerJoint<f64>> {
     let lengths = scene.lengths;
     let own_sd_m = |sd_m: f64, length_m: f64| {
@@ -516,10 +516,10 @@ fn uncertainty(scene: &neck::Scene, neck: &NeckTrack, linked: &LinkedPath) -> Ve
             scale_sd: lengths.scale_sd,
             anchor_scale_sd_m: (neck.scale_sd * neck.distance_m[t]).min(anchor_sd_m),
         };
-        let found = propagate(&linked.figures[t], &scene.rays[t], &causes);
+        let found = propagate(&linked.smoothed[t], &scene.rays[t], &causes);
         found.map_or(PerJoint([f64::NAN; JOINT_COUNT]), |found| found.absolute_sd_m)
     };
-    (0..linked.figures.len()).into_par_iter().map(of_frame).collect()
+    (0..linked.smoothed.len()).into_par_iter().map(of_frame).collect()
 }
 
 /// A figure of camera axes (x right, y down, z forward) in those of the world (z up), metres.
