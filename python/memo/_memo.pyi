@@ -28,6 +28,7 @@ __all__ = [
     "lee_chen_last_stage",
     "moving_regions",
     "posture",
+    "posture_tree",
     "segment_names",
     "side_pairs",
     "silhouettes",
@@ -221,6 +222,15 @@ def posture(
     group_m: float = 0.10,
     max_groups: int = 64,
 ) -> dict[str, Any]: ...
+def posture_tree(
+    rays: npt.NDArray[np.float64],
+    neck: Sequence[float],
+    lengths: dict[str, float],
+    *,
+    rules: str = "physical",
+    strength: str = "measured",
+    noise_rad: float = 0.0,
+) -> npt.NDArray[np.float64]: ...
 def joint_names() -> list[str]: ...
 def segment_names() -> list[str]: ...
 def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...
