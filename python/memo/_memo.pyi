@@ -32,6 +32,7 @@ __all__ = [
     "planar_rods",
     "pointlight",
     "posture",
+    "posture_tree",
     "segment_names",
     "side_pairs",
     "silhouettes",
@@ -280,6 +281,15 @@ def posture(
     group_m: float = 0.10,
     max_groups: int = 64,
 ) -> dict[str, Any]: ...
+def posture_tree(
+    rays: npt.NDArray[np.float64],
+    neck: Sequence[float],
+    lengths: dict[str, float],
+    *,
+    rules: str = "physical",
+    strength: str = "measured",
+    noise_rad: float = 0.0,
+) -> npt.NDArray[np.float64]: ...
 def joint_names() -> list[str]: ...
 def segment_names() -> list[str]: ...
 def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...

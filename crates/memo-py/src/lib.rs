@@ -36,6 +36,7 @@ mod _memo {
     use super::pointlight::{pointlight, walker_motion};
     #[pymodule_export]
     use super::posture::posture;
+    use super::posture::{posture, posture_tree};
     #[pymodule_export]
     use super::reproduce::{
         joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_last_stage, segment_names,

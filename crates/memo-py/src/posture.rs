@@ -1,20 +1,21 @@
 //! Postures of a sequence of keypoints.
 
 use crate::array::{
-    head_points_from_numpy, numpy_from_column, numpy_from_figures, numpy_from_rows, scores_from_numpy,
-    times_from_numpy, track_from_numpy,
+    head_points_from_numpy, numpy_from_column, numpy_from_figures, numpy_from_rows, points_from_numpy,
+    scores_from_numpy, times_from_numpy, track_from_numpy,
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use glam::{DVec2, DVec3};
 use memo_core::posture::anchor::AnchorSource;
+use memo_core::posture::lift::JointRays;
 use memo_core::posture::sequence::{
     AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameReading, KeypointSequence, Motion, PostureSequence,
     SequenceLengths, SequenceOptions, Strength, postures, reason_totals,
 };
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
-use memo_core::posture::tree::LevelCount;
-use numpy::PyArray2;
+use memo_core::posture::tree::{LevelCount, View};
+use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -86,6 +87,33 @@ pub fn posture<'py>(
     };
     let found = py.detach(|| postures(&sequence, &camera.0, &options)).map_err(value_error)?;
     dict_from_postures(py, found)
+}
+
+/// All postures that one view allows: rays (14, 3), unit vectors in camera axes with NaN where a joint is not
+/// seen, and the neck's place (3,) in metres. The surviving postures (N, 14, 3), camera axes, in the order of
+/// the walk. The trunk says where up and forward is.
+#[pyfunction]
+#[pyo3(signature = (rays, neck, lengths, *, rules="physical", strength="measured", noise_rad=0.0))]
+pub fn posture_tree<'py>(
+    py: Python<'py>,
+    rays: &Bound<'py, PyAny>,
+    neck: [f64; 3],
+    lengths: HashMap<String, f64>,
+    rules: &str,
+    strength: &str,
+    noise_rad: f64,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let rays = points_from_numpy(rays)?;
+    let Ok(ray) = <[[f64; 3]; JOINT_COUNT]>::try_from(rays.as_slice()) else {
+        return Err(PyValueError::new_err(format!("wanted rays of shape (14, 3); got ({}, 3)", rays.len())));
+    };
+    let rays =
+        JointRays { ray: PerJoint(ray.map(DVec3::from)), weight: PerJoint([1.0; JOINT_COUNT]), noise_rad };
+    let motion = named("rules", rules, Motion::from_name, &Motion::ALL.map(Motion::name))?;
+    let strength = named("strength", strength, Strength::from_name, &["measured", "paper"])?;
+    let view = View::new(rays, DVec3::from(neck), lengths_from_names(lengths)?);
+    let interpret = || view.interpret(&motion.tree(strength)).map(|found| found.figures());
+    numpy_from_figures(py, &py.detach(interpret).map_err(value_error)?)
 }
 
 fn per_joint<T: Copy>(flat: &[T]) -> Vec<PerJoint<T>> {

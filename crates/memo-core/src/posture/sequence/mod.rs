@@ -86,7 +86,7 @@ impl Motion {
     }
 
     /// What cuts.
-    fn tree(self, strength: Strength) -> TreeOptions {
+    pub fn tree(self, strength: Strength) -> TreeOptions {
         let is_paper = strength == Strength::Paper;
         let options = if is_paper { TreeOptions::physical_paper() } else { TreeOptions::physical() };
         match (self, is_paper) {
