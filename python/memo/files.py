@@ -70,6 +70,7 @@ _DIGITS = {
     "_nats": 3,
     "phase": 5,
     "p_swapped": 6,
+    "p_mirrored": 4,
     "probability": 6,
     "similarity": 5,
     "walk": 0,

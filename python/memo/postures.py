@@ -139,6 +139,9 @@ class Postures:
     """(T, 14) by how much a segment was too short to reach the joint's ray, metres."""
     margin_nats: Array
     """(T,) how much likelier the motion is than the best other one in this frame; infinite without one."""
+    p_mirrored: Array
+    """(T, 14) probability that the segment ending at a joint is mirrored in depth, and what hangs on it with
+    it; measured on walks, so for other motion a rough one."""
     second: SecondBest | None
     """The likeliest other motion, if there is one to speak of."""
     heading_source: str
@@ -370,6 +373,7 @@ def _named(
         sd_m=found["sd_m"],
         gap_m=found["gap_m"],
         margin_nats=found["margin"],
+        p_mirrored=found["p_mirrored"],
         second=None
         if second is None
         else SecondBest(
@@ -496,6 +500,7 @@ def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
     for k, joint in enumerate(postures.joints):
         columns |= {f"{joint}_{axis}_m": postures.smoothed_m[:, k, i] for i, axis in enumerate("xyz")}
         columns[f"{joint}_sd_m"] = postures.sd_m[:, k]
+        columns[f"{joint}_p_mirrored"] = postures.p_mirrored[:, k]
     return columns
 
 
@@ -575,4 +580,5 @@ def _frame_document(postures: Postures, row: int) -> dict[str, Any]:
         "smoothed_m": np.round(postures.smoothed_m[row], _TENTH_MM),
         "sd_m": np.round(postures.sd_m[row], _TENTH_MM),
         "gap_m": np.round(postures.gap_m[row], _TENTH_MM),
+        "p_mirrored": np.round(postures.p_mirrored[row], 4),
     }

@@ -35,7 +35,6 @@ mod _memo {
     #[pymodule_export]
     use super::pointlight::{pointlight, walker_motion};
     #[pymodule_export]
-    use super::posture::posture;
     use super::posture::{posture, posture_tree};
     #[pymodule_export]
     use super::reproduce::{

@@ -260,6 +260,8 @@ fn set_linked(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()>
     dict.set_item("sd_m", table(&found.sd_m)?)?;
     dict.set_item("gap_m", table(&linked.gap_m)?)?;
     dict.set_item("margin", numpy_from_column(py, linked.margin.clone()))?;
+    let mirrored = |t: usize| Joint::ALL.map(|joint| linked.probability_mirrored(t, joint));
+    dict.set_item("p_mirrored", numpy_from_rows(py, (0..linked.figures.len()).map(mirrored).collect())?)?;
     let second = linked.second.as_ref().map(|second| -> PyResult<_> {
         let dict = PyDict::new(py);
         let joints: Vec<&str> = second.joints.iter().map(|&joint| Joint::name(joint)).collect();

@@ -149,6 +149,17 @@ pub struct LinkedPath {
     pub margin: Vec<f64>,
 }
 
+impl LinkedPath {
+    /// Probability that the segment which ends at a joint is mirrored in depth in a frame, 0 to 0.5; NaN where
+    /// the joint is not known.
+    pub fn probability_mirrored(&self, t: usize, joint: Joint) -> f64 {
+        if self.figures[t][joint].is_nan() {
+            return f64::NAN;
+        }
+        1.0 / (1.0 + self.mirror_margin[t][joint].exp())
+    }
+}
+
 /// Links the frames of a sequence.
 ///
 /// # Errors
@@ -501,6 +512,16 @@ mod tests {
                 assert!((figure[joint].distance(figure[start]) - lengths.to[joint]).abs() < 1e-6);
             }
         }
+    }
+
+    #[test]
+    fn what_is_mirrored_in_the_second_reading_is_the_least_sure() {
+        let (_, frames, lengths, options) = sequence(std::f64::consts::FRAC_PI_4);
+        let path = link(&frames, &lengths, &options).unwrap();
+        let second = path.second.clone().unwrap();
+        let stated = path.probability_mirrored(second.from, second.joints[0]);
+        assert!(stated >= second.probability() - 1e-12 && stated <= 0.5);
+        assert_eq!(path.probability_mirrored(0, Joint::Neck), 0.0);
     }
 
     #[test]
