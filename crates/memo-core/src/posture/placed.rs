@@ -6,6 +6,7 @@
 //! hypot(lateral, sd (r·g)) / length towards a unit vector g perpendicular to it.
 
 use std::cell::Cell;
+use std::rc::Rc;
 
 use glam::{DMat3, DVec3};
 
@@ -170,9 +171,9 @@ pub(crate) struct Trunk {
     pub lateral_sd: f64,
     /// Normal of the plane of the body without swing, forward: perpendicular to the trunk (rule 3).
     pub body_normal: DVec3,
-    /// Angles of limbs on it, once asked for.
-    swings: Memo,
-    knees: Memo,
+    /// Angles of limbs on the torso, once asked for: flexion of a limb against it, flexion at a knee.
+    swings: Rc<Memo>,
+    knees: Rc<Memo>,
 }
 
 /// A number of each place, NaN where not yet known.
@@ -204,8 +205,8 @@ impl Trunk {
             lateral: DVec3::NAN,
             lateral_sd: f64::NAN,
             body_normal: DVec3::NAN,
-            swings: Memo::empty(),
-            knees: Memo::empty(),
+            swings: Rc::new(Memo::empty()),
+            knees: Rc::new(Memo::empty()),
         }
     }
 

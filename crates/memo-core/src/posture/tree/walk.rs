@@ -5,7 +5,6 @@
 //! makes, and the verdict goes to all nodes that make the choice. What is left and what was cut is what
 //! a walk down the branches, one by one, leaves and cuts.
 
-use std::borrow::Cow;
 use std::sync::LazyLock;
 
 use super::least::least_violating;
@@ -115,28 +114,32 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Judges constraints of one scope, whose joints are placed at the roots of a node.
-    pub fn judge<'b>(
-        &self,
-        group: &'b [Asked],
+    /// The trunk of a node whose joints are placed, with its hips where a level asks for them.
+    fn trunk<'b>(
+        &'b self,
+        level: Joint,
         figure: &PlacedFigure,
         node: usize,
-    ) -> impl Iterator<Item = (&'b Asked, Option<Violation>)> {
+        with_hips: &'b mut Option<Trunk>,
+    ) -> &'b Trunk {
         let torso = &self.torsos[node & TORSO];
-        let at_hips = group.first().is_some_and(|asked| asked.level == Joint::LeftHip);
-        let trunk = if at_hips { Cow::Owned(torso.with_hips(figure)) } else { Cow::Borrowed(torso) };
-        group.iter().map(move |asked| {
-            (asked, self.options.check(asked.constraint, figure, &trunk, &self.view.lengths))
-        })
+        if level == Joint::LeftHip { with_hips.insert(torso.with_hips(figure)) } else { torso }
+    }
+
+    fn check(&self, asked: &Asked, figure: &PlacedFigure, trunk: &Trunk) -> Option<Violation> {
+        self.options.check(asked.constraint, figure, trunk, &self.view.lengths)
     }
 
     /// What a group of constraints has against a node.
     pub fn violations(&self, group: &[Asked], node: usize) -> impl Iterator<Item = Violation> {
-        let scope = group.first().map_or(0, |asked| asked.scope);
-        let mut figure = self.figure();
-        self.place(&mut figure, scope, node, scope);
-        let violations: Vec<Violation> =
-            self.judge(group, &figure, node).filter_map(|(_, violation)| violation).collect();
+        let mut violations = Vec::new();
+        if let Some(&Asked { scope, level, .. }) = group.first() {
+            let mut figure = self.figure();
+            self.place(&mut figure, scope, node, scope);
+            let mut with_hips = None;
+            let trunk = self.trunk(level, &figure, node, &mut with_hips);
+            violations.extend(group.iter().filter_map(|asked| self.check(asked, &figure, trunk)));
+        }
         violations.into_iter()
     }
 }
@@ -224,8 +227,10 @@ impl Pruned {
         for node in self.nodes.choices(scope).numbers() {
             tree.place(&mut figure, scope, node, changed | node ^ before);
             (changed, before) = (0, node);
-            let first = tree.judge(group, &figure, node).find(|(_, violation)| violation.is_some());
-            broken.extend(first.map(|(asked, _)| (asked.index, node)));
+            let mut with_hips = None;
+            let trunk = tree.trunk(level, &figure, node, &mut with_hips);
+            let first = group.iter().find(|asked| tree.check(asked, &figure, trunk).is_some());
+            broken.extend(first.map(|asked| (asked.index, node)));
         }
         for &asked in group {
             let choices = broken.iter().filter(|(index, _)| *index == asked.index).map(|&(_, node)| node);
