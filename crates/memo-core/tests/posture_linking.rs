@@ -62,6 +62,7 @@ struct Score {
     leaf_error_cm: f64,
     smoothed_cm: f64,
     frames_near_truth: f64,
+    smoothed_near_leaf: f64,
     no_root: f64,
 }
 
@@ -85,6 +86,8 @@ fn score(walk: &Walk, path: &LinkedPath) -> Score {
         score.leaf_error_cm += mean(&leaf);
         score.smoothed_cm += mean(&path.smoothed[t]);
         let all = near(&path.smoothed[t], truth) == JOINT_COUNT;
+        let all_leaf = near(&path.smoothed[t], &leaf) == JOINT_COUNT;
+        score.smoothed_near_leaf += 100.0 * f64::from(u8::from(all_leaf)) / n;
         score.frames_near_truth += 100.0 * f64::from(u8::from(all)) / n;
         let gaps = path.gap_m[t].0.iter().filter(|&&gap| gap > 0.0).count();
         score.no_root += 100.0 * gaps as f64 / 13.0 / n;
@@ -107,12 +110,14 @@ fn view(azimuth_deg: f64, noise_px: f64) -> Option<Score> {
             mean.leaf_error_cm += one.leaf_error_cm / runs;
             mean.smoothed_cm += one.smoothed_cm / runs;
             mean.frames_near_truth += one.frames_near_truth / runs;
+            mean.smoothed_near_leaf += one.smoothed_near_leaf / runs;
             mean.no_root += one.no_root / runs;
         }
     }
     println!(
         "{noise_px} px, {azimuth_deg:>2} deg: all joints near the true leaf in {:.1} % of frames, {:.1} % of joints; \
-         error {:.2} cm (true leaf {:.2}), smoothed {:.2} cm, all within 10 cm of the truth in {:.1} %; \
+         error {:.2} cm (true leaf {:.2}), smoothed {:.2} cm, all within 10 cm of the truth in {:.1} %, \
+         of the true leaf in {:.1} %; \
          no real root {:.0} %",
         mean.frames_near_leaf,
         mean.joints_near_leaf,
@@ -120,6 +125,7 @@ fn view(azimuth_deg: f64, noise_px: f64) -> Option<Score> {
         mean.leaf_error_cm,
         mean.smoothed_cm,
         mean.frames_near_truth,
+        mean.smoothed_near_leaf,
         mean.no_root
     );
     Some(mean)
