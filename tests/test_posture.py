@@ -286,6 +286,25 @@ def test_a_chosen_frame_is_drawn_and_quiet_is_quiet(scene, tmp_path, memo_postur
     assert pictures[0] != pictures[1] and pictures[0][:4] == b"\x89PNG"
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_frame_of_which_nothing_is_known_is_drawn_too(scene, tmp_path, memo_posture):
+    folder, _ = scene
+    rows = [line.split(",") for line in (folder / "walk.csv").read_text().splitlines()]
+    rows[6][1:] = [""] * (len(rows[6]) - 1)
+    (tmp_path / "gap.csv").write_text("\n".join(",".join(row) for row in rows))
+    arguments = (
+        tmp_path / "gap.csv",
+        "--camera",
+        folder / "camera.toml",
+        "--fps",
+        RATE_HZ,
+        "--out",
+        tmp_path,
+    )
+    code, _, complaint = memo_posture(*arguments, "--frame", "5")
+    assert (code, complaint) == (0, "") and (tmp_path / "postures.png").is_file()
+
+
 def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     """In mid-stride nobody stands."""
     folder, truth = scene

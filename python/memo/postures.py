@@ -252,8 +252,8 @@ def posture(
 ) -> Postures:
     """All postures of a person that a view allows, and the likeliest motion.
 
-    The motion takes, over time, one of the two ends of every segment's line of sight; limits and rules it may
-    pass at a price, so it is not bound to the postures left in each frame (see `linked_breaks`).
+    A segment can end at either of two places on its joint's line of sight. The motion takes one of them in
+    each frame; limits it may pass at a price, so it is not bound to the postures left (see `linked_breaks`).
 
     `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown

@@ -797,10 +797,71 @@ mod tests {
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0], sd_m: 0.0 })
                 .contains("sd")
         );
+        for (distance_m, sd_m) in [(1e300, 0.1), (1e-300, 0.1), (4.0, -5.0), (4.0, 1e300)] {
+            let given = AnchorChoice::Given { distance_m: vec![distance_m], sd_m };
+            assert!(refused(&|_, o| o.anchor = given.clone()).starts_with("distance_"));
+        }
         let nothing = |walk: &mut Walk| walk.points_px.fill(PerJoint([DVec2::NAN; JOINT_COUNT]));
         assert!(refused(&|walk, _| nothing(walk)).contains("no frame gives the neck's distance"));
         assert!(refused(&|walk, o| (nothing(walk), o.lengths = None).1).contains("no frame gives"));
         assert!(refused(&|walk, _| walk.camera.focal_px.x = 0.0).contains("focal"));
+    }
+
+    #[test]
+    fn frames_that_say_nothing_say_why() {
+        let mut walk = walk(45.0, 6, 0.5);
+        for joint in Joint::ALL.into_iter().skip(1) {
+            walk.points_px[2][joint] = DVec2::NAN;
+        }
+        let found = walk.postures(&with_lengths()).unwrap();
+        assert_eq!(found.frames[2], Err(FrameProblem::NeckAlone));
+        let anchor = AnchorChoice::Given { distance_m: vec![4.0, 4.0, 4.0, 4.0, 0.5, f64::NAN], sd_m: 1.0 };
+        let found = walk.postures(&SequenceOptions { anchor, ..with_lengths() }).unwrap();
+        assert_eq!(found.frames[4], Err(FrameProblem::VagueDistance { distance_m: 0.5, sd_m: 1.0 }));
+        assert_eq!(found.frames[5], Err(FrameProblem::NoDistance));
+        assert!(found.neck.distance_m[4].is_nan() && found.neck.from[4] == NeckFrom::Nothing);
+        assert!(found.linked.figures[4].0.iter().all(|point| point.is_nan()) && found.frames[3].is_ok());
+    }
+
+    #[test]
+    fn no_neck_has_a_reason_from_every_source() {
+        let mut walk = walk(45.0, 6, 0.5);
+        for points_px in &mut walk.points_px {
+            points_px[Joint::Pelvis] = DVec2::NAN;
+            points_px[Joint::RightHip] = DVec2::NAN;
+            points_px[Joint::LeftHip] = DVec2::NAN;
+            points_px[Joint::RightAnkle] = DVec2::NAN;
+            points_px[Joint::LeftAnkle] = DVec2::NAN;
+        }
+        walk.weights[0][Joint::LeftWrist] = 0.1;
+        let error = walk.postures(&with_lengths()).unwrap_err();
+        let SequenceError::NoNeck { reasons, warnings } = &error else { panic!("{error}") };
+        assert_eq!(reasons.len(), 4, "{error}");
+        assert!(matches!(warnings[..], [Warning::LightJoints { light: 1, .. }]), "{error}");
+        for source in ["ground", "trunk", "extent", "head"] {
+            assert!(error.to_string().contains(&format!("no neck from the {source}")), "{error}");
+        }
+        assert!(error.to_string().contains("noticed before: 1 of"), "{error}");
+    }
+
+    #[test]
+    fn a_picture_of_another_size_is_noticed() {
+        let beyond = |scale: f64| {
+            let mut walk = walk(45.0, 6, 0.5);
+            walk.points_px.iter_mut().flat_map(|points| &mut points.0).for_each(|pixel| *pixel *= scale);
+            let inside = 0.0..=1920.0;
+            let pixels = walk.points_px.iter().flat_map(|points| points.0);
+            let outside = pixels.filter(|p| !(inside.contains(&p.x) && inside.contains(&p.y))).count();
+            let warnings = walk.postures(&with_lengths()).unwrap().warnings;
+            let told = warnings.into_iter().find_map(|warning| match warning {
+                Warning::OutsidePicture { beyond, all: 84, size: [1920, 1920], .. } => Some(beyond),
+                _ => None,
+            });
+            (outside, told)
+        };
+        assert_eq!(beyond(1.0), (0, None));
+        let (outside, told) = beyond(2.0);
+        assert!(told.is_some_and(|told| told.abs_diff(outside) <= 2 && told > 20), "{told:?}, {outside}");
     }
 
     #[test]
