@@ -1,4 +1,4 @@
-"""Plots of postures: what one view leaves of a frame, and the motion through all of them.
+"""Plots of postures: what one view leaves of a frame, and the motion over time.
 
 Every function draws into the Axes it is given and returns them; nothing is shown. `write_posture_plot` saves
 them in one PNG file. Right limbs are solid, left dashed.

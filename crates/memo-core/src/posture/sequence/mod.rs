@@ -719,7 +719,12 @@ mod tests {
         };
         assert!(!has_rule(&physical) && has_rule(&walking));
         let few = walk.postures(&SequenceOptions { max_groups: 2, ..with_lengths() }).unwrap();
-        assert!(few.frames.iter().flatten().all(|frame| frame.groups.len() <= 2));
+        for (few, all) in few.frames.iter().flatten().zip(walking.frames.iter().flatten()) {
+            assert!(few.group_count == all.group_count && all.group_count.is_some_and(|count| count > 2));
+            assert_eq!(few.groups[..], all.groups[..2]);
+            let members: usize = all.groups.iter().map(|group| group.size).sum();
+            assert!(members == all.survivors() || all.group_count > Some(64));
+        }
     }
 
     #[test]
