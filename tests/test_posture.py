@@ -99,9 +99,12 @@ def write_camera(path):
     return path
 
 
-def write_table(path, figures, noise_px=NOISE_PX, without=()):
+def write_table(
+    path, figures, noise_px=NOISE_PX, without=(), names=LIMB_JOINTS, change=lambda pixels: pixels
+):
     pixels = project(figures) + np.random.default_rng(3).normal(0, noise_px, (*figures.shape[:2], 2))
-    names = [name for name in LIMB_JOINTS if name not in without]
+    pixels = change(pixels)
+    names = [name for name in names if name not in without]
     header = ["frame", *(f"{name}_{axis}" for name in names for axis in "xy")]
     rows = [[t, *(f"{x:.3f}" for name in names for x in frame[AT[name]])] for t, frame in enumerate(pixels)]
     with path.open("w", newline="") as file:
@@ -251,14 +254,22 @@ def test_tables_and_document_agree(scene, tmp_path, memo_posture):
     totals: dict[tuple[str, str], int] = {}
     for t, frame in enumerate(document["per_frame"]):
         assert frame["frame"] == t and np.shape(frame["smoothed_m"]) == (14, 3)
-        assert sum(frame["group_sizes"]) <= frame["survivors"]
         assert np.shape(frame["groups_m"])[:1] == (len(frame["group_sizes"]),)
+        given = len(frame["group_sizes"])
+        assert given == min(frame["group_count"], 64) and min(frame["group_sizes"], default=1) >= 1
+        missing = frame["survivors"] - sum(frame["group_sizes"])
+        assert missing >= frame["group_count"] - given >= 0 and (missing == 0) == (
+            given == frame["group_count"]
+        )
         assert [int(row["reached"]) for row in levels[14 * t : 14 * t + 14]] == frame["level_reached"]
         assert [int(row["survived"]) for row in levels[14 * t : 14 * t + 14]] == frame["level_survived"]
-        assert (frame["cut_all"] is None) == (frame["survivors"] > 0)
+        assert (frame["cut_all"] is None) == (frame["survivors"] > 0) and frame["problem"] is None
+        assert frame["level_survived"][-1] == frame["survivors"] <= frame["level_reached"][-1]
         for reason in frame["reasons"]:
             key = reason["constraint"], reason["joint"]
             totals[key] = totals.get(key, 0) + reason["branches"]
+    broken = [frame["linked_breaks"] for frame in document["per_frame"]]
+    assert summary["frames_breaking"] == sum(map(bool, broken))
     assert totals == {(row["constraint"], row["joint"]): int(row["branches"]) for row in reasons}
     assert all(row["sentence"] for row in reasons)
     again = memo.read_lengths(tmp_path / "postures.json")
@@ -275,6 +286,25 @@ def test_a_chosen_frame_is_drawn_and_quiet_is_quiet(scene, tmp_path, memo_postur
     assert pictures[0] != pictures[1] and pictures[0][:4] == b"\x89PNG"
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_frame_of_which_nothing_is_known_is_drawn_too(scene, tmp_path, memo_posture):
+    folder, _ = scene
+    rows = [line.split(",") for line in (folder / "walk.csv").read_text().splitlines()]
+    rows[6][1:] = [""] * (len(rows[6]) - 1)
+    (tmp_path / "gap.csv").write_text("\n".join(",".join(row) for row in rows))
+    arguments = (
+        tmp_path / "gap.csv",
+        "--camera",
+        folder / "camera.toml",
+        "--fps",
+        RATE_HZ,
+        "--out",
+        tmp_path,
+    )
+    code, _, complaint = memo_posture(*arguments, "--frame", "5")
+    assert (code, complaint) == (0, "") and (tmp_path / "postures.png").is_file()
+
+
 def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     """In mid-stride nobody stands."""
     folder, truth = scene
@@ -286,6 +316,12 @@ def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     assert code == 3 and "postures left in 0: what is nearest to one" in said
     assert all(frame["cut_all"] and not frame["groups_m"] for frame in document["per_frame"])
     assert document["frames_in_motion"] == len(document["per_frame"]) > 3
+    assert all(
+        any("upright" in name or "straight" in name for name in frame["linked_breaks"])
+        for frame in document["per_frame"]
+    )
+    assert f"breaks a constraint in {len(document['per_frame'])}" in said
+    assert "moving direction" not in said  # no rule of standing asks for it
 
 
 def test_exchanged_sides_are_put_right_first(scene, tmp_path):
@@ -336,6 +372,8 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["walk.csv", "--layout", "BODY_25"], "leave the layout BODY_25 out"),
         (["walk.csv", "--person", "3"], "no frame has a person 3"),
         (["walk.csv", "--out", "walk.csv"], "cannot be written to"),
+        (["upside.csv"], "from the extent: the figure is upside down in this camera"),
+        (["upside.csv"], "from the trunk: no distance fits"),
     ],
     ids=lambda value: "_".join(value[1:]) if isinstance(value, list) else "",
 )
@@ -352,6 +390,7 @@ def test_mistakes_are_told_in_one_line(scene, tmp_path, monkeypatch, memo_postur
     (tmp_path / "short.csv").write_text("segment\nneck_to_pelvis\n")
     (tmp_path / "unknown.json").write_text(json.dumps(true_lengths(truth) | {"tail": 0.3}))
     (tmp_path / "broken.json").write_text('{"neck_to_pelvis": ')
+    write_table(tmp_path / "upside.csv", truth, change=lambda pixels: [0, SIZE[1]] + pixels * [1, -1])
     (tmp_path / "image.png").write_bytes(b"\x89PNG\xff\xfe")
     monkeypatch.chdir(tmp_path)
     defaults = {"--camera": folder / "camera.toml", "--fps": RATE_HZ, "--out": "out"}
@@ -387,6 +426,13 @@ def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
         ({"group_m": math.nan}, "group_m"),
         ({"moving_direction": (0.0, 0.0, 1.0)}, "moving_direction"),
         ({"distance_m": [4.0, 5.0]}, "40 times need as many distances"),
+        ({"distance_m": 1e300}, "distance_m must be 0.1 to 1000 m"),
+        ({"distance_m": 1e-300}, "distance_m must be 0.1 to 1000 m"),
+        ({"distance_m": math.nan}, "distance_m must be a distance"),
+        ({"distance_m": 5.0, "distance_sd_m": -5.0}, "distance_sd_m must be positive"),
+        ({"distance_sd_m": -5.0}, "distance_sd_m goes with distance_m, got -5 alone"),
+        ({"max_groups": -1}, "max_groups must be 0 to"),
+        ({"moving_direction": (1.0, 0.0)}, "moving_direction must be three numbers"),
     ],
     ids=lambda value: "_".join(value) if isinstance(value, dict) else "",
 )
@@ -396,6 +442,195 @@ def test_mistakes_in_python(scene, options, reason):
     with pytest.raises(ValueError, match=reason) as raised:
         memo.posture(folder / "walk.csv", camera, fps=RATE_HZ, **options)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"max_groups": 1.5}, "max_groups must be a whole number, got 1.5"),
+        ({"distance_m": "a"}, "distance_m must be a number or one for each frame, got a"),
+        ({"distance_m": [[4.0], [5.0, 6.0]]}, "distance_m must be a number or one"),
+        ({"distance_m": 4.0, "distance_sd_m": "b"}, "distance_sd_m must be a number, got b"),
+        ({"rules": None}, "rules must be a name, one of physical"),
+        ({"noise_px": "much"}, "noise_px must be a number, got much"),
+        ({"height_m": [1.8]}, "height_m must be a number"),
+        ({"moving_direction": "north"}, "moving_direction must be"),
+    ],
+    ids=lambda value: "_".join(value) if isinstance(value, dict) else "",
+)
+def test_wrong_types_in_python(scene, options, reason):
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    with pytest.raises(TypeError, match=reason) as raised:
+        memo.posture(folder / "walk.csv", camera, fps=RATE_HZ, **options)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("read", ["keypoints", "lengths", "linked", "folder"])
+def test_what_is_read_is_never_written_over(scene, tmp_path, memo_posture, read):
+    folder, _ = scene
+    keypoints, options = folder / "walk.csv", []
+    if read == "keypoints":
+        keypoints = tmp_path / "postures.csv"
+        keypoints.write_bytes((folder / "walk.csv").read_bytes())
+    elif read == "linked":
+        (tmp_path / "levels.csv").symlink_to(tmp_path / "walk.csv")
+        keypoints = tmp_path / "walk.csv"
+        keypoints.write_bytes((folder / "walk.csv").read_bytes())
+    elif read == "lengths":
+        lengths = (folder / "lengths.csv").read_text().splitlines()[1:]
+        (tmp_path / "postures.json").write_text(json.dumps(dict(row.split(",") for row in lengths)))
+        options = ["--lengths", tmp_path / "postures.json"]
+    else:
+        keypoints = tmp_path
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    arguments = (keypoints, "--camera", folder / "camera.toml", "--fps", "25", *options)
+    code, said, complaint = memo_posture(*arguments, "--out", tmp_path)
+    assert (code, said) == (1, "") and complaint.count("\n") == 1 and "write to another place" in complaint
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_distance_less_sure_than_long_is_none(scene, tmp_path, memo_posture):
+    """All joints in one pixel."""
+    folder, truth = scene
+    path = write_table(tmp_path / "dot.csv", truth[:8], change=lambda pixels: np.full_like(pixels, 400.0))
+    arguments = (path, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
+    code, said, complaint = memo_posture(*arguments, "--out", tmp_path / "out")
+    assert (code, complaint) == (3, "")
+    assert "postures left in 0: in the first, the distance of the neck is not known: " in said
+    assert "m says nothing" in said and "m away" not in said and "which way the limbs" not in said
+    document = json.loads((tmp_path / "out" / "postures.json").read_text())
+    for frame in document["per_frame"]:
+        assert frame["anchor_m"] is None and "not known" in frame["problem"] and frame["cut_all"] is None
+
+
+def test_nothing_is_decided_about_limbs_that_are_not_seen(scene, tmp_path, memo_posture):
+    folder, truth = scene
+    trunk = ["right_shoulder", "left_shoulder", "right_hip", "left_hip"]
+    options = ("--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", RATE_HZ)
+    options = (*options, "--distance", "5", "--out", tmp_path / "out")
+    header = (folder / "walk.csv").read_text().splitlines()[0].split(",")
+
+    def emptied(keep):
+        rows = [line.split(",") for line in (folder / "walk.csv").read_text().splitlines()[1:]]
+        names = [name.rsplit("_", 1)[0] for name in header]
+        for row in rows:
+            row[1:] = [x if name in keep else "" for name, x in zip(names[1:], row[1:], strict=True)]
+        (tmp_path / "some.csv").write_text("\n".join(",".join(row) for row in [header, *rows]))
+        return tmp_path / "some.csv"
+
+    code, said, complaint = memo_posture(emptied(trunk), *options)
+    assert (code, complaint) == (0, "") and "nothing is decided about limbs" in said
+    assert "which way the limbs point" not in said
+    path = write_table(tmp_path / "neck.csv", truth, names=JOINTS)
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    rows[1:] = [[*row[:3], *[""] * (len(row) - 3)] for row in rows[1:]]
+    path.write_text("\n".join(",".join(row) for row in rows))
+    code, said, complaint = memo_posture(path, *options)
+    assert (code, complaint) == (3, "")
+    assert "postures left in 0: in the first, nothing that hangs on the neck is seen" in said
+
+
+def test_points_beyond_the_picture_are_noticed(found, scene, tmp_path):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    assert not any("picture" in warning for warning in found.warnings)
+    path = write_table(tmp_path / "large.csv", truth, change=lambda pixels: 2 * pixels)
+    large = memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ)
+    (said,) = (warning for warning in large.warnings if "picture" in warning)
+    beyond = (np.nan_to_num(large.points_px) > np.array(SIZE) + 5.5).any(axis=-1).sum()
+    assert said.startswith(f"{beyond} of {large.points_px[..., 0].size} points") and "1280x720" in said
+
+
+def test_one_frame_has_no_way(scene, tmp_path):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    path = write_table(tmp_path / "one.csv", truth[:1])
+    said = " ".join(memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ).warnings)
+    assert "no way to take the moving direction from" in said and "NaN" not in said
+    standing = memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ, rules="standing")
+    assert not any("moving direction" in warning for warning in standing.warnings)
+
+
+def test_the_scale_is_said_to_be_of_the_ground_or_of_a_distance(scene, tmp_path, memo_posture):
+    folder, truth = scene
+    arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--out", tmp_path)
+    assert "by the feet on the ground;" in memo_posture(*arguments, "--no-plots")[1]
+    distance_m = np.linalg.norm(truth[:, AT["neck"]] - CAMERA_AT, axis=1).mean()
+    said = memo_posture(*arguments, "--no-plots", "--distance", distance_m)[1]
+    assert "Sizes rest on the distance from the camera that was given;" in said
+
+
+def test_bodies_that_cannot_be_are_told_whatever_the_rules(scene, tmp_path):
+    """Knees bent forwards: each is mirrored in the line from hip to ankle. Elbows are as they were, so that
+    somebody the other way round is as impossible."""
+    folder, truth = scene
+    bent = truth.copy()
+    for side in SIDES:
+        hip, knee, ankle = (truth[:, AT[f"{side}_{joint}"]] for joint in ("hip", "knee", "ankle"))
+        along = (ankle - hip) / np.linalg.norm(ankle - hip, axis=1, keepdims=True)
+        foot = hip + ((knee - hip) * along).sum(axis=1, keepdims=True) * along
+        bent[:, AT[f"{side}_knee"]] = 2 * foot - knee
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    distance_m = np.linalg.norm(truth[:, AT["neck"]] - CAMERA_AT, axis=1)
+    path = write_table(tmp_path / "bent.csv", bent)
+    known = {"lengths": true_lengths(truth), "distance_m": distance_m, "fps": RATE_HZ}
+    wrong = memo.posture(path, camera, **known, rules="physical")
+    right = memo.posture(folder / "walk.csv", camera, **known)
+    assert wrong.summary["frames_breaking"] > FRAMES // 2 > 10 > right.summary["frames_breaking"]
+    assert all(name.endswith("extension") for names in wrong.linked_breaks for name in names[:1])
+    (said,) = (warning for warning in wrong.warnings if "breaks a limit of bodies" in warning)
+    assert said.startswith(f"in {wrong.summary['frames_breaking']} of {FRAMES} frames")
+
+
+def test_frames_without_a_neck_are_a_problem_and_no_violation(scene):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    keypoints = memo.read_keypoints(folder / "walk.csv", fps=RATE_HZ)
+    points = keypoints.points.copy()
+    points[7] = np.nan
+    found = memo.posture(keypoints.replaced(points, keypoints.scores), camera, true_lengths(truth))
+    assert [t for t, problem in enumerate(found.problems) if problem] == [7] and found.survivors[7] == 0
+    assert found.problems[7] == "the neck is not seen" and found.cut_all[7] is None
+    assert found.group_counts[7] == 0
+
+
+def test_groups_are_counted_beyond_those_given(scene, tmp_path, found):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    few = memo.posture(
+        folder / "walk.csv", camera, true_lengths(truth), fps=RATE_HZ, noise_px=NOISE_PX, max_groups=2
+    )
+    assert max(few.group_counts) > 2 == max(map(len, few.group_sizes))
+    for count, sizes in zip(few.group_counts, few.group_sizes, strict=True):
+        assert len(sizes) == min(count, 2)
+    middle = project(truth).mean(axis=1, keepdims=True)
+    path = write_table(tmp_path / "far.csv", truth, change=lambda pixels: middle + 0.01 * (pixels - middle))
+    far = memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ)
+    is_large = far.survivors > 1024
+    assert is_large.any() and [count is None for count in far.group_counts] == is_large.tolist()
+    assert not far.all_groups_given[is_large].any()
+
+
+def test_sides_exchanged_in_all_frames_face_against_the_way(scene, tmp_path):
+    """Seen from the front, where the shoulders tell."""
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    truth = walker(heading_deg=-90)
+    other = [
+        name.replace("right", "LEFT").replace("left", "right").replace("LEFT", "left") for name in JOINTS
+    ]
+    said = {}
+    for name, figures in {"as_is": truth, "exchanged": truth[:, [AT[joint] for joint in other]]}.items():
+        path = write_table(tmp_path / f"{name}.csv", figures)
+        said[name] = " ".join(memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ).warnings)
+    assert "faces against the way" in said["exchanged"] and "faces against" not in said["as_is"]
+
+
+def test_help_says_whose_times_are_taken(memo_posture, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    code, said, _ = memo_posture("--help")
+    assert code == 0 and "taken instead of" in said
 
 
 def test_keypoints_read_before_are_taken_too(scene):

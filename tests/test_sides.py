@@ -68,6 +68,34 @@ def test_planted_exchanges_are_undone_and_reported(confused):
     assert all(0 <= row["probability"] <= 1 and row["reason"] for row in repair.flips)
 
 
+def test_an_exchange_that_is_a_guess_is_called_one(confused, tmp_path, memo_unswap):
+    """Every other frame is exchanged: motion tells them apart, no majority tells which half is right."""
+    path, truth = confused
+    points = truth.copy()
+    points[1::2] = truth[1::2].reshape(-1, 4, 2, 2)[:, :, ::-1].reshape(-1, 8, 2)
+    path = write_table(tmp_path / "half.csv", points)
+    repair = memo.unswap(read_keypoints(path, fps=25))
+    changed = (repair.keypoints.points != np.round(points, 2)).any(axis=(1, 2))
+    assert repair.exchanged == {"legs": 0} and repair.guessed == {"legs": int(changed.sum())} == {"legs": 30}
+    assert {row["verdict"] for row in repair.flips} == {"guessed", "undecided"}
+    assert repair.p_global["legs"] == pytest.approx(0.5, abs=0.1)
+    code, out, _ = memo_unswap(path, "--fps", 25, "--out", tmp_path / "out")
+    assert code == 0 and "legs in 0" in out and "as the best guess: legs in 30" in out
+    assert "what most frames say" in out
+
+
+def test_the_majority_is_what_is_taken_for_right(confused):
+    path, _ = confused
+    repair = memo.unswap(read_keypoints(path, fps=25))
+    assert repair.guessed == {"legs": 0} and repair.p_global["legs"] > 0.99
+
+
+def test_help_says_what_cannot_be_seen(memo_unswap, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    code, out, _ = memo_unswap("--help")
+    assert code == 0 and "in all frames, or most, cannot be seen" in out and "instead of" in out
+
+
 def test_keypoints_without_pairs_are_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("frame,nose_x,nose_y,left_knee_x,left_knee_y\n0,1,2,3,4\n")

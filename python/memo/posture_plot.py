@@ -1,4 +1,4 @@
-"""Plots of postures: what one view leaves of a frame, and the motion through all of them.
+"""Plots of postures: what one view leaves of a frame, and the motion over time.
 
 Every function draws into the Axes it is given and returns them; nothing is shown. `write_posture_plot` saves
 them in one PNG file. Right limbs are solid, left dashed.
@@ -146,7 +146,8 @@ def _view(postures: Postures, *shown: Array) -> tuple[Array, Array, Array]:
     """The camera, and horizontal unit vectors from it to the person and to its left."""
     camera = np.asarray(postures.camera.position)
     points = np.concatenate([part.reshape(-1, 3) for part in shown])
-    away = (np.nanmean(points, axis=0) - camera) * (1, 1, 0)
+    known = points[np.isfinite(points).all(axis=1)]
+    away = (known.mean(axis=0) - camera) * (1, 1, 0) if len(known) else np.zeros(3)
     length = np.linalg.norm(away)
     away = away / length if length > 1e-6 else np.array([0.0, 1.0, 0.0])
     return camera, away, np.array([-away[1], away[0], 0.0])

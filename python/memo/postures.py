@@ -33,6 +33,11 @@ ANCHORS = ("auto", "ground", "trunk", "extent", "head", "combined")
 
 _MAX_LENGTHS_FILE_BYTES = 64 << 20
 
+_LIMB_ENDS = ("elbow", "wrist", "knee", "ankle")
+
+_DISTANCES_M = (0.1, 1000.0)
+_MOST_GROUPS = 1 << 31
+
 _UNDECIDED_NATS = math.log(4)  # probabilities 0.8 and 0.2
 
 Array = npt.NDArray[np.float64]
@@ -124,13 +129,21 @@ class Postures:
     survivors: Whole
     """(T,) postures left in each frame."""
     groups_m: tuple[Array, ...]
-    """(T,) of (G, 14, 3) metres: one posture of each group of similar ones, the largest groups at most."""
+    """(T,) of (G, 14, 3) metres: one posture of each group of similar ones, at most the `max_groups` largest
+    groups; where more than 1024 postures are left, groups of up to 1024 of them, evenly spaced."""
     group_sizes: tuple[Whole, ...]
-    """(T,) of (G,): how many postures each group holds."""
+    """(T,) of (G,): how many of the postures that were grouped each group holds."""
+    group_counts: tuple[int | None, ...]
+    """(T,) how many groups there are, given or not; None where more than 1024 postures are left."""
     cut_all: tuple[tuple[str, ...] | None, ...]
     """(T,) where nothing is left: what the least violating posture violates, in sentences; else None."""
+    problems: tuple[str | None, ...]
+    """(T,) why a frame says nothing, such as a neck that is not seen; else None."""
     linked_m: Array
-    """(T, 14, 3) metres: the likeliest motion through the frames."""
+    """(T, 14, 3) metres: the likeliest motion. It takes either root of every segment and may pass limits at a
+    price, so that a frame's posture need not be among those left."""
+    linked_breaks: tuple[tuple[str, ...], ...]
+    """(T,) names of the constraints that the posture in the motion breaks."""
     smoothed_m: Array
     """(T, 14, 3) metres: the same, smoothed."""
     sd_m: Array
@@ -158,20 +171,21 @@ class Postures:
         return np.asarray(np.any(known, axis=1), np.bool_)
 
     @property
-    def group_counts(self) -> Whole:
-        """(T,) how many groups are given in each frame."""
-        return np.array([len(sizes) for sizes in self.group_sizes], np.int64)
-
-    @property
     def all_groups_given(self) -> npt.NDArray[np.bool_]:
         """(T,) whether there are no more groups than those given."""
-        members = np.array([sizes.sum() for sizes in self.group_sizes], np.int64)
-        return np.asarray(members == self.survivors, np.bool_)
+        given = [len(sizes) for sizes in self.group_sizes]
+        return np.array([own == count for own, count in zip(given, self.group_counts, strict=True)], np.bool_)
 
     @property
     def undecided(self) -> npt.NDArray[np.bool_]:
         """(T,) whether some joint may well be elsewhere: another motion has a probability over 0.2."""
         return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
+
+    @property
+    def limbs_known(self) -> bool:
+        """Whether the motion has the end of any limb's segment: an elbow, wrist, knee or ankle."""
+        limbs = [place for place, name in enumerate(self.joints) if name.endswith(_LIMB_ENDS)]
+        return bool(np.isfinite(self.smoothed_m[:, limbs]).any())
 
     def in_camera(self, points_m: Array) -> Array:
         """World points (..., 3) in the camera's axes: x right, y down, z forward, metres."""
@@ -212,7 +226,9 @@ class Postures:
                 "margin_nats": second.margin_nats,
                 "p": second.p,
             },
+            "frames_breaking": sum(map(bool, self.linked_breaks)),
             "exchanged": {} if self.repair is None else self.repair.exchanged,
+            "guessed": {} if self.repair is None else self.repair.guessed,
             "warnings": list(self.warnings),
         }
 
@@ -237,7 +253,10 @@ def posture(
     layout: str | None = None,
     person: int | None = None,
 ) -> Postures:
-    """All postures of a person that a view allows, and the likeliest motion through them.
+    """All postures of a person that a view allows, and the likeliest motion.
+
+    A segment can end at either of two places on its joint's line of sight. The motion takes one of them in
+    each frame; limits it may pass at a price, so it is not bound to the postures left (see `linked_breaks`).
 
     `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
@@ -245,17 +264,25 @@ def posture(
     `rules`: "physical", "walking", "walking-general" (what people do who walk in whatever way), "running" or
     "standing"; `strength`: "measured" limits or those of the "paper".
     `anchor`: where the distance of the neck comes from, "auto", "ground", "trunk", "extent", "head" or
-    "combined"; or `distance_m`, one number or (T,), with its standard deviation `distance_sd_m`.
+    "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN where unknown, with its standard
+    deviation `distance_sd_m` (0.05).
     `moving_direction`: (3,) world, where the person walks; else seen from the motion.
     `unswap`: exchange right and left first where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures are one group if no joint differs by
-    more; `max_groups`: so many groups a frame are given.
+    more; `max_groups`: so many groups a frame are given, the largest; `group_counts` says how many there are.
 
-    Raises ValueError, with one line, for what cannot be used.
+    Raises ValueError or TypeError, with one line, for what cannot be used.
     """
-    _check_known("rules", rules.replace("_", "-"), RULES)
+    _check_known("rules", rules, RULES)
     _check_known("strength", strength, STRENGTHS)
     _check_known("anchor", anchor, (*ANCHORS, "given"))
+    max_groups = _checked_count("max_groups", max_groups)
+    for name, value in (("height_m", height_m), ("noise_px", noise_px), ("group_m", group_m)):
+        if value is not None:
+            _checked_numbers(name, value, dimensions=0)
+    distance_m, distance_sd_m = _checked_distances(distance_m, distance_sd_m)
+    if moving_direction is not None:
+        moving_direction = _checked_direction(moving_direction)
     if lengths is not None and height_m is not None:
         raise ValueError("give either lengths or a height")
     if distance_m is None and anchor == "given":
@@ -297,8 +324,66 @@ def posture(
 
 
 def _check_known(what: str, value: str, known: Sequence[str]) -> None:
-    if value not in known:
-        raise ValueError(f"{what} must be one of {', '.join(known)}, got {value}")
+    if not isinstance(value, str):
+        raise TypeError(f"{what} must be a name, one of {', '.join(known)}, got {_shown(value)}")
+    if value.replace("_", "-") not in known:
+        raise ValueError(f"{what} must be one of {', '.join(known)}, got {_shown(value)}")
+
+
+def _shown(value: object) -> str:
+    return " ".join(str(value).split())[:60]
+
+
+def _checked_count(what: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{what} must be a whole number, got {_shown(value)}")
+    if not 0 <= value <= _MOST_GROUPS:
+        raise ValueError(f"{what} must be 0 to {_MOST_GROUPS}, got {value}")
+    return int(value)
+
+
+def _checked_numbers(what: str, value: Any, dimensions: int) -> Array:
+    """Numbers in an array of at most so many dimensions."""
+    try:
+        numbers = np.asarray(value)
+        is_numeric = numbers.dtype.kind in "iuf"
+    except ValueError:  # rows of different lengths
+        is_numeric = False
+    if not is_numeric or numbers.ndim > dimensions:
+        wanted = "a number or one for each frame" if dimensions else "a number"
+        raise TypeError(f"{what} must be {wanted}, got {_shown(value)}")
+    return numbers.astype(np.float64)
+
+
+def _checked_distances(distance_m: Any, distance_sd_m: float | None) -> tuple[Any, float | None]:
+    if distance_sd_m is not None:
+        sd_m = float(_checked_numbers("distance_sd_m", distance_sd_m, dimensions=0))
+        if distance_m is None:
+            raise ValueError(f"distance_sd_m goes with distance_m, got {sd_m:g} alone")
+        if not 0 < sd_m <= _DISTANCES_M[1]:
+            raise ValueError(
+                f"distance_sd_m must be positive and at most {_DISTANCES_M[1]:g} m, got {sd_m:g}"
+            )
+        distance_sd_m = sd_m
+    if distance_m is None:
+        return None, None
+    distances_m = _checked_numbers("distance_m", distance_m, dimensions=1)
+    if distances_m.ndim == 0 and np.isnan(distances_m):
+        raise ValueError("distance_m must be a distance, got nan")
+    least_m, most_m = _DISTANCES_M
+    wrong = distances_m[~np.isnan(distances_m) & ~((distances_m >= least_m) & (distances_m <= most_m))]
+    if wrong.size:
+        raise ValueError(
+            f"distance_m must be {least_m:g} to {most_m:g} m (NaN: unknown), got {wrong.flat[0]:g}"
+        )
+    return (distances_m if distances_m.ndim else float(distances_m)), distance_sd_m
+
+
+def _checked_direction(direction: Any) -> list[float]:
+    numbers = _checked_numbers("moving_direction", direction, dimensions=1)
+    if numbers.shape != (3,):
+        raise ValueError(f"moving_direction must be three numbers, got {_shown(direction)}")
+    return [float(number) for number in numbers]
 
 
 def _detector(keypoints: Keypoints) -> str | list[str]:
@@ -367,8 +452,11 @@ def _named(
         survivors=_whole(found["survivors"]),
         groups_m=tuple(np.asarray(groups).reshape(-1, 14, 3) for groups in found["groups"]),
         group_sizes=tuple(_whole(sizes) for sizes in found["group_sizes"]),
+        group_counts=tuple(found["group_counts"]),
+        problems=tuple(found["problems"]),
         cut_all=tuple(None if why is None else tuple(why) for why in found["cut_all"]),
         linked_m=found["linked"],
+        linked_breaks=tuple(map(tuple, found["linked_breaks"])),
         smoothed_m=found["smoothed"],
         sd_m=found["sd_m"],
         gap_m=found["gap_m"],
@@ -471,6 +559,10 @@ _TENTH_MM = 4
 """Digits of metres in postures.json."""
 
 
+#: What `write_postures` writes.
+WRITTEN = ("postures.csv", "postures_camera.csv", "levels.csv", "reasons.csv", "postures.json")
+
+
 def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
     """Writes postures.csv, postures_camera.csv, levels.csv, reasons.csv and postures.json into a folder."""
     out = Path(out)
@@ -487,12 +579,13 @@ def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
 
 
 def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """A row a frame: the smoothed motion in the world, and how sure it is."""
+    """A row a frame: the smoothed motion in the world, and how sure it is; `groups` empty where unknown."""
     columns: dict[str, npt.ArrayLike] = {
         "frame": postures.frames,
         "time_s": postures.times_s,
         "survivors": postures.survivors,
-        "groups": postures.group_counts,
+        "groups": np.array(["" if n is None else n for n in postures.group_counts], dtype=object),
+        "groups_given": np.array([len(sizes) for sizes in postures.group_sizes], np.int64),
         "margin_nats": postures.margin_nats,
         "anchor_m": postures.anchor_m,
         "anchor_sd_m": postures.anchor_sd_m,
@@ -572,9 +665,12 @@ def _frame_document(postures: Postures, row: int) -> dict[str, Any]:
         "level_without_root": postures.level_without_root[row],
         "reasons": [reason._asdict() for reason in postures.reasons[row]],
         "survivors": postures.survivors[row],
+        "group_count": postures.group_counts[row],
         "group_sizes": postures.group_sizes[row],
         "groups_m": np.round(postures.groups_m[row], _TENTH_MM),
         "cut_all": postures.cut_all[row],
+        "problem": postures.problems[row],
+        "linked_breaks": postures.linked_breaks[row],
         "margin_nats": postures.margin_nats[row],
         "linked_m": np.round(postures.linked_m[row], _TENTH_MM),
         "smoothed_m": np.round(postures.smoothed_m[row], _TENTH_MM),

@@ -33,15 +33,20 @@ class SideRepair:
     """Rows of `flips.csv`: one for every frame in which a group was exchanged, one for every run of frames in
     which it could not be decided; `probability` is that of having come exchanged."""
     exchanged: dict[str, int]
-    """How many frames were exchanged, by group."""
+    """How many frames were exchanged and are sure, by group."""
+    guessed: dict[str, int]
+    """How many frames were exchanged as the best guess only, by group."""
     undecided: dict[str, int]
-    """In how many frames the labels are only the best guess, by group."""
+    """In how many frames the labels are only the best guess, exchanged or not, by group."""
+    p_global: dict[str, float]
+    """Probability, by group, that the side most labels name is right, as far as their majority tells."""
 
 
 def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> SideRepair:
     """Exchanges right and left, in legs and arms apart, where the motion shows that they were confused.
 
-    Which leg is the left one is what most frames say. Nothing is moved, made up or removed.
+    It mends changes over time only: which leg is the left one is what most frames say, so labels exchanged in
+    all frames, or most, cannot be seen by it. Nothing is moved, made up or removed.
     """
     pairs = {group: levels for group in groups if (levels := _levels(keypoints.names, group))}
     if not pairs:
@@ -51,7 +56,7 @@ def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> Si
         )
     # AlphaPose's older scores go to 6; the core weights within 0 to 1.
     weights = np.clip(keypoints.scores, 0, 1)
-    found = _memo.unswap(keypoints.times_s, keypoints.points, weights, groups=pairs)["groups"]
+    found = _memo.unswap(keypoints.times_s, keypoints.points, weights, groups=pairs)
     points, scores = keypoints.points.copy(), keypoints.scores.copy()
     for group, levels in pairs.items():
         for level, at in enumerate(levels.values()):
@@ -59,12 +64,16 @@ def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> Si
             for left, right in at:
                 points[rows, [left, right]] = points[rows, [right, left]]
                 scores[rows, [left, right]] = scores[rows, [right, left]]
+    exchanged = {group: found[group]["level_flipped"].any(axis=1) for group in pairs}
+    decided = {group: found[group]["decided"] for group in pairs}
     flips = [row for group in pairs for row in _rows(keypoints, group, found[group])]
     return SideRepair(
         keypoints=keypoints.replaced(points, scores),
         flips=sorted(flips, key=lambda row: (row["frame"], row["group"], row["verdict"])),
-        exchanged={group: int(found[group]["level_flipped"].any(axis=1).sum()) for group in pairs},
-        undecided={group: int((~found[group]["decided"]).sum()) for group in pairs},
+        exchanged={group: int((exchanged[group] & decided[group]).sum()) for group in pairs},
+        guessed={group: int((exchanged[group] & ~decided[group]).sum()) for group in pairs},
+        undecided={group: int((~decided[group]).sum()) for group in pairs},
+        p_global={group: float(found[group]["p_global"]) for group in pairs},
     )
 
 
@@ -94,7 +103,8 @@ def _rows(keypoints: Keypoints, group: str, found: dict[str, Any]) -> Iterator[d
 
     for t in np.flatnonzero(flipped.any(axis=1)).tolist():
         levels = [name for name, own in zip(found["levels"], flipped[t], strict=True) if own]
-        yield row(t, t, t, levels, "flipped", float(probability[t][flipped[t]].min()))
+        verdict = "flipped" if found["decided"][t] else "guessed"
+        yield row(t, t, t, levels, verdict, float(probability[t][flipped[t]].min()))
     doubt = np.flatnonzero(~found["decided"])
     for run in np.split(doubt, np.flatnonzero(np.diff(doubt) > 1) + 1):
         if len(run):

@@ -147,7 +147,7 @@ fn the_scale_is_told_from_where_it_is() {
             "{}: trunk + leg {truth:.3} m, with the ground {found:.3}, assumed {assumed:.3}; scale {:.3} sd {:.3} from {:?}",
             walk.name, fit.scale, fit.scale_sd, fit.scale_from
         );
-        assert_eq!(fit.scale_from, ScaleFrom::Distance);
+        assert_eq!(fit.scale_from, ScaleFrom::Ground);
         ratios.push((found / truth - 1.0, assumed / truth - 1.0));
         let blind = estimate_from_sequence(&rays, None, &prior, &options).unwrap();
         assert_eq!(blind.scale_from, ScaleFrom::Assumed);

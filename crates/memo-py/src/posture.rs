@@ -149,6 +149,9 @@ fn anchor_choice(name: &str, distance_m: Option<Distances>, sd_m: Option<f64>) -
     };
     let names = ["auto", "ground", "trunk", "extent", "head", "combined", "given"];
     let choice = named("anchor", name, of_source, &names)?;
+    if let (None, Some(sd_m)) = (&distance_m, sd_m) {
+        return Err(PyValueError::new_err(format!("distance_sd_m goes with distance_m; got {sd_m} alone")));
+    }
     match (choice, distance_m) {
         (AnchorChoice::Given { .. } | AnchorChoice::Auto, Some(distances)) => Ok(AnchorChoice::Given {
             distance_m: match distances {
@@ -235,17 +238,21 @@ fn set_frames(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()>
     dict.set_item("reason_totals", totals)?;
     let survivors = found.frames.iter().map(|f| f.as_ref().map_or(0, |f| f.survivors() as i64)).collect();
     dict.set_item("survivors", numpy_from_column::<i64>(py, survivors))?;
-    let (mut groups, mut sizes, mut cut_all) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut groups, mut sizes) = (Vec::new(), Vec::new());
     for frame in &found.frames {
         let of_frame = frame.as_ref().map_or(&[][..], |frame| &frame.groups);
         let figures: Vec<StickFigure> = of_frame.iter().map(|group| group.figure).collect();
         groups.push(numpy_from_figures(py, &figures)?);
         sizes.push(numpy_from_column(py, of_frame.iter().map(|group| group.size as i64).collect()));
-        cut_all.push(match frame {
-            Ok(frame) => frame.cut_all(),
-            Err(problem) => Some(vec![problem.to_string()]),
-        });
     }
+    let group_counts: Vec<Option<usize>> =
+        found.frames.iter().map(|frame| frame.as_ref().map_or(Some(0), |frame| frame.group_count)).collect();
+    let cut_all: Vec<Option<Vec<String>>> =
+        found.frames.iter().map(|frame| frame.as_ref().ok().and_then(FrameReading::cut_all)).collect();
+    let problems: Vec<Option<String>> =
+        found.frames.iter().map(|frame| frame.as_ref().err().map(ToString::to_string)).collect();
+    dict.set_item("problems", problems)?;
+    dict.set_item("group_counts", group_counts)?;
     dict.set_item("groups", groups)?;
     dict.set_item("group_sizes", sizes)?;
     dict.set_item("cut_all", cut_all)
@@ -262,6 +269,9 @@ fn set_linked(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()>
     dict.set_item("margin", numpy_from_column(py, linked.margin.clone()))?;
     let mirrored = |t: usize| Joint::ALL.map(|joint| linked.probability_mirrored(t, joint));
     dict.set_item("p_mirrored", numpy_from_rows(py, (0..linked.figures.len()).map(mirrored).collect())?)?;
+    let breaks: Vec<Vec<String>> =
+        found.linked_breaks.iter().map(|broken| broken.iter().map(|c| c.name()).collect()).collect();
+    dict.set_item("linked_breaks", breaks)?;
     let second = linked.second.as_ref().map(|second| -> PyResult<_> {
         let dict = PyDict::new(py);
         let joints: Vec<&str> = second.joints.iter().map(|&joint| Joint::name(joint)).collect();

@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 
 /// Undoes exchanges of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN where
 /// missing, scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk
-/// outwards. Returns points, scores and, per limb, arrays over frames.
+/// outwards. Returns, per limb, arrays over frames and `p_global`, the probability that most labels are right.
 #[pyfunction]
 #[pyo3(signature = (
     times_s, points, scores=None, *, groups, as_is_nats=None, partial_begin_nats=None,
@@ -48,7 +48,7 @@ pub fn unswap<'py>(
         scores: scores.as_deref(),
     };
     let found = py.detach(|| core_unswap(&keypoints, &groups, &options)).map_err(value_error)?;
-    dict_from_unswapped(py, found, &groups, [track.frames, track.joints])
+    dict_from_unswapped(py, found, &groups)
 }
 
 /// Limbs in the order given.
@@ -73,20 +73,12 @@ fn dict_from_unswapped<'py>(
     py: Python<'py>,
     found: Unswapped,
     groups: &[LimbGroup],
-    shape: [usize; 2],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let [frames, joints] = shape;
-    let result = PyDict::new(py);
-    let points: Vec<f64> = found.points_px.into_iter().flatten().collect();
-    result.set_item("points", points.into_pyarray(py).reshape([frames, joints, 2])?)?;
-    let scores = found.scores.map(|scores| scores.into_pyarray(py).reshape([frames, joints])).transpose()?;
-    result.set_item("scores", scores)?;
     let of_groups = PyDict::new(py);
     for (group, found) in groups.iter().zip(&found.groups) {
         of_groups.set_item(&group.name, dict_from_group(py, group, found)?)?;
     }
-    result.set_item("groups", of_groups)?;
-    Ok(result)
+    Ok(of_groups)
 }
 
 fn dict_from_group<'py>(
@@ -97,12 +89,7 @@ fn dict_from_group<'py>(
     let verdicts = &found.verdicts;
     let shape = [verdicts.len(), group.levels.len()];
     let result = PyDict::new(py);
-    let flags = |of: fn(&memo_core::posture::unswap::Verdict) -> bool| {
-        numpy_from_column(py, verdicts.iter().map(of).collect())
-    };
-    result.set_item("flipped", flags(|v| v.flipped))?;
-    result.set_item("partial", flags(|v| v.partial))?;
-    result.set_item("decided", flags(|v| v.decided))?;
+    result.set_item("decided", numpy_from_column(py, verdicts.iter().map(|v| v.decided).collect()))?;
     let probability = verdicts.iter().map(|v| v.probability).collect();
     result.set_item("p_flipped", numpy_from_column(py, probability))?;
     let reasons: Vec<String> = verdicts.iter().map(|v| v.describe(group)).collect();
@@ -113,12 +100,6 @@ fn dict_from_group<'py>(
     result.set_item("level_flipped", flipped.into_pyarray(py).reshape(shape)?)?;
     let p: Vec<f64> = verdicts.iter().flat_map(|v| v.level_probability.iter().copied()).collect();
     result.set_item("level_p_flipped", p.into_pyarray(py).reshape(shape)?)?;
-    let runs: Vec<(usize, usize, f64, f64)> =
-        found.runs.iter().map(|r| (r.start, r.end, r.probability, r.gap_before_s)).collect();
-    result.set_item("runs", runs)?;
     result.set_item("p_global", found.global_probability)?;
-    result.set_item("noise_px", found.noise_px)?;
-    let left_out: Vec<(usize, usize)> = found.left_out.iter().map(|&[frame, left]| (frame, left)).collect();
-    result.set_item("left_out", left_out)?;
     Ok(result)
 }

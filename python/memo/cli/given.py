@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,20 @@ def checked_height(height_m: float) -> float:
     if not (math.isfinite(height_m) and 0.5 <= height_m <= 2.5):
         raise InputError(f"--height {height_m:g} is not the height of a person in metres (0.5 to 2.5)")
     return height_m
+
+
+def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
+    """Refuses to write over what is read, by whatever name or link, or into a folder that is read."""
+    for file in written:
+        for source in read:
+            if source is None:
+                continue
+            if file.resolve() == source.resolve() or (
+                file.exists() and source.exists() and file.samefile(source)
+            ):
+                raise InputError(f"{file}: is what was read; write to another place")
+            if source.is_dir() and file.parent.resolve() == source.resolve():
+                raise InputError(f"{source}: is the folder that was read; write to another place")
 
 
 def check_writable(out: Path) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_writable, checked_height, load_camera
+from memo.cli.given import check_apart, check_writable, checked_height, load_camera
 from memo.cli.unswap import exchanges
-from memo.postures import write_postures
+from memo.postures import WRITTEN, write_postures
 
 if TYPE_CHECKING:
     import typer
@@ -27,7 +27,8 @@ _DRAWN = "postures.png"
 _SCALES = {
     "lengths": "the lengths given",
     "height": "the height given",
-    "distance": "the distance from the camera",
+    "ground": "the distance from the camera by the feet on the ground",
+    "distance": "the distance from the camera that was given",
     "assumed": "the height of an average adult, assumed",
 }
 _SOURCES = {
@@ -97,7 +98,8 @@ def add_posture(app: "typer.Typer") -> None:
             float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
         ] = 2.0,
         fps: Annotated[
-            float | None, typer.Option(help="Frame rate; needed where no times are given.")
+            float | None,
+            typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
         ] = None,
         layout: Annotated[
             str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
@@ -116,7 +118,10 @@ def add_posture(app: "typer.Typer") -> None:
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Finds the postures in 3D that KEYPOINTS allow, and the likeliest motion through them."""
+        """Finds the postures in 3D that KEYPOINTS allow, and the likeliest motion.
+
+        The motion may break a limit at a price: it need not go through the postures that are left.
+        """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
         reading = {"fps": fps, "layout": layout, "person": person}
@@ -130,6 +135,7 @@ def add_posture(app: "typer.Typer") -> None:
 
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
+            check_apart([keypoints, camera, lengths], [delivery.out / name for name in (*WRITTEN, _DRAWN)])
             calibrated = load_camera(camera, camera_name)
             return _posture(keypoints, reading, calibrated, scale | options, frame, delivery)
 
@@ -196,19 +202,31 @@ def _frames_line(postures: memo.Postures) -> str:
     left = postures.survivors > 0
     line = f"{_counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
     if left.any():
-        groups = _counted(round(np.median(postures.group_counts[left])), "group")
-        more = "" if np.median(postures.all_groups_given[left]) else " or more"
-        line += f", median {np.median(postures.survivors[left]):.0f} in {groups}{more}"
-    else:
-        line += _why_none(postures)
+        counts = [
+            (len(sizes), True) if count is None else (count, False)
+            for count, sizes in zip(postures.group_counts, postures.group_sizes, strict=True)
+        ]
+        middle, is_more = sorted(counts[row] for row in np.flatnonzero(left))[left.sum() // 2]
+        groups = _counted(middle, "group") + " or more" * is_more
+        line += f", median {np.median(postures.survivors[left]):.0f} in {groups}"
+    line += _why_none(postures)
+    breaking = sum(map(bool, postures.linked_breaks))
+    if breaking:
+        line += f"; the posture in the motion breaks a constraint in {breaking}"
     if postures.repair is not None and any(postures.repair.exchanged.values()):
         line += f"; right and left exchanged: {exchanges(postures.repair)}"
     return f"{line}."
 
 
 def _why_none(postures: memo.Postures) -> str:
+    """Of frames without a posture: what is in the way in the first, where that is all there is to say."""
+    if (postures.survivors > 0).any():
+        return ""
     why = next((why for why in postures.cut_all if why), None)
-    return "" if why is None else f": what is nearest to one, in the first, breaks {', '.join(why)}"
+    if why is not None:
+        return f": what is nearest to one, in the first, breaks {', '.join(why)}"
+    problem = next((problem for problem in postures.problems if problem), None)
+    return "" if problem is None else f": in the first, {problem}"
 
 
 def _reason_line(postures: memo.Postures) -> list[str]:
@@ -233,6 +251,8 @@ def _scale_line(postures: memo.Postures) -> str:
 
 def _second_line(postures: memo.Postures) -> str:
     second = postures.second
+    if not postures.limbs_known:
+        return "No elbow, wrist, knee or ankle is known: nothing is decided about limbs."
     if second is None:
         return "No other motion is there: which way the limbs point in depth is decided."
     joints = " and ".join(joint.replace("_", " ") for joint in second.joints)

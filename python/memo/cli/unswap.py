@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_writable
+from memo.cli.given import check_apart, check_writable
 from memo.files import write_flips_csv
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ def add_unswap(app: "typer.Typer") -> None:
             Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
         ],
         fps: Annotated[
-            float | None, typer.Option(help="Frame rate; needed where no times are given.")
+            float | None,
+            typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
         ] = None,
         layout: Annotated[
             str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
@@ -39,7 +40,10 @@ def add_unswap(app: "typer.Typer") -> None:
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Exchanges right and left in KEYPOINTS where a detector confused them."""
+        """Exchanges right and left in KEYPOINTS where a detector confused them for a time.
+
+        Labels that are exchanged in all frames, or most, cannot be seen by it.
+        """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
         options = {"fps": fps, "layout": layout, "person": person}
         raise typer.Exit(guarded(lambda: _unswap(keypoints, options, delivery)))
@@ -47,21 +51,41 @@ def add_unswap(app: "typer.Typer") -> None:
 
 def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
     check_writable(delivery.out)
+    written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
     with with_elapsed("looking at right and left", delivery):
         repair = memo.unswap(memo.read_keypoints(path, **options))
-        written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
+        check_apart([path], written)
         if written[0].name == written[1].name:
             raise InputError(f"{path}: is called as the table of changes; rename it")
         repair.keypoints.write(written[0])
         write_flips_csv(written[1], repair.flips)
     frames = len(repair.keypoints.frames)
-    summary = {"frames": frames, "exchanged": repair.exchanged, "undecided": repair.undecided}
-    delivery.tell(summary, [f"Right and left exchanged, of {frames} frames: {exchanges(repair)}."], written)
+    summary = {
+        "frames": frames,
+        "exchanged": repair.exchanged,
+        "guessed": repair.guessed,
+        "undecided": repair.undecided,
+        "p_global": repair.p_global,
+    }
+    line = f"Right and left exchanged, of {frames} frames: {exchanges(repair)}; {_majority(repair)}."
+    delivery.tell(summary, [line], written)
     return Exit.DONE
 
 
 def exchanges(repair: memo.SideRepair) -> str:
     """How many frames were exchanged and how many are in doubt, in words."""
-    done = " and ".join(f"{group} in {frames}" for group, frames in repair.exchanged.items())
-    doubt = " and ".join(f"{group} in {frames}" for group, frames in repair.undecided.items() if frames)
+    done = _by_group(repair.exchanged)
+    doubt = _by_group({group: frames for group, frames in repair.undecided.items() if frames})
+    guessed = _by_group({group: frames for group, frames in repair.guessed.items() if frames})
+    doubt += f", exchanged as the best guess: {guessed}" if guessed else ""
     return f"{done} ({f'undecided: {doubt}' if doubt else 'none undecided'})"
+
+
+def _by_group(frames: dict[str, int]) -> str:
+    return " and ".join(f"{group} in {count}" for group, count in frames.items())
+
+
+def _majority(repair: memo.SideRepair) -> str:
+    """What the repair takes for granted."""
+    sure = " and ".join(f"{group} {p:.0%}" for group, p in repair.p_global.items())
+    return f"which side is right is what most frames say (by their majority alone {sure})"

@@ -33,7 +33,9 @@ pub enum LengthBasis {
 pub enum ScaleFrom {
     /// The body height that was given.
     BodyHeight,
-    /// The distance of the person, known otherwise than by these lengths: ground, or given.
+    /// The distance of the person by the feet on the ground.
+    Ground,
+    /// The distance of the person that was given.
     Distance,
     /// Nothing: an adult of mean height is assumed.
     Assumed,
@@ -183,14 +185,14 @@ const DEPTH_SD: f64 = 0.03;
 /// Lengths from rays and distances of the neck.
 ///
 /// `up` is the vertical in camera axes, if known: joints are then taken to lie in the vertical plane across the
-/// view through the neck, else in the plane across the neck's ray. `is_scale_seen` says that the anchors
-/// do not rest on the prior's lengths alone (ground or given, not trunk).
+/// view through the neck, else in the plane across the neck's ray. `scale_in_anchors` says whence anchors that
+/// do not rest on the prior's lengths alone have their scale (ground or given distance; none: trunk).
 pub fn estimate(
     rays: &[JointRays],
     anchors: &[Option<Anchor>],
     up: Option<DVec3>,
     prior: &LengthPrior,
-    is_scale_seen: bool,
+    scale_in_anchors: Option<ScaleFrom>,
 ) -> Result<LengthFit, LengthFitError> {
     if rays.len() != anchors.len() {
         return Err(LengthFitError::Counts { frames: rays.len(), anchors: anchors.len() });
@@ -210,19 +212,17 @@ pub fn estimate(
         .map(|group| group.pairs.iter().map(|&pair| envelope(&frames, pair, up, scatter)).collect())
         .collect();
     let pooled: Vec<f64> = seen.iter().map(|sides| mean_of_seen(sides)).collect();
-    let (scale, scale_sd) =
-        if is_scale_seen { scale_seen(&pooled, prior, relative_sd(&frames)) } else { (1.0, prior.scale_sd) };
+    let (scale, scale_sd) = match scale_in_anchors {
+        Some(_) => scale_seen(&pooled, prior, relative_sd(&frames)),
+        None => (1.0, prior.scale_sd),
+    };
     let mut fit = LengthFit {
         lengths: prior.lengths,
         estimates: Vec::new(),
         sd_m: PerJoint::default(),
         scale,
         scale_sd,
-        scale_from: if is_scale_seen && scale_sd < 0.8 * prior.scale_sd {
-            ScaleFrom::Distance
-        } else {
-            prior.scale_from
-        },
+        scale_from: scale_in_anchors.filter(|_| scale_sd < 0.8 * prior.scale_sd).unwrap_or(prior.scale_from),
     };
     for ((group, sides), pooled) in GROUPS.iter().zip(&seen).zip(&pooled) {
         let expected = scale * length_of(&prior.lengths, group.pairs[0]);
@@ -280,7 +280,7 @@ pub fn estimate_from_sequence(
         if anchors.iter().all(Option::is_none) {
             return Err(error.into());
         }
-        let found = estimate(&rays, &anchors, up, prior, ground.is_some())?;
+        let found = estimate(&rays, &anchors, up, prior, ground.map(|_| ScaleFrom::Ground))?;
         lengths = found.lengths;
         options.scale_sd = found.scale_sd;
         fit = Some(found);
@@ -461,7 +461,7 @@ mod tests {
     #[test]
     fn too_little_is_refused() {
         let prior = LengthPrior::from_height(Some(1.75)).unwrap();
-        assert_eq!(estimate(&[], &[], None, &prior, true), Err(LengthFitError::TooFewFrames { frames: 0 }));
+        assert_eq!(estimate(&[], &[], None, &prior, None), Err(LengthFitError::TooFewFrames { frames: 0 }));
         let options = AnchorOptions::default();
         assert!(matches!(
             estimate_from_sequence(&[], None, &prior, &options),

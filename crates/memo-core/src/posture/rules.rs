@@ -152,11 +152,9 @@ impl Tolerance {
     }
 }
 
-/// A named set of rules.
+/// A set of rules.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionModel {
-    /// Name in tables.
-    pub name: String,
     /// Tolerances of the rules that apply, in the order of [`Rule::ALL`].
     pub tolerances: [Option<Tolerance>; RULE_COUNT],
     /// A knee flexed by more is flexed for [`Rule::OtherLegUpright`], radians.
@@ -167,13 +165,8 @@ pub struct MotionModel {
 
 impl MotionModel {
     /// A model without rules.
-    pub fn new(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            tolerances: [None; RULE_COUNT],
-            knee_flexed_rad: 40f64.to_radians(),
-            noise_factor: 1.0,
-        }
+    pub fn without_rules() -> Self {
+        Self { tolerances: [None; RULE_COUNT], knee_flexed_rad: 40f64.to_radians(), noise_factor: 1.0 }
     }
 
     /// Rules 1 to 5 at tolerances that true walking keeps.
@@ -189,7 +182,7 @@ impl MotionModel {
 
     /// Rules 1 and 2 alone, at tolerances that true walking keeps.
     pub fn walking_general() -> Self {
-        Self::new("walking")
+        Self::without_rules()
             .with(Rule::ArmsOpposed, Tolerance::from_deg(15.0))
             .with(Rule::LegsOpposed, Tolerance::from_deg(20.0))
             .with(Rule::ArmOpposesLeg, Tolerance::from_deg(15.0))
@@ -212,14 +205,14 @@ impl MotionModel {
     pub fn walking_general_paper() -> Self {
         let model = [Rule::ArmsOpposed, Rule::LegsOpposed, Rule::ArmOpposesLeg]
             .into_iter()
-            .fold(Self::new("walking"), |model, rule| model.with(rule, Tolerance::from_deg(10.0)));
+            .fold(Self::without_rules(), |model, rule| model.with(rule, Tolerance::from_deg(10.0)));
         Self { noise_factor: 0.0, ..model }
     }
 
     /// An example, not measured on running: arms and legs oppose each other, limbs stay in the moving plane;
     /// both knees may be flexed and no leg need be upright.
     pub fn running() -> Self {
-        Self::new("running")
+        Self::without_rules()
             .with(Rule::ArmsOpposed, Tolerance::from_deg(25.0))
             .with(Rule::LegsOpposed, Tolerance::from_deg(30.0))
             .with(Rule::ArmOpposesLeg, Tolerance::from_deg(25.0))
@@ -229,7 +222,7 @@ impl MotionModel {
 
     /// An example, not measured: both legs upright, both knees straight; the arms are free.
     pub fn standing() -> Self {
-        Self::new("standing")
+        Self::without_rules()
             .with(Rule::LegsUpright, Tolerance::from_deg(15.0))
             .with(Rule::KneesStraight, Tolerance::from_deg(30.0))
     }
@@ -237,12 +230,6 @@ impl MotionModel {
     /// The same with a rule.
     pub fn with(mut self, rule: Rule, tolerance: Tolerance) -> Self {
         self.tolerances[rule as usize] = Some(tolerance);
-        self
-    }
-
-    /// The same without a rule.
-    pub fn without(mut self, rule: Rule) -> Self {
-        self.tolerances[rule as usize] = None;
         self
     }
 

@@ -128,7 +128,7 @@ pub enum AnchorError {
         missing: &'static str,
     },
     /// What is seen fits no distance.
-    #[error("no neck from the {}: no distance between {nearest_m:.2} and {farthest_m:.2} m fits", source_name.name())]
+    #[error("no neck from the {}: no distance{} fits", source_name.name(), between(*nearest_m, *farthest_m))]
     NothingFits {
         /// The source.
         source_name: AnchorSource,
@@ -136,6 +136,12 @@ pub enum AnchorError {
         nearest_m: f64,
         /// Farthest distance tried, metres.
         farthest_m: f64,
+    },
+    /// The feet are above the neck.
+    #[error("no neck from the {}: the figure is upside down in this camera, feet above the neck", source_name.name())]
+    UpsideDown {
+        /// The source.
+        source_name: AnchorSource,
     },
     /// There is nothing to combine or to follow.
     #[error("no anchor given")]
@@ -164,6 +170,15 @@ pub enum AnchorError {
         /// The later time.
         after_s: f64,
     },
+}
+
+/// The range that was tried, where it is one.
+fn between(nearest_m: f64, farthest_m: f64) -> String {
+    if farthest_m.is_finite() {
+        format!(" between {nearest_m:.2} and {farthest_m:.2} m")
+    } else {
+        String::new()
+    }
 }
 
 /// The ground and the vertical in camera axes.
@@ -323,6 +338,9 @@ pub fn from_extent(
     let c = n.dot(f);
     let w = (n - c * f) / ((1.0 - c) * (1.0 + c));
     let distance_m = rise * w.dot(up);
+    if distance_m < 0.0 {
+        return Err(AnchorError::UpsideDown { source_name: AnchorSource::Extent });
+    }
     positive("distance of the neck by the extent", distance_m)?;
     let across = (w.length_squared() - w.dot(up).powi(2)).max(0.0).sqrt();
     let scale = distance_m * options.scale_sd;

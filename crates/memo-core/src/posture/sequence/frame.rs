@@ -4,7 +4,7 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::figure_in_world;
-use super::neck::Scene;
+use super::neck::{NeckTrack, Scene};
 use crate::posture::constraint::Constraint;
 use crate::posture::group::group;
 use crate::posture::skeleton::{Joint, StickFigure};
@@ -19,6 +19,17 @@ pub enum FrameProblem {
     /// Nor is there a posture without its distance.
     #[error("the distance of the neck is not known")]
     NoDistance,
+    /// The distance found is less than its standard deviation.
+    #[error("the distance of the neck is not known: {distance_m:.2} ± {sd_m:.2} m says nothing")]
+    VagueDistance {
+        /// The distance, metres.
+        distance_m: f64,
+        /// Its standard deviation, metres.
+        sd_m: f64,
+    },
+    /// No joint that begins at the neck is seen, so that there is no figure.
+    #[error("nothing that hangs on the neck is seen")]
+    NeckAlone,
     /// The tree refuses the view.
     #[error(transparent)]
     Tree(TreeError),
@@ -68,19 +79,26 @@ pub const MOST_GROUPED: usize = 1024;
 pub(super) fn read(
     scene: &Scene,
     options: &TreeOptions,
+    track: &NeckTrack,
     neck: DVec3,
-    neck_sd_m: f64,
     t: usize,
 ) -> Result<FrameReading, FrameProblem> {
     let rays = scene.rays[t];
     if !rays.sees(Joint::Neck) {
         return Err(FrameProblem::NeckNotSeen);
     }
+    if let Some([distance_m, sd_m]) = track.vague[t] {
+        return Err(FrameProblem::VagueDistance { distance_m, sd_m });
+    }
     if neck.is_nan() {
         return Err(FrameProblem::NoDistance);
     }
+    let hangs_on_neck = |joint: &Joint| joint.start() == Some(Joint::Neck);
+    if !Joint::ALL.iter().filter(|joint| hangs_on_neck(joint)).any(|&joint| rays.sees(joint)) {
+        return Err(FrameProblem::NeckAlone);
+    }
     let view = View {
-        neck_sd_m,
+        neck_sd_m: track.sd_m[t],
         length_sd_m: scene.lengths.own_sd_m,
         ..View::new(rays, neck, scene.lengths.lengths)
     };

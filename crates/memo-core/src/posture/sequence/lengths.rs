@@ -55,6 +55,7 @@ impl SequenceLengths {
         match self.scale_from {
             None => "lengths",
             Some(ScaleFrom::BodyHeight) => "height",
+            Some(ScaleFrom::Ground) => "ground",
             Some(ScaleFrom::Distance) => "distance",
             Some(ScaleFrom::Assumed) => "assumed",
         }
@@ -135,7 +136,7 @@ pub(super) fn find(
                 .enumerate()
                 .map(|(t, rays)| from_given(rays, distance_m[t.min(distance_m.len() - 1)], *sd_m).ok())
                 .collect();
-            estimate(rays, &anchors, ground.map(|g| g.up_in_camera), &prior, true)
+            estimate(rays, &anchors, ground.map(|g| g.up_in_camera), &prior, Some(ScaleFrom::Distance))
         }
         _ => {
             let from = |ground| estimate_from_sequence(rays, ground, &prior, &options.anchor_options);

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::anchor::{AnchorError, AnchorOptions, AnchorSource, Ground, SmoothOptions};
+use super::constraint::Constraint;
 use super::group::DEFAULT_GROUP_M;
 use super::lift::JointRays;
 use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link};
@@ -100,9 +101,9 @@ impl Motion {
         }
     }
 
-    /// Whether its rules are measured against the moving direction.
+    /// Whether its rules or what is usual are measured against the moving direction.
     fn needs_heading(self) -> bool {
-        self != Self::Physical
+        matches!(self, Self::Walking | Self::WalkingGeneral | Self::Running)
     }
 
     /// What a person does.
@@ -167,6 +168,9 @@ pub enum AnchorChoice {
 /// Standard deviation of a given distance where none is stated, metres: a tape measure to where somebody
 /// stands.
 pub const DEFAULT_DISTANCE_SD_M: f64 = 0.05;
+
+/// Distances that are taken, metres: nearer the lens touches the person, farther nobody is resolved.
+const DISTANCES_M: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
 /// How postures are found.
 #[derive(Debug, Clone, PartialEq)]
@@ -269,20 +273,30 @@ pub enum SequenceError {
     #[error("the neck's distance from the head needs its six points (neck, nose, eyes, ears)")]
     NoHeadPoints,
     /// No frame gives the neck's place.
-    #[error("no frame gives the neck's distance: {0}")]
-    NoNeck(AnchorError),
+    #[error("no frame gives the neck's distance: {}{}", listed(reasons), also(warnings))]
+    NoNeck {
+        /// Why not, each source for itself.
+        reasons: Vec<AnchorError>,
+        /// What had been noticed before.
+        warnings: Vec<Warning>,
+    },
     /// The camera is not usable.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// Lengths or height are not usable.
     #[error(transparent)]
     Length(#[from] LengthError),
-    /// Assumptions about the neck are not usable.
-    #[error(transparent)]
-    Anchor(#[from] AnchorError),
     /// The frames cannot be linked.
     #[error(transparent)]
     Link(#[from] LinkError),
+}
+
+fn listed<T: std::fmt::Display>(sentences: &[T]) -> String {
+    sentences.iter().map(T::to_string).collect::<Vec<_>>().join("; ")
+}
+
+fn also(warnings: &[Warning]) -> String {
+    if warnings.is_empty() { String::new() } else { format!("; noticed before: {}", listed(warnings)) }
 }
 
 /// What was found in a sequence. Figures are in world axes, metres, Z up.
@@ -299,6 +313,9 @@ pub struct PostureSequence {
     /// One posture a frame, its figures in world axes; its `sd_m` is along the camera's rays and against the
     /// starting joint.
     pub linked: LinkedPath,
+    /// Constraints that the linked posture of each frame breaks. Linking takes both roots of every segment
+    /// with limits that may be passed at a price, not the survivors of a frame alone.
+    pub linked_breaks: Vec<Vec<Constraint>>,
     /// Standard deviation of each joint's place in `linked.figures`, metres: noise, lengths and the neck's
     /// distance. That a root is the wrong one is not in it. NaN where the joint is unknown.
     pub sd_m: Vec<PerJoint<f64>>,
@@ -332,7 +349,7 @@ pub fn postures(
     warnings.extend(warning::of_scale(&scene));
     // 3. The neck in each frame.
     let heads = neck::heads(&scene);
-    let neck = neck::track(&scene, &heads)?;
+    let neck = neck::track(&scene, &heads, &warnings)?;
     let necks = neck.places(&rays);
     lengths::impossible(&rays, &neck, &lengths, &mut warnings);
     // 4. The moving direction.
@@ -343,18 +360,39 @@ pub fn postures(
         .iter()
         .map(|head| tree.clone().with_bearings(scene.bearings(&heading, head.as_ref())))
         .collect();
-    let frames: Vec<_> = (0..rays.len())
-        .into_par_iter()
-        .map(|t| frame::read(&scene, &trees[t], necks[t], neck.sd_m[t], t))
-        .collect();
+    let frames: Vec<_> =
+        (0..rays.len()).into_par_iter().map(|t| frame::read(&scene, &trees[t], &neck, necks[t], t)).collect();
     // 6. One of them a frame.
     let linked = link_frames(&scene, &heading, &necks, &frames)?;
     let sd_m = uncertainty(&scene, &neck, &linked);
     // 7. What casts doubt on it.
-    let found = warning::Found { trees: &trees, frames: &frames, linked: &linked, neck: &neck };
+    let linked_breaks = broken(&trees, &frames, &linked);
+    let found = warning::Found {
+        trees: &trees,
+        frames: &frames,
+        linked: &linked,
+        linked_breaks: &linked_breaks,
+        neck: &neck,
+        heading: &heading,
+    };
     warning::judge(&scene, &found, &mut warnings);
     let linked = to_world(linked, &camera);
-    Ok(PostureSequence { lengths, neck, heading, frames, linked, sd_m, warnings })
+    Ok(PostureSequence { lengths, neck, heading, frames, linked, linked_breaks, sd_m, warnings })
+}
+
+/// What the linked posture of each frame breaks; figures in camera axes.
+fn broken(
+    trees: &[TreeOptions],
+    frames: &[Result<FrameReading, FrameProblem>],
+    linked: &LinkedPath,
+) -> Vec<Vec<Constraint>> {
+    let of_frame = |t: usize| {
+        let Ok(frame) = &frames[t] else { return Vec::new() };
+        let view = &frame.tree.view;
+        let violations = view.violations(view.nearest_path(&linked.figures[t]), &trees[t]);
+        violations.iter().map(|violation| violation.constraint).collect()
+    };
+    (0..frames.len()).into_par_iter().map(of_frame).collect()
 }
 
 fn check(sequence: &KeypointSequence, options: &SequenceOptions) -> Result<(), SequenceError> {
@@ -404,16 +442,13 @@ fn check_options(options: &SequenceOptions) -> Result<(), SequenceError> {
         }
     }
     if let AnchorChoice::Given { distance_m, sd_m } = &options.anchor {
-        let wrong = distance_m.iter().find(|d| !(d.is_nan() || d.is_finite() && **d > 0.0));
-        if let Some(&value) = wrong {
-            return Err(SequenceError::Quantity {
-                name: "distance_m",
-                wanted: "positive (NaN: unknown)",
-                value,
-            });
+        if let Some(&value) = distance_m.iter().find(|d| !(d.is_nan() || DISTANCES_M.contains(d))) {
+            let wanted = "a distance of 0.1 to 1000 m (NaN: unknown)";
+            return Err(SequenceError::Quantity { name: "distance_m", wanted, value });
         }
-        if !(sd_m.is_finite() && *sd_m > 0.0) {
-            return Err(SequenceError::Quantity { name: "distance_sd_m", wanted: "positive", value: *sd_m });
+        if !(*sd_m > 0.0 && sd_m <= DISTANCES_M.end()) {
+            let wanted = "positive and at most 1000 m";
+            return Err(SequenceError::Quantity { name: "distance_sd_m", wanted, value: *sd_m });
         }
     }
     if let Some(lengths) = options.lengths {
@@ -430,6 +465,11 @@ fn check_options(options: &SequenceOptions) -> Result<(), SequenceError> {
     Ok(())
 }
 
+/// Noise moves a point at the picture's edge so many of its standard deviations beyond.
+const BEYOND_SIGMAS: f64 = 3.0;
+/// Share of points outside the picture that is worth a warning: some detectors guess joints that the edge cuts off.
+const CONSIDERABLE_BEYOND: f64 = 0.05;
+
 /// Rays of all frames. Joints of little or no weight, at infinity or where no lens images anything are
 /// missing.
 fn rays(
@@ -439,7 +479,10 @@ fn rays(
     warnings: &mut Vec<Warning>,
 ) -> Vec<JointRays> {
     let noise_rad = options.noise_px / (camera.focal_px.x * camera.focal_px.y).sqrt();
-    let [mut light, mut outside, mut given] = [0; 3];
+    let [mut light, mut outside, mut given, mut beyond] = [0; 4];
+    let margin_px = 0.5 + BEYOND_SIGMAS * options.noise_px;
+    let [lowest_px, highest_px] = [-margin_px, margin_px - 1.0].map(DVec2::splat);
+    let highest_px = highest_px + DVec2::from(camera.size.map(f64::from));
     let mut rays = Vec::with_capacity(sequence.points_px.len());
     for (points_px, weight) in sequence.points_px.iter().zip(sequence.weights) {
         let mut ray = PerJoint([DVec3::NAN; JOINT_COUNT]);
@@ -448,6 +491,7 @@ fn rays(
                 continue;
             }
             given += 1;
+            beyond += usize::from(pixel.cmplt(lowest_px).any() || pixel.cmpgt(highest_px).any());
             // Not `weight < min_weight`: an unknown weight (NaN) is none.
             if weight.is_nan() || weight < options.min_weight {
                 light += 1;
@@ -468,6 +512,12 @@ fn rays(
         min_weight: options.min_weight,
     }));
     warnings.extend((outside > 0).then_some(Warning::OutsideLens { outside, all }));
+    let is_considerable = beyond as f64 > CONSIDERABLE_BEYOND * all as f64;
+    warnings.extend(is_considerable.then(|| {
+        let seen = sequence.points_px.iter().flat_map(|points| points.0).filter(|pixel| pixel.is_finite());
+        let farthest_px = seen.fold(DVec2::splat(f64::NEG_INFINITY), DVec2::max);
+        Warning::OutsidePicture { beyond, all, size: camera.size, farthest_px }
+    }));
     rays
 }
 
@@ -669,7 +719,12 @@ mod tests {
         };
         assert!(!has_rule(&physical) && has_rule(&walking));
         let few = walk.postures(&SequenceOptions { max_groups: 2, ..with_lengths() }).unwrap();
-        assert!(few.frames.iter().flatten().all(|frame| frame.groups.len() <= 2));
+        for (few, all) in few.frames.iter().flatten().zip(walking.frames.iter().flatten()) {
+            assert!(few.group_count == all.group_count && all.group_count.is_some_and(|count| count > 2));
+            assert_eq!(few.groups[..], all.groups[..2]);
+            let members: usize = all.groups.iter().map(|group| group.size).sum();
+            assert!(members == all.survivors() || all.group_count > Some(64));
+        }
     }
 
     #[test]
@@ -747,10 +802,71 @@ mod tests {
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0], sd_m: 0.0 })
                 .contains("sd")
         );
+        for (distance_m, sd_m) in [(1e300, 0.1), (1e-300, 0.1), (4.0, -5.0), (4.0, 1e300)] {
+            let given = AnchorChoice::Given { distance_m: vec![distance_m], sd_m };
+            assert!(refused(&|_, o| o.anchor = given.clone()).starts_with("distance_"));
+        }
         let nothing = |walk: &mut Walk| walk.points_px.fill(PerJoint([DVec2::NAN; JOINT_COUNT]));
         assert!(refused(&|walk, _| nothing(walk)).contains("no frame gives the neck's distance"));
         assert!(refused(&|walk, o| (nothing(walk), o.lengths = None).1).contains("no frame gives"));
         assert!(refused(&|walk, _| walk.camera.focal_px.x = 0.0).contains("focal"));
+    }
+
+    #[test]
+    fn frames_that_say_nothing_say_why() {
+        let mut walk = walk(45.0, 6, 0.5);
+        for joint in Joint::ALL.into_iter().skip(1) {
+            walk.points_px[2][joint] = DVec2::NAN;
+        }
+        let found = walk.postures(&with_lengths()).unwrap();
+        assert_eq!(found.frames[2], Err(FrameProblem::NeckAlone));
+        let anchor = AnchorChoice::Given { distance_m: vec![4.0, 4.0, 4.0, 4.0, 0.5, f64::NAN], sd_m: 1.0 };
+        let found = walk.postures(&SequenceOptions { anchor, ..with_lengths() }).unwrap();
+        assert_eq!(found.frames[4], Err(FrameProblem::VagueDistance { distance_m: 0.5, sd_m: 1.0 }));
+        assert_eq!(found.frames[5], Err(FrameProblem::NoDistance));
+        assert!(found.neck.distance_m[4].is_nan() && found.neck.from[4] == NeckFrom::Nothing);
+        assert!(found.linked.figures[4].0.iter().all(|point| point.is_nan()) && found.frames[3].is_ok());
+    }
+
+    #[test]
+    fn no_neck_has_a_reason_from_every_source() {
+        let mut walk = walk(45.0, 6, 0.5);
+        for points_px in &mut walk.points_px {
+            points_px[Joint::Pelvis] = DVec2::NAN;
+            points_px[Joint::RightHip] = DVec2::NAN;
+            points_px[Joint::LeftHip] = DVec2::NAN;
+            points_px[Joint::RightAnkle] = DVec2::NAN;
+            points_px[Joint::LeftAnkle] = DVec2::NAN;
+        }
+        walk.weights[0][Joint::LeftWrist] = 0.1;
+        let error = walk.postures(&with_lengths()).unwrap_err();
+        let SequenceError::NoNeck { reasons, warnings } = &error else { panic!("{error}") };
+        assert_eq!(reasons.len(), 4, "{error}");
+        assert!(matches!(warnings[..], [Warning::LightJoints { light: 1, .. }]), "{error}");
+        for source in ["ground", "trunk", "extent", "head"] {
+            assert!(error.to_string().contains(&format!("no neck from the {source}")), "{error}");
+        }
+        assert!(error.to_string().contains("noticed before: 1 of"), "{error}");
+    }
+
+    #[test]
+    fn a_picture_of_another_size_is_noticed() {
+        let beyond = |scale: f64| {
+            let mut walk = walk(45.0, 6, 0.5);
+            walk.points_px.iter_mut().flat_map(|points| &mut points.0).for_each(|pixel| *pixel *= scale);
+            let inside = 0.0..=1920.0;
+            let pixels = walk.points_px.iter().flat_map(|points| points.0);
+            let outside = pixels.filter(|p| !(inside.contains(&p.x) && inside.contains(&p.y))).count();
+            let warnings = walk.postures(&with_lengths()).unwrap().warnings;
+            let told = warnings.into_iter().find_map(|warning| match warning {
+                Warning::OutsidePicture { beyond, all: 84, size: [1920, 1920], .. } => Some(beyond),
+                _ => None,
+            });
+            (outside, told)
+        };
+        assert_eq!(beyond(1.0), (0, None));
+        let (outside, told) = beyond(2.0);
+        assert!(told.is_some_and(|told| told.abs_diff(outside) <= 2 && told > 20), "{told:?}, {outside}");
     }
 
     #[test]

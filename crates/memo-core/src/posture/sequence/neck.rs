@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::heading::Heading;
 use super::lengths::SequenceLengths;
-use super::{AnchorChoice, KeypointSequence, SequenceError, SequenceOptions};
+use super::{AnchorChoice, KeypointSequence, SequenceError, SequenceOptions, Warning};
 use crate::model::camera::Camera;
 use crate::posture::anchor::{
     Anchor, AnchorError, AnchorOptions, AnchorSource, Conflict, DepthMode, Ground, combine, from_extent,
@@ -106,6 +106,8 @@ pub struct NeckTrack {
     pub sd_m: Vec<f64>,
     /// What it rests on.
     pub from: Vec<NeckFrom>,
+    /// Distance and standard deviation, metres, that were found and are not used: the second exceeds the first.
+    pub vague: Vec<Option<[f64; 2]>>,
     /// Sources that contradict each other.
     pub conflicts: Vec<SourceConflict>,
     /// The part of `sd_m` that all frames share, metres.
@@ -122,6 +124,19 @@ impl NeckTrack {
             false => DVec3::NAN,
         };
         rays.iter().zip(&self.distance_m).map(place).collect()
+    }
+
+    /// A distance smaller than its standard deviation is none.
+    fn without_vague(mut self) -> Self {
+        for t in 0..self.distance_m.len() {
+            let found = [self.distance_m[t], self.sd_m[t]];
+            if found[1] > found[0] {
+                [self.distance_m[t], self.sd_m[t]] = [f64::NAN; 2];
+                self.from[t] = NeckFrom::Nothing;
+                self.vague[t] = Some(found);
+            }
+        }
+        self
     }
 }
 
@@ -188,17 +203,29 @@ fn head_of(found: &HeadSolution, model: &HeadModel) -> Head {
 
 /// What one frame says about the neck's distance.
 struct FrameAnchor {
-    anchor: Result<Anchor, AnchorError>,
+    /// Or why each source that was asked gives none.
+    anchor: Result<Anchor, Vec<AnchorError>>,
     conflicts: Vec<Conflict>,
     /// Whether several sources were there.
     is_combined: bool,
 }
 
-/// The neck's distance over the sequence.
-pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, SequenceError> {
-    if let AnchorChoice::Given { distance_m, sd_m } = &scene.options.anchor {
-        return given(scene.rays, distance_m, *sd_m);
-    }
+/// The neck's distance over the sequence. `warnings` go with the reasons if no frame gives it.
+pub(super) fn track(
+    scene: &Scene,
+    heads: &[Option<Head>],
+    warnings: &[Warning],
+) -> Result<NeckTrack, SequenceError> {
+    let found = match &scene.options.anchor {
+        AnchorChoice::Given { distance_m, sd_m } => given(scene.rays, distance_m, *sd_m),
+        _ => seen(scene, heads),
+    };
+    let no_neck = |reasons| SequenceError::NoNeck { reasons, warnings: warnings.to_vec() };
+    found.map_err(no_neck).map(NeckTrack::without_vague)
+}
+
+/// From the images.
+fn seen(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, Vec<AnchorError>> {
     let options = scene.lengths.anchor_options(&scene.options.anchor_options);
     let times_s = scene.sequence.times_s;
     // 1. Each frame alone.
@@ -206,18 +233,17 @@ pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, 
     let found: Vec<FrameAnchor> =
         asked.par_iter().map(|&t| frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref())).collect();
     let conflicts = conflicts(&found);
-    let mut error = AnchorError::Empty;
-    let anchors: Vec<Option<Anchor>> =
-        found.into_iter().map(|f| f.anchor.map_err(|e| error = e).ok()).collect();
+    let mut errors = Vec::new();
+    let anchors: Vec<Option<Anchor>> = found
+        .into_iter()
+        .map(|f| f.anchor.map_err(|mut of_frame| errors.append(&mut of_frame)).ok())
+        .collect();
     if anchors.iter().all(Option::is_none) {
-        return Err(match error {
-            AnchorError::NotPositive { .. } => SequenceError::Anchor(error),
-            other => SequenceError::NoNeck(other),
-        });
+        return Err(told_once(errors));
     }
     // 2. All together.
     let asked_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
-    let track = smooth(&asked_s, &anchors, &scene.options.smooth_options)?;
+    let track = smooth(&asked_s, &anchors, &scene.options.smooth_options).map_err(|error| vec![error])?;
     let mut from = vec![NeckFrom::Neighbours; times_s.len()];
     for (&t, anchor) in asked.iter().zip(&anchors) {
         from[t] = anchor.as_ref().map_or(NeckFrom::Neighbours, |anchor| NeckFrom::Source(anchor.source));
@@ -226,6 +252,7 @@ pub(super) fn track(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, 
     of_scale.sort_by(f64::total_cmp);
     Ok(NeckTrack {
         from,
+        vague: vec![None; times_s.len()],
         distance_m: interpolated(times_s, &asked_s, &track.distance_m),
         sd_m: interpolated(times_s, &asked_s, &track.sd_m),
         conflicts,
@@ -267,21 +294,39 @@ fn interpolated(times_s: &[f64], known_s: &[f64], known: &[f64]) -> Vec<f64> {
     times_s.iter().map(at).collect()
 }
 
+/// What frames say alike, once, in the order in which they came.
+fn told_once(errors: Vec<AnchorError>) -> Vec<AnchorError> {
+    let mut once: Vec<AnchorError> = Vec::new();
+    for error in errors {
+        use AnchorError::{NotPositive, NothingFits};
+        let is_told = |told: &AnchorError| match (told, &error) {
+            (NothingFits { source_name: a, .. }, NothingFits { source_name: b, .. }) => a == b,
+            (NotPositive { what: a, .. }, NotPositive { what: b, .. }) => a == b,
+            (told, error) => told == error,
+        };
+        if !once.iter().any(is_told) {
+            once.push(error);
+        }
+    }
+    once
+}
+
 /// Known distances are taken as they are.
-fn given(rays: &[JointRays], distance_m: &[f64], sd_m: f64) -> Result<NeckTrack, SequenceError> {
+fn given(rays: &[JointRays], distance_m: &[f64], sd_m: f64) -> Result<NeckTrack, Vec<AnchorError>> {
     let distance = |t: usize| distance_m[t.min(distance_m.len() - 1)];
-    let mut error = AnchorError::Empty;
+    let mut errors = Vec::new();
     let known: Vec<Option<f64>> = rays
         .iter()
         .enumerate()
-        .map(|(t, rays)| from_given(rays, distance(t), sd_m).map_err(|e| error = e).ok())
+        .map(|(t, rays)| from_given(rays, distance(t), sd_m).map_err(|e| errors.push(e)).ok())
         .map(|anchor| anchor.map(|anchor| anchor.distance_m))
         .collect();
     if known.iter().all(Option::is_none) {
-        return Err(SequenceError::NoNeck(error));
+        return Err(told_once(errors));
     }
     let source = NeckFrom::Source(AnchorSource::Given);
     Ok(NeckTrack {
+        vague: vec![None; rays.len()],
         distance_m: known.iter().map(|d| d.unwrap_or(f64::NAN)).collect(),
         sd_m: known.iter().map(|d| d.map_or(f64::NAN, |_| sd_m)).collect(),
         from: known.iter().map(|d| d.map_or(NeckFrom::Nothing, |_| source)).collect(),
@@ -315,21 +360,21 @@ fn frame_anchor(
         AnchorChoice::Source(_) => (vec![AnchorSource::Ground, Trunk, Extent], false),
         _ => (vec![AnchorSource::Ground, Trunk, Extent], true),
     };
-    let mut error = AnchorError::Empty;
-    let mut found: Vec<Anchor> =
-        asked.into_iter().filter_map(|source| by(source).map_err(|e| error = e).ok()).collect();
+    let mut errors = Vec::new();
+    let mut ask = |source| by(source).map_err(|error| errors.push(error)).ok();
+    let mut found: Vec<Anchor> = asked.into_iter().filter_map(&mut ask).collect();
     if found.is_empty() && or_head {
-        found.extend(by(AnchorSource::Head).ok());
+        found.extend(ask(AnchorSource::Head));
     }
     if found.is_empty() {
-        return FrameAnchor { anchor: Err(error), conflicts: Vec::new(), is_combined: false };
+        return FrameAnchor { anchor: Err(errors), conflicts: Vec::new(), is_combined: false };
     }
     let is_combined = found.len() > 1;
     match combine(&found) {
         Ok(combination) => {
             FrameAnchor { anchor: Ok(combination.anchor), conflicts: combination.conflicts, is_combined }
         }
-        Err(error) => FrameAnchor { anchor: Err(error), conflicts: Vec::new(), is_combined },
+        Err(error) => FrameAnchor { anchor: Err(vec![error]), conflicts: Vec::new(), is_combined },
     }
 }
 

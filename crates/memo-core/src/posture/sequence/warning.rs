@@ -6,10 +6,11 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::frame::{FrameProblem, FrameReading};
-use super::heading::HeadingFrom;
+use super::heading::{Heading, HeadingFrom};
 use super::neck::{NeckTrack, Scene, SourceConflict};
 use super::{AnchorChoice, Motion, Strength};
-use crate::posture::constraint::ConstraintKind;
+use crate::posture::angles::trunk_axes;
+use crate::posture::constraint::{Constraint, ConstraintKind};
 use crate::posture::link::LinkedPath;
 use crate::posture::skeleton::{Joint, PerJoint};
 use crate::posture::tree::TreeOptions;
@@ -32,6 +33,17 @@ pub enum Warning {
         outside: usize,
         /// Of how many points.
         all: usize,
+    },
+    /// Joints lie outside the picture that the camera is calibrated for.
+    OutsidePicture {
+        /// How many.
+        beyond: usize,
+        /// Of how many points.
+        all: usize,
+        /// Width and height of the picture, pixels.
+        size: [u32; 2],
+        /// The largest coordinates that are seen, pixels.
+        farthest_px: DVec2,
     },
     /// The camera is not above the ground.
     NoGround {
@@ -75,6 +87,13 @@ pub enum Warning {
         /// Between the first and the second half of the way, degrees.
         turn_deg: f64,
     },
+    /// The person goes backwards, or right and left are exchanged throughout.
+    Backwards {
+        /// Frames in which the trunk of the linked posture faces against the moving direction.
+        frames: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// Frames say nothing.
     SilentFrames {
         /// How many.
@@ -105,6 +124,13 @@ pub enum Warning {
         /// Of how many.
         of: usize,
     },
+    /// In most frames the linked posture does what a body cannot.
+    LinkedBreaks {
+        /// How many frames.
+        frames: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// The rules of the motion leave no posture, in frames in which a body could have one.
     AgainstRules {
         /// The motion.
@@ -130,6 +156,14 @@ impl fmt::Display for Warning {
             Self::OutsideLens { outside, all } => {
                 write!(f, "{outside} of {all} points lie where this lens shows nothing and count as missing")
             }
+            Self::OutsidePicture { beyond, all, size: [width, height], farthest_px } => write!(
+                f,
+                "{beyond} of {all} points ({:.0} %) lie outside the camera's picture of {width}x{height} pixels \
+                 (they go to {:.0}, {:.0}): the calibration may be of another picture size",
+                percent(*beyond, *all),
+                farthest_px.x,
+                farthest_px.y
+            ),
             Self::NoGround { camera_height_m } => write!(
                 f,
                 "the camera is at a height of {camera_height_m:.2} m, not above the ground: the ground tells nothing"
@@ -149,6 +183,12 @@ impl fmt::Display for Warning {
                  {seen_m:.3} m long: a wrong length or wrong points"
             ),
             Self::Conflict(conflict) => conflict.fmt(f),
+            Self::NoTravel { travelled_m, from } if travelled_m.is_nan() => write!(
+                f,
+                "one frame, or none, has a place over the ground, so there is no way to take the moving direction \
+                 from: that of the {} stands for it",
+                from.name()
+            ),
             Self::NoTravel { travelled_m, from } => write!(
                 f,
                 "the person begins and ends {travelled_m:.2} m apart, too little for a moving direction: that \
@@ -158,6 +198,11 @@ impl fmt::Display for Warning {
             Self::Turns { turn_deg } => {
                 write!(f, "the way turns by {turn_deg:.0} degrees; the rules are of straight walking")
             }
+            Self::Backwards { frames, of } => write!(
+                f,
+                "in {frames} of {of} frames the trunk faces against the way: the person walks backwards, or \
+                 right and left are exchanged in all frames"
+            ),
             Self::SilentFrames { silent, of, reason } => {
                 write!(f, "{silent} of {of} frames say nothing; in the first of them {reason}")
             }
@@ -175,6 +220,11 @@ impl fmt::Display for Warning {
             Self::NothingPossible { frames, of } => write!(
                 f,
                 "in {frames} of {of} frames ({:.0} %) no posture is possible for a body: look at the violations",
+                percent(*frames, *of)
+            ),
+            Self::LinkedBreaks { frames, of } => write!(
+                f,
+                "in {frames} of {of} frames ({:.0} %) the linked posture breaks a limit of bodies",
                 percent(*frames, *of)
             ),
             Self::AgainstRules { motion, strength, frames, of, linked } => write!(
@@ -201,7 +251,10 @@ pub(super) struct Found<'a> {
     pub trees: &'a [TreeOptions],
     pub frames: &'a [Result<FrameReading, FrameProblem>],
     pub linked: &'a LinkedPath,
+    /// What the linked postures break.
+    pub linked_breaks: &'a [Vec<Constraint>],
     pub neck: &'a NeckTrack,
+    pub heading: &'a Heading,
 }
 
 /// Looks at all results.
@@ -215,7 +268,18 @@ pub(super) fn judge(scene: &Scene, found: &Found, warnings: &mut Vec<Warning>) {
     }
     warnings.extend(without_root(&linked.gap_m));
     warnings.extend(noisy(scene));
+    warnings.extend(backwards(scene, found));
     warnings.extend(rejected(scene, found));
+}
+
+/// Whether the linked trunk faces against the way in most frames, where rules or prior are of going forwards.
+fn backwards(scene: &Scene, found: &Found) -> Option<Warning> {
+    let heading = found.heading.direction.filter(|_| scene.options.motion.needs_heading())?;
+    let in_camera = scene.camera.rotation * heading;
+    let trunks = found.linked.figures.iter().filter_map(trunk_axes);
+    let ahead: Vec<f64> = trunks.map(|axes| axes.x_axis.dot(in_camera)).collect();
+    let frames = ahead.iter().filter(|ahead| **ahead < 0.0).count();
+    (2 * frames > ahead.len()).then_some(Warning::Backwards { frames, of: ahead.len() })
 }
 
 fn without_root(gap_m: &[PerJoint<f64>]) -> Option<Warning> {
@@ -267,16 +331,18 @@ fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
     if 2 * impossible > of {
         warnings.push(Warning::NothingPossible { frames: impossible, of });
     }
+    let breaking = |is_rule: bool| {
+        let is_of_kind = |c: &Constraint| (c.kind() == ConstraintKind::Rule) == is_rule;
+        found.linked_breaks.iter().filter(|broken| broken.iter().any(is_of_kind)).count()
+    };
+    let against_bodies = breaking(false);
+    if 2 * against_bodies > of && 2 * impossible <= of {
+        warnings.push(Warning::LinkedBreaks { frames: against_bodies, of });
+    }
     if !has_rules {
         return warnings;
     }
-    let breaks_rule = |&&(t, frame): &&(usize, &FrameReading)| {
-        let view = &frame.tree.view;
-        let path = view.nearest_path(&found.linked.figures[t]);
-        let broken = view.violations(path, &found.trees[t]);
-        broken.iter().any(|violation| violation.constraint.kind() == ConstraintKind::Rule)
-    };
-    let linked = frames.iter().filter(breaks_rule).count() as f64 / of.max(1) as f64;
+    let linked = breaking(true) as f64 / of.max(1) as f64;
     let (against, possible) = (empty.len() - impossible, of - impossible);
     if 2 * against > possible || linked > 0.5 {
         let (motion, strength) = (scene.options.motion, scene.options.strength);

@@ -144,13 +144,6 @@ impl View {
         all_violations(&PlacedFigure::of(&self.place(path)), &self.lengths, options)
     }
 
-    /// Sum of the squared severities of what a posture breaks when no room is given to noise; 0 for one that
-    /// uses none of that room.
-    pub fn soft_excess(&self, path: Path, options: &TreeOptions) -> f64 {
-        let violations = self.violations(path, &options.without_noise());
-        violations.iter().map(|violation| violation.severity().powi(2)).sum()
-    }
-
     fn check(&self, options: &TreeOptions) -> Result<(), TreeError> {
         if !(self.neck.is_finite() && self.neck.z > 0.0) {
             return Err(TreeError::Neck { neck: self.neck });

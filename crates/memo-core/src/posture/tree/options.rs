@@ -49,15 +49,6 @@ impl TreeOptions {
         Self { bearings, ..self }
     }
 
-    /// The same limits with no room for noise.
-    pub fn without_noise(&self) -> Self {
-        let mut options = self.clone();
-        options.limits.iter_mut().for_each(|limits| limits.noise_factor = 0.0);
-        options.collisions.iter_mut().for_each(|collisions| collisions.noise_factor = 0.0);
-        options.motion.iter_mut().for_each(|motion| motion.noise_factor = 0.0);
-        options
-    }
-
     /// Whether a constraint is asked for.
     pub fn asks(&self, constraint: Constraint) -> bool {
         use Constraint::{NeckBending, NeckExtension, NeckFlexion, NeckRotation};
