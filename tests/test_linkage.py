@@ -104,6 +104,23 @@ def test_scales_are_divided_out():
         memo.planar(shown["positions_px"], shown["times_s"], scales=scales[:5])
 
 
+def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
+    shown, names = display(azimuth_deg=60), walk()["names"]
+    scales = np.linspace(0.7, 1.4, 66)
+    points = figure.Points(names, shown["times_s"], shown["positions_px"] * scales[:, None, None], scales)
+    found = memo.planar(points.positions, points.times_s, scales=scales)
+    figure.write_figure_csv(tmp_path, found, points)
+    rows = list(csv.DictReader(open(tmp_path / "points3d.csv", newline="")))
+    a, b = (
+        np.array([[float(row[f"{name}_{axis}_px"]) for axis in "uvz"] for row in rows])
+        for name in ("RHP", "RKN")
+    )
+    lengths = np.linalg.norm(a - b, axis=1)
+    assert lengths.max() < 1.02 * lengths.min()
+    with pytest.raises(ValueError, match="frame 0: scale 0 must be positive"):
+        figure.Points(names, points.times_s, points.positions, scales * 0).at_one_scale()
+
+
 def test_closed_forms_lift_planted_rods_and_hinges():
     angles = np.random.default_rng(3).uniform(0, 2 * np.pi, (500, 4))
     points = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,15 @@ class Points:
     times_s: Array
     positions: Array
     scales: Array | None = None
+
+    def at_one_scale(self) -> Points:
+        """The same points with the scales divided out, as depths are."""
+        if self.scales is None:
+            return self
+        bad = np.flatnonzero(~((self.scales > 0) & np.isfinite(self.scales)))
+        if len(bad):
+            raise ValueError(f"frame {bad[0]}: scale {self.scales[bad[0]]:g} must be positive and finite")
+        return replace(self, positions=self.positions / self.scales[:, None, None], scales=None)
 
 
 @dataclass(frozen=True)
@@ -195,7 +204,8 @@ def write_points_csv(path: str | PathLike[str], points: Points) -> None:
 
 
 def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Path]:
-    """Writes links.csv, chains.csv, windows.csv and points3d.csv; returns their paths."""
+    """Writes links.csv, chains.csv, windows.csv and points3d.csv, all at scale 1; returns their paths."""
+    points = points.at_one_scale()
     name = points.names.__getitem__
     links, chains, windows = [], [], []
     for number, window in enumerate(figure.windows):

@@ -114,7 +114,7 @@ def write_turned_video(
 
 def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any, Any]:
     """The points held in place horizontally (T, K, 2), as seen and turned about the vertical."""
-    tracks, depth = points.positions, figure.depth
+    tracks, depth = points.at_one_scale().positions, figure.depth
     centre = np.nanmean(tracks, axis=1, keepdims=True)
     flat = tracks - centre + np.nanmean(centre, axis=0, keepdims=True) * [0, 1]
     turn = np.deg2rad(turn_deg)

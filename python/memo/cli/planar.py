@@ -61,14 +61,14 @@ def _planar(
     from memo.linkage import read_points_csv, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
-    points, out = read_points_csv(tracks, 2, fps), delivery.out
+    points, out = read_points_csv(tracks, 2, fps).at_one_scale(), delivery.out
     check_writable(out)
     if delivery.talks:
         print(
             f"{len(points.names)} points in {len(points.times_s)} frames: looking for limbs ...", flush=True
         )
     named = {"names": points.names} if names else {}
-    figure = memo.planar(points.positions, points.times_s, noise_px, scales=points.scales, **named, **options)
+    figure = memo.planar(points.positions, points.times_s, noise_px, **named, **options)
     written = write_figure_csv(out, figure, points)
     write_linkage_png(out / "linkage.png", points, figure)
     written.append(out / "linkage.png")
