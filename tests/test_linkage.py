@@ -110,7 +110,7 @@ def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
     points = figure.Points(names, shown["times_s"], shown["positions_px"] * scales[:, None, None], scales)
     found = memo.planar(points.positions, points.times_s, scales=scales)
     figure.write_figure_csv(tmp_path, found, points)
-    rows = list(csv.DictReader(open(tmp_path / "points3d.csv", newline="")))
+    rows = list(csv.DictReader((tmp_path / "points3d.csv").read_text().splitlines()))
     a, b = (
         np.array([[float(row[f"{name}_{axis}_px"]) for axis in "uvz"] for row in rows])
         for name in ("RHP", "RKN")
@@ -119,6 +119,30 @@ def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
     assert lengths.max() < 1.02 * lengths.min()
     with pytest.raises(ValueError, match="frame 0: scale 0 must be positive"):
         figure.Points(names, points.times_s, points.positions, scales * 0).at_one_scale()
+
+
+def found_with(verdicts, status="interpreted", **more):
+    """A figure of one window for each verdict, with the link 0 - 1 as long as the window's number."""
+    link = {"points": (0, 1), "length_sd": 0.1, "margin": 1.0, "confidence": 0.9}
+    windows = [
+        {"status": status, "chains": [{"verdict": verdict, "links": [link | {"length": float(number)}]}]}
+        | more
+        for number, verdict in enumerate(verdicts)
+    ]
+    return figure.PlanarFigure(windows, np.zeros((8, 2)), ["planar"] * 8)
+
+
+def test_chains_that_are_not_planar_are_left_out():
+    from memo.cli.planar import _about_links
+
+    found = found_with(["not planar", "planar", "edge-on", "planar"])
+    assert found.links() == [(0, 1, 2.0, 0.9, 3)]
+    assert found.verdicts() == {(0, 1): {"planar": 2, "not planar": 1, "edge-on": 1}}
+    assert _about_links(found, ["a", "b"]) == [
+        "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1, in 3 of 4 windows",
+        "Left out, their motion is not planar: a - b (in 1 of 4 windows).",
+    ]
+    assert found_with(["not planar"]).links() == []
 
 
 def test_closed_forms_lift_planted_rods_and_hinges():
@@ -170,7 +194,9 @@ def test_commands_make_and_read_a_display(tmp_path):
     read = run("planar", tmp_path / "dots.csv", "--out", tmp_path, "--noise-px", "0", "--no-video")
     assert read.returncode == 0, read.stderr
     with open(tmp_path / "links.csv", newline="") as file:
-        links = {(row["a"], row["b"]) for row in csv.DictReader(file)}
+        rows = list(csv.DictReader(file))
+    links = {(row["a"], row["b"]) for row in rows}
+    assert "planar" in {row["verdict"] for row in rows}
     assert ("RHP", "RKN") in links and len(links) == 8
     assert (tmp_path / "linkage.png").stat().st_size > 1000
     absent = run("planar", tmp_path / "absent.csv")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -22,6 +23,9 @@ from memo.files import JOINTS, complete_file
 __all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
 
 Array = npt.NDArray[np.float64]
+
+REFUTED = "not planar"
+"""Verdict of a chain whose motion contradicts every plane."""
 
 _SHORT = {
     joint: joint[0].upper() + short
@@ -84,14 +88,28 @@ class PlanarFigure:
         return [window for window in self.windows if window["status"] == "interpreted"]
 
     def links(self) -> list[tuple[int, int, float, float, int]]:
-        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows."""
+        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows.
+
+        Those of chains whose motion is not planar are left out.
+        """
         found: dict[tuple[int, int], list[tuple[float, float]]] = {}
-        for window in self.interpreted:
-            for chain in window["chains"]:
-                for link in chain["links"]:
-                    found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
+        for link, verdict in self._judged():
+            if verdict != REFUTED:
+                found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
         rows = [(a, b, *np.mean(seen, axis=0), len(seen)) for (a, b), seen in found.items()]
         return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
+
+    def verdicts(self) -> dict[tuple[int, int], dict[str, int]]:
+        """Of each link in the interpreted windows, how many windows give its chain each verdict."""
+        counts: dict[tuple[int, int], Counter[str]] = {}
+        for link, verdict in self._judged():
+            counts.setdefault(link["points"], Counter())[verdict] += 1
+        return {points: dict(counts[points].most_common()) for points in sorted(counts)}
+
+    def _judged(self) -> list[tuple[dict[str, Any], str]]:
+        """Links of the interpreted windows with the verdicts of their chains."""
+        chains = (chain for window in self.interpreted for chain in window["chains"])
+        return [(link, chain["verdict"]) for chain in chains for link in chain["links"]]
 
 
 def planar(
@@ -223,11 +241,12 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
             for link in chain["links"]:
                 a, b = link["points"]
                 numbers = [link[key] for key in ("length", "length_sd", "margin", "confidence")]
-                links.append([str(number), window["status"], name(a), name(b), *_cells(numbers)])
+                labels = [str(number), window["status"], name(a), name(b), chain["verdict"]]
+                links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
     _write(written[0], ["window", "start_s", "end_s", "status", "planar", "refuted", "undecided"], windows)
     link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
-    _write(written[1], ["window", "status", "a", "b", *link_numbers], links)
+    _write(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)
     chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]
     chain_header = ["window", "chain", "verdict", *chain_numbers, "least_angle_deg", "most_angle_deg"]
     chain_header.append("reflection_margin_deg")

@@ -84,6 +84,7 @@ def _planar(
 
         write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=progress)
         written.append(out / "turned.mp4")
+    verdicts = figure.verdicts()
     links = [
         {
             "a": points.names[a],
@@ -91,6 +92,7 @@ def _planar(
             "length_px": length,
             "confidence": sure,
             "windows": count,
+            "verdicts": verdicts[a, b],
         }
         for a, b, length, sure, count in figure.links()
     ]
@@ -107,12 +109,7 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     lines = [f"Windows: {', '.join(told)}."]
     if not figure.interpreted:
         return [*lines, "No window shows planar motion: nothing is claimed. The best guess is in links.csv."]
-    for a, b, length, confidence, count in figure.links():
-        where = (
-            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
-        )
-        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
-        lines.append(f"  {points.names[a]} - {points.names[b]}: {length:.0f} px long{sure}{where}")
+    lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
         lines.append(
             f"Perspective moves points by up to {figure.perspective_px:.1f} px, more than the noise: "
@@ -129,3 +126,29 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
             else "Every chain may also be its mirror image in depth."
         )
     return [*lines, "Depths of chains against each other are open."]
+
+
+def _about_links(figure: Any, names: list[str]) -> list[str]:
+    """A line for each link, and one for the links of chains that are not planar."""
+    from memo.linkage import REFUTED
+
+    verdicts, lines = figure.verdicts(), []
+    for a, b, length, confidence, count in figure.links():
+        where = (
+            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
+        )
+        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
+        kept = {verdict: number for verdict, number in verdicts[a, b].items() if verdict != REFUTED}
+        judged = ", ".join(
+            f"{verdict} in {number}" if len(kept) > 1 else verdict for verdict, number in kept.items()
+        )
+        lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}{where}")
+    refuted = [
+        f"{names[a]} - {names[b]}"
+        + (f" (in {counts[REFUTED]} of {sum(counts.values())} windows)" if len(counts) > 1 else "")
+        for (a, b), counts in verdicts.items()
+        if REFUTED in counts
+    ]
+    if refuted:
+        lines.append(f"Left out, their motion is not planar: {', '.join(refuted)}.")
+    return lines
