@@ -182,6 +182,35 @@ def test_bad_tracks_are_named(tmp_path, text, part):
         figure.read_points_csv(tmp_path / "bad.csv", 2)
 
 
+@pytest.mark.parametrize(
+    ("text", "rate_hz", "part"),
+    [
+        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 25.0, "time_s has 50 frames a second, not 25"),
+        ("a_u,a_v\n1,2\n", 0.0, "positive and finite, got 0"),
+        ("time_s,a_u,a_v\n0,1,2\n", float("nan"), "positive and finite, got nan"),
+        ("# filtered at 6 Hz, 100 Hz\na_u,a_v\n1,2\n", None, r"several rates \(6, 100 Hz\): give --fps"),
+        ("# ...Hz\na_u,a_v\n1,2\n", None, "no frame rate in a comment"),
+    ],
+)
+def test_doubtful_frame_rates_are_refused(tmp_path, text, rate_hz, part):
+    (tmp_path / "points.csv").write_text(text)
+    with pytest.raises(ValueError, match=part):
+        figure.read_points_csv(tmp_path / "points.csv", 2, rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("text", "rate_hz"),
+    [
+        ("# 50 Hz\na_u,a_v\n1,2\n1,2\n", None),
+        ("# filtered at 6 Hz, 100 Hz\na_u,a_v\n1,2\n1,2\n", 50.0),
+        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 50.0),
+    ],
+)
+def test_frame_rates_are_used(tmp_path, text, rate_hz):
+    (tmp_path / "points.csv").write_text(text)
+    assert figure.read_points_csv(tmp_path / "points.csv", 2, rate_hz).times_s.tolist() == [0, 0.02]
+
+
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "memo.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)

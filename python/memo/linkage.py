@@ -132,7 +132,8 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
 
     With 2 `dimensions` the columns of a point are NAME_u_px, NAME_v_px (or NAME_u, NAME_v), with 3 they are
     NAME_x_m, NAME_y_m, NAME_z_m (or NAME_x, NAME_y, NAME_z). A comment line before the header may hold the
-    frame rate ("100 Hz"). Empty cells are unseen.
+    frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` where there is that. Empty cells
+    are unseen.
     """
     with open(path, newline="", encoding="utf-8") as file:
         lines = file.read().splitlines()
@@ -197,17 +198,31 @@ def _times(
     comments: list[str],
     rate_hz: float | None,
 ) -> Array:
-    if rate_hz is None and "time_s" in column:
-        times_s = table[:, column["time_s"]]
-        late = np.flatnonzero(~(np.diff(times_s) > 0))
-        if len(late):
-            raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
-        return times_s
-    stated = re.search(r"([0-9.]+) *Hz", " ".join(comments))
-    rate_hz = rate_hz or (float(stated.group(1)) if stated else None)
-    if not rate_hz or not rate_hz > 0:
+    """The column time_s, which a given rate may not contradict; else from the rate given or in a comment."""
+    if rate_hz is not None and not (rate_hz > 0 and np.isfinite(rate_hz)):
+        raise ValueError(f"a frame rate must be positive and finite, got {rate_hz:g}")
+    if "time_s" not in column:
+        return np.arange(len(table)) / (_stated_rate(path, comments) if rate_hz is None else rate_hz)
+    times_s = table[:, column["time_s"]]
+    late = np.flatnonzero(~(np.diff(times_s) > 0))
+    if len(late):
+        raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
+    if rate_hz is not None and len(times_s) > 1:
+        timed_hz = 1 / float(np.median(np.diff(times_s)))
+        if abs(timed_hz / rate_hz - 1) > 0.02:
+            raise ValueError(f"{path}: column time_s has {timed_hz:.4g} frames a second, not {rate_hz:g}")
+    return times_s
+
+
+def _stated_rate(path: str | PathLike[str], comments: list[str]) -> float:
+    """The frame rate in the comments, where just one number stands before "Hz"."""
+    stated = {float(rate) for rate in re.findall(r"(?<![\w.,-])(\d+(?:\.\d*)?) *Hz\b", "\n".join(comments))}
+    if len(stated) > 1:
+        rates = ", ".join(f"{rate:g}" for rate in sorted(stated))
+        raise ValueError(f"{path}: the comments hold several rates ({rates} Hz): give --fps")
+    if not stated or 0 in stated:
         raise ValueError(f"{path}: no column time_s and no frame rate in a comment: give --fps")
-    return np.arange(len(table)) / rate_hz
+    return stated.pop()
 
 
 def write_points_csv(path: str | PathLike[str], points: Points) -> None:

@@ -84,7 +84,7 @@ def _pointlight(
     from memo.linkage_plot import write_display_video
 
     if motion is None:
-        points = _walker_points(seconds, fps or 60.0)
+        points = _walker_points(seconds, 60.0 if fps is None else fps)
     else:
         points = read_points_csv(motion / "track.csv" if motion.is_dir() else motion, 3, fps)
     check_writable(out)
