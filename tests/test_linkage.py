@@ -230,3 +230,56 @@ def test_commands_make_and_read_a_display(tmp_path):
     assert (tmp_path / "linkage.png").stat().st_size > 1000
     absent = run("planar", tmp_path / "absent.csv")
     assert absent.returncode == 1 and absent.stderr.startswith("memo: ")
+
+
+def test_a_failure_promises_no_links_that_are_not_there():
+    from memo.cli.planar import _about_figure
+
+    points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
+    assert _about_figure(found_with(["edge-on"], "still"), points, 0.5)[-1].endswith("is in links.csv.")
+    nothing = found_with(["edge-on"], "still", chains=[])
+    assert _about_figure(nothing, points, 0.5)[-1].endswith("nothing is claimed.")
+
+
+def test_points_seen_but_not_joined_are_not_called_unseen():
+    tracks = np.random.default_rng(1).normal(0, 100, (150, 2, 2)).cumsum(axis=0)
+    tracks[75:] = np.nan
+    states = [window["status"] for window in memo.planar(tracks, np.arange(150) / 60, window_s=0.5).windows]
+    assert states[0] == "nothing linked" and states[-1] == "unseen"
+
+
+def test_a_spanning_tree_is_told(tmp_path):
+    from memo.cli.planar import _about_figure
+
+    shown = display(azimuth_deg=30)
+    tracks = np.concatenate([shown["positions_px"], shown["positions_px"][:, :6] + 400], axis=1)
+    points = figure.Points([f"d{i}" for i in range(19)], shown["times_s"], tracks)
+    found = memo.planar(tracks, shown["times_s"])
+    assert "19 points are too many" in _about_figure(found, points, 0.5)[1]
+    figure.write_figure_csv(tmp_path, found, points)
+    rows = csv.DictReader((tmp_path / "windows.csv").read_text().splitlines())
+    assert {row["method"] for row in rows} == {"forest"}
+
+
+def test_the_way_to_the_limbs_is_told_where_there_is_one(tmp_path):
+    pytest.importorskip("typer"), pytest.importorskip("av"), pytest.importorskip("matplotlib")
+    out = tmp_path / "my dots"
+    made = run("pointlight", "--out", out, "--seconds", "0.3", "--noise-px", "1.5")
+    assert f"memo planar '{out / 'dots.csv'}' --noise-px 1.5" in made.stdout
+    for options in (("--seconds", "0.1"), ("--seconds", "0.3", "--scramble-position")):
+        made = run("pointlight", "--out", out, *options)
+        assert made.returncode == 0 and "memo planar" not in made.stdout
+
+
+def test_senseless_options_are_refused(tmp_path):
+    pytest.importorskip("typer")
+    (tmp_path / "dots.csv").write_text("# 30 Hz\na_u,a_v,b_u,b_v\n" + "1,2,3,4\n" * 10)
+    for command, part in (
+        (("planar", tmp_path / "dots.csv", "--focal-px", "0"), "--focal-px 0 must be positive"),
+        (("planar", tmp_path / "dots.csv", "--turn-deg", "nan"), "--turn-deg nan must be finite"),
+        (("planar", tmp_path / "dots.csv", "--names"), "no column names a joint"),
+        (("pointlight", "--period", "1"), "--scramble-phase"),
+        (("pointlight", "--scramble-phase", "--period", "0"), "--period 0 must be positive"),
+    ):
+        refused = run(*command, "--out", tmp_path)
+        assert refused.returncode == 1 and part in refused.stderr

@@ -42,6 +42,10 @@ _SHORT = {
 }
 
 
+JOINT_NAMES = frozenset(_SHORT.values())
+"""Names that `read_points_csv` gives to points that are joints."""
+
+
 @dataclass(frozen=True)
 class Points:
     """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
@@ -68,7 +72,8 @@ class Points:
 class PlanarFigure:
     """The linkage found in tracks, window by window.
 
-    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen"),
+    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen",
+    or "nothing linked" where points are seen but none joined),
     the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
     (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
     motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
@@ -124,7 +129,11 @@ def planar(
     `focal_px`, to be told what perspective costs.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
-    return PlanarFigure(**_memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options))
+    found = _memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options)
+    for window in found["windows"]:
+        if window["status"] == "unseen" and np.isfinite(tracks[window["start"] : window["end"]]).any():
+            window["status"] = "nothing linked"
+    return PlanarFigure(**found)
 
 
 def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float | None = None) -> Points:
@@ -244,7 +253,8 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
     for number, window in enumerate(figure.windows):
         start_s, end_s = (float(points.times_s[frame]) for frame in (window["start"], window["end"] - 1))
         verdicts = [str(window[key]) for key in ("planar", "refuted", "undecided")]
-        windows.append([str(number), f"{start_s:.3f}", f"{end_s:.3f}", window["status"], *verdicts])
+        times = [f"{start_s:.3f}", f"{end_s:.3f}"]
+        windows.append([str(number), *times, window["status"], window.get("method", ""), *verdicts])
         for chain in window["chains"]:
             label = "-".join(name(point) for point in chain["points"])
             values = [chain[key] for key in ("tilt_deg", "residual", "motion", "statistic", "threshold")]
@@ -259,7 +269,8 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
                 labels = [str(number), window["status"], name(a), name(b), chain["verdict"]]
                 links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
-    _write(written[0], ["window", "start_s", "end_s", "status", "planar", "refuted", "undecided"], windows)
+    window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]
+    _write(written[0], window_header, windows)
     link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
     _write(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)
     chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import memo
-from memo.cli.delivery import Delivery, Exit, guarded, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
 from memo.cli.given import check_writable
 
 if TYPE_CHECKING:
@@ -58,10 +58,13 @@ def _planar(
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.linkage import read_points_csv, write_figure_csv
+    from memo.linkage import JOINT_NAMES, read_points_csv, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
+    _check(options["focal_px"], turn_deg)
     points, out = read_points_csv(tracks, 2, fps).at_one_scale(), delivery.out
+    if names and not any(name in JOINT_NAMES for name in points.names):
+        raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)
     if delivery.talks:
         print(
@@ -102,13 +105,26 @@ def _planar(
     return Exit.DONE if figure.interpreted else Exit.NOBODY
 
 
+def _check(focal_px: float | None, turn_deg: float) -> None:
+    if focal_px is not None and not (focal_px > 0 and math.isfinite(focal_px)):
+        raise InputError(f"--focal-px {focal_px:g} must be positive and finite")
+    if not math.isfinite(turn_deg):
+        raise InputError(f"--turn-deg {turn_deg:g} must be finite")
+
+
 def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     """What was found, in sentences."""
     states = [window["status"] for window in figure.windows]
     told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     lines = [f"Windows: {', '.join(told)}."]
+    if any(window.get("method") == "forest" and window["chains"] for window in figure.windows):
+        lines.append(
+            f"{len(points.names)} points are too many to be weighed against each other (at most 16): "
+            "a spanning tree links them, without confidences, and false links are likely."
+        )
     if not figure.interpreted:
-        return [*lines, "No window shows planar motion: nothing is claimed. The best guess is in links.csv."]
+        guess = " The best guess is in links.csv." if any(w["chains"] for w in figure.windows) else ""
+        return [*lines, f"No window shows planar motion: nothing is claimed.{guess}"]
     lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
         lines.append(
