@@ -182,6 +182,50 @@ def test_bad_tracks_are_named(tmp_path, text, part):
         figure.read_points_csv(tmp_path / "bad.csv", 2)
 
 
+def test_files_from_elsewhere_are_read_or_named(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("time_s,a_u,a_v\n0,1,2\n1,1,2\n", encoding="utf-8-sig")
+    assert figure.read_points_csv(path, 2).times_s.tolist() == [0, 1]
+    path.write_bytes(b"\xff\xfe\x00a")
+    with pytest.raises(ValueError, match=r"points\.csv: no UTF-8 text"):
+        figure.read_points_csv(path, 2)
+
+
+def test_scales_are_written_and_read(tmp_path):
+    scales = np.array([0.5, 1.25])
+    points = figure.Points(["a"], np.array([0.0, 1.0]), np.ones((2, 1, 2)), scales)
+    figure.write_points_csv(tmp_path / "points.csv", points)
+    assert figure.read_points_csv(tmp_path / "points.csv", 2).scales.tolist() == scales.tolist()
+
+
+def test_labels_hold_any_name(tmp_path):
+    from memo.cli.pointlight import _write_labels
+
+    shown = display()
+    names = ['a,"b"', *walk()["names"][1:]]
+    _write_labels(tmp_path / "labels.csv", names, names, shown)
+    rows = csv.DictReader((tmp_path / "labels.csv").read_text().splitlines())
+    assert next(rows) == dict(frame="0", dot=names[0], shows=names[0], limb_end="", fraction="", visible="1")
+
+
+@pytest.mark.filterwarnings("error")
+def test_frames_without_points_are_drawn(tmp_path):
+    pytest.importorskip("av"), pytest.importorskip("matplotlib")
+    from memo import linkage_plot
+
+    shown = display(azimuth_deg=30)
+    tracks = shown["positions_px"].copy()
+    tracks[30:36] = np.nan
+    points = figure.Points(walk()["names"], shown["times_s"], tracks)
+    found = memo.planar(tracks, points.times_s, 0.5)
+    assert found.interpreted
+    linkage_plot.write_linkage_png(tmp_path / "linkage.png", points, found)
+    linkage_plot.write_turned_png(tmp_path / "turned.png", points, found)
+    linkage_plot.write_turned_video(tmp_path / "turned.mp4", points, found)
+    linkage_plot.write_display_video(tmp_path / "display.mp4", points.times_s, tracks)
+    assert np.isfinite(tracks[linkage_plot._fullest(tracks)]).all()
+
+
 @pytest.mark.parametrize(
     ("text", "rate_hz", "part"),
     [

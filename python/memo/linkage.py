@@ -144,10 +144,12 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` where there is that. Empty cells
     are unseen.
     """
-    with open(path, newline="", encoding="utf-8") as file:
-        lines = file.read().splitlines()
+    lines = _lines(path)
     comments = [line for line in lines if line.startswith("#")]
-    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    try:
+        rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    except csv.Error as error:
+        raise ValueError(f"{path}: no CSV file: {error}") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: no header and rows of numbers")
     header, body = [name.strip() for name in rows[0]], rows[1:]
@@ -183,6 +185,15 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
         return Points([_SHORT.get(name, name) for name in names], times_s, table[:, np.array(picked)], scales)
     wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
     raise ValueError(f"{path}: no columns {wanted}; it has {', '.join(header[:6])}")
+
+
+def _lines(path: str | PathLike[str]) -> list[str]:
+    """The lines of a text file, with or without a byte order mark."""
+    with open(path, newline="", encoding="utf-8-sig") as file:
+        try:
+            return file.read().splitlines()
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{path}: no UTF-8 text (byte {error.start})") from None
 
 
 def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
@@ -238,10 +249,14 @@ def write_points_csv(path: str | PathLike[str], points: Points) -> None:
     """Writes points so that `read_points_csv` reads them."""
     axes = ("u_px", "v_px") if points.positions.shape[2] == 2 else ("x", "y", "z")
     header = ["frame", "time_s", *(f"{name}_{axis}" for name in points.names for axis in axes)]
-    rows = (
+    rows = [
         [str(frame), f"{time_s:.6f}", *_cells(row.ravel())]
         for frame, (time_s, row) in enumerate(zip(points.times_s, points.positions, strict=True))
-    )
+    ]
+    if points.scales is not None:
+        header.append("scale")
+        for row, scale in zip(rows, points.scales, strict=True):
+            row.append(f"{scale:.9g}" if np.isfinite(scale) else "")
     _write(path, header, rows)
 
 

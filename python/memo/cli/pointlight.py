@@ -3,6 +3,7 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
+import csv
 import math
 import shlex
 from pathlib import Path
@@ -120,14 +121,15 @@ def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
 
 def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
     """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
-    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
-        file.write("frame,dot,shows,limb_end,fraction,visible\n")
+    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["frame", "dot", "shows", "limb_end", "fraction", "visible"])
         for frame, row in enumerate(display["labels"]):
             for dot, label in enumerate(row):
                 end = int(display["limb_ends"][frame, dot])
                 shows = names[label] if label >= 0 else "noise"
-                limb = f"{names[end]},{display['fractions'][frame, dot]:.4f}" if end >= 0 else ","
-                file.write(f"{frame},{dots[dot]},{shows},{limb},{int(display['visible'][frame, dot])}\n")
+                limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
+                table.writerow([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
 
 
 def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
