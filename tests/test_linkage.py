@@ -139,7 +139,7 @@ def test_chains_that_are_not_planar_are_left_out():
     assert found.links() == [(0, 1, 2.0, 0.9, 3)]
     assert found.verdicts() == {(0, 1): {"planar": 2, "not planar": 1, "edge-on": 1}}
     assert _about_links(found, ["a", "b"]) == [
-        "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1, in 3 of 4 windows",
+        "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1 of 4 windows",
         "Left out, their motion is not planar: a - b (in 1 of 4 windows).",
     ]
     assert found_with(["not planar"]).links() == []

@@ -148,20 +148,18 @@ def _about_links(figure: Any, names: list[str]) -> list[str]:
     """A line for each link, and one for the links of chains that are not planar."""
     from memo.linkage import REFUTED
 
-    verdicts, lines = figure.verdicts(), []
+    verdicts, windows, lines = figure.verdicts(), len(figure.interpreted), []
     for a, b, length, confidence, count in figure.links():
-        where = (
-            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
-        )
         sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
         kept = {verdict: number for verdict, number in verdicts[a, b].items() if verdict != REFUTED}
-        judged = ", ".join(
-            f"{verdict} in {number}" if len(kept) > 1 else verdict for verdict, number in kept.items()
-        )
-        lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}{where}")
+        if count == windows and len(kept) == 1:
+            judged = next(iter(kept))
+        else:
+            judged = ", ".join(f"{verdict} in {number}" for verdict, number in kept.items())
+            judged += f" of {windows} windows"
+        lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}")
     refuted = [
-        f"{names[a]} - {names[b]}"
-        + (f" (in {counts[REFUTED]} of {sum(counts.values())} windows)" if len(counts) > 1 else "")
+        f"{names[a]} - {names[b]} (in {counts[REFUTED]} of {windows} windows)"
         for (a, b), counts in verdicts.items()
         if REFUTED in counts
     ]
