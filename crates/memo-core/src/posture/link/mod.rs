@@ -185,7 +185,6 @@ pub fn link(
             (trunk.delta + limbs.cost, trunk, limbs)
         })
         .collect();
-    for b in &bodies {}
     bodies.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (best, trunk, limbs) = &bodies[0];
     let turned: Vec<Flip> = bodies[1..]
