@@ -52,9 +52,10 @@ pub fn at_one_scale(points: &[DVec2], scales: &[f64]) -> Result<Vec<DVec2>, Scal
 /// A hinge that comes nearer or goes away at a steady pace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecedingHinge {
-    /// The hinge at the scale of the middle of the time.
+    /// The hinge at the scale of the middle of the time; its covariance is that of a known change.
     pub fit: HingeFit,
-    /// Change of the distance over the views, relative to the distance in the middle; positive = going away.
+    /// Change of the distance over the views, relative to the distance in the middle; positive = going away;
+    /// at +-0.6, the largest that is tried, it may be more.
     pub distance_change: f64,
 }
 

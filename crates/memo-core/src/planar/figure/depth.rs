@@ -42,7 +42,8 @@ pub(super) fn depth_over_time(
     for frame in 0..frames {
         let Some(index) = nearest(frame) else { continue };
         sources[frame] = DepthSource::Planar;
-        for (chain, sign) in read[index].figure.chains.iter().zip(&signs[index]) {
+        let chains = read[index].figure.chains.iter().zip(&signs[index]);
+        for (chain, sign) in chains.filter(|(chain, _)| chain.evidence.verdict != Verdict::NotPlanar) {
             for (&point, z) in chain.points.iter().zip(&chain.depth[frame - read[index].start]) {
                 depth[frame * points + point] = sign * z;
             }
@@ -121,9 +122,12 @@ fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], 
             let (kept, turned) = (reach(sign), reach(-sign));
             if turned.1 < kept.1 && next.reflection_margin_deg.is_none() {
                 for (later, signs) in read[after..].iter().zip(&mut signs[after..]) {
-                    if let Some(same) = same_chain(later, chain) {
-                        signs[same] = -signs[same];
+                    let Some(same) = same_chain(later, chain) else { continue };
+                    // What joint limits have settled stays.
+                    if later.figure.chains[same].reflection_margin_deg.is_some() {
+                        break;
                     }
+                    signs[same] = -signs[same];
                 }
                 gap.fill(&turned.0, depth);
             } else {

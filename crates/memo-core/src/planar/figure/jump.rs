@@ -33,8 +33,9 @@ pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     let usual = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
     // Noise alone makes a median distance of 1.44 standard deviations.
     let limit = JUMP * usual.max(1.44 * noise_sd);
-    // Where a tenth would have to go, the track is rough, not wrong.
-    for _ in 0..track.len() / 10 {
+    // Where more than a tenth would have to go, the track is rough, not wrong.
+    let most = (track.len() / 10).max(1);
+    for _ in 0..=most {
         let turns_back = |t: usize, d: f64| d > clean[t - 1].distance(clean[t + 1]);
         let distances =
             (0..clean.len()).map(|t| (off(&clean, t), t)).filter(|&(d, t)| d > limit && turns_back(t, d));
@@ -54,6 +55,20 @@ mod tests {
     fn a_foot_that_lands_is_no_jump() {
         let track: Vec<DVec2> = (0..40).map(|t| DVec2::new(8.0 * f64::from(t.clamp(10, 20)), 0.0)).collect();
         assert_eq!(without_jumps(&track, 0.0), track);
+    }
+
+    #[test]
+    fn as_many_jumps_as_allowed_go_and_more_stay() {
+        for (frames, jumps) in [(19, 1), (66, 6), (69, 6), (69, 8)] {
+            let smooth: Vec<DVec2> =
+                (0..frames).map(|t| DVec2::new(f64::from(t), 0.1 * f64::from(t * t))).collect();
+            let mut wrong = smooth.clone();
+            let places: Vec<usize> = (0..jumps).map(|k| 4 + 7 * k).collect();
+            places.iter().for_each(|&t| wrong[t].y += 120.0);
+            let kept = without_jumps(&wrong, 0.0);
+            let gone: Vec<usize> = (0..wrong.len()).filter(|&t| kept[t].is_nan()).collect();
+            assert_eq!(gone, if jumps == 8 { vec![] } else { places }, "{frames} frames");
+        }
     }
 
     #[test]

@@ -110,6 +110,10 @@ pub enum FigureError {
     },
 }
 
+/// A pause in the tracks is longer than so many usual intervals and than this share of a window.
+const MISSED_FRAMES: f64 = 5.0;
+const PAUSE_OF_WINDOW: f64 = 0.25;
+
 /// Fewest frames of a window.
 const FEWEST_FRAMES: usize = 8;
 
@@ -355,13 +359,26 @@ fn size_of(tracks: &[Vec<DVec2>]) -> f64 {
 /// Windows of a length in time that overlap by half; the last ends with the tracks.
 fn windows(times_s: &[f64], window_s: f64) -> Vec<(usize, usize)> {
     let frames = times_s.len();
-    let interval_s = (times_s[frames - 1] - times_s[0]) / (frames - 1) as f64;
-    let long = ((window_s / interval_s).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
+    let mut intervals_s: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = intervals_s.len() / 2;
+    let usual_s = *intervals_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let long = ((window_s / usual_s).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
+    // No window spans a pause.
+    let pause_s = (MISSED_FRAMES * usual_s).max(PAUSE_OF_WINDOW * window_s);
+    let after_pause = (1..frames).filter(|&t| times_s[t] - times_s[t - 1] > pause_s);
+    let bounds: Vec<usize> = std::iter::once(0).chain(after_pause).chain([frames]).collect();
+    let stretches = bounds.windows(2).map(|pair| (pair[0], pair[1]));
+    let long_enough = stretches.filter(|(start, end)| end - start >= FEWEST_FRAMES);
+    long_enough.flat_map(|(start, end)| windows_of(start, end, long)).collect()
+}
+
+fn windows_of(start: usize, end: usize, long: usize) -> Vec<(usize, usize)> {
+    let frames = end - start;
     if 2 * frames <= 3 * long {
-        return vec![(0, frames)];
+        return vec![(start, end)];
     }
     let steps = (2 * (frames - long)).div_ceil(long).max(1);
-    (0..=steps).map(|i| i * (frames - long) / steps).map(|start| (start, start + long)).collect()
+    (0..=steps).map(|i| start + i * (frames - long) / steps).map(|from| (from, from + long)).collect()
 }
 
 #[cfg(test)]
@@ -381,6 +398,21 @@ mod tests {
             format!("{:?}", pool.install(|| interpret_figure(&tracks, &times_s, &options)))
         };
         assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn no_window_spans_a_pause_and_short_stretches_are_none() {
+        let pause_after =
+            |t: usize, pause: f64| f64::from(t as u32) / 60.0 + if t >= 70 { pause } else { 0.0 };
+        let times_s: Vec<f64> = (0..150).map(|t| pause_after(t, 10.0)).collect();
+        let found = windows(&times_s, 1.2);
+        assert!(found.iter().all(|&(start, end)| end <= 70 || start >= 70), "{found:?}");
+        assert!(found.contains(&(0, 70)) && found.last().unwrap().1 == 150);
+        let scattered: Vec<f64> = (0..12).map(|t| f64::from(t) / 60.0 + 5.0 * f64::from(t / 3)).collect();
+        assert!(windows(&scattered, 1.2).is_empty());
+        let (tracks, ..) = walker(12, |_| 0.0, 0.0);
+        let answer = interpret_figure(&tracks, &scattered, &FigureOptions::default()).unwrap();
+        assert!(answer.windows.is_empty() && answer.depth.iter().all(|z| z.is_nan()));
     }
 
     #[test]

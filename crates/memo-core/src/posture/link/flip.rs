@@ -126,12 +126,19 @@ impl Chain<'_> {
     }
 
     /// Cost of mirroring a stretch.
-    fn delta(&self, states: &[usize], mask: usize, from: usize, to: usize) -> f64 {
+    pub fn delta(&self, states: &[usize], mask: usize, from: usize, to: usize) -> f64 {
         let reach = self.around(from, to);
         let mirrored = |t: usize| if (from..to).contains(&t) { states[t] ^ mask } else { states[t] };
         let own: f64 = (from..to).map(|t| (self.cost)(t, states[t] ^ mask) - (self.cost)(t, states[t])).sum();
         let affected = (self.affected)(mask);
         own + self.motion(affected, reach, mirrored) - self.motion(affected, reach, |t| states[t])
+    }
+
+    /// Cost of a path: its states' and its motion's.
+    pub fn total(&self, states: &[usize]) -> f64 {
+        let own: f64 = states.iter().enumerate().map(|(t, &state)| (self.cost)(t, state)).sum();
+        let all = (1 << self.acceleration_mps2.len()) - 1;
+        own + self.motion(all, [0, states.len()], |t| states[t])
     }
 
     /// Negative log likelihood of some segments' motion over a stretch.

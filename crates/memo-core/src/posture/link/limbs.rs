@@ -68,6 +68,8 @@ pub(super) struct Limbs {
     pub smoothed: Vec<StickFigure>,
     /// Standard deviation of each joint along its ray against its starting joint, metres.
     pub sd_m: Vec<PerJoint<f64>>,
+    /// What the paths cost, nats.
+    pub cost: f64,
     flips: [Vec<Flip>; 2],
 }
 
@@ -89,13 +91,17 @@ impl Limbs {
         let mut states = states.map(Option::unwrap_or_default);
         let times_s = problem.times_s();
         let mut flips = [vec![], vec![]];
+        let mut total = 0.0;
         for last in [false, true] {
             for pair in [1, 0] {
                 let cost = pair_costs(problem, &pairs, pair, Some(&states[1 - pair]));
-                flips[pair] = pairs[pair].refine(&times_s, &cost, &mut states[pair], last);
+                let (paths, path_cost) = pairs[pair].refine(&times_s, &cost, &mut states[pair], last);
+                flips[pair] = paths;
+                total += if last { path_cost } else { 0.0 };
             }
         }
-        let mut limbs = Self { smoothed: trunk.smoothed.clone(), sd_m: trunk.sd_m.clone(), flips };
+        let mut limbs =
+            Self { smoothed: trunk.smoothed.clone(), sd_m: trunk.sd_m.clone(), cost: total, flips };
         for (pair, states) in states.into_iter().enumerate() {
             limbs.smooth(problem, pair, &pairs[pair], &states);
         }
@@ -160,14 +166,15 @@ impl Pair {
         )
     }
 
-    /// Mirrors what is better mirrored of a path; returns what the rest would cost if asked.
+    /// Mirrors what is better mirrored of a path; returns, if asked, what the rest would cost and what the
+    /// path costs.
     fn refine(
         &self,
         times_s: &[f64],
         cost: &[[f64; READINGS]],
         states: &mut [usize],
         rest: bool,
-    ) -> Vec<Flip> {
+    ) -> (Vec<Flip>, f64) {
         let chain = Chain {
             times_s,
             acceleration_mps2: &self.acceleration_mps2,
@@ -177,7 +184,7 @@ impl Pair {
             cost: &|t, state| cost[t][state],
         };
         chain.refine(states);
-        if rest { chain.flips(states) } else { vec![] }
+        if rest { (chain.flips(states), chain.total(states)) } else { (vec![], 0.0) }
     }
 }
 

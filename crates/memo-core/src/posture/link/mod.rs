@@ -26,7 +26,7 @@ use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths,
 use super::smooth::Measured;
 use flip::Flip;
 use limbs::Limbs;
-use trunk::Trunk;
+use trunk::{Trunk, joints_of};
 
 /// Why a sequence cannot be linked.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -177,10 +177,27 @@ pub fn link(
     let bridged = bridge(&seen, options.bridge_s);
     let problem = Problem { frames: &bridged, lengths, options };
     // 2. The trunk, then arms and legs in turn, each given the other.
-    let trunk = Trunk::link(&problem);
-    let limbs = Limbs::link(&problem, &trunk);
+    //    Which way a trunk faces its limbs may tell better: it is tried turned round as well.
+    let mut bodies: Vec<(f64, Trunk, Limbs)> = Trunk::link(&problem)
+        .into_iter()
+        .map(|trunk| {
+            let limbs = Limbs::link(&problem, &trunk);
+            (trunk.delta + limbs.cost, trunk, limbs)
+        })
+        .collect();
+    bodies.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (best, trunk, limbs) = &bodies[0];
+    let turned: Vec<Flip> = bodies[1..]
+        .iter()
+        .map(|(cost, other, _)| Flip {
+            mask: other.turn ^ trunk.turn,
+            from: 0,
+            to: seen.len(),
+            delta: cost - best,
+        })
+        .collect();
     // 3. Leaves of the tree, second-best reading and margins.
-    let path = problem.path(&seen, &trunk, &limbs);
+    let path = problem.path(&seen, trunk, limbs, &turned);
     Ok(path.spread(&known, frames.len()))
 }
 
@@ -306,10 +323,11 @@ impl Problem<'_> {
     }
 
     /// Leaves, margins and the second-best reading of a linked sequence.
-    fn path(&self, seen: &[LinkFrame], trunk: &Trunk, limbs: &Limbs) -> LinkedPath {
+    fn path(&self, seen: &[LinkFrame], trunk: &Trunk, limbs: &Limbs, turned: &[Flip]) -> LinkedPath {
         let leaves: Vec<Leaf> =
             (0..seen.len()).map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &[])).collect();
-        let readings = trunk.readings().chain(limbs.readings());
+        let whole = turned.iter().map(|&flip| (flip, joints_of(flip.mask)));
+        let readings = trunk.readings().chain(limbs.readings()).chain(whole);
         let mut margin = vec![f64::INFINITY; seen.len()];
         let mut mirror_margin = vec![PerJoint([f64::INFINITY; JOINT_COUNT]); seen.len()];
         let mut second: Option<(Flip, Vec<Joint>)> = None;

@@ -27,8 +27,18 @@ const STEADY_SHARE: f64 = 0.7;
 /// What may be mirrored together: one segment, both shoulders, both hips.
 const MASKS: [usize; 7] = [1, 2, 4, 8, 16, 3, 24];
 
+/// What turns a trunk round: shoulders and hips.
+const TURN: usize = 27;
+
+/// A turned trunk that costs more than this many nats more is not tried: no limbs outweigh it.
+const WORTH_TRYING: f64 = 200.0;
+
 /// The trunk's path.
 pub(super) struct Trunk {
+    /// By how much it costs more than the least costly trunk, nats, limbs apart.
+    pub delta: f64,
+    /// What is turned round against the least costly trunk.
+    pub turn: usize,
     /// Neck and trunk of every frame, smoothed.
     pub smoothed: Vec<StickFigure>,
     /// Standard deviation of each joint along its ray against its starting joint, metres.
@@ -44,7 +54,8 @@ struct Reading {
 }
 
 impl Trunk {
-    pub fn link(problem: &Problem) -> Self {
+    /// The least costly trunk, and that trunk turned round where limbs may make up for it.
+    pub fn link(problem: &Problem) -> Vec<Self> {
         let readings: Vec<[Reading; READINGS]> = (0..problem.frames.len())
             .into_par_iter()
             .map(|t| std::array::from_fn(|bits| problem.trunk_reading(t, bits)))
@@ -76,20 +87,30 @@ impl Trunk {
             cost: &|t, state| readings[t][state].cost,
         };
         chain.refine(&mut states);
-        let flips = chain.flips(&states);
-        let extents: Vec<[Measured; 5]> =
-            states.iter().enumerate().map(|(t, &state)| readings[t][state].extents).collect();
-        let (smoothed, sd_m) = problem.smooth_trunk(&extents);
-        Self { smoothed, sd_m, flips }
+        let turned = (!states.is_empty()).then(|| (TURN, chain.delta(&states, TURN, 0, states.len())));
+        std::iter::once((0, 0.0))
+            .chain(turned.filter(|(_, delta)| *delta < WORTH_TRYING))
+            .map(|(turn, delta)| {
+                let states: Vec<usize> = states.iter().map(|state| state ^ turn).collect();
+                let flips = chain.flips(&states);
+                let extents: Vec<[Measured; 5]> =
+                    states.iter().enumerate().map(|(t, &state)| readings[t][state].extents).collect();
+                let (smoothed, sd_m) = problem.smooth_trunk(&extents);
+                Self { delta, turn, smoothed, sd_m, flips }
+            })
+            .collect()
     }
 
     /// Other readings: what is mirrored, and the joints concerned.
     pub fn readings(&self) -> impl Iterator<Item = (Flip, Vec<Joint>)> + '_ {
-        self.flips.iter().map(|&flip| {
-            let joints = JOINTS.into_iter().enumerate().filter(|(i, _)| flip.mask >> i & 1 == 1);
-            (flip, joints.map(|(_, joint)| joint).collect())
-        })
+        self.flips.iter().map(|&flip| (flip, joints_of(flip.mask)))
     }
+}
+
+/// The joints of a mask.
+pub(super) fn joints_of(mask: usize) -> Vec<Joint> {
+    let bits = JOINTS.into_iter().enumerate().filter(|(bit, _)| mask >> bit & 1 == 1);
+    bits.map(|(_, joint)| joint).collect()
 }
 
 /// The readings that cost least, of equal ones the lower.
