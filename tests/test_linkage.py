@@ -285,6 +285,15 @@ def test_a_failure_promises_no_links_that_are_not_there():
     assert _about_figure(nothing, points, 0.5)[-1].endswith("nothing is claimed.")
 
 
+def test_tracks_without_a_window_are_told(tmp_path):
+    from memo.cli.planar import _about_figure
+
+    points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
+    nothing = figure.PlanarFigure([], np.full((8, 2), np.nan), ["unknown"] * 8)
+    assert _about_figure(nothing, points, 0.5)[0].startswith("No window")
+    assert len(figure.write_figure_csv(tmp_path, nothing, points)) == 4
+
+
 def test_points_seen_but_not_joined_are_not_called_unseen():
     tracks = np.random.default_rng(1).normal(0, 100, (150, 2, 2)).cumsum(axis=0)
     tracks[75:] = np.nan

@@ -73,10 +73,11 @@ def _planar(
     named = {"names": points.names} if names else {}
     figure = memo.planar(points.positions, points.times_s, noise_px, **named, **options)
     written = write_figure_csv(out, figure, points)
-    write_linkage_png(out / "linkage.png", points, figure)
-    written.append(out / "linkage.png")
-    for stale in ("turned.mp4", "turned.png"):  # of an earlier run
+    for stale in ("linkage.png", "turned.mp4", "turned.png"):  # of an earlier run
         (out / stale).unlink(missing_ok=True)
+    if figure.windows:
+        write_linkage_png(out / "linkage.png", points, figure)
+        written.append(out / "linkage.png")
     if figure.interpreted:
         write_turned_png(out / "turned.png", points, figure, turn_deg=turn_deg)
         written.append(out / "turned.png")
@@ -114,6 +115,8 @@ def _check(focal_px: float | None, turn_deg: float) -> None:
 
 def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     """What was found, in sentences."""
+    if not figure.windows:
+        return ["No window: pauses in the times leave no stretch long enough. Nothing is claimed."]
     states = [window["status"] for window in figure.windows]
     told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     lines = [f"Windows: {', '.join(told)}."]
