@@ -104,6 +104,47 @@ def test_scales_are_divided_out():
         memo.planar(shown["positions_px"], shown["times_s"], scales=scales[:5])
 
 
+def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
+    shown, names = display(azimuth_deg=60), walk()["names"]
+    scales = np.linspace(0.7, 1.4, 66)
+    points = figure.Points(names, shown["times_s"], shown["positions_px"] * scales[:, None, None], scales)
+    found = memo.planar(points.positions, points.times_s, scales=scales)
+    figure.write_figure_csv(tmp_path, found, points)
+    rows = list(csv.DictReader((tmp_path / "points3d.csv").read_text().splitlines()))
+    a, b = (
+        np.array([[float(row[f"{name}_{axis}_px"]) for axis in "uvz"] for row in rows])
+        for name in ("RHP", "RKN")
+    )
+    lengths = np.linalg.norm(a - b, axis=1)
+    assert lengths.max() < 1.02 * lengths.min()
+    with pytest.raises(ValueError, match="frame 0: scale 0 must be positive"):
+        figure.Points(names, points.times_s, points.positions, scales * 0).at_one_scale()
+
+
+def found_with(verdicts, status="interpreted", **more):
+    """A figure of one window for each verdict, with the link 0 - 1 as long as the window's number."""
+    link = {"points": (0, 1), "length_sd": 0.1, "margin": 1.0, "confidence": 0.9}
+    windows = [
+        {"status": status, "chains": [{"verdict": verdict, "links": [link | {"length": float(number)}]}]}
+        | more
+        for number, verdict in enumerate(verdicts)
+    ]
+    return figure.PlanarFigure(windows, np.zeros((8, 2)), ["planar"] * 8)
+
+
+def test_chains_that_are_not_planar_are_left_out():
+    from memo.cli.planar import _about_links
+
+    found = found_with(["not planar", "planar", "edge-on", "planar"])
+    assert found.links() == [(0, 1, 2.0, 0.9, 3)]
+    assert found.verdicts() == {(0, 1): {"planar": 2, "not planar": 1, "edge-on": 1}}
+    assert _about_links(found, ["a", "b"]) == [
+        "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1 of 4 windows",
+        "Left out, their motion is not planar: a - b (in 1 of 4 windows).",
+    ]
+    assert found_with(["not planar"]).links() == []
+
+
 def test_closed_forms_lift_planted_rods_and_hinges():
     angles = np.random.default_rng(3).uniform(0, 2 * np.pi, (500, 4))
     points = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -141,6 +182,79 @@ def test_bad_tracks_are_named(tmp_path, text, part):
         figure.read_points_csv(tmp_path / "bad.csv", 2)
 
 
+def test_files_from_elsewhere_are_read_or_named(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("time_s,a_u,a_v\n0,1,2\n1,1,2\n", encoding="utf-8-sig")
+    assert figure.read_points_csv(path, 2).times_s.tolist() == [0, 1]
+    path.write_bytes(b"\xff\xfe\x00a")
+    with pytest.raises(ValueError, match=r"points\.csv: no UTF-8 text"):
+        figure.read_points_csv(path, 2)
+
+
+def test_scales_are_written_and_read(tmp_path):
+    scales = np.array([0.5, 1.25])
+    points = figure.Points(["a"], np.array([0.0, 1.0]), np.ones((2, 1, 2)), scales)
+    figure.write_points_csv(tmp_path / "points.csv", points)
+    assert figure.read_points_csv(tmp_path / "points.csv", 2).scales.tolist() == scales.tolist()
+
+
+def test_labels_hold_any_name(tmp_path):
+    from memo.cli.pointlight import _write_labels
+
+    shown = display()
+    names = ['a,"b"', *walk()["names"][1:]]
+    _write_labels(tmp_path / "labels.csv", names, names, shown)
+    rows = csv.DictReader((tmp_path / "labels.csv").read_text().splitlines())
+    assert next(rows) == dict(frame="0", dot=names[0], shows=names[0], limb_end="", fraction="", visible="1")
+
+
+@pytest.mark.filterwarnings("error")
+def test_frames_without_points_are_drawn(tmp_path):
+    pytest.importorskip("av"), pytest.importorskip("matplotlib")
+    from memo import linkage_plot
+
+    shown = display(azimuth_deg=30)
+    tracks = shown["positions_px"].copy()
+    tracks[30:36] = np.nan
+    points = figure.Points(walk()["names"], shown["times_s"], tracks)
+    found = memo.planar(tracks, points.times_s, 0.5)
+    assert found.interpreted
+    linkage_plot.write_linkage_png(tmp_path / "linkage.png", points, found)
+    linkage_plot.write_turned_png(tmp_path / "turned.png", points, found)
+    linkage_plot.write_turned_video(tmp_path / "turned.mp4", points, found)
+    linkage_plot.write_display_video(tmp_path / "display.mp4", points.times_s, tracks)
+    assert np.isfinite(tracks[linkage_plot._fullest(tracks)]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "rate_hz", "part"),
+    [
+        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 25.0, "time_s has 50 frames a second, not 25"),
+        ("a_u,a_v\n1,2\n", 0.0, "positive and finite, got 0"),
+        ("time_s,a_u,a_v\n0,1,2\n", float("nan"), "positive and finite, got nan"),
+        ("# filtered at 6 Hz, 100 Hz\na_u,a_v\n1,2\n", None, r"several rates \(6, 100 Hz\): give --fps"),
+        ("# ...Hz\na_u,a_v\n1,2\n", None, "no frame rate in a comment"),
+    ],
+)
+def test_doubtful_frame_rates_are_refused(tmp_path, text, rate_hz, part):
+    (tmp_path / "points.csv").write_text(text)
+    with pytest.raises(ValueError, match=part):
+        figure.read_points_csv(tmp_path / "points.csv", 2, rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("text", "rate_hz"),
+    [
+        ("# 50 Hz\na_u,a_v\n1,2\n1,2\n", None),
+        ("# filtered at 6 Hz, 100 Hz\na_u,a_v\n1,2\n1,2\n", 50.0),
+        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 50.0),
+    ],
+)
+def test_frame_rates_are_used(tmp_path, text, rate_hz):
+    (tmp_path / "points.csv").write_text(text)
+    assert figure.read_points_csv(tmp_path / "points.csv", 2, rate_hz).times_s.tolist() == [0, 0.02]
+
+
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "memo.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
@@ -153,8 +267,72 @@ def test_commands_make_and_read_a_display(tmp_path):
     read = run("planar", tmp_path / "dots.csv", "--out", tmp_path, "--noise-px", "0", "--no-video")
     assert read.returncode == 0, read.stderr
     with open(tmp_path / "links.csv", newline="") as file:
-        links = {(row["a"], row["b"]) for row in csv.DictReader(file)}
+        rows = list(csv.DictReader(file))
+    links = {(row["a"], row["b"]) for row in rows}
+    assert "planar" in {row["verdict"] for row in rows}
     assert ("RHP", "RKN") in links and len(links) == 8
     assert (tmp_path / "linkage.png").stat().st_size > 1000
     absent = run("planar", tmp_path / "absent.csv")
     assert absent.returncode == 1 and absent.stderr.startswith("memo: ")
+
+
+def test_a_failure_promises_no_links_that_are_not_there():
+    from memo.cli.planar import _about_figure
+
+    points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
+    assert _about_figure(found_with(["edge-on"], "still"), points, 0.5)[-1].endswith("is in links.csv.")
+    nothing = found_with(["edge-on"], "still", chains=[])
+    assert _about_figure(nothing, points, 0.5)[-1].endswith("nothing is claimed.")
+
+
+def test_tracks_without_a_window_are_told(tmp_path):
+    from memo.cli.planar import _about_figure
+
+    points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
+    nothing = figure.PlanarFigure([], np.full((8, 2), np.nan), ["unknown"] * 8)
+    assert _about_figure(nothing, points, 0.5)[0].startswith("No window")
+    assert len(figure.write_figure_csv(tmp_path, nothing, points)) == 4
+
+
+def test_points_seen_but_not_joined_are_not_called_unseen():
+    tracks = np.random.default_rng(1).normal(0, 100, (150, 2, 2)).cumsum(axis=0)
+    tracks[75:] = np.nan
+    states = [window["status"] for window in memo.planar(tracks, np.arange(150) / 60, window_s=0.5).windows]
+    assert states[0] == "nothing linked" and states[-1] == "unseen"
+
+
+def test_a_spanning_tree_is_told(tmp_path):
+    from memo.cli.planar import _about_figure
+
+    shown = display(azimuth_deg=30)
+    tracks = np.concatenate([shown["positions_px"], shown["positions_px"][:, :6] + 400], axis=1)
+    points = figure.Points([f"d{i}" for i in range(19)], shown["times_s"], tracks)
+    found = memo.planar(tracks, shown["times_s"])
+    assert "19 points are too many" in _about_figure(found, points, 0.5)[1]
+    figure.write_figure_csv(tmp_path, found, points)
+    rows = csv.DictReader((tmp_path / "windows.csv").read_text().splitlines())
+    assert {row["method"] for row in rows} == {"forest"}
+
+
+def test_the_way_to_the_limbs_is_told_where_there_is_one(tmp_path):
+    pytest.importorskip("typer"), pytest.importorskip("av"), pytest.importorskip("matplotlib")
+    out = tmp_path / "my dots"
+    made = run("pointlight", "--out", out, "--seconds", "0.3", "--noise-px", "1.5")
+    assert f"memo planar '{out / 'dots.csv'}' --noise-px 1.5" in made.stdout
+    for options in (("--seconds", "0.1"), ("--seconds", "0.3", "--scramble-position")):
+        made = run("pointlight", "--out", out, *options)
+        assert made.returncode == 0 and "memo planar" not in made.stdout
+
+
+def test_senseless_options_are_refused(tmp_path):
+    pytest.importorskip("typer")
+    (tmp_path / "dots.csv").write_text("# 30 Hz\na_u,a_v,b_u,b_v\n" + "1,2,3,4\n" * 10)
+    for command, part in (
+        (("planar", tmp_path / "dots.csv", "--focal-px", "0"), "--focal-px 0 must be positive"),
+        (("planar", tmp_path / "dots.csv", "--turn-deg", "nan"), "--turn-deg nan must be finite"),
+        (("planar", tmp_path / "dots.csv", "--names"), "no column names a joint"),
+        (("pointlight", "--period", "1"), "--scramble-phase"),
+        (("pointlight", "--scramble-phase", "--period", "0"), "--period 0 must be positive"),
+    ):
+        refused = run(*command, "--out", tmp_path)
+        assert refused.returncode == 1 and part in refused.stderr

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from memo.files import JOINTS, complete_file
 __all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
 
 Array = npt.NDArray[np.float64]
+
+REFUTED = "not planar"
+"""Verdict of a chain whose motion contradicts every plane."""
 
 _SHORT = {
     joint: joint[0].upper() + short
@@ -38,6 +42,10 @@ _SHORT = {
 }
 
 
+JOINT_NAMES = frozenset(_SHORT.values())
+"""Names that `read_points_csv` gives to points that are joints."""
+
+
 @dataclass(frozen=True)
 class Points:
     """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
@@ -50,12 +58,22 @@ class Points:
     positions: Array
     scales: Array | None = None
 
+    def at_one_scale(self) -> Points:
+        """The same points with the scales divided out, as depths are."""
+        if self.scales is None:
+            return self
+        bad = np.flatnonzero(~((self.scales > 0) & np.isfinite(self.scales)))
+        if len(bad):
+            raise ValueError(f"frame {bad[0]}: scale {self.scales[bad[0]]:g} must be positive and finite")
+        return replace(self, positions=self.positions / self.scales[:, None, None], scales=None)
+
 
 @dataclass(frozen=True)
 class PlanarFigure:
     """The linkage found in tracks, window by window.
 
-    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen"),
+    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen",
+    or "nothing linked" where points are seen but none joined),
     the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
     (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
     motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
@@ -75,14 +93,28 @@ class PlanarFigure:
         return [window for window in self.windows if window["status"] == "interpreted"]
 
     def links(self) -> list[tuple[int, int, float, float, int]]:
-        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows."""
+        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows.
+
+        Those of chains whose motion is not planar are left out.
+        """
         found: dict[tuple[int, int], list[tuple[float, float]]] = {}
-        for window in self.interpreted:
-            for chain in window["chains"]:
-                for link in chain["links"]:
-                    found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
+        for link, verdict in self._judged():
+            if verdict != REFUTED:
+                found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
         rows = [(a, b, *np.mean(seen, axis=0), len(seen)) for (a, b), seen in found.items()]
         return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
+
+    def verdicts(self) -> dict[tuple[int, int], dict[str, int]]:
+        """Of each link in the interpreted windows, how many windows give its chain each verdict."""
+        counts: dict[tuple[int, int], Counter[str]] = {}
+        for link, verdict in self._judged():
+            counts.setdefault(link["points"], Counter())[verdict] += 1
+        return {points: dict(counts[points].most_common()) for points in sorted(counts)}
+
+    def _judged(self) -> list[tuple[dict[str, Any], str]]:
+        """Links of the interpreted windows with the verdicts of their chains."""
+        chains = (chain for window in self.interpreted for chain in window["chains"])
+        return [(link, chain["verdict"]) for chain in chains for link in chain["links"]]
 
 
 def planar(
@@ -97,7 +129,11 @@ def planar(
     `focal_px`, to be told what perspective costs.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
-    return PlanarFigure(**_memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options))
+    found = _memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options)
+    for window in found["windows"]:
+        if window["status"] == "unseen" and np.isfinite(tracks[window["start"] : window["end"]]).any():
+            window["status"] = "nothing linked"
+    return PlanarFigure(**found)
 
 
 def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float | None = None) -> Points:
@@ -105,12 +141,15 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
 
     With 2 `dimensions` the columns of a point are NAME_u_px, NAME_v_px (or NAME_u, NAME_v), with 3 they are
     NAME_x_m, NAME_y_m, NAME_z_m (or NAME_x, NAME_y, NAME_z). A comment line before the header may hold the
-    frame rate ("100 Hz"). Empty cells are unseen.
+    frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` where there is that. Empty cells
+    are unseen.
     """
-    with open(path, newline="", encoding="utf-8") as file:
-        lines = file.read().splitlines()
+    lines = _lines(path)
     comments = [line for line in lines if line.startswith("#")]
-    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    try:
+        rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    except csv.Error as error:
+        raise ValueError(f"{path}: no CSV file: {error}") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: no header and rows of numbers")
     header, body = [name.strip() for name in rows[0]], rows[1:]
@@ -148,6 +187,15 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     raise ValueError(f"{path}: no columns {wanted}; it has {', '.join(header[:6])}")
 
 
+def _lines(path: str | PathLike[str]) -> list[str]:
+    """The lines of a text file, with or without a byte order mark."""
+    with open(path, newline="", encoding="utf-8-sig") as file:
+        try:
+            return file.read().splitlines()
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{path}: no UTF-8 text (byte {error.start})") from None
+
+
 def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
     """A cell's number, NaN where it is empty; words only where no point is."""
     if not cell.strip():
@@ -170,38 +218,58 @@ def _times(
     comments: list[str],
     rate_hz: float | None,
 ) -> Array:
-    if rate_hz is None and "time_s" in column:
-        times_s = table[:, column["time_s"]]
-        late = np.flatnonzero(~(np.diff(times_s) > 0))
-        if len(late):
-            raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
-        return times_s
-    stated = re.search(r"([0-9.]+) *Hz", " ".join(comments))
-    rate_hz = rate_hz or (float(stated.group(1)) if stated else None)
-    if not rate_hz or not rate_hz > 0:
+    """The column time_s, which a given rate may not contradict; else from the rate given or in a comment."""
+    if rate_hz is not None and not (rate_hz > 0 and np.isfinite(rate_hz)):
+        raise ValueError(f"a frame rate must be positive and finite, got {rate_hz:g}")
+    if "time_s" not in column:
+        return np.arange(len(table)) / (_stated_rate(path, comments) if rate_hz is None else rate_hz)
+    times_s = table[:, column["time_s"]]
+    late = np.flatnonzero(~(np.diff(times_s) > 0))
+    if len(late):
+        raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
+    if rate_hz is not None and len(times_s) > 1:
+        timed_hz = 1 / float(np.median(np.diff(times_s)))
+        if abs(timed_hz / rate_hz - 1) > 0.02:
+            raise ValueError(f"{path}: column time_s has {timed_hz:.4g} frames a second, not {rate_hz:g}")
+    return times_s
+
+
+def _stated_rate(path: str | PathLike[str], comments: list[str]) -> float:
+    """The frame rate in the comments, where just one number stands before "Hz"."""
+    stated = {float(rate) for rate in re.findall(r"(?<![\w.,-])(\d+(?:\.\d*)?) *Hz\b", "\n".join(comments))}
+    if len(stated) > 1:
+        rates = ", ".join(f"{rate:g}" for rate in sorted(stated))
+        raise ValueError(f"{path}: the comments hold several rates ({rates} Hz): give --fps")
+    if not stated or 0 in stated:
         raise ValueError(f"{path}: no column time_s and no frame rate in a comment: give --fps")
-    return np.arange(len(table)) / rate_hz
+    return stated.pop()
 
 
 def write_points_csv(path: str | PathLike[str], points: Points) -> None:
     """Writes points so that `read_points_csv` reads them."""
     axes = ("u_px", "v_px") if points.positions.shape[2] == 2 else ("x", "y", "z")
     header = ["frame", "time_s", *(f"{name}_{axis}" for name in points.names for axis in axes)]
-    rows = (
+    rows = [
         [str(frame), f"{time_s:.6f}", *_cells(row.ravel())]
         for frame, (time_s, row) in enumerate(zip(points.times_s, points.positions, strict=True))
-    )
+    ]
+    if points.scales is not None:
+        header.append("scale")
+        for row, scale in zip(rows, points.scales, strict=True):
+            row.append(f"{scale:.9g}" if np.isfinite(scale) else "")
     _write(path, header, rows)
 
 
 def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Path]:
-    """Writes links.csv, chains.csv, windows.csv and points3d.csv; returns their paths."""
+    """Writes links.csv, chains.csv, windows.csv and points3d.csv, all at scale 1; returns their paths."""
+    points = points.at_one_scale()
     name = points.names.__getitem__
     links, chains, windows = [], [], []
     for number, window in enumerate(figure.windows):
         start_s, end_s = (float(points.times_s[frame]) for frame in (window["start"], window["end"] - 1))
         verdicts = [str(window[key]) for key in ("planar", "refuted", "undecided")]
-        windows.append([str(number), f"{start_s:.3f}", f"{end_s:.3f}", window["status"], *verdicts])
+        times = [f"{start_s:.3f}", f"{end_s:.3f}"]
+        windows.append([str(number), *times, window["status"], window.get("method", ""), *verdicts])
         for chain in window["chains"]:
             label = "-".join(name(point) for point in chain["points"])
             values = [chain[key] for key in ("tilt_deg", "residual", "motion", "statistic", "threshold")]
@@ -213,11 +281,13 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
             for link in chain["links"]:
                 a, b = link["points"]
                 numbers = [link[key] for key in ("length", "length_sd", "margin", "confidence")]
-                links.append([str(number), window["status"], name(a), name(b), *_cells(numbers)])
+                labels = [str(number), window["status"], name(a), name(b), chain["verdict"]]
+                links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
-    _write(written[0], ["window", "start_s", "end_s", "status", "planar", "refuted", "undecided"], windows)
+    window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]
+    _write(written[0], window_header, windows)
     link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
-    _write(written[1], ["window", "status", "a", "b", *link_numbers], links)
+    _write(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)
     chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]
     chain_header = ["window", "chain", "verdict", *chain_numbers, "least_angle_deg", "most_angle_deg"]
     chain_header.append("reflection_margin_deg")

@@ -28,12 +28,11 @@ COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4
 
 
 def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *, names: bool = True) -> Axes:
-    """The points in the middle frame of a window with trails, links and their confidence."""
+    """The points about the middle of a window, where most are seen, with trails, links and confidence."""
     part = figure.windows[window]
     tracks = points.positions[part["start"] : part["end"]]
-    middle = tracks[len(tracks) // 2]
-    offset = middle[np.isfinite(middle).all(axis=1)].mean(axis=0)
-    against = tracks - np.nanmean(tracks, axis=1, keepdims=True) + offset
+    middle = tracks[_fullest(tracks)]
+    against = tracks - _centre(tracks) + _centre(middle[None])
     ax.plot(against[..., 0], against[..., 1], color="#bbbbbb", linewidth=0.6, zorder=1)
     for index, chain in enumerate(part["chains"]):
         colour = COLOURS[index % len(COLOURS)]
@@ -112,11 +111,26 @@ def write_turned_video(
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
 
 
+def _centre(tracks: Any) -> Any:
+    """Mean of the points seen in each frame (T, 1, 2), NaN where there is none."""
+    seen = np.isfinite(tracks).all(axis=2, keepdims=True)
+    count = seen.sum(axis=1, keepdims=True)
+    total = np.where(seen, tracks, 0).sum(axis=1, keepdims=True)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _fullest(tracks: Any) -> int:
+    """Of the frames with most points, the one nearest to the middle."""
+    seen = np.isfinite(tracks).all(axis=2).sum(axis=1)
+    fullest = np.flatnonzero(seen == seen.max())
+    return int(fullest[np.argmin(np.abs(fullest - len(tracks) // 2))])
+
+
 def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any, Any]:
     """The points held in place horizontally (T, K, 2), as seen and turned about the vertical."""
-    tracks, depth = points.positions, figure.depth
-    centre = np.nanmean(tracks, axis=1, keepdims=True)
-    flat = tracks - centre + np.nanmean(centre, axis=0, keepdims=True) * [0, 1]
+    tracks, depth = points.at_one_scale().positions, figure.depth
+    centre = _centre(tracks)
+    flat = tracks - centre + _centre(centre.swapaxes(0, 1)) * [0, 1]
     turn = np.deg2rad(turn_deg)
     return flat, np.stack([flat[..., 0] * np.cos(turn) - depth * np.sin(turn), flat[..., 1]], axis=-1)
 

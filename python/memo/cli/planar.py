@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import memo
-from memo.cli.delivery import Delivery, Exit, guarded, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
 from memo.cli.given import check_writable
 
 if TYPE_CHECKING:
@@ -58,22 +58,26 @@ def _planar(
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.linkage import read_points_csv, write_figure_csv
+    from memo.linkage import JOINT_NAMES, read_points_csv, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
-    points, out = read_points_csv(tracks, 2, fps), delivery.out
+    _check(options["focal_px"], turn_deg)
+    points, out = read_points_csv(tracks, 2, fps).at_one_scale(), delivery.out
+    if names and not any(name in JOINT_NAMES for name in points.names):
+        raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)
     if delivery.talks:
         print(
             f"{len(points.names)} points in {len(points.times_s)} frames: looking for limbs ...", flush=True
         )
     named = {"names": points.names} if names else {}
-    figure = memo.planar(points.positions, points.times_s, noise_px, scales=points.scales, **named, **options)
+    figure = memo.planar(points.positions, points.times_s, noise_px, **named, **options)
     written = write_figure_csv(out, figure, points)
-    write_linkage_png(out / "linkage.png", points, figure)
-    written.append(out / "linkage.png")
-    for stale in ("turned.mp4", "turned.png"):  # of an earlier run
+    for stale in ("linkage.png", "turned.mp4", "turned.png"):  # of an earlier run
         (out / stale).unlink(missing_ok=True)
+    if figure.windows:
+        write_linkage_png(out / "linkage.png", points, figure)
+        written.append(out / "linkage.png")
     if figure.interpreted:
         write_turned_png(out / "turned.png", points, figure, turn_deg=turn_deg)
         written.append(out / "turned.png")
@@ -84,6 +88,7 @@ def _planar(
 
         write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=progress)
         written.append(out / "turned.mp4")
+    verdicts = figure.verdicts()
     links = [
         {
             "a": points.names[a],
@@ -91,6 +96,7 @@ def _planar(
             "length_px": length,
             "confidence": sure,
             "windows": count,
+            "verdicts": verdicts[a, b],
         }
         for a, b, length, sure, count in figure.links()
     ]
@@ -100,19 +106,29 @@ def _planar(
     return Exit.DONE if figure.interpreted else Exit.NOBODY
 
 
+def _check(focal_px: float | None, turn_deg: float) -> None:
+    if focal_px is not None and not (focal_px > 0 and math.isfinite(focal_px)):
+        raise InputError(f"--focal-px {focal_px:g} must be positive and finite")
+    if not math.isfinite(turn_deg):
+        raise InputError(f"--turn-deg {turn_deg:g} must be finite")
+
+
 def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     """What was found, in sentences."""
+    if not figure.windows:
+        return ["No window: pauses in the times leave no stretch long enough. Nothing is claimed."]
     states = [window["status"] for window in figure.windows]
     told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     lines = [f"Windows: {', '.join(told)}."]
-    if not figure.interpreted:
-        return [*lines, "No window shows planar motion: nothing is claimed. The best guess is in links.csv."]
-    for a, b, length, confidence, count in figure.links():
-        where = (
-            "" if count == len(figure.interpreted) else f", in {count} of {len(figure.interpreted)} windows"
+    if any(window.get("method") == "forest" and window["chains"] for window in figure.windows):
+        lines.append(
+            f"{len(points.names)} points are too many to be weighed against each other (at most 16): "
+            "a spanning tree links them, without confidences, and false links are likely."
         )
-        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
-        lines.append(f"  {points.names[a]} - {points.names[b]}: {length:.0f} px long{sure}{where}")
+    if not figure.interpreted:
+        guess = " The best guess is in links.csv." if any(w["chains"] for w in figure.windows) else ""
+        return [*lines, f"No window shows planar motion: nothing is claimed.{guess}"]
+    lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
         lines.append(
             f"Perspective moves points by up to {figure.perspective_px:.1f} px, more than the noise: "
@@ -129,3 +145,27 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
             else "Every chain may also be its mirror image in depth."
         )
     return [*lines, "Depths of chains against each other are open."]
+
+
+def _about_links(figure: Any, names: list[str]) -> list[str]:
+    """A line for each link, and one for the links of chains that are not planar."""
+    from memo.linkage import REFUTED
+
+    verdicts, windows, lines = figure.verdicts(), len(figure.interpreted), []
+    for a, b, length, confidence, count in figure.links():
+        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
+        kept = {verdict: number for verdict, number in verdicts[a, b].items() if verdict != REFUTED}
+        if count == windows and len(kept) == 1:
+            judged = next(iter(kept))
+        else:
+            judged = ", ".join(f"{verdict} in {number}" for verdict, number in kept.items())
+            judged += f" of {windows} windows"
+        lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}")
+    refuted = [
+        f"{names[a]} - {names[b]} (in {counts[REFUTED]} of {windows} windows)"
+        for (a, b), counts in verdicts.items()
+        if REFUTED in counts
+    ]
+    if refuted:
+        lines.append(f"Left out, their motion is not planar: {', '.join(refuted)}.")
+    return lines

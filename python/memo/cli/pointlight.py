@@ -3,7 +3,9 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
+import csv
 import math
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +18,9 @@ from memo.files import complete_file
 
 if TYPE_CHECKING:
     import typer
+
+FEWEST_FRAMES = 8
+"""Fewer are not linked by `memo planar`."""
 
 
 def add_pointlight(app: "typer.Typer") -> None:
@@ -83,8 +88,9 @@ def _pointlight(
     from memo.linkage import Points, read_points_csv, write_points_csv
     from memo.linkage_plot import write_display_video
 
+    _check_period(options["period_s"], options["scramble_phase"] is not None)
     if motion is None:
-        points = _walker_points(seconds, fps or 60.0)
+        points = _walker_points(seconds, 60.0 if fps is None else fps)
     else:
         points = read_points_csv(motion / "track.csv" if motion.is_dir() else motion, 3, fps)
     check_writable(out)
@@ -97,21 +103,33 @@ def _pointlight(
     write_display_video(out / "display.mp4", display["times_s"], shown)
     print(f"{shown.shape[1]} dots in {shown.shape[0]} frames.")
     print(f"Written to {out}: dots.csv, labels.csv, display.mp4.")
-    if stays:
-        print(f"To find the limbs in it again: memo planar {out / 'dots.csv'}")
+    scrambled = options["scramble_position"] or options["scramble_phase"]
+    if stays and not scrambled and len(shown) >= FEWEST_FRAMES:
+        given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
+        print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
+
+
+def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
+    if period_s is None:
+        return
+    if not (period_s > 0 and math.isfinite(period_s)):
+        raise InputError(f"--period {period_s:g} must be positive and finite")
+    if not scrambles_phase:
+        raise InputError("--period is used with --scramble-phase only")
 
 
 def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
     """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
-    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
-        file.write("frame,dot,shows,limb_end,fraction,visible\n")
+    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["frame", "dot", "shows", "limb_end", "fraction", "visible"])
         for frame, row in enumerate(display["labels"]):
             for dot, label in enumerate(row):
                 end = int(display["limb_ends"][frame, dot])
                 shows = names[label] if label >= 0 else "noise"
-                limb = f"{names[end]},{display['fractions'][frame, dot]:.4f}" if end >= 0 else ","
-                file.write(f"{frame},{dots[dot]},{shows},{limb},{int(display['visible'][frame, dot])}\n")
+                limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
+                table.writerow([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
 
 
 def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
