@@ -151,24 +151,6 @@ fn walks_at_3_px_of_noise_keep_nine_joints_in_ten() {
     }
 }
 
-/// Every walk alone, with its own seed: which walker is hard.
-#[test]
-#[ignore = "prints"]
-fn each_walk() {
-    for name in mocap::WALKS {
-        for azimuth_deg in [0.0, 45.0, 90.0] {
-            for noise_px in [0.0, 3.0] {
-                let Some(walk) = walk(name, azimuth_deg, noise_px, 1) else { return };
-                let one = score(&walk, &link(&walk.frames, &walk.lengths, &walk.options).unwrap());
-                println!(
-                    "{name:16} {azimuth_deg:>2} deg {noise_px} px: {:.0} % of frames, {:.1} cm, smoothed {:.1} cm",
-                    one.frames_near_leaf, one.error_cm, one.smoothed_cm
-                );
-            }
-        }
-    }
-}
-
 /// Segments mirrored by mistake, by margin: (nats from, segments, mirrored). Only where root and truth are both
 /// clearly on one side.
 fn mirrored(prior: &MotionPrior) -> Option<Vec<(f64, usize, usize)>> {

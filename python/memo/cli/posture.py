@@ -73,11 +73,11 @@ class Anchor(StrEnum):
 def add_posture(app: "typer.Typer") -> None:
     import typer
 
+    from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
+
     @app.command(epilog=POSTURE_EXIT_CODES)
     def posture(
-        keypoints: Annotated[
-            Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
-        ],
+        keypoints: KeypointsPath,
         camera: Annotated[Path, typer.Option(help="Calibration: TOML, or Tsai XML.")],
         camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
         lengths: Annotated[
@@ -97,16 +97,9 @@ def add_posture(app: "typer.Typer") -> None:
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
         ] = 2.0,
-        fps: Annotated[
-            float | None,
-            typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
-        ] = None,
-        layout: Annotated[
-            str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
-        ] = None,
-        person: Annotated[
-            int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
-        ] = None,
+        fps: Fps = None,
+        layout: LayoutName = None,
+        person: Person = None,
         unswap: Annotated[
             bool, typer.Option(help="First exchange right and left where they were confused.")
         ] = True,

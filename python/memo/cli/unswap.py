@@ -21,21 +21,14 @@ UNSWAP_EXIT_CODES = """Exit codes: 0 the keypoints were written; 1 the input can
 def add_unswap(app: "typer.Typer") -> None:
     import typer
 
+    from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
+
     @app.command(epilog=UNSWAP_EXIT_CODES)
     def unswap(
-        keypoints: Annotated[
-            Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
-        ],
-        fps: Annotated[
-            float | None,
-            typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
-        ] = None,
-        layout: Annotated[
-            str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
-        ] = None,
-        person: Annotated[
-            int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
-        ] = None,
+        keypoints: KeypointsPath,
+        fps: Fps = None,
+        layout: LayoutName = None,
+        person: Person = None,
         out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,

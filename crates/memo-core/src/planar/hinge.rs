@@ -19,7 +19,7 @@
 use super::Plane;
 use super::fit::{self, FitError, FitOptions};
 use super::rod::{ROUNDING, condition, difference_of_powers, is_same_or_opposite, polish, slope_of_pairs};
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 use nalgebra::Matrix4;
 use thiserror::Error;
 
@@ -174,10 +174,8 @@ impl HingeFit {
     /// plane, and of the noise `noise_sd` of each coordinate of both points.
     pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
         let c = &self.covariance;
-        let of_plane = c[(0, 0)] * image.x * image.x
-            + 2.0 * c[(0, 1)] * image.x * image.y
-            + c[(1, 1)] * image.y * image.y;
-        (of_plane + 2.0 * noise_sd * noise_sd * self.plane.slope().length_squared()).sqrt()
+        let of_slope = DMat2::from_cols_array(&[c[(0, 0)], c[(1, 0)], c[(0, 1)], c[(1, 1)]]);
+        self.plane.depth_sd(of_slope, image, noise_sd)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The plane of motion through the pivot, z = p x + q y.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat2, DVec2, DVec3};
 
 /// Plane z = p x + q y; x right, y down, z away from the camera.
 ///
@@ -37,6 +37,13 @@ impl Plane {
     /// The vector in space of an image vector that starts at the pivot.
     pub fn lift(&self, image: DVec2) -> DVec3 {
         image.extend(self.depth(image))
+    }
+
+    /// Standard deviation of the depth of an image vector (first order): of the slope, with its covariance,
+    /// and of the noise `noise_sd` of each coordinate of both ends.
+    pub(super) fn depth_sd(&self, slope_covariance: DMat2, image: DVec2, noise_sd: f64) -> f64 {
+        let of_slope = image.dot(slope_covariance * image);
+        (of_slope + 2.0 * noise_sd * noise_sd * self.slope().length_squared()).sqrt()
     }
 
     /// Unit normal, towards the camera (z < 0).

@@ -332,6 +332,14 @@ pub struct RodFit {
     pub at_tilt_limit: bool,
 }
 
+impl RodFit {
+    /// Standard deviation of the depth of the end at an image vector from the pivot (first order): of the
+    /// plane, and of the noise `noise_sd` of each coordinate of both points.
+    pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
+        self.plane.depth_sd(DMat2::from_mat3(self.covariance), image, noise_sd)
+    }
+}
+
 /// Fits a rod in planar motion to views of its two ends (any translation; NaN = not seen).
 ///
 /// # Errors

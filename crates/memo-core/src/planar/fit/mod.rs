@@ -468,7 +468,7 @@ mod tests {
         let mut random = Random::new(5);
         let sd = 0.004;
         let mut squares = [0.0; 4];
-        let (mut residual, mut depth) = (0.0, 0.0);
+        let (mut residual, mut depth, mut depth_of_rod) = (0.0, 0.0, 0.0);
         let draws = 400;
         for _ in 0..draws {
             let slope = random.uniform(0.5, 1.5) * DVec2::from_angle(random.uniform(-1.4, 1.4));
@@ -489,11 +489,17 @@ mod tests {
             let error = (sign * fit.plane.slope() - slope).dot(image);
             depth += (error / fit.depth_sd(image, 0.0)).powi(2) / draws as f64;
             assert!(fit.depth_sd(image, sd) > fit.depth_sd(image, 0.0));
+            let rod = fit_rod(&o, &b, &options).unwrap();
+            let sign = if rod.plane.slope().dot(slope) < 0.0 { -1.0 } else { 1.0 };
+            let error = (sign * rod.plane.slope() - slope).dot(image);
+            depth_of_rod += (error / rod.depth_sd(image, 0.0)).powi(2) / draws as f64;
             residual += fit.residual_rms * fit.residual_rms / (2.0 * sd * sd) / draws as f64;
         }
         println!("normalised variances of p, q, lengths: {squares:?}; of residuals {residual}");
         assert!(squares.iter().all(|s| (0.75..1.3).contains(s)), "{squares:?}");
+        println!("of depths of a hinge {depth}, of a rod {depth_of_rod}");
         assert!((0.75..1.3).contains(&depth), "{depth}");
+        assert!((0.75..1.3).contains(&depth_of_rod), "{depth_of_rod}");
         // 80 residuals, 4 unknowns, correlated by half at most.
         assert!((0.88..1.0).contains(&residual), "{residual}");
     }

@@ -30,8 +30,9 @@ const MASKS: [usize; 7] = [1, 2, 4, 8, 16, 3, 24];
 /// What turns a trunk round: shoulders and hips.
 const TURN: usize = 27;
 
-/// A turned trunk that costs more than this many nats more is not tried: no limbs outweigh it.
-const WORTH_TRYING: f64 = 200.0;
+/// A turned trunk that costs more than so many nats more a second (of at least one) is not tried. On walks
+/// limbs made up for up to 9 nats a second.
+const WORTH_TRYING_PER_S: f64 = 20.0;
 
 /// The trunk's path.
 pub(super) struct Trunk {
@@ -88,8 +89,11 @@ impl Trunk {
         };
         chain.refine(&mut states);
         let turned = (!states.is_empty()).then(|| (TURN, chain.delta(&states, TURN, 0, states.len())));
+        let times_s = chain.times_s;
+        let span_s = times_s.last().zip(times_s.first()).map_or(0.0, |(last, first)| last - first);
+        let worth = WORTH_TRYING_PER_S * span_s.max(1.0);
         std::iter::once((0, 0.0))
-            .chain(turned.filter(|(_, delta)| *delta < WORTH_TRYING))
+            .chain(turned.filter(|(_, delta)| *delta < worth))
             .map(|(turn, delta)| {
                 let states: Vec<usize> = states.iter().map(|state| state ^ turn).collect();
                 let flips = chain.flips(&states);

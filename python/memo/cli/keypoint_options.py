@@ -1,0 +1,20 @@
+"""What commands on keypoints ask alike. Needs typer, so that it is imported where commands are made."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+KeypointsPath = Annotated[
+    Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
+]
+Fps = Annotated[
+    float | None,
+    typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
+]
+LayoutName = Annotated[
+    str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
+]
+Person = Annotated[
+    int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
+]
