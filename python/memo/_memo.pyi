@@ -13,6 +13,7 @@ __all__ = [
     "Tracker",
     "Walk",
     "__version__",
+    "_camera",
     "change_mask",
     "edge_segments",
     "follow_person",
