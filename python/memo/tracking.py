@@ -199,8 +199,8 @@ class Track:
         seek_report: dict[str, int],
         camera: _memo.Camera | None = None,
     ) -> None:
-        self.walks = list(walks)
-        self.seek_report = seek_report
+        self.walks: list[_memo.Walk | StoredWalk] = list(walks)
+        self.seek_report: dict[str, int] = seek_report
         self._camera = camera
 
     @property

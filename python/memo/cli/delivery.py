@@ -133,7 +133,7 @@ class Interrupt(contextlib.AbstractContextManager["Interrupt"]):
     """Turns the first Ctrl-C into a request, so that no frame is left half way; the second is raised."""
 
     def __init__(self) -> None:
-        self.requested = False
+        self.requested: bool = False
 
     def __enter__(self) -> Interrupt:
         self._before = signal.signal(signal.SIGINT, self._request)
