@@ -27,6 +27,13 @@ def walk_keypoints(frames=60):
     return np.asarray(walk["times_s"]), pixels, list(walk["names"])
 
 
+def dots(frames=60):
+    """Times and dots of a point-light display of the walker, with their names."""
+    walk = memo.walker_motion(frames, rate_hz=30)
+    shown = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)
+    return shown["times_s"], shown["positions_px"], list(walk["names"])
+
+
 @pytest.fixture(scope="module")
 def track():
     scene = memo.demo_scene(0)
@@ -48,11 +55,11 @@ def keypoints(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def results(track, keypoints):
-    times_s, pixels, names = walk_keypoints()
+    times_s, tracks, names = dots()
     return {
         "track": track,
         "postures": memo.posture(keypoints, CAMERA, height_m=1.75),
-        "figure": memo.planar(pixels, times_s, names=names),
+        "figure": memo.planar(tracks, times_s, names=names),
         "repair": memo.unswap(keypoints),
         "scene": memo.demo_scene(1, frames=20),
     }
@@ -80,6 +87,7 @@ def test_a_result_is_a_data_frame(results, name):
     if name == "postures":
         assert len(frame) == len(results[name])
     if name == "figure":
+        assert len(frame) == 8
         assert frame["length_px"].gt(0).all()
 
 
@@ -171,10 +179,10 @@ def counted(call):
 
 
 def test_long_calls_tell_how_far_they_are(keypoints):
-    times_s, pixels, names = walk_keypoints(240)
+    times_s, tracks, names = dots(240)
     calls = {
         "posture": lambda progress: memo.posture(keypoints, CAMERA, height_m=1.75, progress=progress),
-        "planar": lambda progress: memo.planar(pixels, times_s, names=names, progress=progress),
+        "planar": lambda progress: memo.planar(tracks, times_s, names=names, progress=progress),
         "demo_scene": lambda progress: memo.demo_scene(0, frames=5, progress=progress),
     }
     for name, call in calls.items():
@@ -204,9 +212,9 @@ def alarm():
 
 
 def test_a_signal_ends_a_long_call(alarm):
-    _, pixels, _ = walk_keypoints(60)
+    _, tracks, _ = dots()
     many, counts = 400, []
-    long_px = np.concatenate([pixels] * many)
+    long_px = np.concatenate([tracks] * many)
     long_s = np.arange(len(long_px)) / 30
     alarm(0.1)
     with pytest.raises(Alarm):
@@ -215,13 +223,13 @@ def test_a_signal_ends_a_long_call(alarm):
 
 
 def test_a_callback_that_raises_ends_the_call():
-    times_s, pixels, names = walk_keypoints(600)
+    times_s, tracks, names = dots(600)
 
     def refuse(done, total):
         raise Alarm
 
     with pytest.raises(Alarm):
-        memo.planar(pixels, times_s, names=names, progress=refuse)
+        memo.planar(tracks, times_s, names=names, progress=refuse)
 
 
 def test_a_tracker_loses_nothing_when_a_frame_is_interrupted(track, alarm):
