@@ -24,6 +24,8 @@ pub struct TrackedWalk {
     pub depth_sd_m: f64,
     /// What the starting phase found.
     pub start: StartReport,
+    /// The speed the average gait was made for, metres a second.
+    pub gait_speed_mps: f64,
     /// The fit of the person, where one was made.
     pub person_fit: Option<PersonFit>,
     /// Options it was followed with.
