@@ -20,6 +20,8 @@ pub struct TrackedWalk {
     pub walk: Walk,
     /// The camera given or guessed.
     pub camera: Camera,
+    /// Whether no camera was given.
+    pub camera_is_guessed: bool,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
     /// What the starting phase found.

@@ -455,6 +455,7 @@ impl Tracker {
                 camera: active.camera,
                 depth_sd_m: active.depth_sd_m,
                 start: active.start,
+                camera_is_guessed: self.options.camera.is_none(),
                 gait_speed_mps: active.gait_speed_mps,
                 person_fit: active.person_fit,
                 options: self.options.walk,
