@@ -40,6 +40,7 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk) -> PyResult<Bound<'py
     dict.set_item("heights", steps.iter().map(|s| s.look.heights.count).collect::<Vec<_>>())?;
     dict.set_item("along_m", steps.iter().map(|s| s.look.best.along_m).collect::<Vec<_>>())?;
     dict.set_item("height_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
+    dict.set_item("similarity", steps.iter().map(|s| s.similarity).collect::<Vec<_>>())?;
     dict.set_item("phase", steps.iter().map(|s| s.look.best.phase).collect::<Vec<_>>())?;
     Ok(dict)
 }
