@@ -8,6 +8,7 @@ What happens is told to the logger "memo", which is silent unless your program s
 
 import logging as _logging
 
+from memo import explain, gait
 from memo._memo import (
     Camera,
     __version__,
@@ -47,6 +48,8 @@ __all__ = [
     "change_mask",
     "demo_scene",
     "edge_segments",
+    "explain",
+    "gait",
     "head_points",
     "layouts",
     "moving_regions",
