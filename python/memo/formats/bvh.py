@@ -14,12 +14,12 @@ to measure, Y up and centimetres are assumed.
 Written are centimetres. The skeleton, as far as the joints are known:
 
     Hips (between the hips) - RightUpLeg - RightLeg - RightFoot, the same left
-                            - Spine (same place) - Spine1 (between the shoulders)
+                            - LowerBack (same place) - Chest (between the shoulders)
                                 - RightArm - RightForeArm - RightHand, the same left
                                 - Neck (same place) - Head
 
 At rest the figure stands upright with all limbs straight down, facing +Z with Y up and -Y with Z up, +X
-to its left. Channels are Y X Z (Y up) or Z X Y (Z up) for Hips, Spine and Spine1, so that the heading
+to its left. Channels are Y X Z (Y up) or Z X Y (Z up) for Hips, LowerBack and Chest, so that the heading
 comes first, and X Z Y or X Y Z for the rest, so that the first is flexion. Rotation of a limb about
 itself cannot be known from joints; the least is taken. Lengths are medians over time, so that joints
 whose distances vary move: by how much is told. Every joint must be known in every frame between the first
@@ -82,7 +82,7 @@ def read_bvh(path: Path, given: Given) -> Motion:
         raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
     up, unit_m, notes = _conventions(nodes, given)
     with np.errstate(over="ignore", invalid="ignore"):
-        points = np.stack([*_positions(nodes, values, kept)], axis=1, dtype=np.float64) * unit_m
+        points: Array = np.stack([*_positions(nodes, values, kept)], axis=1) * unit_m
     if not np.isfinite(points).all():
         raise FormatError("offsets or positions so large that they overflow")
     metadata = {"format": "bvh", "up": up, "unit_m": unit_m, "rate_hz": 1 / frame_s}
@@ -295,7 +295,7 @@ def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]
 
 # Writing.
 
-_TRUNK = ("Hips", "Spine", "Spine1")
+_TRUNK = ("Hips", "LowerBack", "Chest")
 _CM = 100.0
 
 
@@ -419,9 +419,9 @@ def _skeleton(joints: dict[str, Array]) -> list[_Bone]:
     for side, outwards in (("right", -left), ("left", left)):
         add_limb(0, outwards, side, {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot"})
     if has_chest:
-        spine = add("Spine", 0, hips, up, _least_turn(pelvis_turn, up, chest - hips))
+        spine = add("LowerBack", 0, hips, up, _least_turn(pelvis_turn, up, chest - hips))
         chest_turn = _frame(joints["left_shoulder"] - joints["right_shoulder"], chest - hips)
-        top = add("Spine1", spine, chest, up, chest_turn)
+        top = add("Chest", spine, chest, up, chest_turn)
         for side, outwards in (("right", -left), ("left", left)):
             add_limb(top, outwards, side, {"shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand"})
         if "head" in joints:

@@ -400,7 +400,7 @@ def write_c3d(path: Path, motion: Motion, up: Up | None) -> list[str]:
     last = min(first + frames - 1, 65535)
     struct.pack_into("<4H", header, 2, len(labels), 0, min(first, 65535), last)
     struct.pack_into("<Hf", header, 10, 0, -1.0)
-    struct.pack_into("<HHf", header, 16, data_block, 0, rate_hz)
+    struct.pack_into("<HHf", header, 16, data_block, 1, rate_hz)
     struct.pack_into("<H", header, 298, 12345)
     known = np.isfinite(values).all(axis=2)
     words = np.empty((frames, len(labels), 4), "<f4")

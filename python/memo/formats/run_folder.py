@@ -63,7 +63,7 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         else np.empty((len(times_s), 0, 3))
     )
     angles = {f"{side}_{angle}": columns[f"{side}_{angle}_deg"][chosen] for side in SIDES for angle in ANGLES}
-    walks = int(columns["walk"].max()) - int(columns["walk"].min()) + 1
+    walks = len(np.unique(columns["walk"]))
     notes = [f"{walks} walks: between them nobody was tracked."] if walk is None and walks > 1 else []
     kept = [
         GaitEvent(event["time_s"], event["event"], event["side"])
