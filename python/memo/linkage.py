@@ -229,7 +229,7 @@ def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> floa
     try:
         value = float(cell)
     except ValueError:
-        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "scale"):
+        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "deg", "scale"):
             return np.nan
         raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
     if np.isinf(value):

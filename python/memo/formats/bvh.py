@@ -82,13 +82,13 @@ def read_bvh(path: Path, given: Given) -> Motion:
         raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
     up, unit_m, notes = _conventions(nodes, given)
     with np.errstate(over="ignore", invalid="ignore"):
-        points: Array = np.stack([*_positions(nodes, values, kept)], axis=1) * unit_m
+        points = unit_m * np.stack([*_positions(nodes, values, kept)], axis=1)
     if not np.isfinite(points).all():
         raise FormatError("offsets or positions so large that they overflow")
     metadata = {"format": "bvh", "up": up, "unit_m": unit_m, "rate_hz": 1 / frame_s}
     return Motion(
         tuple(names),
-        np.arange(len(values)) * frame_s,
+        np.arange(len(values), dtype=np.float64) * frame_s,
         to_z_up(points, up),
         metadata=metadata,
         notes=tuple(notes),

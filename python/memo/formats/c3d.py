@@ -410,7 +410,8 @@ def write_c3d(path: Path, motion: Motion, up: Up | None) -> list[str]:
         file.write(header)
         file.write(parameters)
         file.write(words.tobytes())
-        file.write(bytes(-words.nbytes % _BLOCK))
+        if frames <= 65535:  # of longer files others take every frame up to the end of the file
+            file.write(bytes(-words.nbytes % _BLOCK))
     return []
 
 

@@ -8,7 +8,8 @@ Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`,
 the model of Rajagopal 2016; in gait2392 the knee has the other sign) and are written in degrees. Where
 both hips or the pelvis are known, the pelvis' position is written as `pelvis_tx`, `pelvis_ty`,
 `pelvis_tz`, metres, Y up unless asked otherwise; the header says which. Pelvis angles are not known and
-not written.
+not written. Instants at
+which a value is missing are left out, since OpenSim stops reading there.
 
 In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point, and columns of forces, moments and the
 like are left out. All other columns are taken to be angles, as the format does not say. Tables of vectors
@@ -102,10 +103,15 @@ def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
         turned = from_z_up(pelvis, up)
         columns |= {f"pelvis_t{axis}": turned[:, k] for k, axis in enumerate("xyz")}
     columns |= {OPENSIM.get(name, name): values for name, values in motion.angles.items()}
+    columns = {name: values for name, values in columns.items() if np.isfinite(values).any()}
     for name in columns:
         if not name.isprintable() or " " in name:
             raise FormatError(f"angle {name!r}: the labels of a MOT file have no white space")
     table = np.column_stack(list(columns.values()))
+    known = np.isfinite(table).all(axis=1)
+    if len(columns) == 1 or not known.any():
+        raise FormatError("no instant at which all angles are known")
+    table = table[known]
     head = [
         path.stem.replace("\n", " "),
         "version=1",
@@ -119,10 +125,12 @@ def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
     with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         file.writelines(line + "\n" for line in head)
         for row in table.tolist():
-            file.write("\t".join("NaN" if x != x else f"{x:.7f}" for x in row) + "\n")
+            file.write("\t".join(f"{x:.7f}" for x in row) + "\n")
+    gaps = len(known) - len(table)
+    notes = [f"{gaps} instants at which an angle or the pelvis is missing were left out."] if gaps else []
     left_out = ["events"] * bool(motion.events)
     left_out += ["points but the pelvis"] * (len(motion.names) > 1)
-    return [f"A MOT or STO file has no place for {what}: left out." for what in left_out]
+    return notes + [f"A MOT or STO file has no place for {what}: left out." for what in left_out]
 
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int]:
