@@ -18,7 +18,7 @@ def shared_motion(*parts):
 
 
 def stick_figure(frames=20, rate_hz=50.0, start_s=0.0, joints=JOINTS):
-    """(T, 12, 3) of a figure with limbs of constant length that walks along a slanting line, and its motion."""
+    """(T, 12, 3) and (T,) of a figure with rigid limbs that walks along a slanting line."""
     times_s = start_s + np.arange(frames) / rate_hz
     phase = 2 * np.pi * (times_s - start_s)
     forward, left = np.array([0.8, 0.6, 0.0]), np.array([-0.6, 0.8, 0.0])

@@ -6,7 +6,10 @@ Where a format wants a frame at every instant, those frames are empty.
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,12 +44,8 @@ def read_run_folder(path: Path, given: Given, walk: int | None) -> Motion:
 
 
 def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
-    try:
-        columns = read_track_csv(table)
-        events = read_events_csv(events_table) if events_table.is_file() else []
-    except (ValueError, TypeError, OverflowError) as error:
-        message = str(error).removeprefix(f"{table}: ").removeprefix(f"{events_table}: ")
-        raise FormatError(f"{table.name} or {events_table.name}: {message}") from None
+    columns = _read(read_track_csv, table)
+    events = _read(read_events_csv, events_table) if events_table.is_file() else []
     chosen = np.ones(len(columns["walk"]), bool) if walk is None else columns["walk"] == walk
     if not len(chosen):
         raise FormatError("track.csv has no frames: nobody was tracked")
@@ -72,3 +71,10 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     ]
     metadata = {"format": "track", "up": "z", "unit": "m"}
     return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes))
+
+
+def _read(reader: Callable[[Path], Any], path: Path) -> Any:
+    try:
+        return reader(path)
+    except (ValueError, TypeError, csv.Error) as error:
+        raise FormatError(f"{path.name}: {str(error).removeprefix(f'{path}: ')}") from None
