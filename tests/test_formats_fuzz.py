@@ -1,6 +1,7 @@
 """Damaged motion files: every one is read or refused by a `FormatError`, in bounded time and memory.
 
-Each format is tried in a process of its own, whose memory is limited; a file that takes seconds ends it. MEMO_FULL=1 tries 100,000 files a format: `MEMO_FULL=1 pytest tests/test_formats_fuzz.py`.
+Each format is tried in a process of its own, whose memory is limited; a file that takes seconds ends it.
+MEMO_FULL=1 tries 100,000 files a format: `MEMO_FULL=1 pytest -s tests/test_formats_fuzz.py`.
 """
 
 import os

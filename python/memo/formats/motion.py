@@ -185,7 +185,7 @@ class Motion:
             )
         steps = np.concatenate([[0.0], np.cumsum(ratios)])
         slope = np.polyfit(steps, self.times_s, 1)[0] if ratios.min() >= 1 else period_s
-        rate_hz = _nominal(1 / float(slope), float(steps[-1]))
+        rate_hz = _nominal(1 / float(slope), float(steps[-1]), self.metadata.get("rate_hz"))
         drift_s = self.times_s - steps / rate_hz
         off_s = float(np.abs(drift_s - (drift_s.max() + drift_s.min()) / 2).max())
         if ratios.min() < 1 or off_s > min(_STAMP_ERROR_S, 0.25 / rate_hz):
@@ -219,10 +219,12 @@ def _check_clock(times_s: Array) -> None:
         raise FormatError(f"frame {late[0] + 1}: times must increase, {b:g} s follows {a:g} s")
 
 
-def _nominal(rate_hz: float, steps: float) -> float:
-    """The whole rate, or that of NTSC, if the difference shows in no stamp; else the rate itself."""
-    for nominal in (round(rate_hz), round(rate_hz * 1.001) / 1.001):
-        if nominal > 0 and abs(steps / nominal - steps / rate_hz) < _STAMP_ERROR_S / 4:
+def _nominal(rate_hz: float, steps: float, said_hz: float | None) -> float:
+    """The rate that the file says, a whole one, or one of NTSC, if the stamps cannot tell it from theirs."""
+    wholes = [rate for rate in (round(rate_hz), round(rate_hz * 1.001) / 1.001) if rate > 0]
+    near = [rate for rate in wholes if abs(rate / rate_hz - 1) < 1e-4]
+    for nominal in ([] if said_hz is None else [float(said_hz)]) + near:
+        if abs(steps / nominal - steps / rate_hz) < _STAMP_ERROR_S / 4:
             return float(nominal)
     return rate_hz
 
