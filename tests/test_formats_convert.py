@@ -57,7 +57,8 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
         assert (code, err) == (0, "")
         assert "Read 55 frames, 12 points, 8 joint angles, 2 events, 0.40 to 2.96 s." in out
         assert "2 walks: between them nobody was tracked." in out
-        assert out.endswith(f"Written to {target}.\n")
+        up = "Z" if ending in ("c3d", "csv") else "Y"
+        assert out.endswith(f"Written to {target}, {up} up.\n")
         read = read_motion(target)
         assert read.angles["right_knee"][5] == 15.5 if ending != "trc" else not read.angles
         if ending in ("trc", "c3d"):
@@ -73,7 +74,13 @@ def test_one_walk_its_events_and_the_summary_as_json(tmp_path, memo_command):
     target = tmp_path / "run" / "walk.c3d"  # beside what was read
     code, out, _ = memo_command("convert", tmp_path / "run", target, "--walk", 1, "--json", "--up", "y")
     summary = json.loads(out)
-    assert code == 0 and summary["frames"] == 25 and summary["events"] == 1 and summary["notes"] == []
+    assert (
+        code == 0
+        and summary["frames"] == 25
+        and summary["up"] == "y"
+        and summary["events"] == 1
+        and summary["notes"] == []
+    )
     assert summary["points"] == [*JOINTS] and summary["files"] == [str(target)]
     file = ezc3d.c3d(str(target))
     assert file["header"]["points"]["first_frame"] == 50
@@ -219,7 +226,7 @@ def test_another_format_is_one_entry_in_each_table(tmp_path, memo_command, monke
 )
 def test_real_motion_files_make_point_light_displays(tmp_path, memo_command, path):
     source = shared_motion("mocap", *path.split("/"))
-    code, out, err = memo_command("pointlight", source, "--out", tmp_path, "--locomotion", "translating")
+    code, _, err = memo_command("pointlight", source, "--out", tmp_path, "--locomotion", "translating")
     assert (code, err) == (0, "")
     with open(tmp_path / "dots.csv", newline="") as file:
         rows = list(csv.DictReader(file))

@@ -315,9 +315,8 @@ class _Bone:
     """(T, 3) where it comes to be."""
 
 
-def write_bvh(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_bvh(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes skeleton and rotations; returns what was left out, in sentences."""
-    up = up or "y"
     rate_hz, motion = motion.at_constant_rate()
     joints, notes = _complete_joints(motion)
     # All is done in figure axes, X to the left, Y up, Z forward, and brought to those of the file at the end.

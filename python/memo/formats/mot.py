@@ -58,6 +58,7 @@ def read_mot(path: Path, given: Given) -> Motion:
     labels = lines[start].split() if start < len(lines) else []
     if not labels or labels[0].lower() != "time":
         raise FormatError(f"line {start + 1}: wanted a row of labels that begins with time")
+    labels[0] = "time"
     if len(set(labels)) < len(labels):
         repeated = next(name for k, name in enumerate(labels) if name in labels[:k])
         raise FormatError(f"line {start + 1}: column {repeated} occurs twice")
@@ -90,9 +91,8 @@ def read_mot(path: Path, given: Given) -> Motion:
     return Motion(tuple(names), column["time"], points, (), angles, metadata, tuple(notes))
 
 
-def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes the angles and the pelvis' position; returns what was left out, in sentences."""
-    up = up or "y"
     if not motion.angles:
         raise FormatError(
             "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
