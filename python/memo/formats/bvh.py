@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.files import complete_file
-from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
+from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
 from memo.formats.reading import Given
 from memo.formats.text import number, numbers, read_lines, whole_number
@@ -78,7 +78,7 @@ def read_bvh(path: Path, given: Given) -> Motion:
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise FormatError(f"joint {twice[0]} occurs twice")
-    if len(values) * len(kept) > 30_000_000:
+    if len(values) * len(kept) > MAX_POINTS:
         raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
     up, unit_m, notes = _conventions(nodes, given)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -219,18 +219,18 @@ def _value(data: bytes, at: int, stop: int, file: _File, where: str) -> list[str
             for k in range(rows if width else 0)
         ]
     if kind == 4:
-        return _floats(np.frombuffer(raw, np.uint8), file).astype(np.float64)
+        return _floats(np.frombuffer(raw, np.uint8), file)
     return np.frombuffer(raw, np.int8 if kind == 1 else file.order + "i2")
 
 
 def _floats(raw: np.ndarray, file: _File) -> np.ndarray:
-    """Bytes (..., 4 n) as floats (..., n); DEC's F format has 16-bit words swapped and a bias 2 larger."""
-    if file.processor != _DEC:
-        return np.ascontiguousarray(raw).view(file.order + "f4")
-    words = np.ascontiguousarray(raw).view("<u2")
-    whole = words[..., ::2].astype(np.uint32) << 16 | words[..., 1::2]
-    values: np.ndarray = whole.view(np.float32) / np.float32(4)
-    return values
+    """Bytes (..., 4 n) as float64 (..., n); DEC's F format has 16-bit words swapped and a bias 2 larger."""
+    with np.errstate(invalid="ignore"):  # damaged floats may be signalling NaN
+        if file.processor != _DEC:
+            return np.ascontiguousarray(raw).view(file.order + "f4").astype(np.float64)
+        words = np.ascontiguousarray(raw).view("<u2")
+        whole = words[..., ::2].astype(np.uint32) << 16 | words[..., 1::2]
+        return whole.view(np.float32).astype(np.float64) / 4
 
 
 def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
@@ -296,7 +296,7 @@ def _frames(data: bytes, file: _File) -> tuple[np.ndarray, np.ndarray]:
     raw = np.frombuffer(data, np.uint8, file.frames * words * size, file.start)
     raw = raw.reshape(file.frames, words * size)[:, : 4 * file.points * size]
     if size == 4:
-        values = _floats(raw, file).astype(np.float64).reshape(file.frames, file.points, 4)
+        values = _floats(raw, file).reshape(file.frames, file.points, 4)
     else:
         whole = np.ascontiguousarray(raw).view(file.order + "i2")
         values = whole.astype(np.float64).reshape(file.frames, file.points, 4)
