@@ -88,7 +88,8 @@ def test_limbs_that_change_their_length_are_told(tmp_path):
 def test_a_real_file_is_read_as_pybvh_reads_it(tmp_path):
     path = shared_motion("mocap", "formats", "cmu_12_01_walk.bvh")
     motion = read_motion(path)
-    assert len(motion.times_s) == 524 and motion.notes[1].startswith("The file names no unit: CMU's unit")
+    assert len(motion.times_s) == 524 and motion.at_constant_rate()[0] == 120
+    assert motion.notes[1].startswith("The file names no unit: CMU's unit")
     file = pybvh.read_bvh_file(path)
     places = file.node_positions() * motion.metadata["unit_m"]
     places = np.stack([places[..., 0], -places[..., 2], places[..., 1]], axis=-1)
@@ -131,9 +132,13 @@ def test_what_is_known_of_a_skeleton_is_written(tmp_path):
 
 def test_empty_frames_at_the_ends_are_left_out(tmp_path):
     points, times_s = stick_figure(30)
-    points[:4] = points[25:] = np.nan
+    points[:4] = points[26:] = np.nan
+    points[25, 2] = np.nan
     notes = write_motion(tmp_path / "cut.bvh", Motion(JOINTS, times_s, points))
-    assert notes == ["9 empty frames at the ends were left out."]
+    assert notes == [
+        "9 frames at the ends, in which a joint is missing, were left out.",
+        "A BVH file begins at 0 s; this motion began at 0.08 s.",
+    ]
     _, names, read = by_pybvh(tmp_path / "cut.bvh")
     assert np.abs(read[:, names.index("RightFoot")] - points[4:25, JOINTS.index("right_ankle")]).max() < 1e-6
 

@@ -22,8 +22,8 @@ At rest the figure stands upright with all limbs straight down, facing +Z with Y
 to its left. Channels are Y X Z (Y up) or Z X Y (Z up) for Hips, LowerBack and Chest, so that the heading
 comes first, and X Z Y or X Y Z for the rest, so that the first is flexion. Rotation of a limb about
 itself cannot be known from joints; the least is taken. Lengths are medians over time, so that joints
-whose distances vary move: by how much is told. Every joint must be known in every frame between the first
-and the last.
+whose distances vary move: by how much is told. Frames at the ends in which a joint is missing are left out;
+between them every joint must be known in every frame.
 """
 
 from __future__ import annotations
@@ -85,10 +85,13 @@ def read_bvh(path: Path, given: Given) -> Motion:
         points = unit_m * np.stack([*_positions(nodes, values, kept)], axis=1)
     if not np.isfinite(points).all():
         raise FormatError("offsets or positions so large that they overflow")
-    metadata = {"format": "bvh", "up": up, "unit_m": unit_m, "rate_hz": 1 / frame_s}
+    rate_hz = 1 / frame_s
+    if abs(round(rate_hz) / rate_hz - 1) < 1e-4:  # frame times are written with few digits
+        rate_hz = float(round(rate_hz))
+    metadata = {"format": "bvh", "up": up, "unit_m": unit_m, "rate_hz": rate_hz}
     return Motion(
         tuple(names),
-        np.arange(len(values), dtype=np.float64) * frame_s,
+        np.arange(len(values), dtype=np.float64) / rate_hz,
         to_z_up(points, up),
         metadata=metadata,
         notes=tuple(notes),
@@ -340,8 +343,6 @@ def write_bvh(path: Path, motion: Motion, up: Up) -> list[str]:
         file.writelines(line + "\n" for line in text)
         for row in table.tolist():
             file.write(" ".join(f"{x:.6f}" for x in row) + "\n")
-    if motion.times_s[0] > 0.5 / rate_hz:
-        notes.append(f"A BVH file begins at 0 s; this motion began at {motion.times_s[0]:g} s.")
     left_out = ["events"] * bool(motion.events) + ["joint angles as such"] * bool(motion.angles)
     return notes + [f"A BVH file has no place for {what}: left out." for what in left_out]
 
@@ -368,8 +369,7 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
     there = np.logical_and.reduce([np.isfinite(points[:, 0]) for points in known.values()])
     if not there.any():
         raise FormatError("no frame has all joints: " + ", ".join(known))
-    some = np.logical_or.reduce([np.isfinite(points[:, 0]) for points in known.values()])
-    first, last = np.flatnonzero(some)[[0, -1]]
+    first, last = np.flatnonzero(there)[[0, -1]]
     for joint, points in known.items():
         missing = np.flatnonzero(~np.isfinite(points[first : last + 1, 0]))
         if len(missing):
@@ -379,8 +379,11 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
                 " place for missing joints: give --fill, --walk, or another format"
             )
     notes = []
-    if last - first + 1 < len(some):
-        notes.append(f"{len(some) - (last - first + 1)} empty frames at the ends were left out.")
+    if last - first + 1 < len(there):
+        cut = len(there) - (last - first + 1)
+        notes.append(f"{cut} frames at the ends, in which a joint is missing, were left out.")
+    if motion.times_s[first] > 0:
+        notes.append(f"A BVH file begins at 0 s; this motion began at {motion.times_s[first]:g} s.")
     places = {found[joint] for joint in known}
     others = [name for k, name in enumerate(motion.names) if k not in places]
     if others:

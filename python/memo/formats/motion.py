@@ -143,10 +143,13 @@ class Motion:
         weight = np.clip((times_s - self.times_s[after - 1]) / intervals[after - 1], 0, 1)
         weight[np.abs(weight) < 1e-9], weight[np.abs(weight - 1) < 1e-9] = 0, 1
         weight[(intervals[after - 1] > 3 * np.median(intervals)) & (weight > 0) & (weight < 1)] = np.nan
+        points = np.empty((count, len(self.names), 3))
+        for k in range(len(self.names)):  # point by point, to hold the whole only once
+            points[:, k] = _between(self.points[after - 1, k], self.points[after, k], weight[:, None])
         return replace(
             self,
             times_s=times_s,
-            points=_between(self.points[after - 1], self.points[after], weight[:, None, None]),
+            points=points,
             angles={
                 name: _between(v[after - 1], v[after - 1] + _turn_deg(v[after] - v[after - 1]), weight)
                 for name, v in self.angles.items()
