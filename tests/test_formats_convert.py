@@ -161,6 +161,8 @@ def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
         ((a, b, "--rate", 0), "--rate 0 must be positive and finite"),
         ((a, b, "--rate", "1e12"), "at 1e+12 Hz are more than"),
         ((a, b, "--unit", "feet"), "--unit feet is neither m, cm, mm nor a number of metres"),
+        ((a, b, "--fps", 50), "the file says it itself: leave out a frame rate (--fps)"),
+        ((a, b, "--unit", "mm"), "the file says it itself: leave out a unit (--unit)"),
         ((a, b, "--walk", 0), "only track.csv counts walks"),
         ((a, tmp_path / "a.mot"), "holds joint angles, and there are none"),
         ((a, a / "b.c3d"), "cannot be written to"),

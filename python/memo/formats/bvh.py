@@ -70,6 +70,7 @@ class _Node:
 
 def read_bvh(path: Path, given: Given) -> Motion:
     """Reads the positions of the joints."""
+    given.check_used("unit_m")
     lines = read_lines(path)
     nodes, start = _hierarchy(lines)
     values, frame_s = _frames(lines, start, sum(len(node.channels) for node in nodes))

@@ -68,6 +68,7 @@ _OURS = {label: joint for joint, label in _FLEXIONS.items()}
 
 def read_c3d(path: Path, given: Given) -> Motion:
     """Reads points, angles and gait events."""
+    given.check_used()
     size = path.stat().st_size
     if size > _MOST_BYTES:
         raise FormatError(f"{size >> 20} MiB are more than the {_MOST_BYTES >> 20} MiB that are read")

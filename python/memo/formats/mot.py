@@ -49,6 +49,7 @@ _MOST_HEADER_LINES = 1000
 
 def read_mot(path: Path, given: Given) -> Motion:
     """Reads the angles, in degrees, and the points given by translations."""
+    given.check_used()
     lines = read_lines(path)
     header, start = _header(lines)
     if header.get("datatype", "double") != "double":

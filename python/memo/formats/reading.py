@@ -26,6 +26,12 @@ class Given:
     unit_m: float | None = None
     """Metres in one unit of length, for BVH, which has none."""
 
+    def check_used(self, *used: str) -> None:
+        """Refuses what was given besides what a reader uses."""
+        for name, what in (("rate_hz", "a frame rate (--fps)"), ("unit_m", "a unit (--unit)")):
+            if name not in used and getattr(self, name) is not None:
+                raise FormatError(f"the file says it itself: leave out {what}")
+
 
 def unit_of(text: str, where: str) -> tuple[str, float]:
     """The unit of length named in a file and its length in metres."""

@@ -31,6 +31,7 @@ def sources(path: Path) -> list[Path]:
 
 def read_run_folder(path: Path, given: Given, walk: int | None) -> Motion:
     """Reads `track.csv` with `events.csv`, or `postures.csv`; of a track one walk, or all."""
+    given.check_used()
     table, *others = sources(path)
     if not table.is_file():
         raise FormatError("holds neither track.csv of `memo track` nor postures.csv of `memo posture`")

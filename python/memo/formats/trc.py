@@ -38,6 +38,7 @@ _FIELDS = (
 
 def read_trc(path: Path, given: Given) -> Motion:
     """Reads a TRC file; the header's rate and counts must agree with the rows."""
+    given.check_used()
     lines = read_lines(path)
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise FormatError("line 1: no TRC file (it begins with PathFileType and has five rows of header)")
