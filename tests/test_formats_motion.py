@@ -46,6 +46,8 @@ def test_stamps_without_a_rate_are_refused_with_what_came():
         line(times_s).at_constant_rate()
     with pytest.raises(FormatError, match="mostly gaps at 100 Hz"):
         line([0, 0.01, 0.02, 5000]).at_constant_rate()
+    with pytest.raises(FormatError, match="0 to 5000 s are mostly gaps: split the motion"):
+        line([0, 0.01, 0.02, 5000]).resampled(30)
     with pytest.raises(FormatError, match="one frame has no frame rate"):
         line([0]).at_constant_rate()
 

@@ -139,10 +139,14 @@ class Motion:
         if len(self.times_s) == 1:
             return replace(self, metadata={**self.metadata, "rate_hz": rate_hz})
         intervals = np.diff(self.times_s)
+        gap_s = 3 * float(np.median(intervals))
+        if span_s > _LONGEST_GAP * intervals[intervals <= gap_s].sum() + 60:
+            first_s, last_s = self.times_s[0], self.times_s[-1]
+            raise FormatError(f"the times {first_s:g} to {last_s:g} s are mostly gaps: split the motion")
         after = np.clip(np.searchsorted(self.times_s, times_s, side="right"), 1, len(self.times_s) - 1)
         weight = np.clip((times_s - self.times_s[after - 1]) / intervals[after - 1], 0, 1)
         weight[np.abs(weight) < 1e-9], weight[np.abs(weight - 1) < 1e-9] = 0, 1
-        weight[(intervals[after - 1] > 3 * np.median(intervals)) & (weight > 0) & (weight < 1)] = np.nan
+        weight[(intervals[after - 1] > gap_s) & (weight > 0) & (weight < 1)] = np.nan
         points = np.empty((count, len(self.names), 3))
         for k in range(len(self.names)):  # point by point, to hold the whole only once
             points[:, k] = _between(self.points[after - 1, k], self.points[after, k], weight[:, None])
@@ -189,7 +193,7 @@ class Motion:
         if ratios.sum() >= _LONGEST_GAP * len(self.times_s) + 1000:
             raise FormatError(
                 f"the times {self.times_s[0]:g} to {self.times_s[-1]:g} s are mostly gaps at"
-                f" {1 / period_s:.4g} Hz: split the motion, or give --rate"
+                f" {1 / period_s:.4g} Hz: split the motion"
             )
         steps = np.concatenate([[0.0], np.cumsum(ratios)])
         slope = np.polyfit(steps, self.times_s, 1)[0] if ratios.min() >= 1 else period_s
