@@ -7,8 +7,8 @@ order, millimetres, residual 0 or -1.
 
 The reader is memo's own. Of 150 damaged files, the C++ library ezc3d 1.7 crashed the process on 15, and
 the Python library c3d 0.6 let struct errors and assertions through on 27; here every size in a file is
-held against the bytes that are there before anything is made of it, and every damaged file ends in one
-`FormatError`.
+held against the bytes that are there before anything is made of it, and a damaged file is read, where its
+sizes still agree, or ends in one `FormatError`.
 
 Conventions: the time of the first frame is (its number - 1) / rate, as Vicon counts, and events (group
 EVENT, labels `Foot Strike` and `Foot Off`, contexts `Right` and `Left`) are on the same clock; of other
