@@ -24,7 +24,7 @@ from motions import walk
 from test_formats_c3d import older
 
 ENDINGS = ("bvh", "c3d", "csv", "mot", "trc", "track.csv")
-COUNT = 100_000 if os.environ.get("MEMO_FULL") else 600
+COUNT = 100_000 if os.environ.get("MEMO_FULL") else 250
 MEMORY = 1 << 30  # bytes beyond what the process has at the start
 SECONDS = 5.0
 
