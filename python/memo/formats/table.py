@@ -1,0 +1,84 @@
+"""Tables of joints: CSV with one header row, `<joint>_x_m`, `<joint>_y_m`, `<joint>_z_m` and `<angle>_deg`.
+
+Times are the column `time_s`, or follow from a rate in a comment ("# metres, Z up, 100 Hz") or from the
+caller. Z is up, as in all tables of memo, unless a comment before the header says `Y up`; with Y up such
+a comment is written, with Z up none, so that any program reads the file. Empty cells are missing.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from memo.files import complete_file
+from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
+from memo.formats.reading import Given, chosen_up
+from memo.formats.text import MAX_TEXT_BYTES
+from memo.linkage import NumberTable, read_number_table
+
+__all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
+
+
+def read_table(path: Path, given: Given) -> Motion:
+    """Reads points and angles of a table; other columns are passed over."""
+    given.check_used("rate_hz")
+    if path.stat().st_size > MAX_TEXT_BYTES:
+        raise FormatError(f"more than the {MAX_TEXT_BYTES >> 20} MiB that are read")
+    try:
+        return motion_of_table(read_number_table(path), given)
+    except ValueError as error:
+        raise FormatError(str(error).removeprefix(f"{path}: ")) from None
+
+
+def motion_of_table(table: NumberTable, given: Given) -> Motion:
+    """The motion in a table of columns as `motion_columns` names them, from whatever file it came."""
+    angles = {
+        name.removesuffix("_deg"): table.numbers[:, index]
+        for name, index in table.column.items()
+        if name.endswith("_deg") and name != "_deg"
+    }
+    names, points = table.points(3)
+    said = re.search(r"\b([yz])[ -]up\b", "\n".join(table.comments), re.IGNORECASE)
+    up, _ = chosen_up(given, said.group(1) if said else "z", "z", "memo's tables have")
+    return Motion(
+        tuple(names),
+        table.times_s(given.rate_hz),
+        to_z_up(points, up),
+        angles=angles,
+        metadata={"format": "csv", "up": up, "unit": "m"},
+    )
+
+
+def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
+    """Writes points and angles with six digits after the point; returns what was left out, in sentences."""
+    if not motion.names:
+        raise FormatError(
+            "a table of joints holds points, and there are none: write angles to a .mot or .sto file"
+        )
+    for name in (*motion.names, *motion.angles):
+        if not name.isprintable():
+            raise FormatError(f"{name!r} is no name for a column")
+    columns = motion_columns(motion, up)
+    table = np.column_stack([columns[name] for name in columns if name != "time_s"])
+    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        if up != "z":
+            file.write("# metres, Y up\n")
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["frame", *columns])
+        for frame in range(len(table)):
+            cells = ("" if x != x else f"{x:.6f}" for x in table[frame].tolist())
+            rows.writerow([frame, f"{motion.times_s[frame]:.6f}", *cells])
+    return ["A table of joints has no place for events: left out."] if motion.events else []
+
+
+def motion_columns(motion: Motion, up: Up) -> dict[str, npt.NDArray[np.float64]]:
+    """The columns of a table of the motion, (T,) each, `time_s` first: what any tabular format writes."""
+    columns = {"time_s": motion.times_s} | {f"{name}_deg": values for name, values in motion.angles.items()}
+    turned = from_z_up(motion.points, up)
+    for k, name in enumerate(motion.names):
+        columns |= {f"{name}_{axis}_m": turned[:, k, i] for i, axis in enumerate("xyz")}
+    return columns
