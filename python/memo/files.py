@@ -28,6 +28,7 @@ __all__ = [
     "complete_file",
     "plain",
     "read_events_csv",
+    "read_track",
     "read_track_csv",
     "read_tsai_xml",
     "write_columns_csv",
@@ -122,6 +123,31 @@ def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
         kind = np.int64 if name in ("frame", "walk") else np.float64
         columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
     return columns
+
+
+def read_track(path: str | PathLike[str]) -> dict[str, Column]:
+    """The columns of `track.csv` or `track.parquet`, or of the one in a folder, as `read_track_csv` has them.
+
+    Parquet needs the extra `parquet`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        names = [path / name for name in ("track.csv", "track.parquet") if (path / name).is_file()]
+        if not names:
+            raise ValueError(f"{path}: a folder without track.csv or track.parquet")
+        path = names[0]
+    if path.suffix.lower() != ".parquet":
+        return read_track_csv(path)
+    from memo.formats.parquet import read_parquet
+
+    columns = read_parquet(path)
+    absent = sorted(set(TRACK_COLUMNS) - set(columns))
+    if absent:
+        raise ValueError(f"{path}: columns missing: {absent}")
+    texts = [name for name in TRACK_COLUMNS if columns[name].dtype.kind not in "iuf"]
+    if texts:
+        raise ValueError(f"{path}: column {texts[0]} holds no numbers")
+    return {name: columns[name] for name in TRACK_COLUMNS}
 
 
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:
