@@ -174,12 +174,12 @@ def boxes_from_contours(track: Track) -> Array:
 
 
 def boxes_from_joints(columns: Mapping[str, npt.ArrayLike]) -> Array:
-    """(N, 4) left, top, right, bottom in pixels of the body around the joints of `track.csv`; NaN where unknown.
+    """(N, 4) left, top, right, bottom in pixels of the body around the joints of `track.csv`; NaN if unknown.
 
-    Head, hands and feet are where the model has them, given its joints, and come into the picture by the affine
-    map that takes the twelve joints of the row to their pixels: the camera, near the body. On tracked walks
-    the sides are on average within 1 % of the body height of `boxes_from_contours`, the top within 3 %, as the
-    height of a fitted person's shoulders is not in the table.
+    Head, hands and feet are where the model has them, given its joints, and come into the picture by the
+    affine map that takes the twelve joints of the row to their pixels: the camera, near the body. On tracked
+    walks the sides are on average within 1 % of the body height of `boxes_from_contours`, the top within 3 %,
+    as the height of a fitted person's shoulders is not in the table.
     """
     in_world = _joints(columns, ("x_m", "y_m", "z_m"))
     in_picture = _joints(columns, ("u_px", "v_px"))

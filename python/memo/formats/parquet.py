@@ -1,8 +1,8 @@
 """Tables as Parquet, the unit of every column in its metadata. Needs the extra `parquet` (pyarrow).
 
 Columns and their names are those of the CSV files. A value that is not known is null: NaN and the empty texts
-of columns that otherwise hold numbers. The unit stands under `unit` in the metadata of a column, and what wrote
-the file under `memo` in that of the table; pyarrow, polars and DuckDB show them, pandas drops them.
+of columns that otherwise hold numbers. The unit stands under `unit` in the metadata of a column (`cycle` for
+`phase`, `1` for a pure number), the version that wrote the file under `memo` in that of the table.
 
 What it cannot do: nested columns, and tables beyond 100 million cells.
 """

@@ -8,7 +8,7 @@ Formats, told apart by their content:
 - COCO annotations: one JSON object with `annotations`; visibility 0, 1, 2 becomes the score 0, 0.5, 1.
 - Tables: CSV, wide (`frame` or `time_s`, `<joint>_x`, `<joint>_y`, optionally `<joint>_score`) or long
   (`frame` or `time_s`, `joint`, `x`, `y`, optionally `score`), either with `person` for several people. The
-  projected joints of `track.csv` are such a table; a folder that holds one may be given.
+  projected joints of `track.csv` are such a table; a folder that holds one may be given. The same as Parquet.
 - TRC in pixels, as Sports2D writes it (`*_px_*.trc`).
 
 A point at (0, 0) or without coordinates is missing: NaN here. Missing frames inside the sequence are missing
@@ -23,12 +23,14 @@ from memo.keypoints.openpose import write_openpose
 from memo.keypoints.points import Keypoints, KeypointsError, layouts
 from memo.keypoints.reading import read_keypoints
 from memo.keypoints.table import write_csv
+from memo.keypoints.track import keypoints_of_track
 from memo.keypoints.writing import WRITERS, write_keypoints
 
 __all__ = [
     "WRITERS",
     "Keypoints",
     "KeypointsError",
+    "keypoints_of_track",
     "layouts",
     "read_keypoints",
     "write_coco",

@@ -17,11 +17,13 @@ from memo.keypoints.coco import read_coco
 from memo.keypoints.found import Found, Person
 from memo.keypoints.openpose import read_openpose
 from memo.keypoints.points import Array, Keypoints, KeypointsError, frame_range
-from memo.keypoints.table import read_csv
+from memo.keypoints.table import read_csv, read_parquet_table
 from memo.keypoints.text import content_of, parsed
 from memo.keypoints.trc import is_trc, read_trc
 
 __all__ = ["read_keypoints"]
+
+_OF_A_TRACK = ("track.csv", "track.parquet")
 
 
 def read_keypoints(
@@ -38,7 +40,8 @@ def read_keypoints(
     the nearest in each next frame, if within 0.3 of the person's size (more after a gap). `fps` is needed
     unless a table has `time_s`, which it replaces. `layout` names the order of points where the file does
     not: without it their number decides, and between BODY_25 and BODY_25B (both 25) whether the points that
-    would be neck and middle of the hips lie there. Of a folder with `track.csv`, that is read.
+    would be neck and middle of the hips lie there. Of a run of `memo track` (a folder with `track.csv` or
+    `track.parquet`) the projected joints are read.
     """
     path = Path(path)
     if fps is not None and not 0 < fps < math.inf:
@@ -55,12 +58,13 @@ def read_keypoints(
 
 
 def _found(path: Path) -> Found:
-    if (path / "track.csv").is_file():
-        path = path / "track.csv"
+    path = next((path / name for name in _OF_A_TRACK if (path / name).is_file()), path)
     if path.is_dir():
         return read_openpose(path)
     if not path.is_file():
         raise KeypointsError(f"{path}: neither a file nor a folder")
+    if path.suffix.lower() == ".parquet":
+        return read_parquet_table(path)
     content = content_of(path)
     if not content.strip():
         raise KeypointsError(f"{path}: the file is empty")

@@ -24,7 +24,7 @@ from memo.keypoints.found import Found, Person, check_all_placed, different, wit
 from memo.keypoints.points import MAX_FRAME, Array, Keypoints, KeypointsError, Source, check_finite
 from memo.keypoints.text import LONGEST_NAME, content_of, short, write_text
 
-__all__ = ["read_csv", "write_csv"]
+__all__ = ["read_csv", "read_parquet_table", "write_csv"]
 
 _AXES_SUFFIXES = (("_x", "_y"), ("_x_px", "_y_px"), ("_u_px", "_v_px"))
 _SCORE_SUFFIXES = ("_score", "_confidence", "_likelihood", "_visibility")
@@ -69,7 +69,27 @@ class Columns:
 
 
 def read_csv(path: Path, content: str) -> Found:
+    """Everybody in a table."""
     rows, _ = _rows(path, content)
+    return _everybody(path, rows, Source(path, _write_like))
+
+
+def read_parquet_table(path: Path) -> Found:
+    """Everybody in a table of Parquet, which is read like CSV but not written like one."""
+    from memo.formats.parquet import ParquetError, read_parquet
+
+    try:
+        columns = read_parquet(path)
+    except ParquetError as error:
+        raise KeypointsError(str(error)) from None
+    texts = [
+        ["" if value != value else str(value) for value in values.tolist()] for values in columns.values()
+    ]
+    rows = [list(columns), *map(list, zip(*texts, strict=True))]
+    return _everybody(path, rows, Source(path, None))
+
+
+def _everybody(path: Path, rows: list[list[str]], source: Source) -> Found:
     columns = _columns(path, rows)
     read = _long_people if columns.joint is not None else wide_people
     frames, times_s = row_frames(path, rows, columns)
@@ -81,7 +101,7 @@ def read_csv(path: Path, content: str) -> Found:
             raise KeypointsError(
                 f"{path}: frame {people[one].frame} stands there twice and no column `person`"
             )
-    return Found(Source(path, _write_like), people, columns.names, times_s, frames=tuple(frames.values()))
+    return Found(source, people, columns.names, times_s, frames=tuple(frames.values()))
 
 
 def _rows(path: Path, content: str) -> tuple[list[list[str]], str]:
