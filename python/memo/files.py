@@ -10,7 +10,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -27,6 +27,7 @@ __all__ = [
     "TRACK_COLUMNS",
     "complete_file",
     "plain",
+    "read_columns_csv",
     "read_events_csv",
     "read_track",
     "read_track_csv",
@@ -96,6 +97,32 @@ def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.Array
     """Writes columns of one length in their order; the end of a name says how many digits are written."""
     texts = [_texts(name, np.asarray(values)) for name, values in columns.items()]
     _write_rows(path, columns, zip(*texts, strict=True))
+
+
+def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
+    """Reads any table written here: a column is int64, float64 with NaN for empty cells, or texts."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a table: {error}") from None
+    if not header or len(set(header)) < len(header):
+        raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
+    cells = zip(*rows, strict=True) if rows else ((),) * len(header)
+    return {name: _column(own) for name, own in zip(header, cells, strict=True)}
+
+
+def _column(cells: Sequence[str]) -> Column:
+    """Cells as whole numbers, numbers or texts, whichever all of them are."""
+    for kind, texts in ((np.int64, cells), (np.float64, [cell or "nan" for cell in cells])):
+        try:
+            return np.array(texts, dtype=object).astype(kind)
+        except (ValueError, OverflowError):
+            pass
+    return np.array(cells, dtype=object)
 
 
 def write_json(path: str | PathLike[str], value: Any) -> None:

@@ -117,6 +117,8 @@ def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
     """A column of Arrow's, null where not known."""
     if values.ndim != 1:
         raise ParquetError(f"column {name}: wanted one value a row, got shape {values.shape}")
+    if values.dtype.kind not in "fiubUO":
+        raise ParquetError(f"column {name}: {values.dtype} is neither number, text nor truth value")
     if values.dtype.kind == "f":
         return pa.array(values, mask=np.isnan(values))
     if values.dtype.kind == "O":
