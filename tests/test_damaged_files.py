@@ -1,6 +1,6 @@
 """Damaged files of keypoints and tables: read, or refused with the format's error, soon and in little memory.
 
-Each format is tried in a process of its own, whose memory is bounded, so that a crash of a library is a failed
+Each format is tried in a process of its own, with bounded memory, so that a crash of a library is a failed
 test too. `MEMO_FULL=1 pytest tests/test_damaged_files.py` tries 100,000 files a format.
 """
 
@@ -97,14 +97,16 @@ READERS = {
 
 
 def damaged(good, rng, binary):
-    """The bytes with one to four edits; of binary files, half in the last 800 bytes, where Parquet's footer is."""
+    """The bytes with one to four edits; of binary files, half in the last 800 bytes, the footer of Parquet."""
     data = bytearray(good)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         at = rng.randrange(len(data) + 1)
         if binary and rng.random() < 0.5:
             at = max(0, len(data) - rng.randrange(800))
         kind = rng.random()
-        if kind < 0.05:
+        if binary and rng.random() < 0.7 and at < len(data):
+            data[at] ^= 1 << rng.randrange(8)
+        elif kind < 0.05:
             del data[at:]
         elif kind < 0.25:
             del data[at : at + rng.choice((1, 2, 5, 20, 100))]
@@ -126,7 +128,7 @@ def damaged(good, rng, binary):
 
 
 def try_files(name, count, folder, seed=1):
-    """Reads so many damaged files; how many were read and how many refused. Whatever else happens is raised."""
+    """Reads so many damaged files; how many were read and how many refused. All else is raised."""
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     read, error_kind = READERS[name]
     good = good_file(name, folder)
