@@ -97,7 +97,7 @@ READERS = {
 
 
 def damaged(good, rng, binary):
-    """The bytes with one to four edits; of binary files, half in the last 800 bytes, the footer of Parquet."""
+    """The bytes with one to four edits; of binary files, half in the last 800 bytes: Parquet's footer."""
     data = bytearray(good)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         at = rng.randrange(len(data) + 1)
