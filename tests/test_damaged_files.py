@@ -170,6 +170,7 @@ def write_again(found, folder, counts):
     write_csv(folder / "table", changed)
     table = read_keypoints(folder / "table")
     np.testing.assert_array_equal(table.points, zero_is_missing(changed.points))
+    (folder / "table").unlink()  # replacing a file waits for the disk
     out = folder / "out_px"
     try:
         changed.write(out)
