@@ -17,8 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from memo.formats.motchallenge import BoxesError, read_motchallenge
-from memo.formats.parquet import ParquetError, read_parquet, write_parquet
+from memo.formats import FormatError
+from memo.formats.motchallenge import read_motchallenge
+from memo.formats.parquet import read_parquet, write_parquet
 from memo.keypoints import (
     Keypoints,
     KeypointsError,
@@ -92,8 +93,8 @@ READERS = {
         ("openpose", "results", "annotations", "by_image", "wide", "long", "trc"),
         (read_keypoints, KeypointsError),
     ),
-    "motchallenge": (read_motchallenge, BoxesError),
-    "parquet": (read_parquet, ParquetError),
+    "motchallenge": (read_motchallenge, FormatError),
+    "parquet": (read_parquet, FormatError),
 }
 
 

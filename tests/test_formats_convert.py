@@ -8,6 +8,7 @@ from pathlib import Path
 
 import ezc3d
 import numpy as np
+import pandas
 import pytest
 from memo import cli
 from memo.files import JOINTS, TRACK_COLUMNS, write_columns_csv, write_events_csv, write_track_csv
@@ -51,13 +52,13 @@ def write_track(folder, times_s=None):
 
 def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     points = write_track(tmp_path / "run")
-    for ending in ("trc", "c3d", "csv", "mot", "sto"):
+    for ending in ("trc", "c3d", "csv", "parquet", "mot", "sto"):
         target = tmp_path / "out" / f"walk.{ending}"
         code, out, err = memo_command("convert", tmp_path / "run", target)
         assert (code, err) == (0, "")
         assert "Read 55 frames, 12 points, 8 joint angles, 2 events, 0.40 to 2.96 s." in out
         assert "2 walks: between them nobody was tracked." in out
-        up = "Z" if ending in ("c3d", "csv") else "Y"
+        up = "Z" if ending in ("c3d", "csv", "parquet") else "Y"
         assert out.endswith(f"Written to {target}, {up} up.\n")
         read = read_motion(target)
         assert read.angles["right_knee"][5] == 15.5 if ending != "trc" else not read.angles
@@ -65,8 +66,33 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
             assert len(read.times_s) == 65 and np.isnan(read.points[30:40]).all()
             assert np.nanmax(np.abs(read.points - points[10:75])) < 1e-4
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        f"walk.{ending}" for ending in ("c3d", "csv", "mot", "sto", "trc")
+        f"walk.{ending}" for ending in ("c3d", "csv", "mot", "parquet", "sto", "trc")
     ]
+
+
+def test_parquet_tells_its_up_axis(tmp_path, memo_command):
+    points = write_track(tmp_path / "run")
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.parquet", "--up", "y")
+    assert (code, err) == (0, "")
+    hip_up_m = pandas.read_parquet(tmp_path / "walk.parquet")["right_hip_y_m"]
+    np.testing.assert_allclose(hip_up_m, points[FRAMES, JOINTS.index("right_hip"), 2], atol=1e-4)
+    again = read_motion(tmp_path / "walk.parquet")
+    np.testing.assert_allclose(again.points, points[FRAMES], atol=1e-4)
+
+
+def test_boxes_and_keypoints_of_a_track(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    for target, said in [("a.txt", "MOTChallenge rows"), ("a.json", "COCO results"), ("a_json", "OpenPose")]:
+        code, out, err = memo_command("convert", tmp_path / "run", tmp_path / target)
+        assert (code, err) == (0, "")
+        assert said in out
+        assert (tmp_path / target).exists()
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.txt", "--rate", 50)
+    assert (code, err) == (1, "memo: --rate: means nothing for MOTChallenge rows")
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.json", "--up", "y")
+    assert (code, err) == (1, "memo: --up: means nothing for COCO results")
+    code, _, err = memo_command("convert", tmp_path / "nobody", tmp_path / "b.txt")
+    assert code == 1 and "no such file or folder" in err
 
 
 def test_one_walk_its_events_and_the_summary_as_json(tmp_path, memo_command):

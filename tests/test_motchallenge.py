@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from conftest import shared_video
 from memo.files import JOINTS, read_tsai_xml
+from memo.formats import FormatError
 from memo.formats.motchallenge import (
-    BoxesError,
     boxes_from_contours,
     boxes_from_joints,
     read_motchallenge,
@@ -107,7 +107,7 @@ def test_y_up_is_turned_about_x(tmp_path, track):
     assert (right, height, back) == (x, 0, -y) and z == 0 and y != 0
     z_up, y_up = read_motchallenge(tmp_path / "z.txt"), read_motchallenge(tmp_path / "y.txt", up="y")
     assert all(np.array_equal(z_up[name], y_up[name]) for name in z_up)
-    with pytest.raises(BoxesError, match='up must be "z" or "y"'):
+    with pytest.raises(FormatError, match='up must be "z" or "y"'):
         write_motchallenge(tmp_path / "x.txt", track, up="x")
 
 
@@ -159,14 +159,14 @@ def test_rows_of_all_years(tmp_path, row, expected):
 def test_broken_rows_are_refused(tmp_path, text, message):
     path = tmp_path / "a.txt"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(BoxesError, match=message) as error:
+    with pytest.raises(FormatError, match=message) as error:
         read_motchallenge(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
 
 
 def test_what_is_no_track_is_refused(tmp_path):
-    with pytest.raises(BoxesError, match="not the columns of a track: no left_ankle_x_m"):
+    with pytest.raises(FormatError, match="not the columns of a track: no left_ankle_x_m"):
         write_motchallenge(tmp_path / "a.txt", {"frame": [0]})
-    with pytest.raises(BoxesError, match="cannot be read"):
+    with pytest.raises(FormatError, match="cannot be read"):
         read_motchallenge(tmp_path / "nowhere.txt")
     assert list(tmp_path.iterdir()) == []

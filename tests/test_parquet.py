@@ -11,7 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from memo.files import TRACK_COLUMNS, read_columns_csv, read_track, write_columns_csv, write_track_csv
-from memo.formats.parquet import ParquetError, read_parquet, unit_of, write_parquet
+from memo.formats import FormatError
+from memo.formats.parquet import read_parquet, unit_of, write_parquet
 
 
 def track_columns(count=20):
@@ -131,23 +132,23 @@ def test_files_of_others_are_read(tmp_path):
 
 def test_what_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "a.parquet"
-    with pytest.raises(ParquetError, match="no such file"):
+    with pytest.raises(FormatError, match="no such file"):
         read_parquet(path)
-    with pytest.raises(ParquetError, match="not Parquet that can be read"):
+    with pytest.raises(FormatError, match="not Parquet that can be read"):
         read_parquet(tmp_path)
     for data in (b"", b"PAR1", b"frame,x\n1,2\n", b"PAR1\xff\xff\xff\x7fPAR1"):
         path.write_bytes(data)
-        with pytest.raises(ParquetError, match="not Parquet that can be read") as error:
+        with pytest.raises(FormatError, match="not Parquet that can be read") as error:
             read_parquet(path)
         assert str(path) in str(error.value) and "\n" not in str(error.value)
     pq.write_table(pa.table({"a": pa.array([[1], [2, 3]])}), path)
-    with pytest.raises(ParquetError, match=r"column a: list<.*> is neither number, text nor truth value"):
+    with pytest.raises(FormatError, match=r"column a: list<.*> is neither number, text nor truth value"):
         read_parquet(path)
     pq.write_table(pa.table([pa.array([1]), pa.array([2])], names=["a", "a"]), path)
-    with pytest.raises(ParquetError, match="stands there twice"):
+    with pytest.raises(FormatError, match="stands there twice"):
         read_parquet(path)
     pq.write_table(pa.table({"a": pa.array([2**63], pa.uint64())}), path)
-    with pytest.raises(ParquetError, match="not Parquet that can be read"):
+    with pytest.raises(FormatError, match="not Parquet that can be read"):
         read_parquet(path)
 
 
@@ -158,7 +159,7 @@ def test_what_cannot_be_written_is_refused_and_leaves_nothing(tmp_path):
         ({"a": np.ones((2, 2))}, r"column a: wanted one value a row, got shape \(2, 2\)"),
         ({"a": np.ones(2, complex)}, "column a"),
     ]:
-        with pytest.raises(ParquetError, match=message):
+        with pytest.raises(FormatError, match=message):
             write_parquet(tmp_path / "a.parquet", columns)
     assert list(tmp_path.iterdir()) == []
 
@@ -167,10 +168,10 @@ def test_without_pyarrow_the_extra_is_named(tmp_path):
     code = f"""
 import sys
 sys.modules["pyarrow"] = None
-import memo.formats.parquet as parquet
+from memo.formats import FormatError, parquet
 try:
     parquet.write_parquet({str(tmp_path / "a.parquet")!r}, {{"a": [1]}})
-except parquet.ParquetError as error:
+except FormatError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

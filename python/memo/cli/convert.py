@@ -36,14 +36,15 @@ def add_convert(app: "typer.Typer") -> None:
             Path,
             typer.Argument(
                 help="A folder of `memo track` or `memo posture`, or a motion file:"
-                " .c3d, .bvh, .trc, .mot, .sto, .csv."
+                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints those of a detector as well."
             ),
         ],
         target: Annotated[
             Path,
             typer.Argument(
-                help=".trc, .csv: joints; .mot, .sto: joint angles; .c3d: joints, angles and events;"
-                " .bvh: a skeleton."
+                help=".trc, .csv, .parquet: joints; .mot, .sto: joint angles;"
+                " .c3d: joints, angles and events; .bvh: a skeleton; .json: keypoints as COCO results;"
+                " no ending: a folder of OpenPose's keypoints; .txt: a track as MOTChallenge rows."
             ),
         ],
         up: Annotated[
@@ -71,6 +72,9 @@ def add_convert(app: "typer.Typer") -> None:
             given = {"rate_hz": _checked(fps, "--fps"), "unit_m": _unit_m(unit)}
             reading = {"up": None if from_up is None else from_up.value, "walk": walk, **given}
             changes = (_checked(rate, "--rate"), _checked(fill, "--fill"))
+            if target.suffix.lower() in _IN_PICTURE:
+                asked = {"--from-up": from_up, "--rate": rate, "--fill": fill, "--walk": walk, "--unit": unit}
+                return _convert_picture(source, target, up, fps, asked, delivery)
             return _convert(source, target, reading, up, *changes, delivery)
 
         raise typer.Exit(guarded(work))
@@ -89,7 +93,8 @@ def _convert(
     from memo.formats.run_folder import sources
 
     if target.suffix.lower() not in WRITERS:
-        raise InputError(f"{target}: the ending must be one of {', '.join(sorted(WRITERS))}")
+        endings = ", ".join(sorted({*WRITERS, ".txt", ".json"}))
+        raise InputError(f"{target}: the ending must be one of {endings}")
     if target.is_dir():
         raise InputError(f"{target}: is a folder")
     if not source.exists():
@@ -120,6 +125,51 @@ def _convert(
         "notes": notes,
     }
     _tell(summary, target, delivery)
+    return Exit.DONE
+
+
+# What is in the picture rather than in the world: boxes and keypoints.
+
+_IN_PICTURE = (".txt", ".json", "")
+
+
+def _convert_picture(
+    source: Path, target: Path, up: Axis | None, fps: float | None, asked: dict[str, Any], delivery: Delivery
+) -> Exit:
+    """Writes boxes of a track (.txt), or keypoints: COCO results (.json), OpenPose's folder (no ending)."""
+    kind = {".txt": "MOTChallenge rows", ".json": "COCO results", "": "OpenPose's keypoints"}[
+        target.suffix.lower()
+    ]
+    unused = [name for name, value in asked.items() if value is not None]
+    unused += ["--up"] * (up is not None and target.suffix.lower() != ".txt")
+    if unused:
+        raise InputError(f"{', '.join(unused)}: means nothing for {kind}")
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder")
+    check_writable(target.parent)
+    check_apart([source], [target])
+    if target.suffix.lower() == ".txt":
+        from memo.files import read_track
+        from memo.formats.motchallenge import write_motchallenge
+
+        columns = read_track(source)
+        write_motchallenge(target, columns, up="z" if up is None else up.value)
+        summary: dict[str, Any] = {"rows": len(columns["frame"]), "notes": []}
+        told = f"{summary['rows']} rows of the track"
+    else:
+        from memo.keypoints import read_keypoints
+        from memo.keypoints.writing import write_keypoints
+
+        keypoints = read_keypoints(source, fps=fps)
+        left_out = write_keypoints(target, keypoints, "coco" if target.suffix else "openpose")
+        notes = [f"No place for {', '.join(left_out)}: left out."] if left_out else []
+        summary = {"frames": len(keypoints.frames), "points": list(keypoints.names), "notes": notes}
+        told = f"{len(keypoints.frames)} frames, {len(keypoints.names)} points"
+    summary = {"source": str(source), "target": str(target), **summary}
+    if delivery.as_json:
+        print(json.dumps(plain({**summary, "files": [str(target)]})))
+    elif delivery.talks:
+        print(f"Read {told}.", *summary["notes"], f"Written to {target}: {kind}.", sep="\n")
     return Exit.DONE
 
 

@@ -1,4 +1,4 @@
-"""Motion files, read and written: TRC, MOT and STO, C3D, BVH and tables of joints.
+"""Motion files, read and written: TRC, MOT and STO, C3D, BVH and tables of joints (CSV, Parquet).
 
 `read_motion` and `write_motion` choose the format by the ending of the file's name; `READERS` and
 `WRITERS` hold what each ending is done by, and a new format is one entry in each. What was assumed in
@@ -17,6 +17,7 @@ from memo.formats.bvh import read_bvh, write_bvh
 from memo.formats.c3d import read_c3d, write_c3d
 from memo.formats.mot import read_mot, write_mot
 from memo.formats.motion import FormatError, GaitEvent, Motion, Up
+from memo.formats.parquet import read_parquet_motion, write_parquet_motion
 from memo.formats.reading import Given
 from memo.formats.run_folder import read_run_folder
 from memo.formats.table import read_table, write_table
@@ -45,6 +46,7 @@ READERS: dict[str, Reader] = {
     ".c3d": read_c3d,
     ".csv": read_table,
     ".mot": read_mot,
+    ".parquet": read_parquet_motion,
     ".sto": read_mot,
     ".trc": read_trc,
 }
@@ -55,6 +57,7 @@ WRITERS: dict[str, Writer] = {
     ".c3d": write_c3d,
     ".csv": write_table,
     ".mot": write_mot,
+    ".parquet": write_parquet_motion,
     ".sto": write_mot,
     ".trc": write_trc,
 }

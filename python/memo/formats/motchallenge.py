@@ -16,17 +16,18 @@ import math
 from collections.abc import Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
 from memo.files import JOINTS, complete_file
+from memo.formats.motion import FormatError
 
 if TYPE_CHECKING:
     from memo.tracking import Track
 
 __all__ = [
-    "BoxesError",
     "boxes_from_contours",
     "boxes_from_joints",
     "read_motchallenge",
@@ -50,16 +51,8 @@ _SOLE_BELOW_ANKLE = 0.039
 _LIMB_HALF_WIDTH = 0.030
 
 
-class BoxesError(ValueError):
-    """MOTChallenge rows that cannot be read or written; the message says which file and line, in one line."""
-
-    def __init__(self, message: str) -> None:
-        # Cells of damaged files may hold anything.
-        super().__init__("".join(character if character.isprintable() else "?" for character in message))
-
-
 def write_motchallenge(
-    path: str | PathLike[str], track: Track | Mapping[str, npt.ArrayLike], *, up: Literal["z", "y"] = "z"
+    path: str | PathLike[str], track: Track | Mapping[str, npt.ArrayLike], *, up: str = "z"
 ) -> None:
     """Writes a track, or the columns of `track.csv`; frames without a box in the picture have no row.
 
@@ -86,16 +79,18 @@ def write_motchallenge(
             f"{of['frame'][row] + 1:.0f},{of['walk'][row] + 1:.0f}",
             *(f"{value:.2f}" for value in (*(box[:2] + 1), *size)),
             f"{sure:.5f}" if math.isfinite(sure) else "-1",
-            *((f"{value:.4f}" for value in ground) if np.isfinite(ground).all() else 3 * ["-1"]),
+            *(
+                (f"{round(value, 4) + 0.0:.4f}" for value in ground)
+                if np.isfinite(ground).all()
+                else 3 * ["-1"]
+            ),
         ]
         lines.append(",".join(cells) + "\n")
     with complete_file(path) as temporary:
         temporary.write_text("".join(lines), encoding="ascii")
 
 
-def read_motchallenge(
-    path: str | PathLike[str], *, up: Literal["z", "y"] = "z"
-) -> dict[str, npt.NDArray[Any]]:
+def read_motchallenge(path: str | PathLike[str], *, up: str = "z") -> dict[str, npt.NDArray[Any]]:
     """Reads results, detections or ground truth: columns `frame`, `id`, `left_px`, `top_px`, `width_px`,
     `height_px`, `conf`, `x_m`, `y_m`, `z_m` in the order of the file; frames and pixels from 0.
 
@@ -107,7 +102,7 @@ def read_motchallenge(
     rows = (_row(line, f"{path}: line {number}") for number, line in _lines(path))
     values: Array = np.fromiter(rows, np.dtype((np.float64, 10)))  # type: ignore[assignment]
     if not len(values):
-        raise BoxesError(f"{path}: no row in it")
+        raise FormatError(f"{path}: no row in it")
     columns: dict[str, npt.NDArray[Any]] = {
         "frame": values[:, 0].astype(np.int64) - 1,
         "id": values[:, 1].astype(np.int64),
@@ -121,7 +116,7 @@ def read_motchallenge(
 
 def _check_up(up: str) -> None:
     if up not in ("z", "y"):
-        raise BoxesError(f'up must be "z" or "y", got {up!r}')
+        raise FormatError(f'up must be "z" or "y", got {up!r}')
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -129,12 +124,12 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
     try:
         size = path.stat().st_size
         if size > _MAX_BYTES:
-            raise BoxesError(f"{path}: {size >> 20} MiB; at most {_MAX_BYTES >> 20} MiB are read")
+            raise FormatError(f"{path}: {size >> 20} MiB; at most {_MAX_BYTES >> 20} MiB are read")
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise BoxesError(f"{path}: not text in UTF-8 (byte {error.start})") from None
+        raise FormatError(f"{path}: not text in UTF-8 (byte {error.start})") from None
     except OSError as error:
-        raise BoxesError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from None
     return ((number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip())
 
 
@@ -142,7 +137,7 @@ def _row(line: str, where: str) -> list[float]:
     """The ten numbers of a row, NaN for those it has not."""
     cells = line.split(",") if "," in line else line.split()
     if len(cells) not in (6, 7, 9, 10):
-        raise BoxesError(f"{where}: {len(cells)} numbers; MOTChallenge rows have 6, 7, 9 or 10")
+        raise FormatError(f"{where}: {len(cells)} numbers; MOTChallenge rows have 6, 7, 9 or 10")
     values = []
     for cell in cells:
         try:
@@ -150,12 +145,12 @@ def _row(line: str, where: str) -> list[float]:
         except ValueError:
             value = math.nan
         if not abs(value) <= _MAX_NUMBER or "_" in cell:
-            raise BoxesError(f"{where}: {cell.strip()[:40]!r} is not a number")
+            raise FormatError(f"{where}: {cell.strip()[:40]!r} is not a number")
         values.append(value)
     if values[0] != int(values[0]) or values[0] < 1 or values[1] != int(values[1]):
-        raise BoxesError(f"{where}: the number of a frame, from 1, and that of a person are needed")
+        raise FormatError(f"{where}: the number of a frame, from 1, and that of a person are needed")
     if values[4] < 0 or values[5] < 0:
-        raise BoxesError(f"{where}: a box of {values[4]:g} by {values[5]:g} pixels")
+        raise FormatError(f"{where}: a box of {values[4]:g} by {values[5]:g} pixels")
     world = values[7:] if len(values) == 10 and values[7:] != [-1, -1, -1] else 3 * [math.nan]
     return [*values[:6], values[6] if len(values) > 6 else math.nan, *world]
 
@@ -201,7 +196,7 @@ def _joints(columns: Mapping[str, npt.ArrayLike], axes: tuple[str, ...]) -> Arra
     """(N, 12, axes)"""
     absent = sorted({f"{joint}_{axis}" for joint in JOINTS for axis in axes} - set(columns))
     if absent:
-        raise BoxesError(f"not the columns of a track: no {absent[0]}")
+        raise FormatError(f"not the columns of a track: no {absent[0]}")
     return np.stack(
         [
             np.stack([np.asarray(columns[f"{joint}_{axis}"], np.float64) for axis in axes], axis=-1)

@@ -36,11 +36,12 @@ _LONGEST_GAP = 20  # times as many empty frames as frames
 
 
 class FormatError(ValueError):
-    """A motion that cannot be read or written; one line says which file, where in it, and why."""
+    """A file that cannot be read or written; one line says which, where in it, and why."""
 
     def __init__(self, message: str) -> None:
-        # Names and cells of damaged files may hold anything.
-        super().__init__("".join(c if c.isprintable() else "?" for c in message[:600]))
+        # Names and cells of damaged files may hold anything, and libraries' messages go over several lines.
+        line = " ".join(message.split())[:600]
+        super().__init__("".join(c if c.isprintable() else "?" for c in line))
 
 
 class GaitEvent(NamedTuple):

@@ -18,10 +18,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from memo._memo import __version__
 from memo.files import complete_file
+from memo.formats.motion import FormatError, Motion, Up
+from memo.formats.reading import Given
+from memo.formats.table import motion_columns, motion_of_table
+from memo.linkage import NumberTable
 
-__all__ = ["ParquetError", "read_parquet", "unit_of", "write_parquet"]
+__all__ = ["read_parquet", "read_parquet_motion", "unit_of", "write_parquet", "write_parquet_motion"]
 
 _MAX_CELLS = 100_000_000
 _UNITS = {
@@ -41,15 +46,6 @@ _UNITS = {
     "probability": "1",
     "similarity": "1",
 }
-
-
-class ParquetError(ValueError):
-    """A Parquet file that cannot be read or written; the message says which and why, in one line."""
-
-    def __init__(self, message: str) -> None:
-        # Damaged files may hold anything, and Arrow's messages go over several lines.
-        line = " ".join(message.split())
-        super().__init__("".join(character if character.isprintable() else "?" for character in line)[:600])
 
 
 def unit_of(name: str) -> str | None:
@@ -72,7 +68,7 @@ def write_parquet(
     arrays = {name: _array(pa, name, np.asarray(values)) for name, values in columns.items()}
     lengths = {name: len(array) for name, array in arrays.items()}
     if not lengths or len(set(lengths.values())) > 1:
-        raise ParquetError(f"{path}: columns of one length are needed, got {lengths}")
+        raise FormatError(f"{path}: columns of one length are needed, got {lengths}")
     known = {name: (units or {}).get(name) or unit_of(name) for name in arrays}
     fields = [
         pa.field(name, array.type, metadata=None if known[name] is None else {"unit": known[name]})
@@ -94,31 +90,63 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         with pq.ParquetFile(path, memory_map=False) as file:
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= _MAX_CELLS:
-                raise ParquetError(f"{path}: {cells} cells; at most {_MAX_CELLS} are read")
+                raise FormatError(f"{path}: {cells} cells; at most {_MAX_CELLS} are read")
             schema = file.schema_arrow
             _check_flat(pa, path, schema)
             table = file.read(use_threads=False)
         table.validate(full=True)
         return {name: _values(pa, table.column(index)) for index, name in enumerate(schema.names)}
     except FileNotFoundError:
-        raise ParquetError(f"{path}: no such file") from None
+        raise FormatError(f"{path}: no such file") from None
     except (pa.ArrowException, OSError, UnicodeDecodeError, MemoryError, OverflowError) as error:
-        raise ParquetError(f"{path}: not Parquet that can be read: {error}") from None
+        raise FormatError(f"{path}: not Parquet that can be read: {error}") from None
+
+
+def read_parquet_motion(path: Path, given: Given) -> Motion:
+    """The points and angles of a table, as `memo.formats.table` reads them; its up axis is in `about`."""
+    given.check_used("rate_hz")
+    try:
+        columns = read_parquet(path)
+    except FormatError as error:
+        raise FormatError(str(error).removeprefix(f"{path}: ")) from None
+    known = [name for name, values in columns.items() if values.dtype.kind in "fi"]
+    if not known:
+        raise FormatError("no column of numbers in it")
+    numbers = np.column_stack([columns[name].astype(np.float64) for name in known])
+    up = _about(path).get("up", "z")
+    table = NumberTable(path, {name: index for index, name in enumerate(known)}, numbers, [f"# {up} up"])
+    try:
+        return motion_of_table(table, given)
+    except ValueError as error:
+        raise FormatError(str(error).removeprefix(f"{path}: ")) from None
+
+
+def write_parquet_motion(path: Path, motion: Motion, up: Up) -> list[str]:
+    """Writes points and angles, the up axis in the table's metadata; returns what was left out."""
+    write_parquet(path, motion_columns(motion, up), about={"up": up})
+    return ["A table of joints has no place for events: left out."] if motion.events else []
+
+
+def _about(path: Path) -> dict[str, str]:
+    """The table's own metadata."""
+    _, pq = _arrow()
+    found = pq.read_schema(path).metadata or {}
+    return {key.decode(errors="replace"): value.decode(errors="replace") for key, value in found.items()}
 
 
 def _arrow() -> tuple[ModuleType, ModuleType]:
     try:
         return import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError:
-        raise ParquetError('Parquet needs pyarrow: pip install "memo-motion[parquet]"') from None
+        raise FormatError('Parquet needs pyarrow: pip install "memo-motion[parquet]"') from None
 
 
 def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
     """A column of Arrow's, null where not known."""
     if values.ndim != 1:
-        raise ParquetError(f"column {name}: wanted one value a row, got shape {values.shape}")
+        raise FormatError(f"column {name}: wanted one value a row, got shape {values.shape}")
     if values.dtype.kind not in "fiubUO":
-        raise ParquetError(f"column {name}: {values.dtype} is neither number, text nor truth value")
+        raise FormatError(f"column {name}: {values.dtype} is neither number, text nor truth value")
     if values.dtype.kind == "f":
         return pa.array(values, mask=np.isnan(values))
     if values.dtype.kind == "O":
@@ -130,7 +158,7 @@ def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
 
 def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
     if len(set(schema.names)) < len(schema.names):
-        raise ParquetError(f"{path}: a name of a column stands there twice")
+        raise FormatError(f"{path}: a name of a column stands there twice")
     types = pa.types
     for name, kind in zip(schema.names, schema.types, strict=True):
         own = kind.value_type if types.is_dictionary(kind) else kind
@@ -142,7 +170,7 @@ def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
             types.is_large_string,
         )
         if not any(check(own) for check in checks):
-            raise ParquetError(f"{path}: column {name}: {kind} is neither number, text nor truth value")
+            raise FormatError(f"{path}: column {name}: {kind} is neither number, text nor truth value")
 
 
 def _values(pa: ModuleType, column: Any) -> npt.NDArray[Any]:

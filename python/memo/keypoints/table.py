@@ -76,11 +76,12 @@ def read_csv(path: Path, content: str) -> Found:
 
 def read_parquet_table(path: Path) -> Found:
     """Everybody in a table of Parquet, which is read like CSV but not written like one."""
-    from memo.formats.parquet import ParquetError, read_parquet
+    from memo.formats.motion import FormatError
+    from memo.formats.parquet import read_parquet
 
     try:
         columns = read_parquet(path)
-    except ParquetError as error:
+    except FormatError as error:
         raise KeypointsError(str(error)) from None
     texts = [
         ["" if value != value else str(value) for value in values.tolist()] for values in columns.values()
