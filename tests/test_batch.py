@@ -62,7 +62,8 @@ for name in ("track.csv", "gait_parameters.csv"):
             file.write("0,stride_time,right," + height + ",s,1.0,1.2,3\\n")
             file.write("0,cadence,," + height + ",1/min,,,6\\n")
 with open(os.path.join(out, "run.json"), "w") as file:
-    file.write('{"summary": {"status": "tracked", "direction": "left to right", "p_swapped": 0.01}}')
+    options = '"options": {"height_m": ' + height + '}, "camera_given": false'
+    file.write('{"summary": {"direction": "left to right", "p_swapped": 0.01}, ' + options + "}")
 print('{"message": "said of ' + os.path.basename(video) + '"}')
 if todo[0] == "no-table":
     os.remove(os.path.join(out, "track.csv"))
@@ -300,7 +301,8 @@ def test_names_follow_from_paths_and_differ(tmp_path):
     assert "line 2: the name 'run' is that of line 4 too" in problems_of(tmp_path / "m.csv")[0]
     for name in ("..", "a/b", ".x", "logs", "status.csv", "x" * 200, "a\x07"):
         assert (
-            "cannot be the name of a folder" in problems_of([{"video": tmp_path / "s2/run.mp4", "name": name}])[0]
+            "cannot be the name of a folder"
+            in problems_of([{"video": tmp_path / "s2/run.mp4", "name": name}])[0]
         )
 
 
@@ -344,6 +346,7 @@ def test_one_table_of_all_walks(lab):
     lab.run()
     first, second, third = table(lab.out, "gait_parameters.csv")
     assert first["name"] == "v00" and first["walk"] == "0" and first["direction"] == "left to right"
+    assert (first["height_m"], first["camera_given"], first["p_swapped"]) == ("1.6", "no", "0.010000")
     assert first["stride_time_right_s"] == "1.6" and first["stride_time_right_s_ci_high"] == "1.2"
     assert first["stride_time_right_s_n"] == "3" and first["cadence_per_min"] == "1.6"
     assert (second["state"], second["walk"], second["cadence_per_min"]) == ("nobody", "", "")
