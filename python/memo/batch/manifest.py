@@ -260,7 +260,7 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
         problems.append(f"{given.place}: name {name!r} is not text")
         name = ""
     # a missing video has the path of the folder's parent, which `_checked` does not look at again
-    path = base / Path(video).expanduser() if video is not None else base
+    path = base / os.path.expanduser(video) if video is not None else base
     return Row(name, path, options, given.place, tuple(problems))
 
 
@@ -281,7 +281,7 @@ def _converted(value: Any, kind: type, base: Path) -> Value:
             raise ValueError(f"{value!r} is not a number{hint}") from None
     if not isinstance(value, str | PathLike):
         raise ValueError(f"{value!r} is not text")
-    return base / Path(value).expanduser() if kind is Path else str(value)
+    return base / os.path.expanduser(value) if kind is Path else str(value)
 
 
 def _named(rows: list[Row]) -> list[Row]:

@@ -5,6 +5,7 @@ Each video is a task of one processor. A worker that is lost loses its video alo
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from typing import Any
@@ -26,6 +27,7 @@ class RayExecutor(Executor):
         self._processors = processors_per_video
         self._connected_here = not ray.is_initialized()
         if self._connected_here:
+            _check_reachable(address)
             try:
                 ray.init(address=address, log_to_driver=False, configure_logging=False)
             except Exception as error:
@@ -52,3 +54,13 @@ class RayExecutor(Executor):
             wait_for(list(self._references))
         if self._connected_here:
             self._ray.shutdown()
+
+
+def _check_reachable(address: str | None) -> None:
+    """Ray itself waits for a cluster that is not there until it ends the process."""
+    host, colon, port = (address or "").removeprefix("ray://").rpartition(":")
+    if colon and port.isdecimal():
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
+        except (OSError, OverflowError) as error:
+            raise BatchError(f"no Ray cluster at {address}: {error}") from None
