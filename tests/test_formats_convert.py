@@ -180,8 +180,8 @@ def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
     before = a.read_bytes()
     for arguments, says in (
         ((a, a), "a.trc: is what was read; write to another place"),
-        ((a, tmp_path / "b.xls"), "b.xls: the ending must be one of .bvh, .c3d, .csv, .mot, .sto"),
-        ((a, tmp_path / "empty"), "the ending must be one of"),
+        ((a, tmp_path / "b.xls"), "b.xls: the ending must be one of .bvh, .c3d, .csv, .json, .mot"),
+        ((a, tmp_path / "empty.xls"), "the ending must be one of"),
         ((tmp_path / "none.trc", b), "none.trc: no such file or folder"),
         ((tmp_path / "empty", b), "empty: holds neither track.csv of `memo track` nor postures.csv"),
         ((a, b, "--rate", 0), "--rate 0 must be positive and finite"),

@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce` and the rest.
+"""The command line: `memo track`, `batch`, `posture`, `planar`, `convert` and the rest.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
 import memo
+from memo.cli.batch import add_batch
 from memo.cli.convert import add_convert
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
@@ -61,6 +62,7 @@ def _app() -> "typer.Typer":
     ) -> None: ...
 
     add_track(app)
+    add_batch(app)
     add_unswap(app)
     add_posture(app)
     add_demo(app)

@@ -33,6 +33,7 @@ class Exit(IntEnum):
     BAD_INPUT = 1
     NOBODY = 3  # or no posture of anybody
     NO_EXTRA = 4
+    SOME_FAILED = 5  # of many videos
     INTERRUPTED = 130
 
 
@@ -93,7 +94,7 @@ def with_progress(
     """The same frames; on a terminal, a bar with the time left."""
     from rich.progress import track
 
-    console = _console(delivery)
+    console = terminal(delivery)
     yield from track(frames, what, total=count, console=console, transient=True, disable=console is None)
 
 
@@ -101,7 +102,7 @@ def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextMan
     """While one step of unknown length lasts; on a terminal, what it is and for how long already."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    console = _console(delivery)
+    console = terminal(delivery)
     if console is None:
         return contextlib.nullcontext()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -115,13 +116,13 @@ def with_count(what: str, delivery: Delivery) -> Iterator[Callable[[int, int | N
     """Gives a callback for the `progress` of a long call; on a terminal, a bar with the time left."""
     from rich.progress import Progress
 
-    console = _console(delivery)
+    console = terminal(delivery)
     with Progress(console=console, transient=True, disable=console is None) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
-def _console(delivery: Delivery) -> Console | None:
+def terminal(delivery: Delivery) -> Console | None:
     """The terminal progress is shown on, if there is one and it is wanted."""
     from rich.console import Console
 

@@ -1,0 +1,87 @@
+"""The tables over all videos: what became of each, and the gait parameters of every walk."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from memo.batch.folder import BatchError, OutFolder
+from memo.batch.manifest import Row
+from memo.files import read_text_columns
+from memo.gait import GAIT_COLUMNS
+
+__all__ = ["STATUS_COLUMNS", "write_status", "write_table"]
+
+STATUS_COLUMNS = ("name", "state", "attempt", "seconds", "message", "video")
+"""Columns of `status.csv`, in order; a state is one of `STATES`, or `waiting`."""
+
+_UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
+_LEADING = ("name", "state", "walk", "height_m", "camera_given", "direction", "gait", "p_swapped")
+
+
+def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
+    """Writes `status.csv`: every video of the manifest, in its order."""
+    cells: list[list[Any]] = []
+    for row in rows:
+        record = folder.record(row.name)
+        if record is None:
+            cells.append([row.name, "waiting", "", "", "", str(row.video)])
+        else:
+            seconds = f"{record.seconds:.1f}"
+            cells.append([row.name, record.state, record.attempt, seconds, record.message, str(row.video)])
+    _write(path, STATUS_COLUMNS, cells)
+
+
+def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
+    """Writes the `gait_parameters.csv` of all videos: one row a walk, and one for each video without a walk.
+
+    A parameter has columns such as `stride_time_right_s`, and with `_ci_low`, `_ci_high` (95 %) and `_n`.
+    """
+    table = [walk for row in rows for walk in _walks(folder, row)]
+    parameters = dict.fromkeys(column for walk in table for column in walk if column not in _LEADING)
+    header = (*_LEADING, *parameters)
+    _write(path, header, ([walk.get(column, "") for column in header] for walk in table))
+
+
+def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
+    """One dict a walk of the video, by column; one without a walk if it has none."""
+    record = folder.record(row.name)
+    state = "waiting" if record is None else record.state
+    if record is None or not record.finished:
+        return [{"name": row.name, "state": state}]
+    results = folder.results(row.name)
+    common = {"name": row.name, "state": state, **_summary(results / "run.json")}
+    walks: dict[str, dict[str, Any]] = {}
+    lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS)
+    for walk, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
+        column = f"{parameter}{'_' if side else ''}{side}{_UNITS.get(unit, '')}"
+        cells = {column: value, f"{column}_ci_low": low, f"{column}_ci_high": high, f"{column}_n": n}
+        walks.setdefault(walk, {**common, "walk": walk}).update(cells)
+    return list(walks.values()) or [common]
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    """What holds for all walks of a video."""
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+        height_m, summary = run["options"]["height_m"], run["summary"]
+        p_swapped = summary.get("p_swapped")
+        return {
+            "height_m": height_m,
+            "camera_given": "yes" if run["camera_given"] else "no",
+            "direction": summary.get("direction", ""),
+            "gait": summary.get("gait", ""),
+            "p_swapped": "" if p_swapped is None else f"{p_swapped:.6f}",
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BatchError(f"{path}: not as memo track writes it: {error!r}") from None
+
+
+def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)
