@@ -58,9 +58,10 @@ def deliver_report(folder: Path, path: Path, delivery: Delivery, **options: Any)
         folder, path, watch=lambda items, what, count: with_progress(items, what, count, delivery), **options
     )
     contents = report.contents
-    line = f"{contents['pictures']} frames with pictures" if report.kind == "memo track" else "Postures"
-    if contents.get("explained"):
-        line += f", {contents['explained']} explained"
+    if report.kind == "memo track":
+        line = f"{contents['pictures']} frames with pictures, {contents['explained']} explained"
+    else:
+        line = f"{contents['frames']} frames"
     lines = [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
     delivery.tell({"kind": report.kind, "bytes": report.bytes, **contents}, lines, [report.path])
     return report.path

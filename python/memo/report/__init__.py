@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from memo.files import complete_file
-from memo.report.track import Choice, track_page
+from memo.report.choice import Choice
+from memo.report.posture import posture_page
+from memo.report.track import track_page
 
 __all__ = ["KINDS", "Report", "write_report"]
 
@@ -59,8 +61,6 @@ def write_report(
     if kind == "memo track":
         page, contents = track_page(folder, choice, watch)
     else:
-        from memo.report.posture import posture_page
-
         page, contents = posture_page(folder, choice)
     path = folder / "report.html" if out is None else Path(out)
     written = page.html().encode("utf-8")

@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+import memo
 from memo.files import JOINTS
 from memo.report import normative
+from memo.report.choice import Choice, ordinal
 from memo.report.page import UNKNOWN, Page, columns, number, rows_table, text
 from memo.report.pictures import Picture, Thinned, colour_frames, jpeg_uri, mask_uri, packed
 from memo.report.run_folder import RunFolder, read_run_folder
 from memo.video import VideoReader
 
-__all__ = ["Choice", "track_page"]
+__all__ = ["track_page"]
 
 _LONGEST_PX = 720
 _PICTURES_BYTES = 14_000_000
@@ -57,20 +58,6 @@ Item = TypeVar("Item")
 Watch = Callable[[Iterable[Item], str, "int | None"], Iterable[Item]]
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Which frames go into the page."""
-
-    first: int = 0
-    stop: int | None = None
-    every: int | None = None
-    """Every n-th; None for as many as keep the file small."""
-    why: bool = True
-
-    def takes(self, frame: int) -> bool:
-        return frame >= self.first and (self.stop is None or frame < self.stop)
-
-
 def track_page(folder: Path, choice: Choice, watch: Watch[Any]) -> tuple[Page, dict[str, Any]]:
     """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
     run = read_run_folder(folder)
@@ -83,7 +70,9 @@ def track_page(folder: Path, choice: Choice, watch: Watch[Any]) -> tuple[Page, d
         "explained": len(explained),
         "explained_every": why_every if explained else None,
     }
-    notes += _thinning(every, why_every, bool(pictures), bool(explained), choice)
+    notes += choice.told(every if pictures else 1)
+    if explained and why_every > 1:
+        notes.append(f"Every {ordinal(why_every)} tracked frame is explained.")
     page = Page(
         title=f"memo: {run.name}",
         layout="track",
@@ -276,6 +265,8 @@ def _frames(run: RunFolder) -> list[int]:
 def _filled(run: RunFolder, notes: list[str]) -> dict[str, str]:
     status, tone = _status(run)
     return {
+        "version": text(memo.__version__),
+        "folder": text(run.path.resolve().name),
         "name": text(run.name),
         "status": text(status),
         "tone": tone,
@@ -449,23 +440,6 @@ def _value(value: Any) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{name} {_value(item)}" for name, item in value.items())
     return str(value)
-
-
-def _thinning(every: int, why_every: int, pictures: bool, explained: bool, choice: Choice) -> list[str]:
-    told = []
-    if pictures and every > 1:
-        told.append(f"Every {_ordinal(every)} frame is in this page, to keep it small.")
-    if explained and why_every > 1:
-        told.append(f"Every {_ordinal(why_every)} tracked frame is explained.")
-    if choice.first or choice.stop is not None:
-        stop = "the end" if choice.stop is None else str(choice.stop - 1)
-        told.append(f"Of the frames, {choice.first} to {stop} were asked for.")
-    return told
-
-
-def _ordinal(count: int) -> str:
-    ending = {1: "st", 2: "nd", 3: "rd"}.get(count % 10 if count % 100 not in (11, 12, 13) else 0, "th")
-    return f"{count}{ending}"
 
 
 def _counted(count: int, one: str) -> str:

@@ -246,7 +246,7 @@ function chart(host, spec) {
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     svg.setAttribute("aria-label", `${spec.title}, from ${told(yLow, spec.digits)} to ${told(yHigh, spec.digits)} ${spec.unit}`);
-    const [yTicks, yDigits] = ticks(yLow, yHigh, 4);
+    const [yTicks, yDigits] = ticks(yLow, yHigh, 5);
     for (const tick of yTicks) {
       svg.append(shape("line", { class: "grid", x1: MARGIN.left, x2: width - MARGIN.right, y1: y(tick), y2: y(tick) }));
       svg.append(shape("text", { x: MARGIN.left - 6, y: y(tick) + 3.5, "text-anchor": "end" }, told(tick, yDigits)));

@@ -157,7 +157,11 @@ let whyNow = 0;
 const matchColour = (share) => `hsl(${Math.round(140 * Math.min(1, Math.max(0, share ?? 0)))} 85% 52%)`;
 const partColour = (part) => (part >= 8 ? (part <= 10 ? DARK.right : DARK.left) : part >= 5 ? DARK.left : part >= 2 ? DARK.right : "#f0e442");
 const WHY = {
-  "why-change": (context, item, images, place, size) => context.drawImage(images.change, 0, 0, ...size),
+  "why-change": (context, item, images, place, size) => {
+    context.globalAlpha = 0.6;
+    context.drawImage(images.change, 0, 0, ...size);
+    context.globalAlpha = 1;
+  },
   "why-edges": (context, item, images, place, size) => {
     context.fillStyle = "rgba(0,0,0,.5)";
     context.fillRect(0, 0, ...size);

@@ -13,7 +13,7 @@ class View3D {
   constructor(canvas, scene) {
     this.canvas = canvas;
     this.scene = scene;
-    this.home = { yaw: -1.15, pitch: 0.22, distance: 4.2 };
+    this.home = { yaw: -1.15, pitch: 0.22, distance: 3.4 };
     Object.assign(this, this.home);
     this.target = [0, 0, 0.9];
     this.draw = drawnCanvas(canvas, () => (canvas.clientWidth < 500 ? 1.1 : 4 / 3), (...args) => this.paint(...args));
@@ -221,8 +221,11 @@ function figure(view, joint, { opacity = 1, thickness = 1, plain: plainColour = 
   for (const [k, l] of [[0, 3], [1, 2]]) view.limb(trunk[k], trunk[l], 0.03 * thickness, trunkColour, rim, opacity);
   if (known(...trunk)) {
     const [neck, pelvis] = [mean(trunk.slice(0, 2)), mean(trunk.slice(2))];
-    const along = difference(neck, pelvis);
-    view.ball(sum(neck, scaled(along, 0.23 / Math.max(0.1, Math.hypot(...along)))), 0.105 * Math.sqrt(thickness), trunkColour, rim, opacity);
+    const up = difference(neck, pelvis);
+    const above = (height) => sum(neck, scaled(up, height / Math.max(0.1, Math.hypot(...up))));
+    view.limb(above(-0.06), pelvis, 0.085 * thickness, trunkColour, rim, opacity);
+    view.limb(above(-0.06), above(0.12), 0.05 * thickness, trunkColour, rim, opacity);
+    view.ball(above(0.2), 0.105 * Math.sqrt(thickness), trunkColour, rim, opacity);
   }
   for (const [side, colour] of [["left", left], ["right", right]]) {
     for (const [from, to, radius] of LIMBS) {
