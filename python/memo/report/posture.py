@@ -77,7 +77,7 @@ def _read(path: Path) -> dict[str, Any]:
     for row, frame in enumerate(document["per_frame"]):
         if not isinstance(frame, dict) or not isinstance(frame.get("frame"), int):
             raise ValueError(f"{path}: per_frame {row} has no frame number: not what memo posture writes")
-        for name in ("points_px", "smoothed_m", "linked_m", "groups_m", "p_mirrored", "sd_m", "gap_m", "weights"):
+        for name in [name for name, instead in _SHOWN.items() if instead == []]:
             if not isinstance(frame.get(name, []), list):
                 raise ValueError(f"{path}: {name} of frame {frame['frame']} is not a list")
     return document
@@ -110,19 +110,21 @@ def _sentences(document: dict[str, Any]) -> list[str]:
     count = document.get("frames", len(document["per_frame"]))
     told = [
         f"In {document.get('frames_with_survivors', UNKNOWN)} of {count} frames postures are left, "
-        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest motion breaks "
-        f"a constraint in {document.get('frames_breaking', UNKNOWN)}."
+        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest motion "
+        f"breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
     ]
     most = document.get("most_cut")
     if most:
-        told.append(f"Most is cut by: {most['sentence']} ({most['branches']} branches in {most['frames']} frames).")
+        told.append(
+            f"Most is cut by: {most['sentence']} ({most['branches']} branches in {most['frames']} frames)."
+        )
     second = document.get("second")
     if second:
         joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
         told.append(
             f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
-            f"{second['last_frame']}; its probability is {number(second.get('p'))}. Some joint is undecided in "
-            f"{document.get('undecided_frames', UNKNOWN)} of {count} frames."
+            f"{second['last_frame']}; its probability is {number(second.get('p'))}. Some joint is undecided "
+            f"in {document.get('undecided_frames', UNKNOWN)} of {count} frames."
         )
     return told
 

@@ -1,7 +1,7 @@
 """What `memo track` left in a folder, read for the page, with what is missing said in sentences.
 
-The tables must be right where they are there: an error names the file. What other files would add (`run.json`,
-`gait_parameters.csv`, the overlay) may be absent, as after an interrupt or from an older memo.
+The tables must be right where they are there: an error names the file. What other files would add
+(`run.json`, `gait_parameters.csv`, the overlay) may be absent, as after an interrupt or from an older memo.
 """
 
 from __future__ import annotations
@@ -112,7 +112,14 @@ def _read_run(path: Path) -> dict[str, Any]:
     run = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(run, dict):
         raise ValueError(f"{path}: not an object")
-    expected = {"video": str, "frames": list, "camera": dict, "options": dict, "summary": dict, "sentences": list}
+    expected = {
+        "video": str,
+        "frames": list,
+        "camera": dict,
+        "options": dict,
+        "summary": dict,
+        "sentences": list,
+    }
     for name, kind in expected.items():
         if not isinstance(run.get(name, None), kind | None):
             raise ValueError(f"{path}: {name} is {json.dumps(run[name])[:40]}")

@@ -213,7 +213,7 @@ def _why(why: Any) -> dict[str, Any]:
 
 
 def _around(why: Any) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom of the part of the frame with the model and a margin; all without a model."""
+    """Left, top, right, bottom of the part of the frame with the model and a margin; all without a model."""
     height, width = why.luma.shape
     points = np.asarray(why.model, np.float64).reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
@@ -317,11 +317,13 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
         told.append("Walking backwards: the band of normal gait is of people who walk forward.")
     if run.run and not run.run.get("camera_given", True):
         told.append(
-            "The camera was guessed: depths rest on the assumed field of view; heights and sideways positions "
-            "do not."
+            "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
+            "positions do not."
         )
     if run.missing:
-        told.append(f"Not in the folder: {', '.join(run.missing)}. The run was interrupted, or is an older one.")
+        told.append(
+            f"Not in the folder: {', '.join(run.missing)}. The run was interrupted, or is an older one."
+        )
     if run.overlay is None and _frames(run):
         told.append("There is no overlay.mp4: it was not wanted, or the run was interrupted.")
     return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
@@ -424,7 +426,11 @@ def _how(run: RunFolder) -> str:
         **{f"camera {name}": _value(value) for name, value in (told.get("camera") or {}).items()},
         **{f"result {name}": _value(value) for name, value in (told.get("summary") or {}).items()},
     }
-    return "<dl>" + "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in given.items()) + "</dl>"
+    return (
+        "<dl>"
+        + "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in given.items())
+        + "</dl>"
+    )
 
 
 def _value(value: Any) -> str:
