@@ -222,6 +222,8 @@ def test_nobody_tracked_is_still_a_page(run_folder):
     )
     assert data["track"]["frame"] == [] and len(data["pictures"]["uri"]) == 20 and data["why"] == []
     assert "Nobody was seen walking." in written and ">nobody</span>" in written
+    assert "Something moves in 19 of the 19 frames" in written or "Nothing moves in the 19 frames" in written
+    assert data["pictures"]["moved"][0] is None and data["pictures"]["moved"][1].startswith("data:image/png")
     assert report.contents["explained"] == 0
 
 
@@ -261,13 +263,17 @@ def test_frames_that_cannot_be_explained(run_folder, monkeypatch):
 
 
 def test_several_walks_and_backwards(run_folder):
-    folder = run_folder(summary={"status": "walking backwards", "gait": "backward", "message": "Backwards."})
+    folder = run_folder()
     table = read_track_csv(folder / "track.csv")
     table["walk"] = np.repeat([0, 1], 10)
+    table["speed_mps"][10:] *= -1
     write_track_csv(folder / "track.csv", table)
     written, data, _ = page_of(folder)
     assert (
-        "of people who walk forward" in written and "10 to 19" in written and data["track"]["walk"][-1] == 1
+        "Walk 1 goes backwards" in written
+        and "Walk 0 goes" not in written
+        and "10 to 19" in written
+        and data["track"]["walk"][-1] == 1
     )
 
 

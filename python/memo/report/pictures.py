@@ -33,6 +33,15 @@ class Picture:
     """Seconds since frame 0."""
     uri: str
     """The JPEG as a data URI."""
+    moved: str | None = None
+    """What changed since the frame before, as a PNG of the video's size; None where nobody asked."""
+    regions: tuple[tuple[int, ...], ...] = ()
+    """Left, top, right and bottom of what moved, largest first, pixels."""
+
+    @property
+    def size_bytes(self) -> int:
+        """How much it adds to a page."""
+        return len(self.uri) + len(self.moved or "")
 
 
 class Thinned(Generic[Kept]):

@@ -28,6 +28,7 @@ _PICTURES_BYTES = 14_000_000
 _WHY_BYTES = 8_000_000
 _MOST_EXPLAINED = 400
 _CROP_MARGIN = 0.25
+_MOST_REGIONS = 5
 _LIKELY_SWAPPED = 0.2
 
 _CHANGED = (0, 158, 115)  # of the palette of Okabe and Ito, like the colours of the sides
@@ -76,13 +77,15 @@ def track_page(folder: Path, choice: Choice, watch: Watch[Any]) -> tuple[Page, d
     page = Page(
         title=f"memo: {run.name}",
         layout="track",
-        filled=_filled(run, notes),
+        filled=_filled(run, notes, pictures),
         data={
             "name": run.name,
             "pictures": {
                 "frame": [picture.frame for picture in pictures],
                 "time_s": [round(picture.time_s, 4) for picture in pictures],
                 "uri": [picture.uri for picture in pictures],
+                "moved": [picture.moved for picture in pictures],
+                "regions": [picture.regions for picture in pictures],
                 "size": size,
                 "drawn": drawn,
             },
@@ -125,14 +128,18 @@ def _video_pictures(
 ) -> tuple[list[Picture], int, tuple[int, int]]:
     stop = run.run.get("frames", [0, None])[1:] or [None]
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
+    nobody = not _frames(run)  # then what moves is shown, for that is where memo looks for a walker
     with VideoReader(video, start=run.first_frame, stop=stop[0], rate_hz=run.run.get("fps_given")) as reader:
         size = _size(run)
         if size is not None and tuple(size) != reader.size:
             raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")
+        before = None
         for frame in watch(reader, "reading the video", reader.frame_count):
             if choice.takes(frame.index) and thinned.wants_next():
-                picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, _LONGEST_PX))
-                thinned.keep(picture, len(picture.uri))
+                moved = _moved(before, frame.luma) if nobody else (None, ())
+                picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, _LONGEST_PX), *moved)
+                thinned.keep(picture, picture.size_bytes)
+            before = frame.luma.copy() if nobody else None
         if reader.damage:
             notes.append(f"The video: {reader.damage}.")
     return thinned.items, thinned.every, reader.size
@@ -147,8 +154,17 @@ def _overlay_pictures(
         frame = index + run.first_frame
         if choice.takes(frame) and thinned.wants_next():
             picture = Picture(frame, float(times.get(frame, time_s)), jpeg_uri(rgb, _LONGEST_PX))
-            thinned.keep(picture, len(picture.uri))
+            thinned.keep(picture, picture.size_bytes)
     return thinned.items, thinned.every
+
+
+def _moved(before: Any, now: Any) -> tuple[str | None, tuple[tuple[int, ...], ...]]:
+    """What changed between two frames, and the regions of it in which a walker is looked for."""
+    if before is None:
+        return None, ()
+    changed = memo.change_mask(before, now)
+    regions = memo.moving_regions(changed)[:, :4].astype(int).tolist()
+    return mask_uri(changed, _CHANGED), tuple(tuple(region) for region in regions[:_MOST_REGIONS])
 
 
 def _explained(
@@ -262,7 +278,7 @@ def _frames(run: RunFolder) -> list[int]:
 # What goes in as text.
 
 
-def _filled(run: RunFolder, notes: list[str]) -> dict[str, str]:
+def _filled(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dict[str, str]:
     status, tone = _status(run)
     return {
         "version": text(memo.__version__),
@@ -277,6 +293,7 @@ def _filled(run: RunFolder, notes: list[str]) -> dict[str, str]:
         "events": _events(run),
         "band_source": text(normative.SOURCE),
         "how": _how(run),
+        "moved": text(_moved_sentence(pictures)),
         "nobody": " hidden" if _frames(run) else "",
         "somebody": "" if _frames(run) else " hidden",
     }
@@ -306,15 +323,14 @@ def _sentences(run: RunFolder) -> list[str]:
 
 def _warnings(run: RunFolder, notes: list[str]) -> str:
     told = []
-    summary = run.run.get("summary") or {}
     for walk, p_swapped in _swapped(run):
         if p_swapped > _LIKELY_SWAPPED:
             told.append(
                 f"Walk {walk}: left and right may be swapped (probability {p_swapped:.0%}). "
                 "Look at the pictures before you use the sides."
             )
-    if summary.get("gait") == "backward" or "backward" in str(summary.get("status")):
-        told.append("Walking backwards: the band of normal gait is of people who walk forward.")
+    for walk in _backward(run):
+        told.append(f"Walk {walk} goes backwards: the band of normal gait is of people who walk forward.")
     if run.run and not run.run.get("camera_given", True):
         told.append(
             "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
@@ -337,6 +353,35 @@ def _swapped(run: RunFolder) -> list[tuple[int, float]]:
     return [(int(walk), float(p_swapped[walks == walk][0])) for walk in np.unique(walks)]
 
 
+def _backward(run: RunFolder) -> list[int]:
+    """The walks with a speed against the direction faced."""
+    if not run.columns:
+        return []
+    walks, speeds = run.columns["walk"], run.columns["speed_mps"]
+    return [int(walk) for walk in np.unique(walks) if _middle(speeds[walks == walk]) < 0]
+
+
+def _middle(values: Any) -> float:
+    """The middle one of the known values; NaN without any."""
+    known = np.sort(values[np.isfinite(values)])
+    return float(known[len(known) // 2]) if len(known) else float("nan")
+
+
+def _moved_sentence(pictures: list[Picture]) -> str:
+    """How much moves, where nobody was tracked."""
+    looked = [picture for picture in pictures if picture.moved is not None]
+    if not looked:
+        return ""
+    heights = [bottom - top + 1 for picture in looked for _, top, _, bottom in picture.regions[:1]]
+    if not heights:
+        return f"Nothing moves in the {_counted(len(looked), 'frame')} of this page."
+    return (
+        f"Something moves in {len(heights)} of the {_counted(len(looked), 'frame')} of this page; the "
+        f"largest thing that does is up to {max(heights)} px high. Above, what changed since the frame before "
+        "is green, with a box around each moving region."
+    )
+
+
 def _walks(run: RunFolder) -> str:
     if not run.columns or not _frames(run):
         return ""
@@ -351,7 +396,7 @@ def _walks(run: RunFolder) -> str:
                 f"{table['frame'][first]} to {table['frame'][last]}",
                 f"{number(table['time_s'][first])} to {number(table['time_s'][last])}",
                 f"{number(table['x_m'][first])} to {number(table['x_m'][last])}",
-                number(np.nanmedian(table["speed_mps"][rows_of])),
+                number(_middle(table["speed_mps"][rows_of])),
                 number(p_swapped, 3),
             )
         )

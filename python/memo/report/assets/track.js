@@ -19,6 +19,7 @@ const rowNow = () => rowOf.get(frames[player.at]);
 const CHAINS = ["right", "left"].flatMap((side) => [["shoulder", "elbow", "wrist"], ["hip", "knee", "ankle"]].map((chain) => [side, chain.map((joint) => `${side}_${joint}`)]));
 const TRAIL_S = 1;
 const stagePictures = new Pictures(pictures.uri);
+const movedPictures = new Pictures(pictures.moved);
 
 /** Segments out of base64: [[u, v], [u, v]] each, in pixels of the part shown. */
 const unpackedOf = new Map();
@@ -62,8 +63,19 @@ const drawStage = drawnCanvas($("stage"), () => stageSize()[0] / stageSize()[1],
   context.fillRect(0, 0, width, height);
   if (image) context.drawImage(image, 0, 0, width, height);
   const row = rowNow();
-  if (row === undefined || pictures.drawn) return;
   const [factorU, factorV] = [width / stageSize()[0], height / stageSize()[1]];
+  const moved = movedPictures.at(player.at, () => drawStage());
+  if (moved) {
+    context.globalAlpha = 0.55;
+    context.drawImage(moved, 0, 0, width, height);
+    context.globalAlpha = 1;
+    context.strokeStyle = "#f0e442";
+    context.lineWidth = 1.5;
+    for (const [left, top, right, bottom] of pictures.regions[player.at]) {
+      context.strokeRect(left * factorU, top * factorV, (right + 1 - left) * factorU, (bottom + 1 - top) * factorV);
+    }
+  }
+  if (row === undefined || pictures.drawn) return;
   const place = ([u, v]) => [(u + 0.5) * factorU, (v + 0.5) * factorV];
   const at = (other, name) => track.points_px[other][jointAt.get(name)];
   const thick = Math.max(1.5, width / 300);
@@ -118,7 +130,7 @@ const view = new View3D($("view"), (self) => {
     self.label(sum(camera.centre, [0, 0, 0.15]), "camera", accent);
   }
   if (row !== undefined) figure(self, (name) => (known(point(row, name)) ? point(row, name) : null));
-});
+}, () => Math.min(16 / 9, Math.max(1, stageSize()[0] / stageSize()[1])));
 
 function aim() {
   const row = rowNow() ?? (track.frame.length ? 0 : undefined);

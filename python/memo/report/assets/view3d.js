@@ -9,14 +9,14 @@ const known = (...points) => points.every((point) => point && point.every(isNumb
 const NEAR_M = 0.05;
 
 class View3D {
-  /** `scene(view)` puts things into the view by `line`, `limb`, `ball`, `face` and `label`. */
-  constructor(canvas, scene) {
+  /** `scene(view)` puts things into the view by `line`, `limb`, `ball`, `face` and `label`; `aspect()` is width over height. */
+  constructor(canvas, scene, aspect = () => 4 / 3) {
     this.canvas = canvas;
     this.scene = scene;
     this.home = { yaw: -1.15, pitch: 0.22, distance: 3.4 };
     Object.assign(this, this.home);
     this.target = [0, 0, 0.9];
-    this.draw = drawnCanvas(canvas, () => (canvas.clientWidth < 500 ? 1.1 : 4 / 3), (...args) => this.paint(...args));
+    this.draw = drawnCanvas(canvas, () => (canvas.clientWidth < 500 ? 1.1 : aspect()), (...args) => this.paint(...args));
     this.listen();
   }
 
