@@ -331,7 +331,7 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
             )
     for walk in _backward(run):
         told.append(f"Walk {walk} goes backwards: the band of normal gait is of people who walk forward.")
-    if run.run and not run.run.get("camera_given", True):
+    if _frames(run) and not run.run.get("camera_given", True):
         told.append(
             "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
             "positions do not."
@@ -377,8 +377,8 @@ def _moved_sentence(pictures: list[Picture]) -> str:
         return f"Nothing moves in the {_counted(len(looked), 'frame')} of this page."
     return (
         f"Something moves in {len(heights)} of the {_counted(len(looked), 'frame')} of this page; the "
-        f"largest thing that does is up to {max(heights)} px high. Above, what changed since the frame before "
-        "is green, with a box around each moving region."
+        f"largest thing that does is up to {max(heights)} px high. What changed since the frame before is "
+        "green, with a box around each moving region."
     )
 
 
