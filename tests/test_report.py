@@ -6,6 +6,7 @@ import hashlib
 import html
 import io
 import json
+import os
 import re
 import shutil
 import sys
@@ -501,6 +502,39 @@ def test_a_broken_postures_json_is_named(posture_folder, monkeypatch, capsys, co
     (posture_folder / "postures.json").write_text(content)
     code, _, err = memo_command(monkeypatch, capsys, "report", posture_folder)
     assert code == 1 and "postures.json: " in err and err.count("\n") == 1
+
+
+# Files that something else has written into
+
+
+def mutated(value, random, depth=0):
+    """The value with something in it exchanged for what may not stand there."""
+    instead = [None, True, -1, 1e308, "", HOSTILE, [], {}, [[[]]], {"a": [1]}, 10**30, "nan"]
+    if isinstance(value, dict | list) and value and random.random() < 0.9:
+        keys = list(value) if isinstance(value, dict) else range(len(value))
+        key = keys[random.integers(len(keys))]
+        if isinstance(value, dict):
+            return {**value, key: mutated(value[key], random, depth + 1)}
+        return [*value[:key], mutated(value[key], random, depth + 1), *value[key + 1 :]]
+    return instead[random.integers(len(instead))]
+
+
+@pytest.mark.parametrize("name", ["run.json", "postures.json"])
+def test_a_mutated_file_is_refused_in_one_line_or_shown(name, run_folder, posture_folder, tmp_path):
+    folder = run_folder(video=str(tmp_path / "gone.mp4")) if name == "run.json" else posture_folder
+    whole = json.loads((folder / name).read_text())
+    random = np.random.default_rng(7)
+    refused = 0
+    for _ in range(20_000 if os.environ.get("MEMO_FULL") else 60):
+        (folder / name).write_text(json.dumps(mutated(whole, random)))
+        try:
+            written = write_report(folder).path.read_text()
+        except ValueError as error:
+            refused += 1
+            assert name in str(error) and "\n" not in str(error)
+        else:
+            assert written.count("<script") == 2 and written.endswith("</html>\n")
+    assert refused
 
 
 # In a browser

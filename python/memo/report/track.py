@@ -31,6 +31,7 @@ _WHY_BYTES = 8_000_000
 _MOST_EXPLAINED = 400
 _CROP_MARGIN = 0.25
 _MOST_REGIONS = 5
+_DEEPEST = 4
 _LIKELY_SWAPPED = 0.2
 
 _CHANGED = (0, 158, 115)  # of the palette of Okabe and Ito, like the colours of the sides
@@ -456,8 +457,10 @@ def _how(run: RunFolder) -> str:
     return _listed(given)
 
 
-def _value(value: Any) -> str:
+def _value(value: Any, depth: int = 0) -> str:
     """A value of run.json in the fewest words."""
+    if depth > _DEEPEST:
+        return "\N{HORIZONTAL ELLIPSIS}"
     if value is None:
         return UNKNOWN
     if isinstance(value, bool):
@@ -465,9 +468,12 @@ def _value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
     if isinstance(value, list):
-        return ", ".join(f"({_value(item)})" if isinstance(item, list) else _value(item) for item in value)
+        return ", ".join(
+            f"({_value(item, depth + 1)})" if isinstance(item, list) else _value(item, depth + 1)
+            for item in value
+        )
     if isinstance(value, dict):
-        return "; ".join(f"{name} {_value(item)}" for name, item in value.items())
+        return "; ".join(f"{name} {_value(item, depth + 1)}" for name, item in value.items())
     return str(value)
 
 
