@@ -20,6 +20,7 @@ from conftest import shared_video
 from memo import cli
 from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
 from memo.gait import DEFINITIONS
+from memo.linkage import Points, write_figure_csv
 from memo.report import normative, write_report
 from memo.report.choice import ordinal
 from memo.report.page import number
@@ -336,7 +337,7 @@ def test_folders_of_another_kind_are_refused(run_folder, tmp_path, monkeypatch, 
     empty = tmp_path / "empty"
     empty.mkdir()
     code, _, err = memo_command(monkeypatch, capsys, "report", empty)
-    assert code == 1 and "track.csv of memo track, postures.json of memo posture" in err
+    assert code == 1 and "postures.json of memo posture, points3d.csv of memo planar" in err
     assert memo_command(monkeypatch, capsys, "report", tmp_path / "none")[2].endswith(
         "none: no such folder\n"
     )
@@ -502,6 +503,53 @@ def test_a_broken_postures_json_is_named(posture_folder, monkeypatch, capsys, co
     (posture_folder / "postures.json").write_text(content)
     code, _, err = memo_command(monkeypatch, capsys, "report", posture_folder)
     assert code == 1 and "postures.json: " in err and err.count("\n") == 1
+
+
+# Limbs from dots
+
+
+@pytest.fixture(scope="module")
+def limb_folder(tmp_path_factory):
+    """A folder as `memo planar` leaves it, of the synthetic walker's dots."""
+    folder = tmp_path_factory.mktemp("limbs")
+    walk = memo.walker_motion(72)
+    shown = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=60.0)
+    points = Points(list(walk["names"]), np.asarray(walk["times_s"]), np.asarray(shown["positions_px"]))
+    write_figure_csv(folder, memo.planar(points.positions, points.times_s, 0.5), points)
+    return folder
+
+
+def test_limbs_from_dots_have_a_page(limb_folder):
+    written, data, report = page_of(limb_folder)
+    assert report.kind == "memo planar" and report.contents["frames"] == len(data["frames"])
+    planar = {frozenset((link["a"], link["b"])) for link in data["links"] if link["verdict"] == "planar"}
+    assert frozenset(("RHP", "RKN")) in planar and "8 links swing in planes" in written
+    knee = data["names"].index("RKN")
+    assert any(frame["points"][knee][2] for frame in data["frames"])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("links.csv", "window,a\n0,RHP\n", "links.csv: columns missing"),
+        ("points3d.csv", "frame,time_s,source\n", "points3d.csv: columns missing"),
+        (
+            "points3d.csv",
+            "frame,time_s,source,A_u_px,A_v_px,A_z_px\n0,0,x,1,far,\n",
+            "line 2: A_v_px 'far' is not",
+        ),
+        ("points3d.csv", "frame,time_s,source,A_u_px,A_v_px,A_z_px\n0,0,x,1,inf,\n", "'inf' is not finite"),
+        ("windows.csv", None, "windows.csv"),
+    ],
+)
+def test_a_broken_table_of_limbs_is_named(limb_folder, tmp_path, monkeypatch, capsys, name, content, said):
+    folder = tmp_path / "limbs"
+    shutil.copytree(limb_folder, folder)
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_text(content)
+    code, _, err = memo_command(monkeypatch, capsys, "report", folder)
+    assert code == 1 and said in err and err.count("\n") == 1
 
 
 # Files that something else has written into
@@ -728,6 +776,20 @@ def test_postures_turn_and_another_reading_stands_beside(posture_folder, opened)
     assert len(set(seen)) == 3
     assert "breaks: left knee extension" in shown_text(page, "#frame-told")
     assert shown_text(page, "#joints tbody td").endswith("0.25")
+
+
+def test_limbs_turn_and_mirror(limb_folder, opened):
+    page = opened(write_report(limb_folder).path)
+    seen = [pixels(page, "view")]
+    for toggle in page.find_elements("css selector", "#mirrors input")[:2]:
+        toggle.click()
+        seen.append(pixels(page, "view"))
+    page.find_element("css selector", "#views button").click()
+    seen.append(pixels(page, "view"))
+    assert len(set(seen)) == 4
+    dots = pixels(page, "points")
+    page.find_element("id", "show-links").click()
+    assert pixels(page, "points") != dots
 
 
 def test_dark_and_paper(run_folder, opened):

@@ -14,12 +14,13 @@ from typing import Any
 
 from memo.files import complete_file
 from memo.report.choice import Choice
+from memo.report.planar import planar_page
 from memo.report.posture import posture_page
 from memo.report.track import track_page
 
 __all__ = ["KINDS", "Report", "write_report"]
 
-KINDS = {"track.csv": "memo track", "postures.json": "memo posture"}
+KINDS = {"track.csv": "memo track", "postures.json": "memo posture", "points3d.csv": "memo planar"}
 """The file that tells a kind of folder, and the command that leaves it."""
 
 
@@ -63,7 +64,7 @@ def write_report(
     if kind == "memo track":
         page, contents = track_page(folder, choice, watch, None if video is None else Path(video))
     else:
-        page, contents = posture_page(folder, choice)
+        page, contents = (posture_page if kind == "memo posture" else planar_page)(folder, choice)
     path = folder / "report.html" if out is None else Path(out)
     written = page.html().encode("utf-8")
     with complete_file(path) as temporary:

@@ -76,9 +76,8 @@ def _sentences(document: dict[str, Any]) -> list[str]:
     ]
     most = document.get("most_cut")
     if most:
-        told.append(
-            f"Most is cut by: {most.get('sentence')} ({most['branches']} branches in {most['frames']} frames)."
-        )
+        often = f"{most['branches']} branches in {most['frames']} frames"
+        told.append(f"Most is cut by: {most.get('sentence')} ({often}).")
     second = document.get("second")
     if second:
         joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
