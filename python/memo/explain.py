@@ -106,6 +106,10 @@ def explain(
     frames read and that of all to be read. `video`: where the video is now, if it was moved. Memory does not
     grow with the number of frames. Needs the `app` extra for reading the video.
     """
+    try:
+        from memo.video import VideoReader
+    except ModuleNotFoundError as error:
+        raise ImportError(f'reading the video needs {error.name}: pip install "memo-motion[app]"') from None
     run = read_run(run_folder)
     file = Path(run_folder) / NAME
     first = run["frames"][0]
@@ -123,7 +127,13 @@ def explain(
         explainer = _memo.Explainer(tracker, run["walks"], {frame - first for frame in wanted})
     except (TypeError, ValueError, OverflowError) as error:
         raise RunError(f"{file}: {error}") from None
-    return _explained(run, file, path, wanted, explainer, progress)
+    first, count = run["frames"][0], run["frames_read"]
+    # A frame's changes need the one after it.
+    stop = min(first + count, max(wanted, default=first - 2) + 2)
+    if stop <= first:
+        return iter(())
+    reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"])
+    return _explained(run, file, reader, stop - first, wanted, explainer, progress)
 
 
 def _video(run: dict[str, Any], file: Path, given: str | PathLike[str] | None) -> Path:
@@ -140,26 +150,21 @@ def _video(run: dict[str, Any], file: Path, given: str | PathLike[str] | None) -
 def _explained(
     run: dict[str, Any],
     file: Path,
-    video: Path,
+    reader: VideoReader,
+    count: int,
     wanted: set[int],
     explainer: _memo.Explainer,
     progress: Callable[[int, int], object] | None,
 ) -> Iterator[Why]:
-    from memo.video import VideoReader
-
-    first, count = run["frames"][0], run["frames_read"]
-    # A frame's changes need the one after it.
-    last = min(first + count, max(wanted, default=first - 1) + 2)
-    if last <= first:
-        return
+    first, video = run["frames"][0], reader.path
     similarities = {
         first + frame: similarity
         for walk in run["walks"]
         for frame, similarity in zip(walk["frame"], walk.get("similarity", ()), strict=False)
     }
     left = set(wanted)
-    with VideoReader(video, start=first, stop=last, rate_hz=run["fps_given"]) as reader:
-        for found in _found(reader, explainer, last - first, progress):
+    with reader:
+        for found in _found(reader, explainer, count, progress):
             why = _why(found, first)
             tracked = similarities.get(why.frame, why.chosen_similarity)
             if abs(why.chosen_similarity - tracked) > _SAME_SIMILARITY:

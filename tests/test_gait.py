@@ -1,0 +1,167 @@
+"""Gait parameters against motion capture and planted walks; their table, definitions and sentences."""
+
+import csv
+import json
+import sys
+
+import memo
+import numpy as np
+import pytest
+from conftest import shared_video
+from memo import _memo, cli
+from memo.gait import (
+    DEFINITIONS,
+    GAIT_COLUMNS,
+    gait_table,
+    lookup,
+    read_gait_parameters_csv,
+    symmetry_sentences,
+    write_gait_parameters_csv,
+)
+from memo.video import VideoReader
+
+CLIPS = {"mocap_a": 1.86, "mocap_b": 1.66, "mocap_c_yaw25": 1.61}
+
+
+def motion_captured(clip, rows_s):
+    """Cadence, speed, strides, steps by side and symmetries from the joints and heel contacts of a clip."""
+    truth = np.genfromtxt(clip / "truth.csv", delimiter=",", names=True)
+    with open(clip / "events.csv", newline="", encoding="utf-8") as file:
+        strikes = sorted((float(row["time_s"]), row["side"]) for row in csv.DictReader(file))
+    times_s = truth["time_s"]
+    at = {
+        joint: np.column_stack([truth[f"{joint}_x_m"], truth[f"{joint}_y_m"]])
+        for joint in ("RHP", "LHP", "RAN", "LAN")
+    }
+    hips = (at["RHP"] + at["LHP"]) / 2
+    forward = (hips[-1] - hips[0]) / np.linalg.norm(hips[-1] - hips[0])
+    tracked = (times_s >= rows_s[0] - 1e-6) & (times_s <= rows_s[-1] + 1e-6)
+    speed = np.polyfit(times_s[tracked], hips[tracked] @ forward, 1)[0]
+    cadence = 60 * (len(strikes) - 1) / (strikes[-1][0] - strikes[0][0])
+
+    def foot(strike):
+        time_s, side = strike
+        return np.interp(time_s, times_s, at[f"{side[0].upper()}AN"] @ forward)
+
+    pairs = list(zip(strikes, strikes[1:], strict=False))
+    found = {("cadence", ""): cadence, ("speed", ""): speed}
+    found |= {("stride_time", ""): 120 / cadence, ("stride_length", ""): speed * 120 / cadence}
+    for name, of in (
+        ("step_time", lambda a, b: b[0] - a[0]),
+        ("step_length", lambda a, b: foot(b) - foot(a)),
+    ):
+        right, left = (np.mean([of(a, b) for a, b in pairs if b[1] == side]) for side in ("right", "left"))
+        found |= {(name, "right"): right, (name, "left"): left}
+        found[f"{name}_symmetry", ""] = 100 * (right - left) / ((right + left) / 2)
+    return found
+
+
+@pytest.mark.parametrize("knows_camera", [True, False], ids=["camera", "guessed"])
+@pytest.mark.parametrize("name", CLIPS)
+def test_intervals_hold_what_was_motion_captured(name, knows_camera):
+    """Heel contacts of the clips are defined by the ankle's speed and lie up to 0.03 s off."""
+    clip = shared_video(name)
+    camera = memo.Camera.from_toml(str(clip / "camera.toml")) if knows_camera else None
+    tracker = memo.Tracker(CLIPS[name], camera)
+    with VideoReader(clip / "video.mp4") as video:
+        for frame in video:
+            tracker.update(frame.luma, frame.time_s)
+    track = tracker.finish()
+    table = track.gait_parameters
+    truth = motion_captured(clip, track.columns["time_s"])
+    for (parameter, side), true in truth.items():
+        line = lookup(table, 0, parameter, side)
+        assert line["n"] >= 2
+        assert line["ci_low"] <= true <= line["ci_high"], (parameter, side, true, line)
+    # The intervals are of use: narrow where much is measured.
+    shares = {"cadence": 0.04, "speed": 0.09, "stride_length": 0.10, "step_time": 0.05}
+    for parameter, share in shares.items():
+        line = lookup(table, 0, parameter)
+        assert line["ci_high"] - line["ci_low"] < 2 * share * line["value"]
+    assert len(track.sentences) == 1, "healthy walkers are not called asymmetric"
+
+
+def test_a_late_left_step_is_found_and_said():
+    scene = _memo.Scene(1, late_left=0.07, leftward=False)
+    tracker = memo.Tracker(scene.height_m, scene.camera)
+    for index in range(len(scene)):
+        tracker.update(scene.frame(index), scene.time_s(index))
+    track = tracker.finish()
+    line = lookup(track.gait_parameters, 0, "step_time_symmetry")
+    assert line["value"] == pytest.approx(-28, abs=4) and line["ci_high"] < 0
+    assert track.sentences[0] == track.summary["message"]
+    assert "walks left to right" in track.sentences[0]
+    assert (
+        track.sentences[1].startswith("The right step is 1")
+        and "shorter than the left (" in track.sentences[1]
+    )
+    assert (
+        track.sentences[2].startswith("The right step takes 0.1")
+        and "less than the left" in track.sentences[2]
+    )
+    assert track.summary["speed_mps"] == lookup(track.gait_parameters, 0, "speed")["value"]
+
+
+def test_without_a_walk_the_table_is_empty():
+    tracker = memo.Tracker(1.75)
+    tracker.update(np.zeros((48, 64), np.uint8), 0.0)
+    track = tracker.finish()
+    assert tuple(track.gait_parameters) == GAIT_COLUMNS
+    assert all(len(column) == 0 for column in track.gait_parameters.values())
+    assert track.sentences == ["Nobody was seen walking."] and track.records == []
+
+
+LINES = [
+    ("step_length", "right", 0.70, "m", 0.65, 0.75, 3),
+    ("step_length", "left", 0.60, "m", 0.55, 0.65, 3),
+    ("step_length_symmetry", "", 15.3846, "%", 4.0, 26.0, 6),
+    ("step_time", "right", 0.5, "s", 0.4, 0.6, 3),
+    ("step_time", "left", 0.52, "s", 0.4, 0.6, 3),
+    ("step_time_symmetry", "", -3.9, "%", -15.0, 8.0, 6),
+    ("stance", "", 61.0, "%", np.nan, np.nan, 0),
+]
+
+
+def test_only_what_excludes_zero_is_said():
+    assert symmetry_sentences(gait_table([LINES]), 0) == [
+        "The left step is 10 cm shorter than the right (3 to 17)."
+    ]
+    unknown = [(*line[:2], np.nan, line[3], np.nan, np.nan, 0) for line in LINES]
+    assert symmetry_sentences(gait_table([LINES, unknown]), 1) == []
+
+
+def test_the_table_is_read_as_it_was_written(tmp_path):
+    table = gait_table([LINES, LINES])
+    write_gait_parameters_csv(tmp_path / "gait.csv", table)
+    text = (tmp_path / "gait.csv").read_text().splitlines()
+    assert text[0] == "walk,parameter,side,value,unit,ci_low,ci_high,n"
+    assert text[1] == "0,step_length,right,0.7000,m,0.6500,0.7500,3" and text[7] == "0,stance,,61.0000,%,,,0"
+    again = read_gait_parameters_csv(tmp_path / "gait.csv")
+    for name in GAIT_COLUMNS:
+        if table[name].dtype == float:
+            np.testing.assert_allclose(again[name], table[name], atol=5e-5)
+        else:
+            np.testing.assert_array_equal(again[name], table[name])
+    with pytest.raises(ValueError, match="missing \\['n'\\]"):
+        write_gait_parameters_csv(tmp_path / "x.csv", {k: v for k, v in table.items() if k != "n"})
+    (tmp_path / "bad.csv").write_text("\n".join([text[0], "0,speed,,fast,m/s,,,1"]))
+    with pytest.raises(ValueError, match=r"bad\.csv: column value: .*fast"):
+        read_gait_parameters_csv(tmp_path / "bad.csv")
+
+
+def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):
+    clip = shared_video("mocap_a")
+    arguments = ["track", clip / "video.mp4", "--height", "1.86", "--out", tmp_path, "--no-overlay"]
+    monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments), "--no-plots", "--json"])
+    with pytest.raises(SystemExit) as exited:
+        cli.main()
+    assert not exited.value.code
+    said = json.loads(capsys.readouterr().out)
+    assert said["sentences"] == [said["message"]]
+    assert str(tmp_path / "gait_parameters.csv") in said["files"]
+    table = read_gait_parameters_csv(tmp_path / "gait_parameters.csv")
+    assert set(table["parameter"]) == set(DEFINITIONS), (
+        "every line has its definition and the other way round"
+    )
+    assert lookup(table, 0, "speed")["value"] == pytest.approx(said["speed_mps"], abs=1e-4)
+    assert lookup(table, 0, "stance")["n"] == 0 and np.isnan(lookup(table, 0, "stance")["ci_low"])
