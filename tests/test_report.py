@@ -837,3 +837,13 @@ def test_a_tracked_video_and_its_page(monkeypatch, capsys, tmp_path, opened):
     assert all(pixels(page, name) != before for name, before in seen.items())
     phase = table["phase"][3]
     assert shown_text(page, "#clock") == f"frame 3, {table['time_s'][3]:.2f} s, phase {phase:.2f}"
+
+
+def test_a_video_of_nobody_has_a_page_too(monkeypatch, capsys, tmp_path, write_video):
+    video = write_video("black.mp4", np.full((20, 96, 128), 16, np.uint8))
+    folder = tmp_path / "run"
+    code, out, _ = memo_command(monkeypatch, capsys, "track", video, "--out", folder, "--report", "--json")
+    assert code == 3 and str(folder / "report.html") in json.loads(out)["files"]
+    assert "Nothing moves in the 19 frames of this page." in (folder / "report.html").read_text()
+    assert memo_command(monkeypatch, capsys, "track", video, "--out", folder, "--quiet")[0] == 3
+    assert not (folder / "report.html").exists()  # it would stand beside tables it does not belong to
