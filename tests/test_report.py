@@ -159,10 +159,25 @@ def test_frames_are_chosen_and_the_choice_is_told(run_folder):
     folder = run_folder()
     written, data, report = page_of(folder, frames=(4, 12), every=3)
     assert data["pictures"]["frame"] == [why["frame"] for why in data["why"]] == [4, 7, 10]
-    assert "Every 3rd frame is in this page" in written and "4 to 11 were asked for" in written
-    assert len(report.contents["notes"]) == 3
+    assert "Every 3rd frame is in this page, as asked" in written and "4 to 11 were asked for" in written
+    assert len(report.contents["notes"]) == 2
     _, data, _ = page_of(folder, why=False)
     assert data["why"] == []
+
+
+def test_of_many_frames_some_are_left_out(run_folder, monkeypatch):
+    folder = run_folder()
+    monkeypatch.setattr("memo.report.track._MOST_EXPLAINED", 5)
+    written, data, _ = page_of(folder)
+    assert [why["frame"] for why in data["why"]] == [0, 4, 8, 12, 16] and len(data["pictures"]["uri"]) == 20
+    assert "Of the tracked frames in it, every 4th is explained." in written
+    monkeypatch.setattr("memo.report.track._PICTURES_BYTES", 10_000)
+    written, data, report = page_of(folder)
+    every = report.contents["every"]
+    assert every > 1 and data["pictures"]["frame"] == list(range(0, 20, every))
+    assert "to keep it small" in written and {why["frame"] for why in data["why"]} <= set(
+        data["pictures"]["frame"]
+    )
 
 
 def test_a_small_page_of_a_long_video():

@@ -26,7 +26,8 @@ class Choice:
         """What should be said where not all frames are in the page, every n-th being there."""
         sentences = []
         if every > 1:
-            sentences.append(f"Every {ordinal(every)} frame is in this page, to keep it small.")
+            reason = "as asked" if self.every else "to keep it small"
+            sentences.append(f"Every {ordinal(every)} frame is in this page, {reason}.")
         if self.first or self.stop is not None:
             stop = "the end" if self.stop is None else str(self.stop - 1)
             sentences.append(f"Of the frames, {self.first} to {stop} were asked for.")

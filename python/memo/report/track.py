@@ -69,7 +69,7 @@ def track_page(
     run = read_run_folder(folder, video)
     notes: list[str] = []
     pictures, drawn, size, every = _pictures(run, choice, watch, notes)
-    explained, why_every = _explained(run, choice, watch, notes)
+    explained, why_every = _explained(run, pictures, choice, watch, notes)
     counts = {
         "pictures": len(pictures),
         "every": every if pictures else None,
@@ -78,7 +78,7 @@ def track_page(
     }
     notes += choice.told(every if pictures else 1)
     if explained and why_every > 1:
-        notes.append(f"Every {ordinal(why_every)} tracked frame is explained.")
+        notes.append(f"Of the tracked frames in it, every {ordinal(why_every)} is explained.")
     page = Page(
         title=f"memo: {run.name}",
         layout="track",
@@ -173,13 +173,14 @@ def _moved(before: Any, now: Any) -> tuple[str | None, tuple[tuple[int, ...], ..
 
 
 def _explained(
-    run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str]
+    run: RunFolder, pictures: list[Picture], choice: Choice, watch: Watch[Any], notes: list[str]
 ) -> tuple[list[dict[str, Any]], int]:
-    """Frames with what was seen in them, and every how many-th of the tracked ones they are."""
-    frames = [frame for frame in run.frames if choice.takes(frame)]
+    """Frames with what was seen in them, and every how many-th of the tracked ones in the page they are."""
+    shown = {picture.frame for picture in pictures}
+    frames = [frame for frame in run.frames if frame in shown]
     if not (choice.why and run.run and frames):
         return [], 1
-    every = choice.every or -(-len(frames) // _MOST_EXPLAINED)
+    every = -(-len(frames) // _MOST_EXPLAINED) if choice.every is None else 1
     chosen = frames[::every]
     thinned: Thinned[dict[str, Any]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
     try:
