@@ -3,6 +3,7 @@
 import csv
 import json
 import sys
+from itertools import pairwise
 
 import memo
 import numpy as np
@@ -43,7 +44,7 @@ def motion_captured(clip, rows_s):
         time_s, side = strike
         return np.interp(time_s, times_s, at[f"{side[0].upper()}AN"] @ forward)
 
-    pairs = list(zip(strikes, strikes[1:], strict=False))
+    pairs = list(pairwise(strikes))
     found = {("cadence", ""): cadence, ("speed", ""): speed}
     found |= {("stride_time", ""): 120 / cadence, ("stride_length", ""): speed * 120 / cadence}
     for name, of in (
