@@ -171,7 +171,7 @@ def test_of_many_frames_some_are_left_out(run_folder, monkeypatch):
     written, data, _ = page_of(folder)
     assert [why["frame"] for why in data["why"]] == [0, 4, 8, 12, 16] and len(data["pictures"]["uri"]) == 20
     assert "Of the tracked frames in it, every 4th is explained." in written
-    monkeypatch.setattr("memo.report.track._PICTURES_BYTES", 10_000)
+    monkeypatch.setattr("memo.report.track._PICTURES_BYTES", 4_000)
     written, data, report = page_of(folder)
     every = report.contents["every"]
     assert every > 1 and data["pictures"]["frame"] == list(range(0, 20, every))
