@@ -588,7 +588,7 @@ def test_a_mutated_file_is_refused_in_one_line_or_shown(name, run_folder, postur
     whole = json.loads((folder / name).read_text())
     random = np.random.default_rng(7)
     refused = 0
-    for _ in range(20_000 if os.environ.get("MEMO_FULL") else 60):
+    for _ in range(5_000 if os.environ.get("MEMO_FULL") else 60):
         (folder / name).write_text(json.dumps(mutated(whole, random)))
         try:
             written = write_report(folder).path.read_text()
@@ -627,7 +627,11 @@ def browser():
 
 @pytest.fixture
 def opened(browser):
-    """Opens a page; at the end nothing may have been complained of in the console or asked of a network."""
+    """Opens a page and waits for its curves.
+
+    At the end nothing may have been complained of in the console or asked of a network.
+    """
+    wait = pytest.importorskip("selenium.webdriver.support.ui")
 
     def resize(width_px):
         size = {"width": width_px, "height": 900, "deviceScaleFactor": 1, "mobile": width_px < 600}
@@ -637,6 +641,9 @@ def opened(browser):
         browser.get_log("browser"), browser.get_log("performance")
         resize(width_px)
         browser.get(path.resolve().as_uri())
+        drawn = """return [...document.querySelectorAll(".chart svg")].every(
+            (curve) => curve.childElementCount || !curve.clientWidth)"""
+        wait.WebDriverWait(browser, 30).until(lambda _: browser.execute_script(drawn))
         return browser
 
     yield open_page
