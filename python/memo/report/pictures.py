@@ -14,9 +14,12 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-__all__ = ["Picture", "Thinned", "colour_frames", "jpeg_uri", "mask_uri", "packed"]
+__all__ = ["LONGEST_PX", "Picture", "Thinned", "colour_frames", "jpeg_uri", "mask_uri", "packed"]
 
-JPEG_QUALITY = 72
+LONGEST_PX = 720
+"""The longer side of a picture in a page."""
+
+_JPEG_QUALITY = 72
 _SIXTEENTH_PX = 16
 _REACH_PX = 32767 // _SIXTEENTH_PX
 
@@ -79,11 +82,11 @@ class Thinned(Generic[Kept]):
         return [item for item, _ in self._kept.values()]
 
 
-def jpeg_uri(pixels: npt.NDArray[np.uint8], longest_px: int) -> str:
+def jpeg_uri(pixels: npt.NDArray[np.uint8], longest_px: int = LONGEST_PX) -> str:
     """(H, W) grey or (H, W, 3) RGB pixels as JPEG, made smaller where a side is longer than `longest_px`."""
     image = Image.fromarray(np.ascontiguousarray(pixels))
     image.thumbnail((longest_px, longest_px), Image.Resampling.BILINEAR)
-    return _uri("jpeg", image, quality=JPEG_QUALITY, optimize=True)
+    return _uri("jpeg", image, quality=_JPEG_QUALITY, optimize=True)
 
 
 def mask_uri(mask: npt.NDArray[np.bool_], colour: tuple[int, int, int]) -> str:
