@@ -1,0 +1,142 @@
+"""The page of `memo planar`: unnamed dots, the links found between them, and their depths in 3D."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import memo
+from memo.report.choice import Choice
+from memo.report.page import Page, number, rows_table, text
+from memo.report.pictures import Thinned
+
+__all__ = ["planar_page"]
+
+_BYTES = 20_000_000
+_TABLES = {
+    "windows.csv": ("window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"),
+    "links.csv": ("window", "a", "b", "verdict", "length_px", "length_sd_px", "confidence"),
+    "chains.csv": ("window", "chain", "verdict", "tilt_deg", "residual_px", "motion_px"),
+}
+_NUMBERS = (
+    *("start_s", "end_s", "length_px", "length_sd_px", "confidence", "tilt_deg", "residual_px", "motion_px"),
+    *("planar", "refuted", "undecided"),
+)
+
+Row = dict[str, Any]
+
+
+def planar_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
+    """The page of a folder of `memo planar`, and how many frames are in it and what could not be shown."""
+    windows, links, chains = (_table(folder / name, columns) for name, columns in _TABLES.items())
+    names, rows = _points(folder / "points3d.csv")
+    thinned: Thinned[Row] = Thinned(_BYTES, choice.every)
+    for row in rows:
+        if choice.takes(row["frame"]) and thinned.wants_next():
+            thinned.keep(row, len(repr(row)))
+    notes = choice.told(thinned.every)
+    interpreted = sum(window["status"] == "interpreted" for window in windows)
+    title = folder.resolve().name
+    page = Page(
+        title=f"memo: {title}",
+        layout="planar",
+        filled={
+            "version": text(memo.__version__),
+            "name": text(title),
+            "status": text("limbs found" if interpreted else "nothing claimed"),
+            "tone": "good" if interpreted else "bad",
+            "sentences": "".join(f"<p>{text(line)}</p>" for line in _sentences(windows, links, interpreted)),
+            "warnings": "".join(f"<li>{text(note)}</li>" for note in notes),
+            "windows": _shown("Windows in time", windows, _TABLES["windows.csv"]),
+            "links": _shown("Links", links, _TABLES["links.csv"]),
+            "chains": _shown("Chains of two links that swing in a plane", chains, _TABLES["chains.csv"]),
+        },
+        data={"names": names, "frames": thinned.items, "windows": windows, "links": links, "chains": chains},
+    )
+    return page, {"frames": len(thinned.items), "every": thinned.every, "notes": notes}
+
+
+def _table(path: Path, columns: tuple[str, ...]) -> list[Row]:
+    """Rows of a table; numbers as float, None where empty. ValueError names the file and the line."""
+    with open(path, newline="", encoding="utf-8") as file:
+        try:
+            table = csv.DictReader(file)
+            absent = set(columns) - set(table.fieldnames or ())
+            if absent:
+                raise ValueError(f"columns missing: {sorted(absent)}")
+            return [_table_row(table.line_num, row, columns) for row in table]
+        except (ValueError, csv.Error) as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+def _table_row(line: int, row: dict[str, str], columns: tuple[str, ...]) -> Row:
+    return {name: _cell(line, name, row[name], name in _NUMBERS) for name in columns}
+
+
+def _points(path: Path) -> tuple[list[str], list[Row]]:
+    """Names of the points, and by frame u, v and depth of each, pixels; None where not known."""
+    with open(path, newline="", encoding="utf-8") as file:
+        try:
+            table = csv.DictReader(file)
+            header = list(table.fieldnames or ())
+            names = [name.removesuffix("_z_px") for name in header if name.endswith("_z_px")]
+            wanted = [f"{name}_{axis}_px" for name in names for axis in "uvz"]
+            absent = {"frame", "time_s", "source", *wanted} - set(header)
+            if absent or not names:
+                raise ValueError(f"columns missing: {sorted(absent) or ['NAME_u_px, NAME_v_px, NAME_z_px']}")
+            return names, [_point_row(table.line_num, row, names) for row in table]
+        except (ValueError, csv.Error) as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+def _point_row(line: int, row: dict[str, str], names: list[str]) -> Row:
+    def cell(name: str) -> Any:
+        return _cell(line, name, row[name], True)
+
+    frame = cell("frame")
+    if frame is None:
+        raise ValueError(f"line {line}: frame is empty")
+    return {
+        "frame": int(frame),
+        "time_s": cell("time_s"),
+        "source": row["source"] or "",
+        "points": [[cell(f"{name}_{axis}_px") for axis in "uvz"] for name in names],
+    }
+
+
+def _cell(line: int, name: str, written: str | None, is_number: bool) -> Any:
+    if not is_number:
+        return written or ""
+    if not written:
+        return None
+    try:
+        value = float(written)
+    except ValueError:
+        raise ValueError(f"line {line}: {name} {written[:40]!r} is not a number") from None
+    if not math.isfinite(value):
+        raise ValueError(f"line {line}: {name} {written[:40]!r} is not finite")
+    return value
+
+
+def _sentences(windows: list[Row], links: list[Row], interpreted: int) -> list[str]:
+    if not interpreted:
+        return ["No window shows planar motion: nothing is claimed."]
+    found = {(link["a"], link["b"]) for link in links if link["verdict"] == "planar"}
+    return [
+        f"{len(found)} links swing in planes, in {interpreted} of {len(windows)} windows.",
+        "Each chain may also be its mirror image in depth; depths of chains against each other are open.",
+    ]
+
+
+def _shown(caption: str, rows: list[Row], columns: tuple[str, ...]) -> str:
+    """A table of the page; counts without digits."""
+
+    def cell(name: str, value: Any) -> str:
+        if name not in _NUMBERS:
+            return text(value)
+        return number(value, 0 if name in ("planar", "refuted", "undecided") else 2)
+
+    cells = [[cell(name, row[name]) for name in columns] for row in rows]
+    return rows_table(caption, [name.replace("_", " ") for name in columns], cells)

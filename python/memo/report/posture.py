@@ -1,0 +1,119 @@
+"""The page of `memo posture`: what was seen, the likeliest motion in 3D, and what else it may have been."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import memo
+from memo.report.choice import Choice
+from memo.report.page import UNKNOWN, Page, number, rows_table, text
+from memo.report.pictures import Thinned
+from memo.report.posture_file import FRAME_SHAPES, read_postures_json
+
+__all__ = ["posture_page"]
+
+_BYTES = 20_000_000
+_MOST_GROUPS = 12
+
+
+def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
+    """The page of a folder of `memo posture`, and how many frames are in it and what could not be shown."""
+    document = read_postures_json(folder / "postures.json")
+    thinned: Thinned[dict[str, Any]] = Thinned(_BYTES, choice.every)
+    for frame in document["per_frame"]:
+        if choice.takes(frame["frame"]) and thinned.wants_next():
+            item = {name: frame[name] for name in ("frame", *FRAME_SHAPES)}
+            item |= {name: frame.get(name) for name in ("problem", "cut_all", "linked_breaks")}
+            item["groups_m"] = item["groups_m"][:_MOST_GROUPS]
+            thinned.keep(item, len(json.dumps(item)))
+    notes = choice.told(thinned.every)
+    name = folder.resolve().name
+    second = document.get("second")
+    page = Page(
+        title=f"memo: {name}",
+        layout="posture",
+        filled=_filled(document, name, notes),
+        data={
+            "joints": document["joints"],
+            "frames": thinned.items,
+            "second": None if not second else _second(second, document["per_frame"]),
+        },
+    )
+    return page, {"frames": len(thinned.items), "every": thinned.every, "notes": notes}
+
+
+def _second(second: dict[str, Any], frames: list[dict[str, Any]]) -> dict[str, Any]:
+    """The second-best motion, its postures by frame number."""
+    first, last = second["first_frame"], second["last_frame"]
+    within = [frame["frame"] for frame in frames if first <= frame["frame"] <= last]
+    at = dict(zip(map(str, within), second["postures_m"], strict=False))
+    return {name: second[name] for name in ("joints", "first_frame", "last_frame", "p")} | {"at": at}
+
+
+def _filled(document: dict[str, Any], name: str, notes: list[str]) -> dict[str, str]:
+    left = document.get("frames_with_survivors") or 0
+    warnings = [*document.get("warnings", ()), *document.get("anchor_conflicts", ()), *notes]
+    return {
+        "version": text(memo.__version__),
+        "name": text(name),
+        "status": text("postures left" if left else "no posture left"),
+        "tone": "good" if left else "bad",
+        "sentences": "".join(f"<p>{text(sentence)}</p>" for sentence in _sentences(document)),
+        "warnings": "".join(f"<li>{text(warning)}</li>" for warning in warnings),
+        "reasons": _reasons(document),
+        "lengths": _lengths(document),
+    }
+
+
+def _sentences(document: dict[str, Any]) -> list[str]:
+    count = document.get("frames", len(document["per_frame"]))
+    told = [
+        f"In {document.get('frames_with_survivors', UNKNOWN)} of {count} frames postures are left, "
+        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest "
+        f"motion breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
+    ]
+    most = document.get("most_cut")
+    if most:
+        often = f"{most['branches']} branches in {most['frames']} frames"
+        told.append(f"Most is cut by: {most.get('sentence')} ({often}).")
+    second = document.get("second")
+    if second:
+        joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
+        told.append(
+            f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
+            f"{second['last_frame']}; its probability is {number(second.get('p'))}. Some joint is undecided "
+            f"in {document.get('undecided_frames', UNKNOWN)} of {count} frames."
+        )
+    return told
+
+
+def _reasons(document: dict[str, Any]) -> str:
+    totals = sorted(document.get("reason_totals", ()), key=lambda total: -total["branches"])
+    if not totals:
+        return "<p>Nothing was cut.</p>"
+    rows = [
+        (
+            text(total.get("sentence")),
+            text(str(total.get("joint")).replace("_", " ")),
+            text(total["branches"]),
+            text(total["frames"]),
+        )
+        for total in totals
+    ]
+    return rows_table("Constraints, what cut most first", ("constraint", "at", "branches", "frames"), rows)
+
+
+def _lengths(document: dict[str, Any]) -> str:
+    rows = [
+        (
+            text(name.replace("_", " ")),
+            number(100 * (length.get("length_m") or float("nan")), 1),
+            number(100 * (length.get("sd_m") or float("nan")), 1),
+            text(length.get("basis")),
+        )
+        for name, length in document.get("lengths", {}).items()
+    ]
+    caption = f"Lengths of the segments; the size rests on: {text(document.get('scale_from'))}"
+    return rows_table(caption, ("segment", "length, cm", "sd, cm", "from"), rows)

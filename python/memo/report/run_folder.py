@@ -1,0 +1,107 @@
+"""What `memo track` left in a folder, read for the page, with what is missing said in sentences.
+
+The tables must be right where they are there: an error names the file. What other files would add
+(`run.json`, `gait_parameters.csv`, the overlay) may be absent, as in the folder of an older memo.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from memo.files import read_events_csv, read_track_csv
+from memo.gait import read_gait_parameters_csv
+from memo.run import read_run
+
+__all__ = ["RunFolder", "read_run_folder"]
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """One run of `memo track`."""
+
+    path: Path
+    columns: dict[str, Any]
+    """`track.csv`: an array per column; no rows where nobody was tracked."""
+    events: list[dict[str, Any]]
+    """`events.csv`."""
+    parameters: dict[str, Any]
+    """`gait_parameters.csv`: an array per column; empty where it is not there."""
+    run: dict[str, Any]
+    """`run.json`; empty where it is not there."""
+    missing: list[str]
+    """Files of a run that are not there."""
+    video: Path | None
+    """The video that was tracked, as the run tells or the user; it need not be there any more."""
+
+    @property
+    def overlay(self) -> Path | None:
+        """The video with the model drawn on it, if there is one."""
+        path = self.path / "overlay.mp4"
+        return path if path.is_file() else None
+
+    @property
+    def frames(self) -> list[int]:
+        """Numbers of the tracked frames in the video."""
+        return [int(frame) for frame in self.columns["frame"]]
+
+    @property
+    def first_frame(self) -> int:
+        """Number in the video of the first frame the run read."""
+        return int(self.run["frames"][0]) if self.run else 0
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the video, pixels, where the run has a camera."""
+        camera = self.run.get("camera") or {}
+        size = camera.get("size")
+        return (int(size[0]), int(size[1])) if size else None
+
+    @property
+    def name(self) -> str:
+        """What the run is called: the video's name, else the folder's."""
+        return self.video.name if self.video else self.path.resolve().name
+
+
+def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
+    """Reads a folder of `memo track`; `video` is where its video is now, if not where `run.json` says.
+
+    ValueError names the file that cannot be used.
+    """
+    missing = []
+
+    def read(name: str, reader: Callable[[Path], Any], instead: Any) -> Any:
+        path = folder / name
+        if not path.is_file():
+            missing.append(name)
+            return instead
+        try:
+            return reader(path)
+        except (ValueError, OverflowError, csv.Error) as error:
+            raise ValueError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+    columns = read("track.csv", read_track_csv, {})
+    run = read("run.json", lambda path: _checked(path, read_run(path.parent)), {})
+    return RunFolder(
+        path=folder,
+        columns=columns,
+        events=read("events.csv", read_events_csv, []),
+        parameters=read("gait_parameters.csv", read_gait_parameters_csv, {}),
+        run=run,
+        missing=missing,
+        video=video if video is not None or not run.get("video") else Path(run["video"]),
+    )
+
+
+def _checked(path: Path, run: dict[str, Any]) -> dict[str, Any]:
+    """The run, where its camera is one: the page draws it."""
+    camera = run["camera"] or {}
+    for name, count in (("size", 2), ("rotation", 3), ("translation", 3)):
+        values = camera.get(name, [0] * count)
+        numbers = isinstance(values, list) and all(isinstance(value, int | float) for value in values)
+        if not numbers or len(values) != count:
+            raise ValueError(f"{path}: camera {name} must be {count} numbers, got {str(values)[:60]}")
+    return run

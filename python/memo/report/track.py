@@ -1,0 +1,211 @@
+"""The page of a run of `memo track`: pictures, the walker in 3D, curves, parameters, and why.
+
+Bookkeeping alone: what is drawn was computed by the core, in the run or when a frame is explained again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+import memo
+from memo.explain import explain
+from memo.files import JOINTS
+from memo.report import normative
+from memo.report.choice import Choice, ordinal
+from memo.report.evidence import CHANGED, evidence
+from memo.report.page import Page, columns
+from memo.report.pictures import LONGEST_PX, Picture, Thinned, colour_frames, jpeg_uri, mask_uri
+from memo.report.run_folder import RunFolder, read_run_folder
+from memo.report.track_text import track_text
+from memo.video import VideoReader
+
+__all__ = ["track_page"]
+
+_PICTURES_BYTES = 14_000_000
+_WHY_BYTES = 8_000_000
+_MOST_EXPLAINED = 400
+_MOST_REGIONS = 5
+
+
+# What goes into the page of every row, with digits that no curve shows.
+_SHOWN = {
+    "time_s": 4,
+    "x_m": 4,
+    "y_m": 4,
+    "z_m": 4,
+    "heading_rad": 5,
+    "phase": 5,
+    "p_swapped": 6,
+    "speed_mps": 4,
+    "sd_x_m": 4,
+    "sd_y_m": 4,
+    "sd_z_m": 4,
+    "sd_phase": 4,
+    "similarity": 5,
+    "right_hip_deg": 2,
+    "right_knee_deg": 2,
+    "left_hip_deg": 2,
+    "left_knee_deg": 2,
+}
+
+Item = TypeVar("Item")
+Watch = Callable[[Iterable[Item], str, "int | None"], Iterable[Item]]
+
+
+def track_page(
+    folder: Path, choice: Choice, watch: Watch[Any], video: Path | None = None
+) -> tuple[Page, dict[str, Any]]:
+    """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
+    run = read_run_folder(folder, video)
+    notes: list[str] = []
+    pictures, drawn, size, every = _pictures(run, choice, watch, notes)
+    explained, why_every = _explained(run, pictures, choice, watch, notes)
+    counts = {
+        "pictures": len(pictures),
+        "every": every if pictures else None,
+        "explained": len(explained),
+        "explained_every": why_every if explained else None,
+    }
+    notes += choice.told(every if pictures else 1)
+    if explained and why_every > 1:
+        notes.append(f"Of the tracked frames in it, every {ordinal(why_every)} is explained.")
+    page = Page(
+        title=f"memo: {run.name}",
+        layout="track",
+        filled=track_text(run, notes, pictures),
+        data={
+            "name": run.name,
+            "pictures": {
+                "frame": [picture.frame for picture in pictures],
+                "time_s": [round(picture.time_s, 4) for picture in pictures],
+                "uri": [picture.uri for picture in pictures],
+                "moved": [picture.moved for picture in pictures],
+                "regions": [picture.regions for picture in pictures],
+                "size": size,
+                "drawn": drawn,
+            },
+            "track": _track(run),
+            "events": run.events,
+            "camera": _camera(run),
+            "band": normative.band(),
+            "why": explained,
+        },
+    )
+    return page, counts | {"notes": notes}
+
+
+def _pictures(
+    run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str]
+) -> tuple[list[Picture], bool, Sequence[int] | None, int]:
+    """The frames as JPEG, whether the model is drawn on them already, the size in pixels that positions
+    refer to, and every how many-th frame they are."""
+    if run.video is not None:
+        try:
+            kept, every, size = _video_pictures(run, run.video, choice, watch, notes)
+            return kept, False, size, every
+        except (ValueError, OSError) as error:
+            notes.append(f"The video cannot be read any more ({_one_line(error)}).")
+    if run.overlay is not None:
+        try:
+            kept, every = _overlay_pictures(run, run.overlay, choice, watch)
+            return kept, True, None, every
+        except (ValueError, OSError) as error:
+            notes.append(f"The overlay cannot be read ({_one_line(error)}).")
+    notes.append("There are no pictures: neither the video nor overlay.mp4 can be read.")
+    return [], False, run.size, 1
+
+
+def _video_pictures(
+    run: RunFolder, video: Path, choice: Choice, watch: Watch[Any], notes: list[str]
+) -> tuple[list[Picture], int, tuple[int, int]]:
+    stop = run.first_frame + run.run["frames_read"] if run.run else None
+    thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
+    nobody = not run.frames  # then what moves is shown, for that is where memo looks for a walker
+    with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=run.run.get("fps_given")) as reader:
+        size = run.size
+        if size is not None and tuple(size) != reader.size:
+            raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")
+        before = None
+        for frame in watch(reader, "reading the video", reader.frame_count):
+            if choice.takes(frame.index) and thinned.wants_next():
+                moved = _moved(before, frame.luma) if nobody else (None, ())
+                picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, LONGEST_PX), *moved)
+                thinned.keep(picture, picture.size_bytes)
+            before = frame.luma.copy() if nobody else None
+        if reader.damage:
+            notes.append(f"The video: {reader.damage}.")
+    return thinned.items, thinned.every, reader.size
+
+
+def _overlay_pictures(
+    run: RunFolder, overlay: Path, choice: Choice, watch: Watch[Any]
+) -> tuple[list[Picture], int]:
+    thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
+    times = dict(zip(run.frames, run.columns["time_s"], strict=True))
+    for index, time_s, rgb in watch(colour_frames(overlay), "reading the overlay", None):
+        frame = index + run.first_frame
+        if choice.takes(frame) and thinned.wants_next():
+            picture = Picture(frame, float(times.get(frame, time_s)), jpeg_uri(rgb, LONGEST_PX))
+            thinned.keep(picture, picture.size_bytes)
+    return thinned.items, thinned.every
+
+
+def _moved(before: Any, now: Any) -> tuple[str | None, tuple[tuple[int, ...], ...]]:
+    """What changed between two frames, and the regions of it in which a walker is looked for."""
+    if before is None:
+        return None, ()
+    changed = memo.change_mask(before, now)
+    regions = memo.moving_regions(changed)[:, :4].astype(int).tolist()
+    return mask_uri(changed, CHANGED), tuple(tuple(region) for region in regions[:_MOST_REGIONS])
+
+
+def _explained(
+    run: RunFolder, pictures: list[Picture], choice: Choice, watch: Watch[Any], notes: list[str]
+) -> tuple[list[dict[str, Any]], int]:
+    """Frames with what was seen in them, and every how many-th of the tracked ones in the page they are."""
+    shown = {picture.frame for picture in pictures}
+    frames = [frame for frame in run.frames if frame in shown]
+    if not (choice.why and run.run and frames):
+        return [], 1
+    every = -(-len(frames) // _MOST_EXPLAINED) if choice.every is None else 1
+    chosen = frames[::every]
+    thinned: Thinned[dict[str, Any]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
+    try:
+        for why in watch(explain(run.path, chosen, video=run.video), "explaining frames", len(chosen)):
+            if thinned.wants_next():
+                item = evidence(why)
+                thinned.keep(item, len(json.dumps(item)))
+    except (ValueError, OSError) as error:
+        notes.append(f"Frames cannot be explained ({_one_line(error)}).")
+    return thinned.items, every * thinned.every
+
+
+def _track(run: RunFolder) -> dict[str, Any]:
+    """The rows: what is plotted, and joints as (rows, 12, 3) metres and (rows, 12, 2) pixels."""
+    table = run.columns
+    points = [np.stack([table[f"{joint}_{axis}_m"] for axis in "xyz"], axis=1) for joint in JOINTS]
+    pixels = [np.stack([table[f"{joint}_{axis}_px"] for axis in "uv"], axis=1) for joint in JOINTS]
+    return {
+        "frame": [int(frame) for frame in table["frame"]],
+        "walk": [int(walk) for walk in table["walk"]],
+        **{name: columns(table[name], digits) for name, digits in _SHOWN.items()},
+        "joints": list(JOINTS),
+        "points_m": columns(np.stack(points, axis=1), 3),
+        "points_px": columns(np.stack(pixels, axis=1), 1),
+    }
+
+
+def _camera(run: RunFolder) -> dict[str, Any] | None:
+    camera = run.run.get("camera")
+    if camera is None or not {"rotation", "translation"} <= set(camera):
+        return None
+    return {"rotation": camera["rotation"], "translation": camera["translation"]}
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,235 @@
+"""The words and tables on the page of a run of `memo track`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import memo
+from memo.gait import DEFINITIONS, GAIT_COLUMNS
+from memo.report import normative
+from memo.report.page import UNKNOWN, number, rows_table, text
+from memo.report.pictures import Picture
+from memo.report.run_folder import RunFolder
+
+__all__ = ["track_text"]
+
+_DEEPEST = 4
+_LIKELY_SWAPPED = 0.2
+
+
+def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dict[str, str]:
+    """HTML for the places of `track.html`."""
+    status, tone = _status(run)
+    return {
+        "version": text(memo.__version__),
+        "folder": text(run.path.resolve().name),
+        "name": text(run.name),
+        "status": text(status),
+        "tone": tone,
+        "sentences": "".join(f"<p>{text(sentence)}</p>" for sentence in _sentences(run)),
+        "warnings": _warnings(run, notes),
+        "parameters": _parameters(run),
+        "walks": _walks(run),
+        "events": _events(run),
+        "band_source": text(normative.SOURCE),
+        "how": _how(run),
+        "moved": text(_moved_sentence(pictures)),
+        "nobody": " hidden" if run.frames else "",
+        "somebody": "" if run.frames else " hidden",
+    }
+
+
+def _status(run: RunFolder) -> tuple[str, str]:
+    """What became of the run in two words, and how it is coloured."""
+    status = (run.run.get("summary") or {}).get("status")
+    if not run.frames:
+        return str(status or "nobody tracked"), "bad"
+    return str(status or "tracked"), "good" if status in (None, "tracked") else "fair"
+
+
+def _sentences(run: RunFolder) -> list[str]:
+    told = [str(sentence) for sentence in run.run.get("sentences") or ()]
+    message = (run.run.get("summary") or {}).get("message")
+    if not told and message:
+        told = [str(message)]
+    if told:
+        return told
+    frames = run.frames
+    if not frames:
+        return ["Nobody was tracked in this video."]
+    walks = len(set(run.columns["walk"].tolist()))
+    return [f"{_counted(walks, 'walk')} in {_counted(len(frames), 'frame')}, {frames[0]} to {frames[-1]}."]
+
+
+def _warnings(run: RunFolder, notes: list[str]) -> str:
+    told = []
+    for walk, p_swapped in _swapped(run):
+        if not run.run and p_swapped > _LIKELY_SWAPPED:  # else the sentences say so
+            told.append(f"Left and right of walk {walk + 1} may be swapped (probability {p_swapped:.0%}).")
+    for walk in _backward(run):
+        told.append(f"Walk {walk + 1} goes backwards: the band of normal gait is of people who walk forward.")
+    if run.frames and not run.run.get("camera_given", True):
+        told.append(
+            "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
+            "positions do not."
+        )
+    if run.missing:
+        told.append(f"Not in the folder: {', '.join(run.missing)}. It may be from an older memo.")
+    if run.overlay is None and run.frames:
+        told.append("There is no overlay.mp4: it was not wanted, or the run was interrupted.")
+    return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
+
+
+def _swapped(run: RunFolder) -> list[tuple[int, float]]:
+    """The probability that the sides are interchanged, walk by walk: it is the same in all rows of one."""
+    walks, p_swapped = run.columns["walk"], run.columns["p_swapped"]
+    return [(int(walk), float(p_swapped[walks == walk][0])) for walk in np.unique(walks)]
+
+
+def _backward(run: RunFolder) -> list[int]:
+    """The walks with a speed against the direction faced."""
+    walks, speeds = run.columns["walk"], run.columns["speed_mps"]
+    return [int(walk) for walk in np.unique(walks) if _middle(speeds[walks == walk]) < 0]
+
+
+def _middle(values: Any) -> float:
+    """The middle one of the known values; NaN without any."""
+    known = np.sort(values[np.isfinite(values)])
+    return float(known[len(known) // 2]) if len(known) else float("nan")
+
+
+def _moved_sentence(pictures: list[Picture]) -> str:
+    """How much moves, where nobody was tracked."""
+    looked = [picture for picture in pictures if picture.moved is not None]
+    if not looked:
+        return ""
+    heights = [bottom - top + 1 for picture in looked for _, top, _, bottom in picture.regions[:1]]
+    if not heights:
+        return f"Nothing moves in the {_counted(len(looked), 'frame')} of this page."
+    return (
+        f"Something moves in {len(heights)} of the {_counted(len(looked), 'frame')} of this page; the "
+        f"largest thing that does is up to {max(heights)} px high. What changed since the frame before is "
+        "green, with a box around each moving region."
+    )
+
+
+def _walks(run: RunFolder) -> str:
+    if not run.frames:
+        return ""
+    table = run.columns
+    rows = []
+    for walk, p_swapped in _swapped(run):
+        rows_of = np.flatnonzero(table["walk"] == walk)
+        first, last = rows_of[0], rows_of[-1]
+        rows.append(
+            (
+                str(walk + 1),
+                f"{table['frame'][first]} to {table['frame'][last]}",
+                f"{number(table['time_s'][first])} to {number(table['time_s'][last])}",
+                f"{number(table['x_m'][first])} to {number(table['x_m'][last])}",
+                number(_middle(table["speed_mps"][rows_of])),
+                number(p_swapped, 3),
+            )
+        )
+    header = ("walk", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
+    return rows_table("Walks in this video (the files count them from 0)", header, rows)
+
+
+def _parameters(run: RunFolder) -> str:
+    """A table of gait parameters for each walk, and what they mean."""
+    if not run.parameters or not len(run.parameters["walk"]):
+        return "<p>There are none: gait_parameters.csv is not there, or holds no line.</p>"
+    columns = [run.parameters[name] for name in GAIT_COLUMNS]
+    lines = [dict(zip(GAIT_COLUMNS, line, strict=True)) for line in zip(*columns, strict=True)]
+    tables = []
+    for walk in dict.fromkeys(line["walk"] for line in lines):
+        known = [line for line in lines if line["walk"] == walk and np.isfinite(line["value"])]
+        if not known:
+            tables.append(f"<p>Walk {walk + 1}: too short or too uncertain for any.</p>")
+            continue
+        rows = []
+        for name, unit in dict.fromkeys((line["parameter"], line["unit"]) for line in known):
+            cells = {line["side"]: _measured(line) for line in known if line["parameter"] == name}
+            in_words = text(name.replace("_", " ")) + (f", {text(unit)}" if unit else "")
+            rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
+        header = ("parameter", "both", "right", "left")
+        tables.append(rows_table(f"Walk {walk + 1}: value, 95 % interval, number of steps", header, rows))
+    named = dict.fromkeys(line["parameter"] for line in lines)
+    meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
+    return f"{''.join(tables)}<details open><summary>What they are</summary>{_listed(meanings)}</details>"
+
+
+def _measured(line: dict[str, Any]) -> str:
+    """A value with its interval and how many steps it rests on, as HTML."""
+    digits = 1 if line["unit"] in ("%", "1/min") else 3
+    interval = "no interval"
+    if np.isfinite(line["ci_low"]) and np.isfinite(line["ci_high"]):
+        interval = f"{number(line['ci_low'], digits)} to {number(line['ci_high'], digits)}"
+    value = number(line["value"], digits)
+    return f'{value} <small class="interval">{interval} (n = {line["n"]})</small>'
+
+
+def _listed(values: dict[str, Any]) -> str:
+    """Names and values as a list in HTML."""
+    return f"<dl>{''.join(f'<dt>{text(n)}</dt><dd>{text(v)}</dd>' for n, v in values.items())}</dl>"
+
+
+def _events(run: RunFolder) -> str:
+    if not run.events:
+        return ""
+    rows = [
+        (
+            text(str(event["event"]).replace("_", " ")),
+            text(event["side"]),
+            number(event["time_s"], 3),
+            number(event["frame"], 1),
+        )
+        for event in run.events
+    ]
+    return rows_table("Heel strikes and toe-offs", ("event", "side", "time, s", "frame"), rows)
+
+
+def _how(run: RunFolder) -> str:
+    """How it was run, as a list of names and values."""
+    if not run.run:
+        return "<p>There is no run.json in the folder: with which options it was run is not known.</p>"
+    told = run.run
+    first, stop = told["frames"]
+    given = {
+        "memo": told.get("memo"),
+        "video": told.get("video"),
+        "frames": f"{first} to {'the end' if stop is None else stop - 1}, {told['frames_read']} read",
+        "frames per second": _value(told.get("rate_hz")),
+        "rate given": _value(told.get("fps_given")),
+        "camera": "as given" if told.get("camera_given") else "guessed",
+        **{f"option {name}": _value(value) for name, value in (told.get("options") or {}).items()},
+        **{f"camera {name}": _value(value) for name, value in (told.get("camera") or {}).items()},
+        **{f"result {name}": _value(value) for name, value in (told.get("summary") or {}).items()},
+    }
+    return _listed(given)
+
+
+def _value(value: Any, depth: int = 0) -> str:
+    """A value of run.json in the fewest words."""
+    if depth > _DEEPEST:
+        return "\N{HORIZONTAL ELLIPSIS}"
+    if value is None:
+        return UNKNOWN
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+    if isinstance(value, list):
+        return ", ".join(
+            f"({_value(item, depth + 1)})" if isinstance(item, list) else _value(item, depth + 1)
+            for item in value
+        )
+    if isinstance(value, dict):
+        return "; ".join(f"{name} {_value(item, depth + 1)}" for name, item in value.items())
+    return str(value)
+
+
+def _counted(count: int, one: str) -> str:
+    return f"{count} {one}{'' if count == 1 else 's'}"
