@@ -3,6 +3,7 @@
 mod active;
 mod column;
 pub mod evidence;
+pub mod experiment;
 pub mod kalman;
 pub mod locate;
 pub mod person;
