@@ -80,7 +80,8 @@ def lee_chen(progress: Callable[[str], object] = lambda _: None) -> Reproduction
     inputs, head = _memo.lee_chen_inputs(), _memo.lee_chen_head()
     progress("lee-chen: Tables 3 and 4")
     counts = {
-        sequence: [_memo.lee_chen_counts(sequence, merge_m) for merge_m in (0.04, 0.0)] for sequence in SEQUENCES
+        sequence: [_memo.lee_chen_counts(sequence, merge_m) for merge_m in (0.04, 0.0)]
+        for sequence in SEQUENCES
     }
     progress("lee-chen: rules 1 to 5 over ten phases")
     stages = _last_stages()
@@ -117,12 +118,14 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
         ),
         compared("appendix", "seconds a frame", "0.2", inputs["frame_s"]),
     ]
-    for sequence, printed, camera in zip(SEQUENCES, ("400 0 0", "300 0 300"), inputs["cameras_cm"], strict=True):
+    for sequence, printed, camera in zip(
+        SEQUENCES, ("400 0 0", "300 0 300"), inputs["cameras_cm"], strict=True
+    ):
         quantity = f"camera of {sequence}, centimetres"
         rows.append(compared("appendix", quantity, printed, np.round(camera, 9), "the image plane's place"))
     for name, (least, most) in inputs["angles"]:
         quantity, printed = TABLE_1[name]
-        rows.append(compared("Table 1", f"{quantity}, degrees", printed, np.round([-least, most], 9)))
+        rows.append(compared("Table 1", f"{quantity}, degrees", printed, np.round([-least, most], 9) + 0.0))
     lengths = dict(inputs["lengths_cm"])
     for name, (printed, pattern) in TABLE_A1.items():
         found = sorted({round(lengths[pattern.format(side)], 9) for side in ("right", "left")})
@@ -175,9 +178,11 @@ def _head_table(head: list[dict[str, Any]]) -> Table:
 def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
     """Table 2 against the linear solution from projections that were not rounded."""
     by_method = {column["method"]: column for column in head}
-    printed, exact = by_method["printed"], by_method["linear, exact projections"]
+    printed, exact = head[0], by_method["linear, exact projections"]
     rounded, known = by_method["linear, A.2(b) as printed"], by_method["least squares, f = 5"]
-    how = "eqs. (1)-(5) from projections that are not rounded, as it differs from its own geometry by that much"
+    how = (
+        "eqs. (1)-(5) from projections that are not rounded, as it differs from its own geometry by that much"
+    )
 
     def row(quantity: str, name: str, *, within: float, place: Any = ...) -> Row:
         text = " ".join(f"{value:.5f}" for value in np.atleast_1d(np.asarray(printed[name])[place]))
@@ -217,9 +222,7 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
     rows = []
     equal = 0
     for level, joint in enumerate(_memo.joint_names()):
-        printed, ours = (
-            [merged[f"{prefix}{half}"][level] for half in HALVES] for prefix in ("printed_", "")
-        )
+        printed, ours = ([merged[f"{prefix}{half}"][level] for half in HALVES] for prefix in ("printed_", ""))
         here = int(np.sum(np.asarray(printed) == np.asarray(ours)))
         equal += here
         roots = "; ".join(" ".join(map(str, apart[half][level])) for half in HALVES)
@@ -308,7 +311,11 @@ def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
         name = reading.replace("_", " ")
         rows.append(
             in_kind(
-                *("section 4.2", f"postures that rules 1 to 5 and grouping leave of {sequence}, {name}", final),
+                *(
+                    "section 4.2",
+                    f"postures that rules 1 to 5 and grouping leave of {sequence}, {name}",
+                    final,
+                ),
                 f"median {median(groups_left):g}, {min(groups_left)} to {max(groups_left)}",
                 f"printed of frame 1 alone; {WALKER}, frames 1, 3, 5 from each of ten phases on; {READINGS[reading]}",
             )
@@ -345,7 +352,9 @@ def _stage_table(stages: Stages) -> Table:
 def _cannot_rows() -> list[Row]:
     unpublished = "the joints of the sequences are not printed, and the program that drew them is not public"
     return [
-        cannot("Tables 3 and 4", "the printed numbers on the paper's own sequences", "168 numbers", unpublished),
+        cannot(
+            "Tables 3 and 4", "the printed numbers on the paper's own sequences", "168 numbers", unpublished
+        ),
         cannot("Figs. 6-8, A.1", "the printed figures line for line", "4 figures", unpublished),
         cannot(
             *("section 5", "a unique posture in every frame from a sequence", "no numbers"),
@@ -382,23 +391,46 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
     from_side = f"{WALKER[:1].upper()}{WALKER[1:]}; depth and height without perspective"
     on_walker = f"{WALKER[:1].upper()}{WALKER[1:]}"
     return [
-        Drawing("fig1", "Fig. 1", "The stick figure of 14 joints and 17 segments", _draw_model, (5, 6.5), on_walker),
         Drawing(
-            *("fig2", "Fig. 2", "The head's axes and the cameras of both sequences, from above and from the side"),
-            *(_draw_cameras, (9, 5), "Places as printed in the appendix; the walker made anew"),
+            "fig1",
+            "Fig. 1",
+            "The stick figure of 14 joints and 17 segments",
+            _draw_model,
+            (5, 6.5),
+            on_walker,
         ),
         Drawing(
-            *("fig3", "Fig. 3", "The two places at which a segment of known length can end on its line of sight"),
+            *(
+                "fig2",
+                "Fig. 2",
+                "The head's axes and the cameras of both sequences, from above and from the side",
+            ),
+            *(_draw_cameras, (6, 7), "Places as printed in the appendix; the walker made anew"),
+        ),
+        Drawing(
+            *(
+                "fig3",
+                "Fig. 3",
+                "The two places at which a segment of known length can end on its line of sight",
+            ),
             *(lambda figure: _draw_two_ends(figure, first), (6, 4.2)),
             f"{on_walker}, frame 1 of SEQ1",
         ),
         Drawing(
-            *("fig4", "Fig. 4", "The interpretation tree, pruned: every path down is one of the postures left"),
+            *(
+                "fig4",
+                "Fig. 4",
+                "The interpretation tree, pruned: every path down is one of the postures left",
+            ),
             *(lambda figure: _draw_tree(figure, first), (10, 6)),
             f"{on_walker}, frame 1 of SEQ1 after rules 1 and 2",
         ),
         Drawing(
-            *("fig5", "Fig. 5", "Both shoulders can be at two places each; their distance says which go together"),
+            *(
+                "fig5",
+                "Fig. 5",
+                "Both shoulders can be at two places each; their distance says which go together",
+            ),
             *(lambda figure: _draw_rigid(figure, second), (8, 5)),
             f"{on_walker}, frame 1 of SEQ2, from above",
         ),
@@ -416,7 +448,11 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             *(lambda figure: _draw_panels(figure, second), _panel_size(second), from_side),
         ),
         Drawing(
-            *("figA1", "Fig. A.1", "The image sequences: SEQ1 above, SEQ2 (in a dissertation, not in the paper) below"),
+            *(
+                "figA1",
+                "Fig. A.1",
+                "The image sequences: SEQ1 above, SEQ2 (in a dissertation, not in the paper) below",
+            ),
             *(_draw_sequences, (10, 6), f"{on_walker}; central projection"),
         ),
     ]
@@ -450,7 +486,7 @@ def _draw_cameras(figure: Figure) -> None:
     # Camera axes of SEQ1 in the head's: x to the walker's right hand is its left in the image.
     lens = inputs["cameras_cm"][0][0] / 100 + 0.05
     forward, up, right = lens - figures[0, :, 2], -figures[0, :, 1], -figures[0, :, 0]
-    above, aside = figure.subplots(1, 2)
+    above, aside = figure.subplots(2, 1, sharex=True, height_ratios=(3.5, 1.7))
     for ax, across, label in ((above, right, "z, to the walker's right, m"), (aside, up, "y, up, m")):
         draw_figure(ax, np.column_stack([forward, across]))
         ax.plot(0, 0, marker="+", color="black", markersize=10)
@@ -476,14 +512,27 @@ def _distinct(points: Points) -> Points:
     return np.array(kept)
 
 
-def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
-    """In the plane of the line of sight and the elbow: the circle of the forearm's length cuts it twice."""
+def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
+    """Of the joints that the postures put at two places behind the same joint, the pair farthest apart: name of
+    the segment, its start (3,) and both ends (2, 3)."""
     names = _memo.joint_names()
-    elbow_at, wrist_at = names.index("right_elbow"), names.index("right_wrist")
-    elbow = left["truth"][elbow_at]
-    same = np.linalg.norm(left["figures"][:, elbow_at] - elbow, axis=1) < 0.03
-    start = left["figures"][same][0, elbow_at]
-    ends = _distinct(left["figures"][same][:, wrist_at])[:2]
+    found = []
+    for side in ("right", "left"):
+        for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")):
+            starts, ends = (left["figures"][:, names.index(f"{side}_{joint}")] for joint in (start, end))
+            for place in _distinct(starts):
+                both = _distinct(ends[np.linalg.norm(starts - place, axis=1) < 1e-3])
+                if len(both) == 2:
+                    found.append(
+                        (float(np.linalg.norm(both[1] - both[0])), f"{side} {start} to {end}", place, both)
+                    )
+    _, name, place, both = max(found, key=lambda pair: pair[0])
+    return name, place, both
+
+
+def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
+    """In the plane of the line of sight and the known joint: the circle of the segment's length cuts it twice."""
+    name, start, ends = _two_ends(left)
     ray = ends[0] / np.linalg.norm(ends[0])
     along = float(start @ ray)
     off = float(np.linalg.norm(start - along * ray))
@@ -492,16 +541,17 @@ def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
     turn = np.linspace(0, 2 * np.pi, 200)
     ax.plot(along + length * np.cos(turn), off + length * np.sin(turn), color=NEUTRAL, linewidth=0.8)
     places = ends @ ray
-    ax.plot([min(places) - 0.25, max(places) + 0.25], [0, 0], color="black", linewidth=1)
-    ax.annotate("line of sight, camera to the left", (min(places) - 0.25, 0), xytext=(0, -12),
+    ends_at = (along - 1.25 * length, along + 1.25 * length)
+    ax.plot(ends_at, [0, 0], color="black", linewidth=1)
+    ax.annotate("line of sight; camera to the left", (ends_at[0], 0), xytext=(0, -12),
                 textcoords="offset points", fontsize=8)  # fmt: skip
-    ax.plot(along, off, marker="o", color=NEUTRAL)
-    ax.annotate("elbow (known)", (along, off), xytext=(6, 4), textcoords="offset points")
-    for place, name, colour in zip(places, ("wrist 1", "wrist 2"), (RIGHT, LEFT), strict=False):
-        ax.plot([along, place], [off, 0], color=colour, linewidth=2, marker="o")
-        ax.annotate(name, (place, 0), xytext=(4, -14), textcoords="offset points", color=colour)
+    known, sought = name.split(" ", 1)[1].split(" to ")
+    for place, label, colour in zip(sorted(places), ("nearer", "farther"), (RIGHT, LEFT), strict=True):
+        ax.plot([along, place], [off, 0], color=colour, linewidth=2, marker="o", label=f"{sought}, {label}")
+    ax.plot(along, off, marker="o", color="black", linestyle="none", label=f"{known}, known")
     ax.set(aspect="equal", xlabel="along the line of sight, m", ylabel="distance from it, m")
-    ax.set_title(f"forearm of {100 * length:.0f} cm", loc="left", fontsize=9)
+    ax.legend(frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
+    ax.set_title(f"{name}, {100 * length:.0f} cm", loc="left", fontsize=9)
 
 
 def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
@@ -525,7 +575,9 @@ def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
     for level, nodes in enumerate(places):
         ax.annotate(f"{len(nodes)}", (len(order) + 0.5, level), va="center", fontsize=8)
     ax.annotate("nodes", (len(order) + 0.5, -0.8), va="center", fontsize=8)
-    ax.set_yticks(range(len(names)), [f"{k} {name.replace('_', ' ')}" for k, name in enumerate(names)], fontsize=8)
+    ax.set_yticks(
+        range(len(names)), [f"{k} {name.replace('_', ' ')}" for k, name in enumerate(names)], fontsize=8
+    )
     ax.invert_yaxis()
     ax.set_xticks([])
     ax.spines[["top", "right", "bottom", "left"]].set_visible(False)
@@ -537,9 +589,15 @@ def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
     """From above: lines of sight, the two places of each shoulder, and the distance of each pair."""
     names = _memo.joint_names()
     neck = left["truth"][0]
-    right, other = (
-        _distinct(left["figures"][:, names.index(f"{side}_shoulder")]) for side in ("right", "left")
-    )
+
+    def roots(joint: str) -> Points:
+        """Both places on the line of sight: they lie symmetrically to its point nearest to the neck."""
+        true = left["truth"][names.index(joint)]
+        ray = true / np.linalg.norm(true)
+        both = np.array([true, 2 * (neck @ ray) * ray - true])
+        return both[np.argsort(both[:, 2])]
+
+    right, other = roots("right_shoulder"), roots("left_shoulder")
     wanted = dict(_memo.lee_chen_inputs()["lengths_cm"])["right_shoulder_to_left_shoulder"]
     ax = _plain(figure)
     for letter, places, colour in (("A", right, RIGHT), ("B", other, LEFT)):

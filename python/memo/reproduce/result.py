@@ -29,7 +29,7 @@ class Verdict(StrEnum):
     """How a printed thing stands."""
 
     SAME = "same"
-    """Computed anew from what the paper gives, and equal to the digits printed."""
+    """Computed anew from what the paper gives, and equal to the digits printed or within what the row states."""
     DIFFERS = "differs"
     """Computed anew from what the paper gives, and not equal; the row says why."""
     IN_KIND = "in kind"
@@ -138,7 +138,9 @@ class Reproduction:
             progress(f"{self.name}: drawing {drawing.item}")
             written.append(drawing.write(folder))
         written += [table.write(folder) for table in self.tables]
-        _write_csv(written[1], ROW_COLUMNS, ([getattr(row, name) for name in ROW_COLUMNS] for row in self.rows))
+        _write_csv(
+            written[1], ROW_COLUMNS, ([getattr(row, name) for name in ROW_COLUMNS] for row in self.rows)
+        )
         with complete_file(written[0]) as temporary:
             temporary.write_text(self.markdown(), encoding="utf-8")
         return written
@@ -176,10 +178,12 @@ def compared(
     allowed = [0.5 * 10.0**-d if within is None else within for d in digits]
     wanted = [float(number.group()) for number in found]
     is_same = all(
-        abs(a - b) <= tolerance * (1 + 1e-6)
-        for a, b, tolerance in zip(values, wanted, allowed, strict=True)
+        abs(a - b) <= tolerance * (1 + 1e-6) for a, b, tolerance in zip(values, wanted, allowed, strict=True)
     )
-    text = " ".join(_digits(value, d) for value, d in zip(values, digits, strict=True))
+    if within is not None and within < 1e-4 and not any(digits):
+        text = " ".join(f"{value:.1e}" for value in values)
+    else:
+        text = " ".join(_digits(value, d) for value, d in zip(values, digits, strict=True))
     how = "equal to the digits printed" if within is None else f"within {within:g}"
     said = f"{how}; {why}" if is_same and why else how if is_same else why
     return Row(item, quantity, printed, text, Verdict.SAME if is_same else Verdict.DIFFERS, said)
