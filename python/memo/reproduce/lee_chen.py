@@ -618,7 +618,7 @@ def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
             ax.plot([first[2], second[2]], [first[0], second[0]], color=NEUTRAL, zorder=0,
                     linewidth=1.8 if fits else 0.6, linestyle="-" if fits else "--",
                     label=f"A{a} B{b}: {apart:.1f} cm" + (", kept" if fits else ", cut"))  # fmt: skip
-    ax.set(aspect="equal", xlabel="distance from the camera, m", ylabel="to the right in the image, m")
+    ax.set(aspect="equal", xlabel="distance from the camera, m", ylabel="to the right, m")
     ax.legend(frameon=False, fontsize=8, title=f"shoulder to shoulder {wanted:g} cm", loc="center left",
               bbox_to_anchor=(1, 0.5))  # fmt: skip
 
