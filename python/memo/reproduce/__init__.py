@@ -1,8 +1,8 @@
 """The papers' experiments again, beside the numbers printed there.
 
-One function a paper gives a `Reproduction`: rows of what is printed, what memo has, a verdict and the reason,
-and figures that are drawn when written. Rows are compared to the digits printed; what rests on other input than
-the paper's is "in kind", and what cannot be made is a row that says why.
+One function a paper gives a `Reproduction`: rows of what is printed, what memo has, a verdict and the
+reason, and figures that are drawn when written. Rows are compared to the digits printed; what rests on
+other input than the paper's is "in kind", and what cannot be made is a row that says why.
 """
 
 from __future__ import annotations

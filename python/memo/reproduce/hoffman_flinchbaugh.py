@@ -1,5 +1,5 @@
-"""Hoffman and Flinchbaugh (1982): both propositions as counts over random problems, the scheme on a point-light
-walker, and the figures.
+"""Hoffman and Flinchbaugh (1982): both propositions as counts over random problems, the scheme on a point-
+light walker, and the figures.
 
 The paper has no data: its numbers are numbers of views, equations and solutions. So nearly every row is a
 statement, counted here over problems drawn from a seed.
@@ -27,10 +27,10 @@ TRIALS = 20_000
 SEARCHED = 500
 SEED = 1982
 
-NOTE = f"""The paper prints statements and equations, no data. They are counted here over {TRIALS} rods seen three
-times and {TRIALS} hinges seen twice, drawn from a seed: the tilt of the plane between 5 and 85 degrees, all angles
-uniform. "In kind" rows are of a synthetic point-light walker, since Johansson's films are not published. Counts say
-what happens to problems as drawn; they are no proofs."""
+NOTE = f"""The paper prints statements and equations, no data. They are counted here over {TRIALS} rods seen
+three times and {TRIALS} hinges seen twice, drawn from a seed: the tilt of the plane between 5 and 85
+degrees, all angles uniform. "In kind" rows are of a synthetic point-light walker, since Johansson's films
+are not published. Counts say what happens to problems as drawn; they are no proofs."""
 
 # Arms and legs, in the names of point-light displays.
 LINKS = {frozenset(f"{side}{joint}" for joint in pair) for side in "RL" for pair in
@@ -137,8 +137,8 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             *(
                 rods["one_root"],
                 trials,
-                "a root holds when z3 is real and (6) is met within 1e-6: of the four solutions that Bezout allows a"
-                " mirror pair is left",
+                "a root holds when z3 is real and (6) is met within 1e-6: of the four solutions that Bezout"
+                " allows a mirror pair is left",
             ),
             least=0.98,
         ),
@@ -188,8 +188,8 @@ def _proposition_2(hinges: dict[str, Any]) -> list[Row]:
 
 def _false_targets(rods: int, hinges: int) -> list[Row]:
     why = (
-        "the claim cannot hold for the least number of views, which has as many equations as unknowns; it needs"
-        " more views and a test with a stated rate, as `memo planar` has"
+        "the claim cannot hold for the least number of views, which has as many equations as unknowns; it"
+        " needs more views and a test with a stated rate, as `memo planar` has"
     )
     return [
         Row("section 6", name, "probability zero", _share(count, TRIALS), Verdict.DIFFERS, why)
@@ -223,8 +223,8 @@ def _degenerate_rows(rods: dict[str, Any], degenerate: list[tuple[str, int]]) ->
             *("appendix 1, claim", "k1 = k2 without parallel plane or collinear images", "degenerate"),
             f"one root holds in {_share(one, of)}",
             Verdict.DIFFERS,
-            "views 2 and 3 mirrored in the ellipse's axis have k1 = k2, and of x = 1 and x = -1 just one is real:"
-            " such views are not degenerate",
+            "views 2 and 3 mirrored in the ellipse's axis have k1 = k2, and of x = 1 and x = -1 just one is"
+            " real: such views are not degenerate",
         )
     )
     return rows
@@ -247,7 +247,7 @@ def _linking_rows(hinges: dict[str, Any]) -> list[Row]:
 
 
 class _Walker:
-    """A point-light walker and the linkage found in it, as it is, scrambled in place and scrambled in phase."""
+    """A point-light walker and the linkage found in it, as it is and with scrambled starting times."""
 
     def __init__(self) -> None:
         motion = _memo.walker_motion(frames=90, rate_hz=60.0)
@@ -295,7 +295,10 @@ class _Walker:
         }
 
     def rows(self) -> list[Row]:
-        on = f"synthetic walker seen from {AZIMUTH_DEG:g} degrees aside, no names given; Johansson's films are not published"
+        on = (
+            f"synthetic walker seen from {AZIMUTH_DEG:g} degrees aside, no names given; Johansson's films are"
+            " not published"
+        )
         links = self.links(self.found["as it is"])
         errors = [abs(links[link] / self.lengths_m[link] - 1) for link in LINKS & set(links)]
         noisy = self.links(self.at_1_px)
@@ -347,8 +350,8 @@ def _cannot_rows() -> list[Row]:
         ),
         cannot(
             *("section 6", "motion from known lengths where planarity fails", "inferred uniquely"),
-            "stated without proof; in one view each rod of known length has two ends, so a hinge has four readings"
-            " (two up to the mirror): only motion over time chooses, as `memo posture` does",
+            "stated without proof; in one view each rod of known length has two ends, so a hinge has four"
+            " readings (two up to the mirror): only motion over time chooses, as `memo posture` does",
         ),
         cannot(
             "section 5",
@@ -470,10 +473,13 @@ def _draw_inputs(figure: Figure) -> None:
     ax = figure.subplots()
     cells = [
         ["", "parallel projection", "central projection"],
-        ["views at instants\n(the paper's choice)", "rod from three, hinge from two;\nfits of many (`memo planar`)",
-         "scale and focal length of the views\n(`scales`, `focal_px`)"],
+        [
+            "views at instants\n(the paper's choice)",
+            "rod from three, hinge from two;\nfits of many (`memo planar`)",
+            "scale and focal length of the views\n(`scales`, `focal_px`)",
+        ],
         ["continuous motion", "plane from velocities\n(`memo_core::planar::motion`)", "not in memo"],
-    ]  # fmt: skip
+    ]
     table = ax.table(cells, loc="center", cellLoc="center")
     table.auto_set_font_size(False)
     table.set_fontsize(9)
@@ -550,8 +556,8 @@ def _draw_views(figure: Figure, rods: list[list[Array]]) -> None:
 
 
 def _draw_solutions(figure: Figure) -> None:
-    """Left in space: of z1^2 - z2^2 + k1 = 0 and z1^2 - z3^2 + k2 = 0 the sheets through the solution, and the
-    plane k3 z1 + k4 z2 + k5 z3 = 0. Right in that plane: all sheets as curves."""
+    """Left in space: of z1^2 - z2^2 + k1 = 0 and z1^2 - z3^2 + k2 = 0 the sheets through the solution, and
+    the plane k3 z1 + k4 z2 + k5 z3 = 0. Right in that plane: all sheets as curves."""
     ends = np.array([_in_plane(angle) for angle in ROD_DEG])
     printed = _memo.hoffman_flinchbaugh_rod(np.ascontiguousarray(ends[None, :, :2]))
     k1, k2, *normal = printed["k"]
@@ -569,10 +575,11 @@ def _draw_solutions(figure: Figure) -> None:
         ax.plot_surface(*across, color=colour, alpha=0.45, linewidth=0, rcount=2, ccount=80)
     u, v = np.meshgrid([-reach, reach], [-reach, reach])
     ax.plot_surface(*(u * first[k] + v * second[k] for k in range(3)), color="#999999", alpha=0.35)
+    above = np.array([0, 0, 0.12])
     for solution in (z, -z):
         ax.plot(*solution[:, None], marker="o", color="black", linestyle="none")
-    ax.text(*(z + [0, 0, 0.12]), "solution", fontsize=9)
-    ax.text(*(-z + [0, 0, 0.12]), "its mirror", fontsize=9)
+    ax.text(*(z + above), "solution", fontsize=9)
+    ax.text(*(above - z), "its mirror", fontsize=9)
     limits = (-reach, reach)
     ax.set(xlabel="z1", ylabel="z2", zlabel="z3", xlim=limits, ylim=limits, zlim=limits)
     ax.set_box_aspect((1, 1, 1))

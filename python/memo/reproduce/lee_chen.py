@@ -22,11 +22,12 @@ __all__ = ["lee_chen", "plot_posture", "plot_superposition"]
 SEQUENCES = ("SEQ1", "SEQ2")
 FRAMES = (1, 3, 5)
 
-NOTE = """Lengths, head, cameras, frame interval and joint limits are the paper's. It prints neither the joints of
-its sequences nor their gait phases and cadence, and the program that drew them (Cutting 1978) is not public: so a
-walker is made anew from average gait curves, with shoulders that turn by 4 and a pelvis that turns by 6 degrees,
-at an ordinary cadence. The phase of frame 1 is that of fifty which brings frame 1 of Tables 3 and 4 nearest, so
-that agreement there says that such a walker exists, not that it is the paper's."""
+NOTE = """Lengths, head, cameras, frame interval and joint limits are the paper's. It prints neither the
+joints of its sequences nor their gait phases and cadence, and the program that drew them (Cutting 1978) is
+not public: so a walker is made anew from average gait curves, with shoulders that turn by 4 and a pelvis
+that turns by 6 degrees, at an ordinary cadence. The phase of frame 1 is that of fifty which brings frame 1
+of Tables 3 and 4 nearest, so that agreement there says that such a walker exists, not that it is the
+paper's."""
 
 WALKER = "on the walker made anew"
 
@@ -225,17 +226,19 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
         printed, ours = ([merged[f"{prefix}{half}"][level] for half in HALVES] for prefix in ("printed_", ""))
         here = int(np.sum(np.asarray(printed) == np.asarray(ours)))
         equal += here
+        texts = ["; ".join(" ".join(map(str, half)) for half in cells) for cells in (printed, ours)]
         roots = "; ".join(" ".join(map(str, apart[half][level])) for half in HALVES)
         rows.append(
             in_kind(
                 f"Table {number}",
                 f"level {level}, {joint.replace('_', ' ')}: frames 1 3 5, then with rules 1 and 2",
-                *("; ".join(" ".join(map(str, half)) for half in cells) for cells in (printed, ours)),
-                f"{here} of 6 are equal, {WALKER}; roots nearer than 4 cm are one ({roots} where only equal ones)",
+                *(texts[0], texts[1]),
+                f"{here} of 6 are equal, {WALKER}; roots nearer than 4 cm are one (where only equal ones:"
+                f" {roots})",
             )
         )
     phases = ", ".join(f"{phase:.2f}" for phase in merged["phases"])
-    kept = sum(all(frame) for table in (merged, apart) for frame in table["truth_kept"])
+    kept = " and ".join(f"{sum(map(all, table['truth_kept']))} of 3" for table in (merged, apart))
     ratio = max(float(np.max(merged[half][1:] / merged[half][:-1])) for half in HALVES)
     rows += [
         in_kind(
@@ -243,8 +246,8 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
             f"{WALKER}, frames 1, 3, 5 at gait phases {phases}",
         ),
         in_kind(
-            *(f"Table {number}", "frames in which the true posture is left", "3", str(kept // 2)),
-            f"{WALKER}, with and without rules 1 and 2, roots merged or not",
+            *(f"Table {number}", "frames whose true posture is left", "3 of 3", kept),
+            f"{WALKER}, with and without rules 1 and 2; roots merged and not",
         ),
         in_kind(
             *(f"Table {number}", "largest ratio of two levels", "2", f"{ratio:g}"),
@@ -275,10 +278,10 @@ def _count_table(number: int, merged: dict[str, Any], apart: dict[str, Any]) -> 
 
 Stages = dict[tuple[str, str], list[dict[str, Any]]]
 READINGS = {
-    "rigid_torso": "instead of rule 3 at the shoulder the neck must lie ahead of the line of the shoulders, as a"
-    " rigid torso is not its mirror image; knees are flexed from 25 degrees",
-    "as_printed": "rule 3 refuses arms that swing forward, since the lengths put both shoulders 3.7 cm behind the"
-    " neck",
+    "rigid_torso": "instead of rule 3 at the shoulder the neck must lie ahead of the line of the shoulders,"
+    " as a rigid torso is not its mirror image; knees are flexed from 25 degrees",
+    "as_printed": "rule 3 refuses arms that swing forward, since the lengths put both shoulders 3.7 cm behind"
+    " the neck",
 }
 
 
@@ -317,7 +320,8 @@ def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
                     final,
                 ),
                 f"median {median(groups_left):g}, {min(groups_left)} to {max(groups_left)}",
-                f"printed of frame 1 alone; {WALKER}, frames 1, 3, 5 from each of ten phases on; {READINGS[reading]}",
+                f"printed of frame 1 alone; {WALKER}, frames 1, 3, 5 from each of ten phases on;"
+                f" {READINGS[reading]}",
             )
         )
         broken = Counter(cause for frame in frames for cause in {_without_side(b) for b in frame["broken"]})
@@ -513,8 +517,8 @@ def _distinct(points: Points) -> Points:
 
 
 def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
-    """Of the joints that the postures put at two places behind the same joint, the pair farthest apart: name of
-    the segment, its start (3,) and both ends (2, 3)."""
+    """Of the joints that the postures put at two places behind the same joint, the pair farthest apart: name
+    of the segment, its start (3,) and both ends (2, 3)."""
     names = _memo.joint_names()
     found = []
     for side in ("right", "left"):
@@ -531,7 +535,7 @@ def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
 
 
 def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
-    """In the plane of the line of sight and the known joint: the circle of the segment's length cuts it twice."""
+    """In the plane of the line of sight and the known joint: the segment's circle cuts the line twice."""
     name, start, ends = _two_ends(left)
     ray = ends[0] / np.linalg.norm(ends[0])
     along = float(start @ ray)
@@ -607,8 +611,13 @@ def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
         for number, place in enumerate(places, 1):
             ax.plot(place[2], place[0], marker="o", color=colour)
             up = 1 if letter == "B" else -1
-            ax.annotate(f"{letter}{number}", (place[2], place[0]), xytext=(0, 9 * up), textcoords="offset points",
-                        ha="center", va="center", color=colour)  # fmt: skip
+            above: dict[str, Any] = {
+                "xytext": (0, 9 * up),
+                "textcoords": "offset points",
+                "ha": "center",
+                "va": "center",
+            }
+            ax.annotate(f"{letter}{number}", (place[2], place[0]), color=colour, **above)
     ax.plot(neck[2], neck[0], marker="o", color=NEUTRAL)
     ax.annotate("neck", (neck[2], neck[0]), xytext=(8, 0), textcoords="offset points", va="center")
     for a, first in enumerate(right, 1):

@@ -1,4 +1,4 @@
-"""What a reproduction gives: rows of printed and own values with a verdict, figures, tables; and its files."""
+"""What a reproduction gives: rows of printed and own values with verdicts, figures, tables, files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Verdict(StrEnum):
     """How a printed thing stands."""
 
     SAME = "same"
-    """Computed anew from what the paper gives, and equal to the digits printed or within what the row states."""
+    """Computed anew from what the paper gives, and equal to the digits printed or within what is stated."""
     DIFFERS = "differs"
     """Computed anew from what the paper gives, and not equal; the row says why."""
     IN_KIND = "in kind"
@@ -165,10 +165,10 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.(\d+))?")
 def compared(
     item: str, quantity: str, printed: str, ours: npt.ArrayLike, why: str = "", *, within: float | None = None
 ) -> Row:
-    """A row whose verdict follows from the numbers: same when each differs from the one printed by no more than
-    half a unit of its last digit, or `within`.
+    """A row whose verdict follows from the numbers: same when each differs from the one printed by no more
+    than half a unit of its last digit, or `within`.
 
-    `printed` holds as many numbers as `ours`, and may hold units after them. A row that differs needs a `why`.
+    `printed` holds as many numbers as `ours`, and may hold words between. A row that differs needs a `why`.
     """
     found = list(_NUMBER.finditer(printed))
     values = np.atleast_1d(np.asarray(ours, dtype=float)).ravel()

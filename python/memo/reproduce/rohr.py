@@ -1,7 +1,7 @@
 """Rohr (1994): constants and equations, the model, and every figure in kind.
 
-The paper's sequences are not published. Its numbers that follow from the text are computed; what it shows of a
-sequence is shown of the synthetic scene of `memo demo`, or of a video that is given.
+The paper's sequences are not published. Its numbers that follow from the text are computed; what it shows
+of a sequence is shown of the synthetic scene of `memo demo`, or of a video that is given.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from memo.reproduce.sequence import Clip, NobodyTracked, Sequence, clip_sequence
 
 __all__ = ["Clip", "NobodyTracked", "rohr"]
 
-NOTE = """Numbers and equations are computed from the code that tracks. The paper prints neither its gait samples
-(Murray's averages at ten instants) nor its body sizes, and its image sequences are not published: figures are made
-in kind, on the synthetic scene of `memo demo` (drawn with the model that tracks it, as the paper's synthetic
-sequence was) or on a video that is given. They are not the paper's figures."""
+NOTE = """Numbers and equations are computed from the code that tracks. The paper prints neither its gait
+samples (Murray's averages at ten instants) nor its body sizes, and its image sequences are not published:
+figures are made in kind, on the synthetic scene of `memo demo` (drawn with the model that tracks it, as the
+paper's synthetic sequence was) or on a video that is given. They are not the paper's figures."""
 
 CURVES = ("hip", "knee", "shoulder", "elbow")
 
 
 def rohr(clip: Clip | None = None, progress: Callable[[str], object] = lambda _: None) -> Reproduction:
-    """Every number, equation and figure of Rohr (1994); figures of real sequences from `clip`, if there is one.
+    """Every number, equation and figure of Rohr (1994); figures of real sequences from `clip`, if given.
 
     Raises `NobodyTracked` where nobody is tracked in the clip.
     """
+    filmed = clip_sequence(clip, progress) if clip is not None else None
+    scene = scene_sequence(progress)
     progress("rohr: numbers and equations")
     numbers, deviations = dict(_memo.rohr_numbers()), dict(_memo.rohr_deviations(0))
-    scene = scene_sequence(progress)
-    filmed = clip_sequence(clip, progress) if clip is not None else None
     rows = [
         *_model_rows(numbers, deviations),
         *_image_rows(numbers, deviations, filmed or scene),
@@ -95,7 +95,12 @@ def _model_rows(numbers: dict[str, float], deviations: dict[str, float]) -> list
             *("section 3.1", "sizes of the 14 cylinders", "not printed"),
             "measured on a clothed person; body_parts.csv has memo's, by Drillis and Contini 1966",
         ),
-        cannot("section 3.2", "subjects of the gait study", "60 men, 20 to 65 years", "a cited study (Murray 1964)"),
+        cannot(
+            "section 3.2",
+            "subjects of the gait study",
+            "60 men, 20 to 65 years",
+            "a cited study (Murray 1964)",
+        ),
     ]
 
 
@@ -120,7 +125,8 @@ def _body_table() -> Table:
 
 
 def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: Sequence) -> list[Row]:
-    place, camera_distance = _rectangle_positions(shown)
+    soles = shown.soles_m()
+    away_m = shown.camera.camera_from_world(soles)[:, 2]
     scatter = f"{_on(shown)}; from the rectangles alone"
     return [
         compared("section 4.1", "grey values in the 5x5 window", "25", numbers["window_px"]),
@@ -145,26 +151,13 @@ def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: 
         ),
         in_kind(
             *("section 4.2, Fig. 15", "distance covered in X, metres", "about 4.5"),
-            *(f"{np.ptp(place[:, 0]):.1f}", scatter),
+            *(f"{np.ptp(soles[:, 0]):.1f}", scatter),
         ),
         in_kind(
             *("section 4.2, Fig. 15", "distances from the camera, metres", "10.9 to 12.6"),
-            *(f"{camera_distance.min():.1f} to {camera_distance.max():.1f}", scatter),
+            *(f"{away_m.min():.1f} to {away_m.max():.1f}", scatter),
         ),
     ]
-
-
-def _rectangle_positions(sequence: Sequence) -> tuple[np.ndarray, np.ndarray]:
-    """Soles (N, 3) and their distances from the camera (N,), one for each rectangle that has one."""
-    camera, found = sequence.camera, []
-    for _, left, top, right, bottom in sequence.rectangles:
-        middle = 0.5 * (left + right)
-        try:
-            found.append(camera.position_from_rectangle((middle, bottom), (middle, top), sequence.height_m))
-        except ValueError:  # no upright person spans such a rectangle
-            continue
-    soles = np.array(found).reshape(-1, 3)
-    return soles, camera.camera_from_world(np.ascontiguousarray(soles))[:, 2]
 
 
 # Section 4.3: matching.
@@ -189,7 +182,10 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
         ),
         compared(
             *("eqs. (9), (10)", "growth of Lowe's measure (10) when all is twice as large", "1"),
-            *(deviations["eq_10_scaled_twice"], f"independent of scale; (9) grows {deviations['eq_9_scaled_twice']:g} times"),
+            *(
+                deviations["eq_10_scaled_twice"],
+                f"independent of scale; (9) grows {deviations['eq_9_scaled_twice']:g} times",
+            ),
         ),
         compared(
             *("eq. (11)", "1 - s(p) where every contour is an edge", "0", deviations["eq_11_perfect"]),
@@ -198,7 +194,10 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
         ),
     ]
     for item, look, printed in zip(
-        ("section 4.3, Fig. 19", "section 4.3, Fig. 21"), shown.examples, ("0.55 and 0.05", "not printed"), strict=True
+        ("section 4.3, Fig. 19", "section 4.3, Fig. 21"),
+        shown.examples,
+        ("0.55 and 0.05", "not printed"),
+        strict=True,
     ):
         best, other, apart = similarity_peaks(shown, look)
         rows.append(
@@ -263,17 +262,17 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
             "a cycle of 1 s, 25 images a second",
         ),
         compared(
-            *("section 6", "σ²QX, cm²/image²", "3.69", numbers["sigma_q_x_sq"]),
+            *("section 6", "sigma_QX squared, cm²/image²", "3.69", numbers["sigma_q_x_sq"]),
             f"30 % of 6.4 squared is {numbers['sigma_q_x_sq_from_text']:.4f}; as the filter has it",
         ),
-        compared("section 5.2", "σ²QY", "0", numbers["sigma_q_y_sq"], "the height stays"),
+        compared("section 5.2", "sigma_QY squared", "0", numbers["sigma_q_y_sq"], "the height stays"),
         compared(
-            *("section 6", "σ²Qpose, 1/image²", "0.000144", numbers["sigma_q_pose_sq"]),
+            *("section 6", "sigma_Qpose squared, 1/image²", "0.000144", numbers["sigma_q_pose_sq"]),
             "30 % of 0.04 squared; as the filter has it",
         ),
-        compared("section 6", "σ²RX, cm²", "400", numbers["sigma_r_x_sq"], slip),
-        compared("section 6", "σ²RY, cm²", "100", numbers["sigma_r_y_sq"], slip),
-        compared("section 6", "σ²Rpose", "0.04", numbers["sigma_r_pose_sq"], slip),
+        compared("section 6", "sigma_RX squared, cm²", "400", numbers["sigma_r_x_sq"], slip),
+        compared("section 6", "sigma_RY squared, cm²", "100", numbers["sigma_r_y_sq"], slip),
+        compared("section 6", "sigma_Rpose squared", "0.04", numbers["sigma_r_pose_sq"], slip),
         compared("section 6", "2ΔX, cm", "40", np.round(numbers["interval_x_cm"], 9)),
         compared("section 6", "2ΔY, cm", "20", np.round(numbers["interval_y_cm"], 9)),
         compared("section 6", "2Δpose", "0.4", numbers["interval_pose"]),
@@ -297,7 +296,9 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
 def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
     measured, filtered = scene.walk.measured(), _memo.walk_filtered(scene.walk)
     rows = []
-    for column, (name, unit, scale) in enumerate((("x_m", "cm", 100), ("z_m", "cm", 100), ("phase", "cycles", 1))):
+    for column, (name, unit, scale) in enumerate(
+        (("x_m", "cm", 100), ("z_m", "cm", 100), ("phase", "cycles", 1))
+    ):
         truth = scene.true(name)
         errors = []
         for values in (measured[:, column], filtered[:, column]):
@@ -310,7 +311,8 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
                 *("Fig. 26", f"{letter} measured and after the Kalman filter, RMS from the truth, {unit}"),
                 "fairly good agreement",
                 " and ".join(f"{error:.2g}" for error in errors),
-                f"{_on(scene)}; the filter without smoothing, with the printed variances",
+                f"{_on(scene)}; printed variances, no smoothing; the distance stays what the start made it,"
+                " as in the paper",
             )
         )
     for item, sequence, label in (("Fig. 27", scene, "synthetic"), ("Figs. 28-31", filmed, "real")):
@@ -319,7 +321,11 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
         frames = sequence.track.columns["frame"]
         rows.append(
             in_kind(
-                *(item, f"images through which the pedestrian is tracked, {label} sequence", "the whole sequence"),
+                *(
+                    item,
+                    f"images through which the pedestrian is tracked, {label} sequence",
+                    "the whole sequence",
+                ),
                 *(f"{len(frames)}, numbers {frames[0]} to {frames[-1]}", _on(sequence)),
             )
         )
@@ -328,7 +334,11 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
     low, high = (leg_cm * np.radians(angle) for angle in (3, 5))
     rows.append(
         in_kind(
-            *("section 6, Figs. 32, 33", "what 3 to 5 degrees at the hip move, at the ankle", "relatively large changes"),
+            *(
+                "section 6, Figs. 32, 33",
+                "what 3 to 5 degrees at the hip move, at the ankle",
+                "relatively large changes",
+            ),
             *(f"{low:.0f} to {high:.0f} cm", "thigh and shank of memo's body, times the angle"),
         )
     )
@@ -337,10 +347,25 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
 
 def _cannot_rows(filmed: Sequence | None) -> list[Row]:
     rows = [
-        cannot("Figs. 1-3", "rigid and nonrigid objects, interpretation cycles", "diagrams", "ideas, without data"),
-        cannot("Figs. 34, 35", "pedestrian with cyclist, with car", "2 figures", "models of cycle and car are not described"),
+        cannot(
+            "Figs. 1-3",
+            "rigid and nonrigid objects, interpretation cycles",
+            "diagrams",
+            "ideas, without data",
+        ),
+        cannot(
+            "Figs. 34, 35",
+            "pedestrian with cyclist, with car",
+            "2 figures",
+            "models of cycle and car are not described",
+        ),
         cannot("sections 4-6", "the paper's own sequences f2, f3 and synthetic", "figures", "not published"),
-        cannot("section 4.3", "c_l, c_d, c_r, sigma of the angle, T of eq. (1)", "not printed", "memo's are its own"),
+        cannot(
+            "section 4.3",
+            "c_l, c_d, c_r, sigma of the angle, T of eq. (1)",
+            "not printed",
+            "memo's are its own",
+        ),
         cannot(
             *("Figs. 32, 33", "dashed curves adjusted by hand", "curves"),
             "made by a person on the paper's sequence; where the truth is known it is drawn instead",
@@ -348,6 +373,11 @@ def _cannot_rows(filmed: Sequence | None) -> list[Row]:
     ]
     if filmed is None:
         rows.append(
-            cannot("Figs. 24, 25, 28-31", "results on real sequences", "6 figures", "give a video: --video and --height")
+            cannot(
+                "Figs. 24, 25, 28-31",
+                "results on real sequences",
+                "6 figures",
+                "give a video: --video and --height",
+            )
         )
     return rows

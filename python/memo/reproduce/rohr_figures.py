@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 
 def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
-    """All figures: those of a sequence from `filmed`, if there is one, and of the synthetic one from `scene`."""
+    """All figures: those of a sequence from `filmed`, if given, and the synthetic one's from `scene`."""
     shown = filmed or scene
     first, second = shown.examples
     model = "Memo's body and gait; the paper's sizes and samples are not printed"
@@ -32,68 +32,220 @@ def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
         at = "" if frame is None else f", frame {frame}"
         return f"In kind, on {sequence.label}{at}; the paper's sequence is not published"
 
-    def drawing(name: str, item: str, caption: str, draw: Callable[[Figure], object], size: Any, why: str) -> Drawing:
+    def drawing(
+        name: str, item: str, caption: str, draw: Callable[[Figure], object], size: Any, why: str
+    ) -> Drawing:
         return Drawing(name, item, caption, draw, size, why)
 
     made = [
-        drawing("fig4", "Fig. 4", "The body: all contours, and those not hidden", _draw_body, (6, 5.5), model),
+        drawing(
+            "fig4", "Fig. 4", "The body: all contours, and those not hidden", _draw_body, (6, 5.5), model
+        ),
         drawing("fig5", "Fig. 5", "Several persons, hidden contours removed", _draw_several, (8, 4.5), model),
-        drawing("fig6", "Fig. 6", "Motion curves over the walking cycle: ten samples and their spline, and fifty",
-                _draw_gait, (9, 6), model),
-        drawing("fig7", "Fig. 7", "Movement states for half of the walking cycle", _draw_states, (11, 4), model),
-        drawing("fig8", "Fig. 8", "Grey-value image", lambda f: _draw_image(f, first), (6.4, 4.8), on(shown, first.frame)),
-        drawing("fig9", "Fig. 9", "Result of the change detection, eq. (1)",
-                lambda f: _draw_mask(f, first.stages["changed"]), (6.4, 4.8), on(shown, first.frame)),
-        drawing("fig10", "Fig. 10", "After the binary operations, with the surrounding rectangle",
-                lambda f: _draw_cleaned(f, first), (6.4, 4.8), on(shown, first.frame)),
-        drawing("fig11", "Fig. 11", "Outline", lambda f: _draw_outline(f, first), (4.5, 5.5), on(shown, first.frame)),
-        drawing("fig12", "Fig. 12", "Velocity field", lambda f: _draw_velocities(f, first), (5, 5.5),
-                on(shown, first.frame)),
-        drawing("fig13", "Fig. 13", "Coordinate systems of scene, camera and image", lambda f: _draw_axes(f, shown),
-                (6.5, 5.5), f"{on(shown)}; memo's axes: Z up where the paper has Y"),
-        drawing("fig14", "Fig. 14", "Midpoints of the bottom and top edges of the rectangles",
-                lambda f: _draw_midpoints(f, shown), (6.4, 4.8), on(shown)),
-        drawing("fig15", "Fig. 15", "Positions from single rectangles on the ground plane",
-                lambda f: _draw_positions(f, shown), (7, 3.6), on(shown)),
-        drawing("fig16", "Fig. 16", "Enclosing rectangle and edge lines", lambda f: _draw_edges(f, first), (4.5, 5.5),
-                on(shown, first.frame)),
-        drawing("fig17", "Fig. 17", "Search windows of the model", lambda f: _draw_windows(f, shown, first),
-                (4.5, 5.5), on(shown, first.frame)),
-        drawing("fig18", "Fig. 18", "An edge cut to its window, and the model contour",
-                lambda f: _draw_comparison(f, shown, first), (6.5, 3.6), on(shown, first.frame)),
-        drawing("fig19", "Fig. 19", "Similarity over pose, the place kept",
-                lambda f: _draw_similarity(f, shown, first), (6, 3.4), on(shown, first.frame)),
-        drawing("fig19_surface", "Fig. 19", "Similarity over pose and place, the best height of each",
-                lambda f: _draw_surface(f, shown, first), (7, 4), f"{on(shown, first.frame)}; not in the paper"),
-        drawing("fig20", "Fig. 20", "Determined motion state", lambda f: _draw_state(f, shown, first), (4.5, 5.5),
-                on(shown, first.frame)),
-        drawing("fig21", "Fig. 21", "Similarity over pose, another image",
-                lambda f: _draw_similarity(f, shown, second), (6, 3.4), on(shown, second.frame)),
-        drawing("fig22", "Fig. 22", "Determined motion state, another image",
-                lambda f: _draw_state(f, shown, second), (4.5, 5.5), on(shown, second.frame)),
-        drawing("fig23", "Fig. 23", "The start on a synthetic sequence", lambda f: _draw_start(f, scene), (6, 3.6),
-                on(scene)),
-        drawing("fig26", "Fig. 26", "X, Y and pose: measured, and after the Kalman filter with one σ",
-                lambda f: _draw_filter(f, scene), (8, 6.5), f"{on(scene)}; dashed: the truth"),
-        drawing("fig27", "Fig. 27", "Estimated models, synthetic sequence", lambda f: _draw_models(f, scene), (9, 7),
-                on(scene)),
-    ]  # fmt: skip
+        drawing(
+            "fig6",
+            "Fig. 6",
+            "Motion curves over the walking cycle: ten samples and their spline, and fifty",
+            _draw_gait,
+            (9, 6),
+            model,
+        ),
+        drawing(
+            "fig7", "Fig. 7", "Movement states for half of the walking cycle", _draw_states, (11, 3), model
+        ),
+        drawing(
+            "fig8",
+            "Fig. 8",
+            "Grey-value image",
+            lambda f: _draw_image(f, first),
+            (6.4, 4.8),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig9",
+            "Fig. 9",
+            "Result of the change detection, eq. (1)",
+            lambda f: _draw_mask(f, first.stages["changed"]),
+            (6.4, 4.8),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig10",
+            "Fig. 10",
+            "After the binary operations, with the surrounding rectangle",
+            lambda f: _draw_cleaned(f, first),
+            (6.4, 4.8),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig11",
+            "Fig. 11",
+            "Outline",
+            lambda f: _draw_outline(f, first),
+            (4.5, 5.5),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig12",
+            "Fig. 12",
+            "Velocity field",
+            lambda f: _draw_velocities(f, first),
+            (5, 5.5),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig13",
+            "Fig. 13",
+            "Coordinate systems of scene, camera and image",
+            lambda f: _draw_axes(f, shown),
+            (6.5, 5.5),
+            f"{on(shown)}; memo's axes: Z up where the paper has Y",
+        ),
+        drawing(
+            "fig14",
+            "Fig. 14",
+            "Midpoints of the bottom and top edges of the rectangles",
+            lambda f: _draw_midpoints(f, shown),
+            (6.4, 4.8),
+            on(shown),
+        ),
+        drawing(
+            "fig15",
+            "Fig. 15",
+            "Positions from single rectangles on the ground plane",
+            lambda f: _draw_positions(f, shown),
+            (7, 3.6),
+            on(shown),
+        ),
+        drawing(
+            "fig16",
+            "Fig. 16",
+            "Enclosing rectangle and edge lines",
+            lambda f: _draw_edges(f, first),
+            (4.5, 5.5),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig17",
+            "Fig. 17",
+            "Search windows of the model",
+            lambda f: _draw_windows(f, shown, first),
+            (4.5, 5.5),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig18",
+            "Fig. 18",
+            "An edge cut to its window, and the model contour",
+            lambda f: _draw_comparison(f, shown, first),
+            (6.5, 3.6),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig19",
+            "Fig. 19",
+            "Similarity over pose, the place kept",
+            lambda f: _draw_similarity(f, shown, first),
+            (6, 3.4),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig19_surface",
+            "Fig. 19",
+            "Similarity over pose and place, the best height of each",
+            lambda f: _draw_surface(f, shown, first),
+            (7, 4),
+            f"{on(shown, first.frame)}; not in the paper",
+        ),
+        drawing(
+            "fig20",
+            "Fig. 20",
+            "Determined motion state",
+            lambda f: _draw_state(f, shown, first),
+            (4.5, 5.5),
+            on(shown, first.frame),
+        ),
+        drawing(
+            "fig21",
+            "Fig. 21",
+            "Similarity over pose, another image",
+            lambda f: _draw_similarity(f, shown, second),
+            (6, 3.4),
+            on(shown, second.frame),
+        ),
+        drawing(
+            "fig22",
+            "Fig. 22",
+            "Determined motion state, another image",
+            lambda f: _draw_state(f, shown, second),
+            (4.5, 5.5),
+            on(shown, second.frame),
+        ),
+        drawing(
+            "fig23",
+            "Fig. 23",
+            "The start on a synthetic sequence",
+            lambda f: _draw_start(f, scene),
+            (6, 3.6),
+            on(scene),
+        ),
+        drawing(
+            "fig26",
+            "Fig. 26",
+            "X, Y and pose: measured, and after the Kalman filter with one sigma",
+            lambda f: _draw_filter(f, scene),
+            (8, 6.5),
+            f"{on(scene)}; dashed: the truth",
+        ),
+        drawing(
+            "fig27",
+            "Fig. 27",
+            "Estimated models, synthetic sequence",
+            lambda f: _draw_models(f, scene),
+            _models_size(scene),
+            on(scene),
+        ),
+    ]
     if filmed is not None:
         made += [
-            drawing("fig24", "Figs. 24, 25", "The start on a real sequence", lambda f: _draw_start(f, filmed),
-                    (6, 3.6), on(filmed)),
-            drawing("fig28", "Figs. 28, 30", "As Fig. 26, on a real sequence", lambda f: _draw_filter(f, filmed),
-                    (8, 6.5), on(filmed)),
-            drawing("fig29", "Figs. 29, 31", "Estimated models, real sequence", lambda f: _draw_models(f, filmed),
-                    (9, 7), on(filmed)),
-        ]  # fmt: skip
+            drawing(
+                "fig24",
+                "Figs. 24, 25",
+                "The start on a real sequence",
+                lambda f: _draw_start(f, filmed),
+                (6, 3.6),
+                on(filmed),
+            ),
+            drawing(
+                "fig28",
+                "Figs. 28, 30",
+                "As Fig. 26, on a real sequence",
+                lambda f: _draw_filter(f, filmed),
+                (8, 6.5),
+                on(filmed),
+            ),
+            drawing(
+                "fig29",
+                "Figs. 29, 31",
+                "Estimated models, real sequence",
+                lambda f: _draw_models(f, filmed),
+                _models_size(filmed),
+                on(filmed),
+            ),
+        ]
     for number, side in ((32, "right"), (33, "left")):
         caption = f"Hip and knee of the {side} side: estimated, and the model's optimal movement" + (
             ", with the truth" if shown.truth is not None else ""
         )
         made.append(
             Drawing(
-                *(f"fig{number}", f"Fig. {number}", caption, lambda f, s=side: _draw_angles(f, shown, s), (7, 5)),
+                *(
+                    f"fig{number}",
+                    f"Fig. {number}",
+                    caption,
+                    lambda f, s=side: _draw_angles(f, shown, s),
+                    (7, 5),
+                ),
                 on(shown),
             )
         )
@@ -121,7 +273,7 @@ def similarity_peaks(sequence: Sequence, look: Look) -> tuple[float, float, floa
 
 
 def start_outliers(sequence: Sequence) -> tuple[int, int]:
-    """How many single frames of the start prefer a phase over a quarter cycle off the line, and of how many."""
+    """How many frames of the start prefer a phase over a quarter cycle off the line, and of how many."""
     start = sequence.track.start
     at, rate, _ = start["line"]
     line = at + rate * (np.asarray(start["time_s"]) - start["time_s"][0])
@@ -185,13 +337,20 @@ def _draw_gait(figure: Figure) -> None:
 
 
 def _draw_states(figure: Figure) -> None:
-    states = 10
+    states, spacing = 10, 100.0  # pixels
     ax = figure.subplots()
     for k in range(states):
-        segments, _, _ = _memo.model_contours(_camera(), [(0, 0, 0, 0.5 * k / (states - 1), 1.75)], gait="sampled_10")
-        _lines(ax, segments + [130.0 * k, 0])
-        ax.annotate(f"{0.5 * k / (states - 1):.2f}", (segments[..., 0].mean() + 130 * k, 0), xytext=(0, -12),
-                    xycoords=("data", "axes fraction"), textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
+        segments, _, _ = _memo.model_contours(
+            _camera(), [(0, 0, 0, 0.5 * k / (states - 1), 1.75)], gait="sampled_10"
+        )
+        _lines(ax, segments + np.array([spacing * k, 0]))
+        below: dict[str, Any] = {
+            "xycoords": ("data", "axes fraction"),
+            "xytext": (0, -12),
+            "textcoords": "offset points",
+        }
+        place = (segments[..., 0].mean() + spacing * k, 0)
+        ax.annotate(f"{0.5 * k / (states - 1):.2f}", place, ha="center", fontsize=8, **below)
     ax.set_aspect("equal")
     ax.autoscale_view()
     ax.invert_yaxis()
@@ -251,7 +410,9 @@ def _draw_velocities(figure: Figure, look: Look) -> None:
     y, x = np.mgrid[top : bottom + 1 : step, left : right + 1 : step]
     ax = figure.subplots()
     _grey(ax, look.luma, faint=True)
-    arrows = ax.quiver(x, y, u[y, x], v[y, x], color=RIGHT, angles="xy", scale_units="xy", scale=1 / 2, width=0.003)
+    arrows = ax.quiver(
+        x, y, u[y, x], v[y, x], color=RIGHT, angles="xy", scale_units="xy", scale=1 / 2, width=0.003
+    )
     ax.quiverkey(arrows, 0.8, 1.03, 5, "5 px a frame", labelpos="E", fontproperties={"size": 8})
     _about(ax, look)
 
@@ -310,7 +471,9 @@ def _draw_similarity(figure: Figure, sequence: Sequence, look: Look) -> None:
     ax = figure.subplots()
     ax.plot(phase, score, color=NEUTRAL, marker=".", linewidth=1)
     ax.axvline(best, color=RIGHT, linewidth=1, label=f"best, {best:.2f}")
-    ax.axvline(other, color=LEFT, linewidth=1, linestyle="--", label=f"best about half a cycle away, {other:.2f}")
+    ax.axvline(
+        other, color=LEFT, linewidth=1, linestyle="--", label=f"best about half a cycle away, {other:.2f}"
+    )
     ax.set(xlim=(0, 1), xlabel="pose", ylabel="similarity s(p)")
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False, fontsize=8, ncols=2, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0)
@@ -364,22 +527,30 @@ def _draw_axes(figure: Figure, sequence: Sequence) -> None:
             points = [[columns[f"{side}_{j}_{a}_m"][look.row] for a in "xyz"] for j in chain]
             ax.plot(*np.transpose(points), color=colour, linewidth=1.8)
     trunk = [
-        np.mean([[columns[f"{side}_{j}_{a}_m"][look.row] for a in "xyz"] for side in ("right", "left")], axis=0)
+        np.mean(
+            [[columns[f"{side}_{j}_{a}_m"][look.row] for a in "xyz"] for side in ("right", "left")], axis=0
+        )
         for j in ("shoulder", "hip")
     ]
     ax.plot(*np.transpose(trunk), color=NEUTRAL, linewidth=1.8)
     ax.plot(*np.transpose([position, torso]), color=NEUTRAL, linewidth=0.7, linestyle=":")
     width, height = (0.5 * side for side in camera.size)
     scale = 0.9 / width
-    corners = np.array([[a * width, b * height, 0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))])
+    corners = np.array(
+        [[a * width, b * height, 0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+    )
     frame = position + (scale * corners + [0, 0, 1.5]) @ axes_in_world
     ax.plot(*frame.T, color=NEUTRAL, linewidth=1)
     ax.text(*frame[0], "image", fontsize=8, color=NEUTRAL)
     ax.text(*(position - [0, 0, 0.35]), "camera", fontsize=8)
     ax.text(0, 0, -0.3, "scene", fontsize=8)
-    ax.set(xlabel="X, m", ylabel="Y, m", zlabel="Z, m")
+    ax.set(xticklabels=[], yticklabels=[], zticklabels=[])
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.pane.set_visible(False)
+    ax.grid(False)
     ax.set_aspect("equal")
-    ax.view_init(elev=22, azim=-35)
+    ax.set_box_aspect(None, zoom=1.2)
+    ax.view_init(elev=20, azim=-30)
 
 
 def _draw_midpoints(figure: Figure, sequence: Sequence) -> None:
@@ -393,23 +564,22 @@ def _draw_midpoints(figure: Figure, sequence: Sequence) -> None:
 
 
 def _draw_positions(figure: Figure, sequence: Sequence) -> None:
-    camera, found = sequence.camera, []
-    for _, left, top, right, bottom in sequence.rectangles:
-        middle = 0.5 * (left + right)
-        try:
-            found.append(camera.position_from_rectangle((middle, bottom), (middle, top), sequence.height_m))
-        except ValueError:  # no upright person spans such a rectangle
-            continue
-    soles = np.array(found).reshape(-1, 3)
+    soles = sequence.soles_m()
     ax = figure.subplots()
     ax.plot(soles[:, 0], soles[:, 1], color=NEUTRAL, marker=".", linewidth=0.8, label="single rectangles")
     columns = sequence.track.columns
     ax.plot(columns["x_m"], columns["y_m"], color=RIGHT, linewidth=1.4, label="the track's path")
     if sequence.truth is not None:
-        ax.plot(sequence.true("x_m"), sequence.true("y_m"), color="black", linestyle="--", linewidth=1, label="truth")
+        ax.plot(
+            sequence.true("x_m"),
+            sequence.true("y_m"),
+            color="black",
+            linestyle="--",
+            linewidth=1,
+            label="truth",
+        )
     ax.set(xlabel="X, m", ylabel="Y (away from the camera), m")
-    ax.margins(y=0.15)
-    ax.set_aspect("equal")
+    ax.margins(y=0.3)
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0)
 
@@ -424,7 +594,7 @@ def _draw_start(figure: Figure, sequence: Sequence) -> None:
 
 
 def _draw_filter(figure: Figure, sequence: Sequence) -> None:
-    """Left what the best hypothesis of each frame says, right the Kalman filter, not smoothed, with one sigma."""
+    """Left what the best hypothesis of each frame says, right the Kalman filter before smoothing."""
     frames = sequence.track.columns["frame"]
     measured, filtered = sequence.walk.measured(), _memo.walk_filtered(sequence.walk)
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
@@ -451,9 +621,15 @@ def _draw_filter(figure: Figure, sequence: Sequence) -> None:
         if name == "phase":
             left.set(ylim=(0, 1))
     axes[0, 0].set_title("measured", fontsize=10)
-    axes[0, 1].set_title("Kalman filter, ± one σ", fontsize=10)
+    axes[0, 1].set_title("Kalman filter, ± one sigma", fontsize=10)
     for ax in axes[-1]:
         ax.set(xlabel="image number")
+
+
+def _models_size(sequence: Sequence) -> tuple[float, float]:
+    """Two by two images fill it."""
+    height, width = sequence.shown[0][1].shape
+    return 9.0, 9.0 * height / width + 0.5
 
 
 def _draw_models(figure: Figure, sequence: Sequence) -> None:
@@ -467,7 +643,7 @@ def _draw_models(figure: Figure, sequence: Sequence) -> None:
 
 
 def _draw_angles(figure: Figure, sequence: Sequence, side: str) -> None:
-    """Hip above, knee below: estimated (solid), the truth where known (dashed), the model at a steady pace."""
+    """Hip above, knee below: estimated (solid), the truth if known (dashed), the model at a steady pace."""
     columns = sequence.track.columns
     frames = columns["frame"]
     phase = np.unwrap(columns["phase"], period=1.0)
@@ -476,11 +652,21 @@ def _draw_angles(figure: Figure, sequence: Sequence, side: str) -> None:
     axes = figure.subplots(2, 1, sharex=True)
     for column, (ax, joint) in enumerate(zip(axes, ("hip", "knee"), strict=True)):
         name = f"{side}_{joint}_deg"
-        ax.plot(frames, columns[name], color=RIGHT if side == "right" else LEFT, linewidth=1.6, label="estimated")
+        ax.plot(frames, columns[name], color=RIGHT if side == "right" else LEFT, linewidth=4, alpha=0.45,
+                label="estimated")  # fmt: skip
         if sequence.truth is not None:
             ax.plot(frames, sequence.true(name), color="black", linestyle="--", linewidth=1, label="truth")
-        ax.plot(frames, model[:, column], color=NEUTRAL, linestyle=":", linewidth=1.4, label="model at a steady pace")
+        ax.plot(
+            frames,
+            model[:, column],
+            color=NEUTRAL,
+            linestyle=":",
+            linewidth=1.4,
+            label="model at a steady pace",
+        )
         ax.set(ylabel=f"{joint}, degrees")
         ax.spines[["top", "right"]].set_visible(False)
-    axes[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0)
+    axes[0].legend(
+        frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0
+    )
     axes[-1].set(xlabel="image number")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -80,6 +81,16 @@ class Sequence:
         """The camera given or guessed."""
         return self.walk.camera
 
+    def soles_m(self) -> npt.NDArray[np.float64]:
+        """Places (N, 3) from single rectangles, eqs. (3)-(6), without those that no upright person spans."""
+        found = []
+        for _, left, top, right, bottom in self.rectangles:
+            middle = 0.5 * (left + right)
+            with contextlib.suppress(ValueError):
+                place = self.camera.position_from_rectangle((middle, bottom), (middle, top), self.height_m)
+                found.append(place)
+        return np.array(found).reshape(-1, 3)
+
     def true(self, name: str) -> npt.NDArray[Any]:
         """The truth of a column in the frames of the track; only where there is one."""
         if self.truth is None:
@@ -93,7 +104,9 @@ def scene_sequence(progress: Callable[[str], object]) -> Sequence:
     scene = demo_scene(SEED)
 
     def frames() -> Frames:
-        yield from ((k, float(t), f) for k, (t, f) in enumerate(zip(scene.times_s, scene.frames, strict=True)))
+        yield from (
+            (k, float(t), f) for k, (t, f) in enumerate(zip(scene.times_s, scene.frames, strict=True))
+        )
 
     progress("rohr: tracking the synthetic scene")
     tracker = Tracker(scene.height_m, scene.camera, adapt=False)
@@ -157,9 +170,7 @@ def _sequence(
             shown.append((row, here))
     if len(examples) < 2:
         raise NobodyTracked(f"{label}: nothing moves in the frames of the start")
-    return Sequence(
-        label, height_m, track, (examples[0], examples[1]), shown, np.array(rectangles), truth
-    )
+    return Sequence(label, height_m, track, (examples[0], examples[1]), shown, np.array(rectangles), truth)
 
 
 def _spread(rows: Any, count: int) -> list[int]:
