@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from memo.cli.reproduce import Paper
 from memo.reproduce import EXPERIMENTS, Clip, NobodyTracked, Verdict, hoffman_flinchbaugh, lee_chen, rohr
 from memo.reproduce.lee_chen import plot_posture, plot_superposition
 from memo.reproduce.result import Row, cannot, compared
+from memo.reproduce.rohr_figures import similarity_peaks
+from memo.reproduce.sequence import scene_sequence
 
 # Lee and Chen, Tables 3 and 4, last row: left ankle, frames 1, 3, 5, then with rules 1 and 2.
 PRINTED_LEAVES = {"SEQ1": ([192, 96, 80], [32, 20, 28]), "SEQ2": ([44, 32, 8], [6, 5, 4])}
@@ -42,7 +45,17 @@ FIGURES = {
 
 
 @pytest.fixture(scope="module")
-def papers():
+def scene():
+    """The synthetic scene, tracked once for all tests."""
+    once = scene_sequence(lambda _: None)
+    with pytest.MonkeyPatch.context() as patch:
+        # The package's attribute `rohr` is the function, not the module.
+        patch.setattr(sys.modules["memo.reproduce.rohr"], "scene_sequence", lambda progress: once)
+        yield once
+
+
+@pytest.fixture(scope="module")
+def papers(scene):
     return {name: reproduce() for name, reproduce in EXPERIMENTS.items()}
 
 
@@ -234,11 +247,7 @@ def test_a_search_window_is_as_long_as_the_contour_and_half_as_wide():
     assert np.linalg.norm(corners[3] - corners[0]) == pytest.approx(2.5)
 
 
-def test_a_walk_is_searched_over_the_cycle_and_filtered_without_smoothing():
-    from memo.reproduce.rohr_figures import similarity_peaks
-    from memo.reproduce.sequence import scene_sequence
-
-    scene = scene_sequence(lambda _: None)
+def test_a_walk_is_searched_over_the_cycle_and_filtered_without_smoothing(scene):
     look = scene.examples[1]
     found = _memo.walk_similarity(scene.walk, look.row, look.stages["edges"], along_m=0.2, height_m=0.1)
     assert found["scores"].shape == (50, 21, 11)
@@ -257,6 +266,7 @@ def test_a_walk_is_searched_over_the_cycle_and_filtered_without_smoothing():
         _memo.walk_similarity(scene.walk, 0, np.zeros((1, 3)))
 
 
+@pytest.mark.usefixtures("scene")
 def test_a_clip_takes_the_place_of_the_real_sequences():
     clip = Clip(shared_video("weizmann_ido_walk") / "ido_walk.avi", 1.75)
     made = rohr(clip)
