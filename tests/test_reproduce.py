@@ -450,7 +450,7 @@ def run(monkeypatch, *arguments):
 def test_the_command_prints_the_rows_and_names_what_it_wrote(tmp_path, monkeypatch, capsys):
     assert run(monkeypatch, "hoffman-flinchbaugh", "--out", tmp_path / "here") == Exit.DONE
     said = capsys.readouterr().out
-    assert "Proposition 1" in said and "probability zero" in said and "fig5.png" in said
+    assert "Proposition 1" in said and "probability zero" in said and "7 figures" in said
     assert (tmp_path / "here" / "reproduction.md").is_file()
 
 
@@ -468,6 +468,21 @@ def test_without_an_argument_all_papers_are_made(tmp_path, monkeypatch, papers):
     assert run(monkeypatch, "--quiet", "--out", tmp_path) == Exit.DONE
     for name, reproduction in papers.items():
         assert len(read_csv(tmp_path / name / "reproduction.csv")) == len(reproduction.rows)
+        assert f"({name}/reproduction.md)" in (tmp_path / "reproduction.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("made_before")
+def test_figures_of_an_earlier_run_do_not_stay(tmp_path, papers):
+    folder = tmp_path / "rohr"
+    papers["rohr"].write(folder)
+    table = folder / "reproduction.csv"
+    table.write_text(
+        table.read_text(encoding="utf-8") + "Fig. 24,q,figure,fig24.png,in kind,why\n", encoding="utf-8"
+    )
+    for name in ("fig24.png", "mine.png"):
+        (folder / name).write_bytes(b"")
+    papers["rohr"].write(folder)
+    assert not (folder / "fig24.png").exists() and (folder / "mine.png").exists()
 
 
 @pytest.mark.parametrize(

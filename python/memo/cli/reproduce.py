@@ -96,6 +96,7 @@ def _clip(
 
 def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
     from memo.reproduce import EXPERIMENTS, NobodyTracked
+    from memo.reproduce.result import write_index
 
     names = list(EXPERIMENTS) if paper is Paper.ALL else [paper.value]
     check_writable(delivery.out)
@@ -111,14 +112,18 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
             for reproduction in made:
                 folder = delivery.out / (reproduction.name if paper is Paper.ALL else "")
                 written += reproduction.write(folder, progress)
+            if paper is Paper.ALL:
+                written.append(write_index(delivery.out, made))
     except NobodyTracked as error:
         complain(str(error))
         return Exit.NOBODY
-    if delivery.talks:
+    if delivery.as_json:
+        delivery.tell({"papers": [_summary(reproduction) for reproduction in made]}, [], written)
+    elif delivery.talks:
         for reproduction in made:
             _print(reproduction)
-    summary = {"papers": [_summary(reproduction) for reproduction in made]}
-    delivery.tell(summary, [], written)
+        figures = sum(path.suffix == ".png" for path in written)
+        print(f"Written to {delivery.out}: reproduction.md and .csv, {figures} figures and the tables.")
     return Exit.DONE
 
 

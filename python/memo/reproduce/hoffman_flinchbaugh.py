@@ -19,7 +19,7 @@ from memo import _memo
 from memo.linkage import PlanarFigure, planar
 from memo.linkage_plot import COLOURS
 from memo.plot import LEFT, NEUTRAL, RIGHT
-from memo.reproduce.result import Drawing, Reproduction, Row, Table, Verdict, cannot, compared, in_kind
+from memo.reproduce.result import EQUAL, Drawing, Reproduction, Row, Table, Verdict, cannot, compared, in_kind
 
 __all__ = ["hoffman_flinchbaugh"]
 
@@ -119,12 +119,16 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             rest=NEAR,
         ),
         compared(
-            *(f"{where}, eq. (6)", "[a1 a2 a3] less k3 z1 + k4 z2 + k5 z3, largest", "0"),
+            *(f"{where}, eq. (6)", "[a1 a2 a3] less k3 z1 + k4 z2 + k5 z3, largest", EQUAL),
             *(rods["triple_product_error"], f"{trials} triples of vectors with the k's of footnote 11"),
             within=1e-12,
         ),
         compared(
-            *(f"{where}, Jacobian", "determinant less 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), largest", "0"),
+            *(
+                f"{where}, Jacobian",
+                "determinant less 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), largest",
+                EQUAL,
+            ),
             *(rods["jacobian_error"], "the determinant printed, expanded; footnote 12 asks for its factors"),
             within=1e-12,
         ),

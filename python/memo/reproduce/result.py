@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections import Counter
@@ -19,7 +20,21 @@ from matplotlib.figure import Figure
 
 from memo.files import complete_file
 
-__all__ = ["Drawing", "Reproduction", "Row", "Table", "Verdict", "cannot", "compared", "in_kind"]
+__all__ = [
+    "EQUAL",
+    "Drawing",
+    "Reproduction",
+    "Row",
+    "Table",
+    "Verdict",
+    "cannot",
+    "compared",
+    "in_kind",
+    "write_index",
+]
+
+EQUAL = "equal (0)"
+"""What is printed of the difference of an equation's two sides."""
 
 ROW_COLUMNS = ("item", "quantity", "printed", "ours", "verdict", "why")
 """Columns of `reproduction.csv`, in order."""
@@ -133,6 +148,7 @@ class Reproduction:
         """Writes reproduction.md, reproduction.csv, the tables and the figures; their paths."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
+        self._remove_others(folder)
         written = [folder / "reproduction.md", folder / "reproduction.csv"]
         for drawing in self.figures:
             progress(f"{self.name}: drawing {drawing.item}")
@@ -144,6 +160,17 @@ class Reproduction:
         with complete_file(written[0]) as temporary:
             temporary.write_text(self.markdown(), encoding="utf-8")
         return written
+
+    def _remove_others(self, folder: Path) -> None:
+        """Figures of an earlier run that this one does not draw: they would stand beside other rows."""
+        with (
+            contextlib.suppress(OSError),
+            open(folder / "reproduction.csv", newline="", encoding="utf-8") as file,
+        ):
+            earlier = {row["ours"] for row in csv.DictReader(file) if row.get("printed") == "figure"}
+            for name in earlier - {f"{drawing.name}.png" for drawing in self.figures}:
+                if Path(name).name == name:
+                    (folder / name).unlink(missing_ok=True)
 
     def markdown(self) -> str:
         """The rows as a table and the figures with their captions."""
@@ -157,6 +184,18 @@ class Reproduction:
             lines += ["", f"## {drawing.item}", "", f"{drawing.caption}. {drawing.why}", ""]
             lines.append(f"![{drawing.item}]({drawing.name}.png)")
         return "\n".join([*lines, ""])
+
+
+def write_index(folder: Path, reproductions: Sequence[Reproduction]) -> Path:
+    """Writes `folder`/reproduction.md, which counts each paper's verdicts and leads to its folder."""
+    lines = ["# The papers again", "", f"| paper | {' | '.join(Verdict)} |", "|---|" + "---|" * len(Verdict)]
+    for made in reproductions:
+        counts = " | ".join(str(count) for count in made.counts.values())
+        lines.append(f"| [{made.title}]({made.name}/reproduction.md) | {counts} |")
+    path = folder / "reproduction.md"
+    with complete_file(path) as temporary:
+        temporary.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return path
 
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.(\d+))?")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from memo import _memo
-from memo.reproduce.result import Reproduction, Row, Table, Verdict, cannot, compared, in_kind
+from memo.reproduce.result import EQUAL, Reproduction, Row, Table, Verdict, cannot, compared, in_kind
 from memo.reproduce.rohr_figures import figures, similarity_peaks, start_outliers
 from memo.reproduce.sequence import Clip, NobodyTracked, Sequence, clip_sequence, scene_sequence
 
@@ -66,23 +66,28 @@ def _model_rows(numbers: dict[str, float], deviations: dict[str, float]) -> list
         compared("section 3.1", "of arms and legs, three each", "12", numbers["arm_and_leg_parts"]),
         compared("section 3.1", "parameters of a cylinder", "3", len(_memo.body_parts(1.75)[0]) - 1),
         compared(
-            *("section 3.1", "printed inverse of A times A, less I", "0", deviations["inverse"]),
+            *("section 3.1", "printed inverse of A times A, less I", EQUAL, deviations["inverse"]),
             "largest element, 100 rigid transforms",
             within=1e-9,
         ),
         compared(
-            *("section 3.1", "printed A_i A_i+1 less the product of matrices", "0", deviations["product"]),
+            *(
+                "section 3.1",
+                "printed A_i A_i+1 less the product of matrices",
+                EQUAL,
+                deviations["product"],
+            ),
             "largest element, 100 pairs",
             within=1e-9,
         ),
         compared(
-            *("section 3.2", "splines through ten samples less the samples, degrees", "0"),
+            *("section 3.2", "splines through ten samples less the samples, degrees", EQUAL),
             deviations["spline_samples_deg"],
             "ten samples of a sine of 60 degrees; periodic cubic spline",
             within=1e-9,
         ),
         compared(
-            *("section 3.2", "left side less right side half a cycle later, degrees", "0"),
+            *("section 3.2", "left side less right side half a cycle later, degrees", EQUAL),
             deviations["left_half_cycle_later_deg"],
             "all four joints, 100 phases: one parameter fixes the posture",
             within=1e-9,
@@ -135,17 +140,22 @@ def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: 
             f"so X X* has rank {numbers['rank']:g}",
         ),
         compared(
-            *("eq. (1)", "norm of two fits' difference less the norm computed", "0", deviations["eq_1"]),
+            *(
+                "eq. (1)",
+                "norm of two fits' difference less the norm computed",
+                EQUAL,
+                deviations["eq_1"],
+            ),
             "relative, 100 pairs of random windows; memo fits the difference once, in integers",
             within=1e-5,
         ),
         compared(
-            *("eq. (6)", "T* X* + b* over its largest term", "0", deviations["eq_6"]),
+            *("eq. (6)", "T* X* + b* over its largest term", EQUAL, deviations["eq_6"]),
             "100 people before random cameras; six equations, five unknowns",
             within=1e-9,
         ),
         compared(
-            *("eqs. (3)-(6)", "position from the rectangle less the true one, metres", "0"),
+            *("eqs. (3)-(6)", "position from the rectangle less the true one, metres", EQUAL),
             *(deviations["eq_6_position_m"], "exact midpoints"),
             within=1e-9,
         ),
@@ -166,29 +176,43 @@ def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: 
 def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
     rows = [
         compared(
-            *("eq. (7)", "s_i as printed less the score that is used, over l", "0", deviations["eq_7"]),
+            *(
+                "eq. (7)",
+                "s_i as printed less the score that is used, over l",
+                EQUAL,
+                deviations["eq_7"],
+            ),
             "200 pairs of contour and edge",
             within=1e-5,
         ),
         compared(
-            *("eqs. (7), (8)", "the two forms of s_i, difference over l", "0", deviations["eq_8"]),
+            *("eqs. (7), (8)", "the two forms of s_i, difference over l", EQUAL, deviations["eq_8"]),
             "200 pairs",
             within=1e-9,
         ),
         compared(
-            *("eq. (8)", "change of the exponent when all is three times as large", "0"),
+            *("eq. (8)", "change of the exponent when all is three times as large", EQUAL),
             *(deviations["eq_8_scale"], "the exponent does not depend on the scale"),
             within=1e-9,
         ),
         compared(
-            *("eqs. (9), (10)", "growth of Lowe's measure (10) when all is twice as large", "1"),
+            *(
+                "eqs. (9), (10)",
+                "growth of Lowe's measure (10) when all is twice as large",
+                "independent of scale (1)",
+            ),
             *(
                 deviations["eq_10_scaled_twice"],
                 f"independent of scale; (9) grows {deviations['eq_9_scaled_twice']:g} times",
             ),
         ),
         compared(
-            *("eq. (11)", "1 - s(p) where every contour is an edge", "0", deviations["eq_11_perfect"]),
+            *(
+                "eq. (11)",
+                "1 - s(p) where every contour is an edge",
+                EQUAL,
+                deviations["eq_11_perfect"],
+            ),
             "the sum is normalised by the contours' lengths",
             within=1e-5,
         ),
@@ -249,7 +273,7 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
     slip = "printed per image², a slip: it is a variance of a position"
     return [
         compared(
-            *("eqs. (12)-(22)", "eight-state filter as printed less the filters that run", "0"),
+            *("eqs. (12)-(22)", "eight-state filter as printed less the filters that run", EQUAL),
             *(deviations["eqs_12_22"], "largest of states and covariances over 50 images"),
             within=1e-9,
         ),
