@@ -138,8 +138,9 @@ def test_noise_is_not_a_walker():
 
 def test_progress_is_told_after_every_frame():
     told = []
-    memo.track([GREY] * 4, height_m=1.75, fps=25, progress=told.append)
-    assert told == [1, 2, 3, 4]
+    memo.track([GREY] * 2, height_m=1.75, fps=25, progress=lambda *counts: told.append(counts))
+    memo.track(iter([GREY] * 2), height_m=1.75, fps=25, progress=lambda *counts: told.append(counts))
+    assert told == [(1, 2), (2, 2), (1, None), (2, None)]
 
 
 # On a real walk

@@ -2,7 +2,11 @@
 
 Frames are numpy arrays (H, W) uint8; metres and seconds throughout; world Z up; gait phase in [0, 1) with
 0 at the right heel strike.
+
+What happens is told to the logger "memo", which is silent unless your program sets up logging.
 """
+
+import logging as _logging
 
 from memo._memo import (
     Camera,
@@ -26,6 +30,8 @@ from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
 from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
+
+_logging.getLogger("memo").addHandler(_logging.NullHandler())
 
 __all__ = [
     "Camera",

@@ -1,6 +1,6 @@
 """The compiled core; see the docstrings of the `memo` package for shapes, units and axes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any, Self, final
 
@@ -13,6 +13,7 @@ __all__ = [
     "Tracker",
     "Walk",
     "__version__",
+    "_camera",
     "body_parts",
     "change_mask",
     "edge_segments",
@@ -97,6 +98,15 @@ class Camera:
     def position_on_ground(
         self, bottom_px: tuple[float, float], top_px: tuple[float, float], height_m: float
     ) -> tuple[float, float, float]: ...
+
+def _camera(
+    size: tuple[int, int],
+    focal_px: tuple[float, float],
+    centre_px: tuple[float, float],
+    lens: tuple[str, list[float]],
+    rotation: Sequence[float],
+    translation_m: tuple[float, float, float],
+) -> Camera: ...
 
 @final
 class Scene:
@@ -247,6 +257,7 @@ def planar(
     names: Sequence[str] | None = None,
     scales: Sequence[float] | npt.NDArray[np.float64] | None = None,
     focal_px: float | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
 def planar_rods(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 def planar_hinges(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
@@ -297,6 +308,7 @@ def posture(
     head_points: npt.NDArray[np.float64] | None = None,
     group_m: float = 0.10,
     max_groups: int = 64,
+    progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Any]: ...
 def posture_tree(
     rays: npt.NDArray[np.float64],

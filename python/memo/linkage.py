@@ -6,21 +6,29 @@ Arrays in, arrays out; the numbers come from the core. Tracks are (T, K, 2) pixe
 from __future__ import annotations
 
 import csv
+import logging
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, complete_file
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
+
+_log = logging.getLogger(__name__)
 
 Array = npt.NDArray[np.float64]
 
@@ -46,7 +54,7 @@ JOINT_NAMES = frozenset(_SHORT.values())
 """Names that `read_points_csv` gives to points that are joints."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class Points:
     """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
 
@@ -58,6 +66,10 @@ class Points:
     positions: Array
     scales: Array | None = None
 
+    def __repr__(self) -> str:
+        frames, count, dimensions = self.positions.shape
+        return f"Points({count} points in {dimensions}D, {frames} frames)"
+
     def at_one_scale(self) -> Points:
         """The same points with the scales divided out, as depths are."""
         if self.scales is None:
@@ -68,7 +80,7 @@ class Points:
         return replace(self, positions=self.positions / self.scales[:, None, None], scales=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class PlanarFigure:
     """The linkage found in tracks, window by window.
 
@@ -80,12 +92,14 @@ class PlanarFigure:
     where it is open). `depth` (T, K) is each point's depth against the first point of its chain
     in pixels, NaN where not known, up to a reflection of each open chain; `sources` says by frame where it
     comes from. `perspective_px`: by how much perspective moves a point at most, if a focal length was given.
+    `points`: the tracks as they were given, with the names of the points or their numbers.
     """
 
     windows: list[dict[str, Any]]
     depth: Array
     sources: list[str]
     perspective_px: float | None = None
+    points: Points | None = None
 
     @property
     def interpreted(self) -> list[dict[str, Any]]:
@@ -111,6 +125,43 @@ class PlanarFigure:
             counts.setdefault(link["points"], Counter())[verdict] += 1
         return {points: dict(counts[points].most_common()) for points in sorted(counts)}
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """The links as a `pandas.DataFrame`: the two points, `length_px`, `confidence` and `windows`, means
+        over the windows in which they were found."""
+        rows = self.links()
+        names = [str(number) for number in range(self.depth.shape[1])]
+        if self.points is not None:
+            names = self.points.names
+        return data_frame(
+            {
+                "a": [names[row[0]] for row in rows],
+                "b": [names[row[1]] for row in rows],
+                "length_px": [row[2] for row in rows],
+                "confidence": [row[3] for row in rows],
+                "windows": [row[4] for row in rows],
+            }
+        )
+
+    def plot(self, window: int | None = None, ax: Axes | None = None) -> Axes:
+        """Draws the linkage of a window, by default the first interpreted one, into `ax`, or Axes of its own,
+        and returns them. Needs matplotlib."""
+        from memo.linkage_plot import plot_linkage, telling_window
+        from memo.plot import new_axes
+
+        if self.points is None or not self.windows:
+            raise ValueError("there is nothing to plot: no window")
+        if window is None:
+            window = telling_window(self)
+        if not 0 <= window < len(self.windows):
+            raise IndexError(f"window {window} of {len(self.windows)}")
+        return plot_linkage(new_axes() if ax is None else ax, self.points, self, window)
+
+    def __repr__(self) -> str:
+        return (
+            f"PlanarFigure({len(self.links())} links of {self.depth.shape[1]} points, "
+            f"{len(self.interpreted)} of {len(self.windows)} windows interpreted)"
+        )
+
     def _judged(self) -> list[tuple[dict[str, Any], str]]:
         """Links of the interpreted windows with the verdicts of their chains."""
         chains = (chain for window in self.interpreted for chain in window["chains"])
@@ -118,7 +169,12 @@ class PlanarFigure:
 
 
 def planar(
-    tracks: Array, times_s: Sequence[float] | Array, noise_px: float = 0.0, **options: Any
+    tracks: Array,
+    times_s: Sequence[float] | Array,
+    noise_px: float = 0.0,
+    *,
+    progress: Callable[[int, int], object] | None = None,
+    **options: Any,
 ) -> PlanarFigure:
     """Links unnamed tracks (T, K, 2) into limbs that swing in planes.
 
@@ -126,14 +182,18 @@ def planar(
     figure, by default that of the points), `carry` (lengths through windows in which the figure is lost),
     `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points where they are joints
     (`RKN`, `right_knee`): joint limits then tell limbs from their mirrors; `scales` (T,) of the frames;
-    `focal_px`, to be told what perspective costs.
+    `focal_px`, to be told what perspective costs. `progress` is called with the windows done and in all.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
-    found = _memo.planar(tracks, np.asarray(times_s, dtype=np.float64), noise_px, **options)
+    at_s = np.asarray(times_s, dtype=np.float64)
+    found = _memo.planar(tracks, at_s, noise_px, progress=progress, **options)
     for window in found["windows"]:
         if window["status"] == "unseen" and np.isfinite(tracks[window["start"] : window["end"]]).any():
             window["status"] = "nothing linked"
-    return PlanarFigure(**found)
+    names = options.get("names") or [str(number) for number in range(tracks.shape[1])]
+    figure = PlanarFigure(**found, points=Points(list(names), at_s, tracks))
+    _log.info("%r", figure)
+    return figure
 
 
 def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float | None = None) -> Points:

@@ -18,6 +18,7 @@ from memo.overlay import _h264
 
 __all__ = [
     "plot_linkage",
+    "telling_window",
     "write_display_video",
     "write_linkage_png",
     "write_turned_png",
@@ -56,12 +57,17 @@ def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *,
     return ax
 
 
+def telling_window(figure: PlanarFigure) -> int:
+    """The first interpreted window, or the first at all."""
+    states = [window["status"] for window in figure.windows]
+    return states.index("interpreted") if "interpreted" in states else 0
+
+
 def write_linkage_png(
     path: str | PathLike[str], points: Points, figure: PlanarFigure, *, names: bool = True
 ) -> None:
     """The first interpreted window, or the first at all, as a picture."""
-    states = [window["status"] for window in figure.windows]
-    window = states.index("interpreted") if "interpreted" in states else 0
+    window = telling_window(figure)
     drawing = Figure(figsize=(7, 8), layout="constrained")
     FigureCanvasAgg(drawing)
     plot_linkage(drawing.subplots(), points, figure, window, names=names)

@@ -17,14 +17,31 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import complete_file
+from memo.files import ANGLES, complete_file
 
-__all__ = ["plot_angles", "plot_motion", "plot_similarity", "plot_start", "write_plots"]
+__all__ = [
+    "new_axes",
+    "plot_angles",
+    "plot_exchanges",
+    "plot_motion",
+    "plot_over_time",
+    "plot_similarity",
+    "plot_start",
+    "write_plots",
+]
 
 RIGHT = "#d55e00"
 LEFT = "#0072b2"
 NEUTRAL = "#444444"
+SIDE_COLOURS = {"right": RIGHT, "left": LEFT}
 MEASURED: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 4, "color": NEUTRAL}
+
+
+def new_axes() -> Axes:
+    """Axes of a new figure of pyplot's, which notebooks show by themselves."""
+    from matplotlib import pyplot
+
+    return pyplot.subplots(layout="constrained")[1]
 
 
 def plot_similarity(ax: Axes, track: Any, start_row: int = 0) -> Axes:
@@ -84,19 +101,65 @@ def plot_angles(axes: Sequence[Axes], track: Any) -> Sequence[Axes]:
 
     `axes` are two: hip and knee.
     """
-    columns = track.columns
     for ax, joint in zip(axes, ("hip", "knee"), strict=True):
-        for side, colour in (("right", RIGHT), ("left", LEFT)):
-            flexion = columns[f"{side}_{joint}_deg"]
-            ax.plot(columns["time_s"], flexion, color=colour, linewidth=1.2, label=side)
-        for event in track.events:
-            if event["event"] == "heel_strike":
-                colour = RIGHT if event["side"] == "right" else LEFT
-                ax.axvline(event["time_s"], color=colour, linewidth=0.6, linestyle=":")
-        ax.set(ylabel=f"{joint} flexion, degrees")
-    _legend_above(axes[0])
+        plot_over_time(ax, track, joint)
+        ax.set(xlabel="")
+    for ax in axes[1:]:
+        legend = ax.get_legend()
+        if legend is not None:
+            legend.remove()
     axes[-1].set(xlabel="time, s (dotted: heel strikes)")
     return axes
+
+
+def plot_over_time(ax: Axes, track: Any, what: str) -> Axes:
+    """Over time: flexion of a joint ("hip", "knee", "shoulder", "elbow") on both sides, with the heel
+    strikes, or one column with its standard deviation, if it has one."""
+    columns = track.columns
+    time_s = columns["time_s"]
+    if what in ANGLES:
+        for side, colour in SIDE_COLOURS.items():
+            ax.plot(time_s, columns[f"{side}_{what}_deg"], color=colour, linewidth=1.2, label=side)
+        for event in track.events:
+            if event["event"] == "heel_strike":
+                ax.axvline(event["time_s"], color=SIDE_COLOURS[event["side"]], linewidth=0.6, linestyle=":")
+        ax.set(ylabel=f"{what} flexion, degrees")
+        _legend_above(ax)
+    elif what in columns:
+        value, sd = columns[what], columns.get(f"sd_{what}", np.full(len(time_s), np.nan))
+        at = time_s
+        if what == "phase":
+            value, at, sd = _cut_at_wraps(value, time_s, sd)
+        ax.plot(at, value, color=NEUTRAL, linewidth=1.2)
+        ax.fill_between(at, value - sd, value + sd, color=NEUTRAL, alpha=0.25, linewidth=0)
+        ax.set(ylabel=what)
+    else:
+        wanted = ", ".join((*ANGLES, *columns))
+        raise ValueError(f"nothing named {what!r} to plot; there are {wanted}")
+    ax.set(xlabel="time, s")
+    return ax
+
+
+def plot_exchanges(ax: Axes, repair: Any) -> Axes:
+    """Where right and left were exchanged in keypoints, as a bar over time a group; grey where undecided."""
+    keypoints = repair.keypoints
+    frame_s = float(np.median(np.diff(keypoints.times_s))) if len(keypoints.times_s) > 1 else 1.0
+    at_s = dict(zip(keypoints.frames.tolist(), keypoints.times_s.tolist(), strict=True))
+    groups = list(repair.exchanged)
+    shades = {"flipped": RIGHT, "guessed": "#e8b48a", "undecided": "#cccccc"}
+    for verdict in ("undecided", "guessed", "flipped"):
+        for place, group in enumerate(groups):
+            spans = [
+                (row["time_s"], at_s[row["last_frame"]] - row["time_s"] + frame_s)
+                for row in repair.flips
+                if (row["group"], row["verdict"]) == (group, verdict)
+            ]
+            label = verdict if place == 0 else None
+            ax.broken_barh(spans, (place - 0.4, 0.8), color=shades[verdict], label=label)
+    ends = keypoints.times_s[[0, -1]] + [0, frame_s] if len(keypoints.times_s) else [0, 1]
+    ax.set(xlim=ends, xlabel="time, s", yticks=range(len(groups)), yticklabels=groups)
+    _legend_above(ax)
+    return ax
 
 
 def write_plots(track: Any, out_dir: str | PathLike[str]) -> list[Path]:

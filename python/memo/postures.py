@@ -11,12 +11,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +25,15 @@ import numpy.typing as npt
 from memo import _memo, sides
 from memo.files import write_columns_csv, write_json
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["Postures", "Reason", "ReasonTotal", "SecondBest", "posture", "read_lengths", "write_postures"]
+
+_log = logging.getLogger(__name__)
 
 RULES = ("physical", "walking", "walking-general", "running", "standing")
 STRENGTHS = ("measured", "paper")
@@ -68,7 +76,7 @@ class ReasonTotal(NamedTuple):
     """What the constraint is."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SecondBest:
     """The likeliest other motion: where it differs, and how much less likely it is."""
 
@@ -84,8 +92,12 @@ class SecondBest:
     p: float
     """Probability of this one against the best."""
 
+    def __repr__(self) -> str:
+        where = f"frames {self.first_frame}-{self.last_frame}"
+        return f"SecondBest({', '.join(self.joints)} mirrored in {where}, p = {self.p:.2g})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Postures:
     """The postures of one person over T frames. World: right-handed, Z up, metres; NaN where unknown."""
 
@@ -202,6 +214,32 @@ class Postures:
         counts = self.survivors[rows]
         return int(rows[np.argmin(np.abs(counts - np.median(counts)))])
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """The columns of `postures.csv` as a `pandas.DataFrame`, a row a frame."""
+        return data_frame(_posture_columns(self))
+
+    def plot(self, row: int | None = None, ax: Axes | None = None) -> Axes:
+        """Draws into `ax`, or Axes of its own, and returns them: the motion as a strip of stick figures, or
+        all groups of postures of one row from the side. Needs matplotlib."""
+        from memo.plot import new_axes
+        from memo.posture_plot import plot_from_the_side, plot_strip
+
+        ax = new_axes() if ax is None else ax
+        if row is None:
+            return plot_strip(ax, self)
+        if not 0 <= row < len(self.frames):
+            raise IndexError(f"row {row} of postures with {len(self.frames)} rows")
+        return plot_from_the_side(ax, self, row)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __repr__(self) -> str:
+        left = self.summary["survivors_median"]
+        found = f"{self.found.sum()} of {len(self)} frames"
+        sure = f"{self.undecided.sum()} undecided"
+        return f"Postures({found} in the motion, {sure}, median of {left:g} postures left, {self.scale_from})"
+
     @property
     def summary(self) -> dict[str, Any]:
         """The figures of the whole: counts, medians, scale, the second best, warnings."""
@@ -252,6 +290,7 @@ def posture(
     fps: float | None = None,
     layout: str | None = None,
     person: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Postures:
     """All postures of a person that a view allows, and the likeliest motion.
 
@@ -270,6 +309,7 @@ def posture(
     `unswap`: exchange right and left first where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures are one group if no joint differs by
     more; `max_groups`: so many groups a frame are given, the largest; `group_counts` says how many there are.
+    `progress` is called with the work done and in all, now and then.
 
     Raises ValueError or TypeError, with one line, for what cannot be used.
     """
@@ -319,7 +359,10 @@ def posture(
         head_points=head_px,
         group_m=group_m,
         max_groups=max_groups,
+        progress=progress,
     )
+    for warning in found["warnings"]:
+        _log.warning("%s", warning)
     return _named(found, used, camera, points_px, weights, repair)
 
 

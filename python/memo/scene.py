@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
 from memo.files import ANGLES, JOINTS, SIDES
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
 
 __all__ = ["DemoScene", "demo_scene"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class DemoScene:
     """Frames with ground truth."""
 
@@ -28,16 +33,35 @@ class DemoScene:
     #: Columns of `track.csv` that have a truth, one row per frame with the walker in it.
     truth: dict[str, npt.NDArray[Any]]
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """The truth as a `pandas.DataFrame`, a row a frame with the walker in it."""
+        return data_frame(self.truth)
+
+    def __repr__(self) -> str:
+        frames, height, width = self.frames.shape
+        return f"DemoScene({frames} frames of {width}x{height}, walker of {self.height_m:.2f} m)"
+
 
 def demo_scene(
-    seed: int = 0, *, frames: int = 80, noise_sd: float = 5.0, leftward: bool | None = None
+    seed: int = 0,
+    *,
+    frames: int = 80,
+    noise_sd: float = 5.0,
+    leftward: bool | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> DemoScene:
     """Draws a scene: camera, walker, clothes and wall follow from the seed; `noise_sd` in grey levels.
+    `progress` is called with the frames drawn and in all.
 
     The walker is the model itself, so what tracking reaches here is bounded by the method alone.
     """
     scene = _memo.Scene(seed, frames=frames, noise_sd=noise_sd, leftward=leftward)
-    drawn = np.stack([scene.frame(index) for index in range(len(scene))])
+    images = []
+    for index in range(len(scene)):
+        images.append(scene.frame(index))
+        if progress is not None:
+            progress(index + 1, len(scene))
+    drawn = np.stack(images)
     times_s = np.array([scene.time_s(index) for index in range(len(scene))])
     return DemoScene(drawn, times_s, scene.camera, scene.height_m, _truth(scene))
 

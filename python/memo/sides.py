@@ -7,12 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from memo import _memo
+from memo.files import FLIP_COLUMNS
 from memo.keypoints import Keypoints, KeypointsError
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["SideRepair", "unswap"]
 
@@ -23,7 +29,7 @@ _LEVELS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class SideRepair:
     """Keypoints with right and left where they belong, and what was done."""
 
@@ -40,6 +46,24 @@ class SideRepair:
     """In how many frames the labels are only the best guess, exchanged or not, by group."""
     p_global: dict[str, float]
     """Probability, by group, that the side most labels name is right, as far as their majority tells."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows of `flips.csv` as a `pandas.DataFrame`."""
+        return data_frame({name: [row[name] for row in self.flips] for name in FLIP_COLUMNS})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws, over time, where each group was exchanged and where it could not be decided, into `ax`, or
+        Axes of its own, and returns them. Needs matplotlib."""
+        from memo.plot import new_axes, plot_exchanges
+
+        return plot_exchanges(new_axes() if ax is None else ax, self)
+
+    def __repr__(self) -> str:
+        groups = ", ".join(
+            f"{group}: {count} exchanged, {self.guessed[group]} guessed, {self.undecided[group]} undecided"
+            for group, count in self.exchanged.items()
+        )
+        return f"SideRepair({groups}; of {len(self.keypoints.frames)} frames)"
 
 
 def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> SideRepair:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+import logging
+from collections.abc import Callable, Iterable, Sequence, Sized
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
 from memo.files import TRACK_COLUMNS
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["Track", "Tracker", "track"]
+
+_log = logging.getLogger(__name__)
 
 _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
 
@@ -83,7 +92,15 @@ class Tracker:
         """Ends the stream and returns all walks that were not taken before."""
         self._core.finish()
         self._walks += self._core.take_finished()
-        return Track(self._walks, self._core.seek_report(), self._camera)
+        found = Track(self._walks, self._core.seek_report(), self._camera)
+        _log.info("%s", found.summary["message"])
+        return found
+
+    def __repr__(self) -> str:
+        seen = self._core.seek_report()["frames"]
+        return (
+            f"Tracker({'following' if self._core.current() else 'seeking'}, {seen} frames without a walker)"
+        )
 
 
 def track(
@@ -93,19 +110,21 @@ def track(
     times_s: Iterable[float] | None = None,
     fps: float | None = None,
     camera: _memo.Camera | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int, int | None], object] | None = None,
     **options: Any,
 ) -> Track:
     """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
-    `progress` is called with the number of frames done; `options` are those of `Tracker`. An interrupt
-    (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
+    `progress` is called with the number of frames done and that of all, None where `frames` has no length;
+    `options` are those of `Tracker`. An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was
+    tracked until then.
     """
     if (times_s is None) == (fps is None):
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
     tracker = Tracker(height_m, camera, **options)
+    count = len(frames) if isinstance(frames, Sized) else None
     times = iter(times_s) if times_s is not None else None
     index = -1
     for index, frame in enumerate(frames):
@@ -118,20 +137,70 @@ def track(
             time_s = index / float(fps or 1)
         tracker.update(frame, time_s)
         if progress is not None:
-            progress(index + 1)
+            progress(index + 1, count)
     if times is not None and next(times, None) is not None:
         raise ValueError(f"times_s has more values than the {index + 1} frames")
     return tracker.finish()
 
 
+@dataclass(frozen=True)
+class StoredWalk:
+    """A walk that went through a file or to another process: all that `_memo.Walk` answers, read out."""
+
+    tables: dict[str, Any]
+    camera: _memo.Camera
+    direction: str
+    p_other_direction: float
+    p_swapped: float
+    deviation: tuple[float, float, float, float, float, bool] | None
+
+    @classmethod
+    def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
+        """The walk, read out."""
+        tables: dict[str, Any] = {name: getattr(walk, name)() for name in _TABLES}
+        tables["contours"] = [walk.contours(row) for row in range(len(walk))]
+        single = {name: getattr(walk, name) for name in cls.__dataclass_fields__ if name != "tables"}
+        return cls(tables, **single)
+
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        return dict(self.tables["columns"])
+
+    def events(self) -> list[tuple[float, float, str, str]]:
+        return list(self.tables["events"])
+
+    def measured(self) -> npt.NDArray[np.float64]:
+        return self.tables["measured"]  # type: ignore[no-any-return]
+
+    def start(self) -> dict[str, Any]:
+        return dict(self.tables["start"])
+
+    def contours(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]:
+        return self.tables["contours"][row]  # type: ignore[no-any-return]
+
+    def __len__(self) -> int:
+        return len(self.tables["measured"])
+
+    def __repr__(self) -> str:
+        return f"StoredWalk({len(self)} rows, {self.direction})"
+
+
+_TABLES = ("columns", "events", "measured", "start")
+
+
 class Track:
-    """All walks of a video: what `track.csv` and `events.csv` hold, and everything that led there."""
+    """All walks of a video: what `track.csv` and `events.csv` hold, and everything that led there.
+
+    It can be pickled, and then holds what its walks say instead of the walks themselves.
+    """
 
     def __init__(
-        self, walks: list[_memo.Walk], seek_report: dict[str, int], camera: _memo.Camera | None = None
+        self,
+        walks: Sequence[_memo.Walk | StoredWalk],
+        seek_report: dict[str, int],
+        camera: _memo.Camera | None = None,
     ) -> None:
-        self.walks = walks
-        self.seek_report = seek_report
+        self.walks: list[_memo.Walk | StoredWalk] = list(walks)
+        self.seek_report: dict[str, int] = seek_report
         self._camera = camera
 
     @property
@@ -184,7 +253,7 @@ class Track:
         raise IndexError(f"row {row} of a track with {sum(map(len, self.walks))} rows")
 
     @property
-    def _main(self) -> _memo.Walk | None:
+    def _main(self) -> _memo.Walk | StoredWalk | None:
         return max(self.walks, key=lambda walk: (walk.direction == "forward", len(walk)), default=None)
 
     @property
@@ -224,7 +293,7 @@ class Track:
         }
 
     @staticmethod
-    def _moves_right(walk: _memo.Walk) -> bool:
+    def _moves_right(walk: _memo.Walk | StoredWalk) -> bool:
         columns = walk.columns()
         return bool(columns["right_hip_u_px"][-1] > columns["right_hip_u_px"][0])
 
@@ -238,8 +307,25 @@ class Track:
             return "never fully visible"
         return "nobody"
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """The columns of `track.csv` as a `pandas.DataFrame`, a row a frame."""
+        return data_frame(self.columns)
+
+    def plot(self, what: str = "knee", ax: Axes | None = None) -> Axes:
+        """Draws a quantity over time into `ax`, or Axes of its own, and returns them.
+
+        `what`: "hip", "knee", "shoulder" or "elbow" (flexion of both sides, degrees, with the heel strikes),
+        or a column of `track.csv`, with one standard deviation where it has one. Needs matplotlib.
+        """
+        from memo.plot import new_axes, plot_over_time
+
+        return plot_over_time(new_axes() if ax is None else ax, self, what)
+
     def __len__(self) -> int:
         return sum(map(len, self.walks))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "walks": [StoredWalk.of(walk) for walk in self.walks]}
 
     def __repr__(self) -> str:
         return f"Track({len(self)} rows, {len(self.walks)} walks: {self.summary['message']})"
@@ -252,7 +338,7 @@ _NOBODY = {
 }
 
 
-def _deviation(walk: _memo.Walk) -> dict[str, Any] | None:
+def _deviation(walk: _memo.Walk | StoredWalk) -> dict[str, Any] | None:
     """The fitted deviation from the average walker in degrees and per cent of body height."""
     if walk.deviation is None:
         return None

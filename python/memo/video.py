@@ -70,7 +70,7 @@ class VideoReader:
             raise VideoError(f"frames {start}:{'' if stop is None else stop} is not a range of frames")
         if rate_hz is not None and not 0 < rate_hz < float("inf"):
             raise VideoError(f"the frame rate must be positive, got {rate_hz}")
-        self.path = Path(path)
+        self.path: Path = Path(path)
         self.damage: str | None = None
         """After iteration: what could not be read, `None` if everything was."""
         self._start, self._stop, self._rate_hz = start, stop, rate_hz

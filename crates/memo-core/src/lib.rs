@@ -14,5 +14,6 @@ pub mod image;
 pub mod model;
 pub mod planar;
 pub mod posture;
+pub mod progress;
 pub mod synth;
 pub mod track;

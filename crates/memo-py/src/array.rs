@@ -34,6 +34,17 @@ impl FrameArray<'_> {
             Self::Copied(image) => Ok(image.as_frame()),
         }
     }
+
+    /// The frame in memory of its own, for another thread.
+    pub fn into_image(self) -> PyResult<Image<u8>> {
+        match self {
+            Self::Borrowed(array) => {
+                let (height, width) = array.as_array().dim();
+                Image::from_vec(width, height, array.as_slice()?.to_vec()).map_err(value_error)
+            }
+            Self::Copied(image) => Ok(image),
+        }
+    }
 }
 
 /// Takes an array of shape (H, W), dtype uint8, with any strides.

@@ -2,16 +2,55 @@
 
 use crate::array::{numpy_from_rows, points_from_numpy};
 use crate::error::value_error;
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
+use memo_core::model::distortion::Distortion;
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
 use memo_core::model::{Camera, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters};
 use numpy::PyArray2;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// A calibrated camera: OpenCV axes, world Z up, metres.
-#[pyclass(name = "Camera", module = "memo", frozen, from_py_object)]
-#[derive(Clone)]
+#[pyclass(name = "Camera", module = "memo", frozen, eq, from_py_object)]
+#[derive(Clone, PartialEq)]
 pub struct PyCamera(pub Camera);
+
+/// All that a camera is, for pickling: size, (fx, fy), (cx, cy), lens with its coefficients, the rotation
+/// column by column, translation.
+type Parameters = ((u32, u32), (f64, f64), (f64, f64), (String, Vec<f64>), Vec<f64>, (f64, f64, f64));
+
+/// The camera of `Camera.__reduce__`.
+#[pyfunction(name = "_camera")]
+pub fn camera_of_parameters(
+    size: (u32, u32),
+    focal_px: (f64, f64),
+    centre_px: (f64, f64),
+    lens: (String, Vec<f64>),
+    rotation: Vec<f64>,
+    translation_m: (f64, f64, f64),
+) -> PyResult<PyCamera> {
+    let distortion = match (lens.0.as_str(), lens.1.as_slice()) {
+        ("none", []) => Distortion::None,
+        ("brown", &[k1, k2, p1, p2, k3]) => Distortion::Brown { k1, k2, p1, p2, k3 },
+        ("tsai", &[kappa]) => Distortion::Tsai { kappa },
+        (name, coefficients) => {
+            let message = format!("no lens {name:?} with {} coefficients", coefficients.len());
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    let Ok(rotation) = <[f64; 9]>::try_from(rotation) else {
+        return Err(PyValueError::new_err("the rotation must have 9 elements"));
+    };
+    let camera = Camera {
+        size: size.into(),
+        focal_px: focal_px.into(),
+        centre_px: centre_px.into(),
+        distortion,
+        rotation: DMat3::from_cols_array(&rotation),
+        translation: translation_m.into(),
+    };
+    camera.validated().map(PyCamera).map_err(value_error)
+}
 
 #[pymethods]
 impl PyCamera {
@@ -22,9 +61,7 @@ impl PyCamera {
         let unreadable = |error| pyo3::exceptions::PyOSError::new_err(format!("{}: {error}", path.display()));
         let text = std::fs::read_to_string(&path).map_err(unreadable)?;
         let camera = Camera::from_toml_str(&text, name);
-        camera
-            .map(Self)
-            .map_err(|error| pyo3::exceptions::PyValueError::new_err(format!("{}: {error}", path.display())))
+        camera.map(Self).map_err(|error| PyValueError::new_err(format!("{}: {error}", path.display())))
     }
 
     /// From Tsai's parameters, lengths in mm, angles in radians.
@@ -131,6 +168,25 @@ impl PyCamera {
         height_m: f64,
     ) -> PyResult<(f64, f64, f64)> {
         self.standing_point(position_on_ground, bottom_px, top_px, height_m)
+    }
+
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, Parameters)> {
+        let camera = &slf.get().0;
+        let lens = match camera.distortion {
+            Distortion::None => ("none", vec![]),
+            Distortion::Brown { k1, k2, p1, p2, k3 } => ("brown", vec![k1, k2, p1, p2, k3]),
+            Distortion::Tsai { kappa } => ("tsai", vec![kappa]),
+        };
+        let restore = slf.py().import("memo._memo")?.getattr("_camera")?.unbind();
+        let parameters = (
+            camera.size.into(),
+            camera.focal_px.into(),
+            camera.centre_px.into(),
+            (lens.0.to_owned(), lens.1),
+            camera.rotation.to_cols_array().to_vec(),
+            camera.translation.into(),
+        );
+        Ok((restore, parameters))
     }
 
     fn __repr__(&self) -> String {

@@ -1,11 +1,12 @@
 //! Image evidence: changes, background, edges, velocities.
 
-use crate::array::{FrameArray, frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
+use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
 use crate::error::value_error;
+use crate::wait::interruptible;
 use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
-    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, LineOptions, clean,
+    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, Image, LineOptions, clean,
     edge_segments as core_edge_segments, fill_holes, group_regions, pair_changes, regions,
 };
 use numpy::PyArray2;
@@ -52,9 +53,10 @@ pub fn silhouettes<'py>(
     frames: Vec<Bound<'py, PyAny>>,
     threshold: f64,
 ) -> PyResult<Vec<Bound<'py, PyArray2<bool>>>> {
-    let arrays = frames.iter().map(frame_from_numpy).collect::<PyResult<Vec<_>>>()?;
-    let views = arrays.iter().map(FrameArray::as_frame).collect::<PyResult<Vec<_>>>()?;
-    let masks = py.detach(|| core_silhouettes(&views, threshold)).map_err(value_error)?;
+    let images =
+        frames.iter().map(|frame| frame_from_numpy(frame)?.into_image()).collect::<PyResult<Vec<_>>>()?;
+    let found = move || core_silhouettes(&images.iter().map(Image::as_frame).collect::<Vec<_>>(), threshold);
+    let masks = interruptible(py, found)?.map_err(value_error)?;
     masks.into_iter().map(|mask| numpy_from_image(py, mask)).collect()
 }
 
@@ -70,13 +72,15 @@ pub fn edge_segments<'py>(
     high: f32,
     min_length_px: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let array = frame_from_numpy(frame)?;
-    let frame = array.as_frame()?;
+    let image = frame_from_numpy(frame)?.into_image()?;
     let mask = mask.map(mask_from_numpy).transpose()?;
     let edge = EdgeOptions { sigma_px, low, high };
     let line = LineOptions { min_length_px, ..LineOptions::default() };
-    let domain = EdgeDomain { mask: mask.as_ref(), window: None };
-    let found = py.detach(|| core_edge_segments(&frame, &domain, &edge, &line)).map_err(value_error)?;
+    let segments = move || {
+        let domain = EdgeDomain { mask: mask.as_ref(), window: None };
+        core_edge_segments(&image.as_frame(), &domain, &edge, &line)
+    };
+    let found = interruptible(py, segments)?.map_err(value_error)?;
     let row = |s: &memo_core::image::EdgeSegment| {
         [s.start_px.x, s.start_px.y, s.end_px.x, s.end_px.y, s.mean_gradient, s.residual_rms_px]
     };
@@ -95,12 +99,12 @@ pub fn velocity_field<'py>(
     second: &Bound<'py, PyAny>,
     region: &Bound<'py, PyAny>,
 ) -> PyResult<Velocities<'py>> {
-    let (first, second) = (frame_from_numpy(first)?, frame_from_numpy(second)?);
-    let (first, second, region) = (first.as_frame()?, second.as_frame()?, mask_from_numpy(region)?);
-    let field = py
-        .detach(|| core_velocity_field(&first, &second, &region, &FlowOptions::default()))
-        .map_err(value_error)?;
+    let (first, second) = (frame_from_numpy(first)?.into_image()?, frame_from_numpy(second)?.into_image()?);
+    let region = mask_from_numpy(region)?;
     let (width, height) = (first.width(), first.height());
+    let velocities =
+        move || core_velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default());
+    let field = interruptible(py, velocities)?.map_err(value_error)?;
     let mut components = [vec![f32::NAN; width * height], vec![f32::NAN; width * height]];
     for y in 0..height {
         for x in 0..width {

@@ -13,6 +13,7 @@ mod score;
 mod synth;
 mod tracker;
 mod unswap;
+mod wait;
 
 use pyo3::prelude::*;
 
@@ -22,7 +23,7 @@ mod _memo {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use super::camera::PyCamera;
+    use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
     #[pymodule_export]

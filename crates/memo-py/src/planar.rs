@@ -2,16 +2,19 @@
 
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat, rows_from_numpy};
 use crate::error::value_error;
+use crate::wait::watched;
 use glam::DVec2;
 use memo_core::planar::{
     Chain, DepthSource, EvidenceOptions, FalseTargetRate, Figure, FigureOptions, FitOptions, Interpretation,
-    Method, Status, Undecided, Verdict, at_one_scale, hinge_depths, interpret_figure, interpret_named_figure,
-    joint_of, perspective_of_figure_px, rod_depths,
+    Method, Status, Undecided, Verdict, at_one_scale, hinge_depths, interpret_with_progress, joint_of,
+    perspective_of_figure_px, rod_depths,
 };
+use memo_core::progress::Progress;
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use std::sync::Arc;
 
 /// z1, z2, z3 of N rods from three views each (N, 3, 2), image vectors from pivot to end; NaN where there is
 /// none.
@@ -44,7 +47,7 @@ pub fn planar_hinges<'py>(
 ///
 /// `names`: those of the points where they are joints (`RKN` or `right_knee`), so that joint limits tell
 /// limbs from their mirrors. `scales` (T,): scale of each frame, divided out. `focal_px`: focal length in
-/// pixels.
+/// pixels. `progress` is called with the windows done and their number.
 ///
 /// Returns windows (a list of dicts), depth (T, K) against the first point of each chain with NaN where
 /// unknown, sources (T,) of "planar", "carried", "unknown", and perspective_px: by how much perspective moves
@@ -52,7 +55,7 @@ pub fn planar_hinges<'py>(
 #[pyfunction]
 #[pyo3(signature = (
     tracks, times_s, noise_px=0.0, *, window_s=1.2, size_px=None, carry=false, false_target_rate=0.01,
-    max_tilt_deg=80.0, names=None, scales=None, focal_px=None
+    max_tilt_deg=80.0, names=None, scales=None, focal_px=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keyword options")]
 pub fn planar<'py>(
@@ -68,6 +71,7 @@ pub fn planar<'py>(
     names: Option<Vec<String>>,
     scales: Option<Vec<f64>>,
     focal_px: Option<f64>,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (points, frames, count) = motion_from_numpy::<2>(tracks)?;
     let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
@@ -91,12 +95,12 @@ pub fn planar<'py>(
         }
     }
     let joints: Option<Vec<_>> = names.map(|names| names.iter().map(|name| joint_of(name)).collect());
-    let found = py
-        .detach(|| match &joints {
-            Some(joints) => interpret_named_figure(&tracks, joints, &times_s, &options),
-            None => interpret_figure(&tracks, &times_s, &options),
-        })
-        .map_err(value_error)?;
+    let tracks = Arc::new(tracks);
+    let of_worker = Arc::clone(&tracks);
+    let interpret = move |progress: &Progress| {
+        interpret_with_progress(&of_worker, joints.as_deref(), &times_s, &options, progress)
+    };
+    let found = watched(py, progress, interpret)?.map_err(value_error)?;
     let perspective_px = focal_px.map(|focal_px| perspective_of_figure_px(&tracks, &found.depth, focal_px));
     let result = dict_of(py, found, frames, count)?;
     result.set_item("perspective_px", perspective_px)?;

@@ -6,15 +6,17 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::wait::watched;
 use glam::{DVec2, DVec3};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::sequence::{
     AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameReading, KeypointSequence, Motion, PostureSequence,
-    SequenceLengths, SequenceOptions, Strength, postures, reason_totals,
+    SequenceLengths, SequenceOptions, Strength, postures_with_progress, reason_totals,
 };
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::tree::{LevelCount, View};
+use memo_core::progress::Progress;
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -31,12 +33,12 @@ pub enum Distances {
 }
 
 /// Postures of one person: times (T,) s, points (T, 14, 2) px of the stick figure's joints with NaN where
-/// missing, weights (T, 14). World axes in metres, Z up.
+/// missing, weights (T, 14). World axes in metres, Z up. `progress` is called with the work done and in all.
 #[pyfunction]
 #[pyo3(signature = (
     times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=2.0, rules="walking",
     strength="measured", anchor="auto", distance_m=None, distance_sd_m=None, moving_direction=None,
-    head_points=None, group_m=0.10, max_groups=64
+    head_points=None, group_m=0.10, max_groups=64, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn posture<'py>(
@@ -57,6 +59,7 @@ pub fn posture<'py>(
     head_points: Option<&Bound<'py, PyAny>>,
     group_m: f64,
     max_groups: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let times_s = times_from_numpy(times_s)?;
     let track = track_from_numpy(points)?;
@@ -79,13 +82,17 @@ pub fn posture<'py>(
         max_groups,
         ..SequenceOptions::default()
     };
-    let sequence = KeypointSequence {
-        times_s: &times_s,
-        points_px: &points_px,
-        weights: &weights,
-        head_points_px: head_points_px.as_deref(),
+    let camera = camera.0.clone();
+    let interpret = move |progress: &Progress| {
+        let sequence = KeypointSequence {
+            times_s: &times_s,
+            points_px: &points_px,
+            weights: &weights,
+            head_points_px: head_points_px.as_deref(),
+        };
+        postures_with_progress(&sequence, &camera, &options, progress)
     };
-    let found = py.detach(|| postures(&sequence, &camera.0, &options)).map_err(value_error)?;
+    let found = watched(py, progress, interpret)?.map_err(value_error)?;
     dict_from_postures(py, found)
 }
 

@@ -3,6 +3,7 @@
 use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::wait::interruptible;
 use glam::{DVec2, DVec3};
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
@@ -17,10 +18,29 @@ use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
+///
+/// An interrupted call goes on by itself: the frame is taken, and the next call waits for it.
 #[pyclass(name = "Tracker", module = "memo._memo")]
-pub struct PyTracker(Tracker);
+pub struct PyTracker(Arc<Mutex<Tracker>>);
+
+impl PyTracker {
+    fn locked(&self) -> MutexGuard<'_, Tracker> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Calls the tracker on another thread.
+    fn call<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Tracker) -> T + Send + 'static,
+    ) -> PyResult<T> {
+        let tracker = Arc::clone(&self.0);
+        interruptible(py, move || work(&mut tracker.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
+}
 
 #[pymethods]
 impl PyTracker {
@@ -75,29 +95,28 @@ impl PyTracker {
         }
         options.person = adapt.then(PersonOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
-        Tracker::new(options).map(Self).map_err(value_error)
+        Ok(Self(Arc::new(Mutex::new(Tracker::new(options).map_err(value_error)?))))
     }
 
     /// Takes the next frame, (H, W) uint8, and its time in seconds.
-    fn update(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
-        let array = frame_from_numpy(frame)?;
-        let frame = array.as_frame()?;
-        py.detach(|| self.0.update(&frame, time_s)).map_err(value_error)
+    fn update(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
+        let image = frame_from_numpy(frame)?.into_image()?;
+        self.call(py, move |tracker| tracker.update(&image.as_frame(), time_s))?.map_err(value_error)
     }
 
     /// Ends the stream.
-    fn finish(&mut self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.0.finish()).map_err(value_error)
+    fn finish(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, Tracker::finish)?.map_err(value_error)
     }
 
     /// The walks that have ended since this was last asked.
-    fn take_finished(&mut self) -> Vec<PyWalk> {
-        self.0.take_finished().into_iter().map(PyWalk::new).collect()
+    fn take_finished(&self) -> Vec<PyWalk> {
+        self.locked().take_finished().into_iter().map(PyWalk::new).collect()
     }
 
     /// Filtered state of the walk under way: a dict of time, position, phase, speed and `p_swapped`, or None.
     fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(now) = self.0.current() else { return Ok(None) };
+        let Some(now) = self.locked().current() else { return Ok(None) };
         let dict = PyDict::new(py);
         dict.set_item("frame", now.frame)?;
         dict.set_item("time_s", now.time_s)?;
@@ -113,7 +132,7 @@ impl PyTracker {
 
     /// What happened while nobody was followed: numbers of frames.
     fn seek_report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.0.seek_report();
+        let report = self.locked().seek_report();
         let dict = PyDict::new(py);
         dict.set_item("frames", report.frames)?;
         dict.set_item("frames_with_candidate", report.frames_with_candidate)?;

@@ -2,12 +2,14 @@
 
 use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track_from_numpy};
 use crate::error::value_error;
+use crate::wait::interruptible;
 use memo_core::posture::unswap::{
     GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, Unswapped, unswap as core_unswap,
 };
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::Arc;
 
 /// Undoes exchanges of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN where
 /// missing, scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk
@@ -41,13 +43,18 @@ pub fn unswap<'py>(
         partial_stay_nats: partial_stay_nats.unwrap_or(default.partial_stay_nats),
         decided_at: decided_at.unwrap_or(default.decided_at),
     };
-    let keypoints = Keypoints {
-        times_s: &times_s,
-        joints: track.joints,
-        points_px: &points_px,
-        scores: scores.as_deref(),
+    let groups = Arc::new(groups);
+    let of_worker = Arc::clone(&groups);
+    let repair = move || {
+        let keypoints = Keypoints {
+            times_s: &times_s,
+            joints: track.joints,
+            points_px: &points_px,
+            scores: scores.as_deref(),
+        };
+        core_unswap(&keypoints, &of_worker, &options)
     };
-    let found = py.detach(|| core_unswap(&keypoints, &groups, &options)).map_err(value_error)?;
+    let found = interruptible(py, repair)?.map_err(value_error)?;
     dict_from_unswapped(py, found, &groups)
 }
 

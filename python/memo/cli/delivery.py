@@ -110,6 +110,17 @@ def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextMan
     return progress
 
 
+@contextlib.contextmanager
+def with_count(what: str, delivery: Delivery) -> Iterator[Callable[[int, int | None], None]]:
+    """Gives a callback for the `progress` of a long call; on a terminal, a bar with the time left."""
+    from rich.progress import Progress
+
+    console = _console(delivery)
+    with Progress(console=console, transient=True, disable=console is None) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
 def _console(delivery: Delivery) -> Console | None:
     """The terminal progress is shown on, if there is one and it is wanted."""
     from rich.console import Console
@@ -122,7 +133,7 @@ class Interrupt(contextlib.AbstractContextManager["Interrupt"]):
     """Turns the first Ctrl-C into a request, so that no frame is left half way; the second is raised."""
 
     def __init__(self) -> None:
-        self.requested = False
+        self.requested: bool = False
 
     def __enter__(self) -> Interrupt:
         self._before = signal.signal(signal.SIGINT, self._request)

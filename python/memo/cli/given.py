@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -43,10 +44,17 @@ def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
                 raise InputError(f"{source}: is the folder that was read; write to another place")
 
 
+_LEAST_FREE_BYTES = 4 << 20  # tables and pictures of a short video
+
+
 def check_writable(out: Path) -> None:
+    """Makes the folder, and refuses one that cannot be written to or whose disk is full."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=out):
-            pass
+        with tempfile.TemporaryFile(dir=out) as file:
+            file.write(b"memo")
+        free = shutil.disk_usage(out).free
     except OSError as error:
         raise InputError(f"{out}: cannot be written to: {error.strerror}") from None
+    if free < _LEAST_FREE_BYTES:
+        raise InputError(f"{out}: the disk is full ({free >> 10} kB free)")

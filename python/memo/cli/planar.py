@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count, with_progress
 from memo.cli.given import check_writable
 
 if TYPE_CHECKING:
@@ -66,12 +66,10 @@ def _planar(
     if names and not any(name in JOINT_NAMES for name in points.names):
         raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)
-    if delivery.talks:
-        print(
-            f"{len(points.names)} points in {len(points.times_s)} frames: looking for limbs ...", flush=True
-        )
-    named = {"names": points.names} if names else {}
-    figure = memo.planar(points.positions, points.times_s, noise_px, **named, **options)
+    if names:
+        options = options | {"names": points.names}
+    with with_count("looking for limbs", delivery) as progress:
+        figure = memo.planar(points.positions, points.times_s, noise_px, progress=progress, **options)
     written = write_figure_csv(out, figure, points)
     for stale in ("linkage.png", "turned.mp4", "turned.png"):  # of an earlier run
         (out / stale).unlink(missing_ok=True)
@@ -83,10 +81,10 @@ def _planar(
         written.append(out / "turned.png")
     if figure.interpreted and delivery.overlay:
 
-        def progress(frames: Iterable[int]) -> Iterable[int]:
+        def drawn(frames: Iterable[int]) -> Iterable[int]:
             return with_progress(cast(Any, frames), "drawing", len(points.times_s), delivery)  # type: ignore[return-value]
 
-        write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=progress)
+        write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=drawn)
         written.append(out / "turned.mp4")
     verdicts = figure.verdicts()
     links = [

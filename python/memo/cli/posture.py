@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
 from memo.cli.given import check_apart, check_writable, checked_height, load_camera
 from memo.cli.unswap import exchanges
 from memo.postures import WRITTEN, write_postures
@@ -144,10 +144,10 @@ def _posture(
     delivery: Delivery,
 ) -> Exit:
     check_writable(delivery.out)
-    with with_elapsed("finding postures", delivery):
+    with with_count("finding postures", delivery) as progress:
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)
-        postures = memo.posture(keypoints, camera, **options)
+        postures = memo.posture(keypoints, camera, **options, progress=progress)
         (delivery.out / _DRAWN).unlink(missing_ok=True)  # of an earlier run: it would belong to other tables
         written = write_postures(postures, delivery.out)
         if delivery.plots and postures.found.any():

@@ -29,7 +29,7 @@ pub use evidence::{
 };
 pub use figure::{
     Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation,
-    Link, Method, Status, interpret_figure, interpret_named_figure, joint_of,
+    Link, Method, Status, interpret_figure, interpret_named_figure, interpret_with_progress, joint_of,
 };
 pub use fit::{FitError, FitOptions};
 pub use group::{Pair, Triple, test_pairs, test_triples};

@@ -33,6 +33,7 @@ pub use reflection::joint_of;
 
 use super::{EvidenceOptions, FitOptions, Verdict};
 use crate::posture::skeleton::Joint;
+use crate::progress::{Progress, Stopped};
 use depth::depth_over_time;
 use glam::DVec2;
 use group::best_figure;
@@ -108,6 +109,9 @@ pub enum FigureError {
         /// Its value.
         value: f64,
     },
+    /// Somebody wished it to end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A pause in the tracks is longer than so many usual intervals and than this share of a window.
@@ -229,32 +233,7 @@ pub fn interpret_figure(
     times_s: &[f64],
     options: &FigureOptions,
 ) -> Result<Interpretation, FigureError> {
-    check(tracks, times_s, options)?;
-    let size = options.size.unwrap_or_else(|| size_of(tracks));
-    if !(size > 0.0 && size.is_finite()) {
-        return Err(FigureError::NoExtent);
-    }
-    let clean: Vec<Vec<DVec2>> =
-        tracks.iter().map(|track| without_jumps(track, options.fit.noise_sd)).collect();
-    let ranges = windows(times_s, options.window_s);
-    let windows: Vec<FigureWindow> = ranges
-        .into_par_iter()
-        .map(|(start, end)| {
-            let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
-            let figure = best_figure(&part, size, options);
-            let planar = figure.count(|v| v == Verdict::Planar);
-            let refuted = figure.count(|v| v == Verdict::NotPlanar);
-            let silent = figure.chains.len() - planar - refuted;
-            let status = match (planar, refuted, silent) {
-                (0, 0, 0) => Status::Unseen,
-                (0, 0, _) => Status::Still,
-                _ if planar > refuted => Status::Interpreted,
-                _ => Status::Lost,
-            };
-            FigureWindow { start, end, status, chains: [planar, refuted, silent], figure }
-        })
-        .collect();
-    Ok(over_time(windows, tracks, options))
+    interpret_with_progress(tracks, None, times_s, options, &Progress::new())
 }
 
 /// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint
@@ -268,17 +247,65 @@ pub fn interpret_named_figure(
     times_s: &[f64],
     options: &FigureOptions,
 ) -> Result<Interpretation, FigureError> {
-    if joints.len() != tracks.len() {
-        return Err(FigureError::Names { names: joints.len(), tracks: tracks.len() });
-    }
-    let mut windows = interpret_figure(tracks, times_s, options)?.windows;
-    reflect_by_anatomy(&mut windows, tracks, joints);
-    Ok(over_time(windows, tracks, options))
+    interpret_with_progress(tracks, Some(joints), times_s, options, &Progress::new())
 }
 
-fn over_time(windows: Vec<FigureWindow>, tracks: &[Vec<DVec2>], options: &FigureOptions) -> Interpretation {
+/// [`interpret_figure`], or with joints [`interpret_named_figure`], counting windows in `progress`.
+///
+/// # Errors
+/// Theirs, and [`FigureError::Stopped`].
+pub fn interpret_with_progress(
+    tracks: &[Vec<DVec2>],
+    joints: Option<&[Option<Joint>]>,
+    times_s: &[f64],
+    options: &FigureOptions,
+    progress: &Progress,
+) -> Result<Interpretation, FigureError> {
+    if let Some(joints) = joints
+        && joints.len() != tracks.len()
+    {
+        return Err(FigureError::Names { names: joints.len(), tracks: tracks.len() });
+    }
+    check(tracks, times_s, options)?;
+    let size = options.size.unwrap_or_else(|| size_of(tracks));
+    if !(size > 0.0 && size.is_finite()) {
+        return Err(FigureError::NoExtent);
+    }
+    // 1. The tracks without single wrong positions, in windows.
+    let clean: Vec<Vec<DVec2>> =
+        tracks.iter().map(|track| without_jumps(track, options.fit.noise_sd)).collect();
+    let ranges = windows(times_s, options.window_s);
+    progress.expect(ranges.len());
+    // 2. The best figure of each.
+    let read = |(start, end)| {
+        let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
+        let figure = best_figure(&part, size, options);
+        progress.advance(1)?;
+        Ok(FigureWindow::judged(start, end, figure))
+    };
+    let mut windows = ranges.into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
+    // 3. Limbs told from their mirrors, and everything followed over time.
+    if let Some(joints) = joints {
+        reflect_by_anatomy(&mut windows, tracks, joints);
+    }
     let (depth, sources) = depth_over_time(tracks, &windows, options.carries_structure);
-    Interpretation { windows, depth, sources }
+    Ok(Interpretation { windows, depth, sources })
+}
+
+impl FigureWindow {
+    /// The window of a figure, with the status that its chains give it.
+    fn judged(start: usize, end: usize, figure: Figure) -> Self {
+        let planar = figure.count(|v| v == Verdict::Planar);
+        let refuted = figure.count(|v| v == Verdict::NotPlanar);
+        let silent = figure.chains.len() - planar - refuted;
+        let status = match (planar, refuted, silent) {
+            (0, 0, 0) => Status::Unseen,
+            (0, 0, _) => Status::Still,
+            _ if planar > refuted => Status::Interpreted,
+            _ => Status::Lost,
+        };
+        Self { start, end, status, chains: [planar, refuted, silent], figure }
+    }
 }
 
 fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Result<(), FigureError> {

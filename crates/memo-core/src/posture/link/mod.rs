@@ -24,6 +24,7 @@ use super::lift::{JointRays, RootKind, Roots, extent_sd, roots};
 use super::prior::{MotionPrior, chi_sq};
 use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 use super::smooth::Measured;
+use crate::progress::{Progress, Stopped};
 use flip::Flip;
 use limbs::Limbs;
 use trunk::{Trunk, joints_of};
@@ -60,6 +61,9 @@ pub enum LinkError {
     /// A segment length is wrong.
     #[error(transparent)]
     Lengths(#[from] LengthError),
+    /// Somebody wished it to end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// What one frame shows.
@@ -169,6 +173,19 @@ pub fn link(
     lengths: &SegmentLengths,
     options: &LinkOptions,
 ) -> Result<LinkedPath, LinkError> {
+    link_with_progress(frames, lengths, options, &Progress::new())
+}
+
+/// [`link`], each frame counting as one unit of the caller's `progress`.
+///
+/// # Errors
+/// Those of [`link`], and [`LinkError::Stopped`].
+pub(super) fn link_with_progress(
+    frames: &[LinkFrame],
+    lengths: &SegmentLengths,
+    options: &LinkOptions,
+    progress: &Progress,
+) -> Result<LinkedPath, LinkError> {
     lengths.validated()?;
     check(frames, options)?;
     let known: Vec<usize> = (0..frames.len()).filter(|&t| !frames[t].neck.is_nan()).collect();
@@ -178,13 +195,14 @@ pub fn link(
     let problem = Problem { frames: &bridged, lengths, options };
     // 2. The trunk, then arms and legs in turn, each given the other.
     //    Which way a trunk faces its limbs may tell better: it is tried turned round as well.
-    let mut bodies: Vec<(f64, Trunk, Limbs)> = Trunk::link(&problem)
-        .into_iter()
-        .map(|trunk| {
-            let limbs = Limbs::link(&problem, &trunk);
-            (trunk.delta + limbs.cost, trunk, limbs)
-        })
-        .collect();
+    let trunks = Trunk::link(&problem);
+    let share = frames.len() / trunks.len();
+    let mut bodies = Vec::with_capacity(trunks.len());
+    for trunk in trunks {
+        let limbs = Limbs::link(&problem, &trunk);
+        bodies.push((trunk.delta + limbs.cost, trunk, limbs));
+        progress.advance(share)?;
+    }
     bodies.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (best, trunk, limbs) = &bodies[0];
     let turned: Vec<Flip> = bodies[1..]

@@ -23,13 +23,14 @@ use super::anchor::{AnchorError, AnchorOptions, AnchorSource, Ground, SmoothOpti
 use super::constraint::Constraint;
 use super::group::DEFAULT_GROUP_M;
 use super::lift::JointRays;
-use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link};
+use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress};
 use super::prior::MotionPrior;
 use super::rules::MotionModel;
 use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
 use crate::model::camera::{Camera, CameraError};
+use crate::progress::{Progress, Stopped};
 
 pub use frame::{FrameProblem, FrameReading, MOST_GROUPED, ReasonTotal, RepresentedGroup, reason_totals};
 pub use heading::{Heading, HeadingFrom};
@@ -289,6 +290,9 @@ pub enum SequenceError {
     /// The frames cannot be linked.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// Somebody wished it to end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 fn listed<T: std::fmt::Display>(sentences: &[T]) -> String {
@@ -337,8 +341,23 @@ pub fn postures(
     camera: &Camera,
     options: &SequenceOptions,
 ) -> Result<PostureSequence, SequenceError> {
+    postures_with_progress(sequence, camera, options, &Progress::new())
+}
+
+/// [`postures`], counting frames in `progress`: once for the neck, once for the tree, once for the link.
+///
+/// # Errors
+///
+/// Those of [`postures`], and [`SequenceError::Stopped`].
+pub fn postures_with_progress(
+    sequence: &KeypointSequence,
+    camera: &Camera,
+    options: &SequenceOptions,
+    progress: &Progress,
+) -> Result<PostureSequence, SequenceError> {
     // 1. Check what came; rays through the lens.
     check(sequence, options)?;
+    progress.expect(3 * sequence.times_s.len());
     let camera = camera.clone().validated()?;
     let mut warnings = Vec::new();
     let rays = rays(sequence, &camera, options, &mut warnings);
@@ -349,7 +368,7 @@ pub fn postures(
     warnings.extend(warning::of_scale(&scene));
     // 3. The neck in each frame.
     let heads = neck::heads(&scene);
-    let neck = neck::track(&scene, &heads, &warnings)?;
+    let neck = neck::track(&scene, &heads, &warnings, progress)?;
     let necks = neck.places(&rays);
     lengths::impossible(&rays, &neck, &lengths, &mut warnings);
     // 4. The moving direction.
@@ -360,10 +379,13 @@ pub fn postures(
         .iter()
         .map(|head| tree.clone().with_bearings(scene.bearings(&heading, head.as_ref())))
         .collect();
-    let frames: Vec<_> =
-        (0..rays.len()).into_par_iter().map(|t| frame::read(&scene, &trees[t], &neck, necks[t], t)).collect();
+    let read = |t: usize| {
+        progress.advance(1)?;
+        Ok(frame::read(&scene, &trees[t], &neck, necks[t], t))
+    };
+    let frames = (0..rays.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
     // 6. One of them a frame.
-    let linked = link_frames(&scene, &heading, &necks, &frames)?;
+    let linked = link_frames(&scene, &heading, &necks, &frames, progress)?;
     let sd_m = uncertainty(&scene, &neck, &linked);
     // 7. What casts doubt on it.
     let linked_breaks = broken(&trees, &frames, &linked);
@@ -526,6 +548,7 @@ fn link_frames(
     heading: &Heading,
     necks: &[DVec3],
     frames: &[Result<FrameReading, FrameProblem>],
+    progress: &Progress,
 ) -> Result<LinkedPath, LinkError> {
     let link_frames: Vec<LinkFrame> = (0..necks.len())
         .map(|t| LinkFrame {
@@ -545,7 +568,7 @@ fn link_frames(
             .map(|direction| scene.camera.rotation * direction),
         ..LinkOptions::default()
     };
-    link(&link_frames, &scene.lengths.lengths, &options)
+    link_with_progress(&link_frames, &scene.lengths.lengths, &options, progress)
 }
 
 /// Standard deviations of the joints of the smoothed figures, as if each frame stood alone.

@@ -20,6 +20,7 @@ use crate::posture::head::{
 use crate::posture::lift::JointRays;
 use crate::posture::placed::Bearings;
 use crate::posture::skeleton::{Joint, SegmentLengths};
+use crate::progress::{Progress, Stopped};
 
 /// What all stages look at.
 pub(super) struct Scene<'a> {
@@ -215,23 +216,42 @@ pub(super) fn track(
     scene: &Scene,
     heads: &[Option<Head>],
     warnings: &[Warning],
+    progress: &Progress,
 ) -> Result<NeckTrack, SequenceError> {
     let found = match &scene.options.anchor {
-        AnchorChoice::Given { distance_m, sd_m } => given(scene.rays, distance_m, *sd_m),
-        _ => seen(scene, heads),
+        AnchorChoice::Given { distance_m, sd_m } => {
+            progress.advance(scene.rays.len())?;
+            given(scene.rays, distance_m, *sd_m)
+        }
+        _ => {
+            let asked = asked(scene.sequence.times_s);
+            let found = anchors(scene, heads, &asked, progress)?;
+            over_time(scene, &asked, found)
+        }
     };
     let no_neck = |reasons| SequenceError::NoNeck { reasons, warnings: warnings.to_vec() };
     found.map_err(no_neck).map(NeckTrack::without_vague)
 }
 
-/// From the images.
-fn seen(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, Vec<AnchorError>> {
+/// From the images, each frame alone.
+fn anchors(
+    scene: &Scene,
+    heads: &[Option<Head>],
+    asked: &[usize],
+    progress: &Progress,
+) -> Result<Vec<FrameAnchor>, Stopped> {
     let options = scene.lengths.anchor_options(&scene.options.anchor_options);
+    let anchor = |(place, &t): (usize, &usize)| {
+        let next = asked.get(place + 1).copied().unwrap_or(scene.rays.len());
+        progress.advance(next - if place == 0 { 0 } else { t })?;
+        Ok(frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref()))
+    };
+    asked.par_iter().enumerate().map(anchor).collect()
+}
+
+/// All frames together.
+fn over_time(scene: &Scene, asked: &[usize], found: Vec<FrameAnchor>) -> Result<NeckTrack, Vec<AnchorError>> {
     let times_s = scene.sequence.times_s;
-    // 1. Each frame alone.
-    let asked = asked(times_s);
-    let found: Vec<FrameAnchor> =
-        asked.par_iter().map(|&t| frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref())).collect();
     let conflicts = conflicts(&found);
     let mut errors = Vec::new();
     let anchors: Vec<Option<Anchor>> = found
@@ -241,7 +261,6 @@ fn seen(scene: &Scene, heads: &[Option<Head>]) -> Result<NeckTrack, Vec<AnchorEr
     if anchors.iter().all(Option::is_none) {
         return Err(told_once(errors));
     }
-    // 2. All together.
     let asked_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
     let track = smooth(&asked_s, &anchors, &scene.options.smooth_options).map_err(|error| vec![error])?;
     let mut from = vec![NeckFrom::Neighbours; times_s.len()];

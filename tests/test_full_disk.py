@@ -1,0 +1,45 @@
+"""A disk that is full, or becomes full, is told in one line and leaves nothing half written."""
+
+import resource
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+
+import pytest
+from memo import cli
+
+COMMAND = [sys.executable, "-m", "memo.cli"]
+
+
+def test_a_full_disk_is_told_before_work_starts(monkeypatch, tmp_path, capsys):
+    usage = namedtuple("usage", "total used free")(10**9, 10**9, 5000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+    monkeypatch.setattr(sys, "argv", ["memo", "demo", "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 1
+    assert "the disk is full (4 kB free)" in capsys.readouterr().err
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("most_bytes", [0, 3_000, 60_000])
+def test_a_disk_that_becomes_full_leaves_whole_files_alone(tmp_path, most_bytes):
+    """No file can grow beyond so many bytes, as on a disk that is filling up."""
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+
+    out = tmp_path / "out"
+    done = subprocess.run(
+        [*COMMAND, "demo", "--out", str(out)], preexec_fn=limited, capture_output=True, text=True, timeout=100
+    )
+    assert done.returncode == 1, done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    left = list(out.iterdir()) if out.exists() else []
+    assert [path.name for path in left if path.name.startswith(".")] == []
+    for path in left:
+        assert 0 < path.stat().st_size <= most_bytes
+        if path.suffix == ".csv":
+            assert path.read_text().endswith("\n")

@@ -1,0 +1,252 @@
+"""What every result can do beside holding numbers: a short repr, pandas, plots, pickling; and long calls that
+can be watched and interrupted."""
+
+import logging
+import pickle
+import signal
+import subprocess
+import sys
+
+import matplotlib
+import memo
+import numpy as np
+import pandas
+import pytest
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+
+matplotlib.use("Agg")
+
+CAMERA = memo.Camera.level((1280, 720), 60.0, 1.2, 4.0)
+
+
+def walk_keypoints(frames=60):
+    """Projections of the synthetic walker's joints, and their names."""
+    walk = memo.walker_motion(frames, rate_hz=30, heading_deg=20)
+    pixels = np.stack([CAMERA.project(np.ascontiguousarray(row)) for row in walk["positions"]])
+    return np.asarray(walk["times_s"]), pixels, list(walk["names"])
+
+
+def dots(frames=60):
+    """Times and dots of a point-light display of the walker, with their names."""
+    walk = memo.walker_motion(frames, rate_hz=30)
+    shown = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)
+    return shown["times_s"], shown["positions_px"], list(walk["names"])
+
+
+@pytest.fixture(scope="module")
+def track():
+    scene = memo.demo_scene(0)
+    return memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera)
+
+
+@pytest.fixture(scope="module")
+def keypoints(tmp_path_factory):
+    times_s, pixels, names = walk_keypoints()
+    path = tmp_path_factory.mktemp("keypoints") / "walk.csv"
+    header = ["frame", "time_s", *(f"{name}_{axis}" for name in names for axis in ("u_px", "v_px"))]
+    rows = (
+        [str(t), f"{time_s:.6f}", *(f"{value:.4f}" for value in row.ravel())]
+        for t, (time_s, row) in enumerate(zip(times_s, pixels, strict=True))
+    )
+    path.write_text("\n".join(",".join(row) for row in [header, *rows]))
+    return memo.read_keypoints(path)
+
+
+@pytest.fixture(scope="module")
+def results(track, keypoints):
+    times_s, tracks, names = dots()
+    return {
+        "track": track,
+        "postures": memo.posture(keypoints, CAMERA, height_m=1.75),
+        "figure": memo.planar(tracks, times_s, names=names),
+        "repair": memo.unswap(keypoints),
+        "scene": memo.demo_scene(1, frames=20),
+    }
+
+
+NAMES = ["track", "postures", "figure", "repair", "scene"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_repr_fits_in_two_lines(results, name):
+    text = repr(results[name])
+    assert text.startswith(type(results[name]).__name__ + "(")
+    assert len(text) < 220
+    assert "array" not in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_is_a_data_frame(results, name):
+    frame = results[name].to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    if name == "track":
+        assert list(frame.columns) == list(results[name].columns)
+        assert frame.attrs["units"]["x_m"] == "m"
+        np.testing.assert_array_equal(frame["phase"], results[name].columns["phase"])
+    if name == "postures":
+        assert len(frame) == len(results[name])
+    if name == "figure":
+        assert len(frame) == 8
+        assert frame["length_px"].gt(0).all()
+
+
+@pytest.mark.parametrize("name", ["track", "postures", "figure", "repair"])
+def test_a_plot_goes_where_it_is_wanted(results, name):
+    _, ax = pyplot.subplots()
+    assert results[name].plot(ax=ax) is ax
+    assert ax.has_data() or name == "repair"  # nothing was exchanged
+    own = results[name].plot()
+    assert isinstance(own, Axes)
+    assert own is not ax
+    pyplot.close("all")
+
+
+def test_plots_say_what_there_is(results):
+    assert results["track"].plot("x_m").get_ylabel() == "x_m"
+    with pytest.raises(ValueError, match="nothing named 'toe' to plot; there are hip, knee"):
+        results["track"].plot("toe")
+    assert results["postures"].plot(row=5).has_data()
+    with pytest.raises(IndexError, match="row 99 of postures with 60 rows"):
+        results["postures"].plot(row=99)
+    with pytest.raises(IndexError, match="window 99"):
+        results["figure"].plot(window=99)
+    pyplot.close("all")
+
+
+def test_without_pandas_it_is_said_what_to_install(monkeypatch, results):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        results["track"].to_pandas()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_survives_pickling(results, name):
+    result = results[name]
+    again = pickle.loads(pickle.dumps(result))
+    assert repr(again) == repr(result)
+    for ours, theirs in zip(again.to_pandas().items(), result.to_pandas().items(), strict=True):
+        pandas.testing.assert_series_equal(ours[1], theirs[1])
+
+
+def test_a_pickled_track_answers_all_it_did(track):
+    again = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(track))))
+    assert again.summary == track.summary
+    assert again.events == track.events
+    assert again.camera == track.camera
+    np.testing.assert_array_equal(again.contours(7), track.contours(7))
+    np.testing.assert_array_equal(again.contour_parts(7), track.contour_parts(7))
+    np.testing.assert_array_equal(again.measured["phase"], track.measured["phase"])
+    np.testing.assert_array_equal(again.start["similarity"], track.start["similarity"])
+
+
+def test_cameras_are_pickled_to_the_last_bit():
+    tsai = memo.Camera.from_tsai(
+        size=(768, 576),
+        pixel_mm=(0.0051273271277, 0.00465),
+        focal_mm=5.5549183034,
+        kappa1_per_mm2=0.0051113043639,
+        centre_px=(324.22149053, 282.56650051),
+        sx=1.0937855397,
+        translation_mm=(-4.8441913843e03, 5.5109448682e02, 4.9667438357e03),
+        rotation_rad=(1.9007833770e00, 4.9730769727e-01, 1.8415452559e-01),
+    )
+    points = np.random.default_rng(0).uniform([-5, -5, 0], [5, 5, 2], (50, 3))
+    for camera in (tsai, CAMERA):
+        again = pickle.loads(pickle.dumps(camera))
+        assert again == camera
+        np.testing.assert_array_equal(again.project(points), camera.project(points))
+    assert tsai != CAMERA
+
+
+def test_the_logger_is_silent_unless_asked(caplog):
+    program = "import memo, numpy as np; memo.track([np.zeros((64, 64), np.uint8)] * 3, height_m=1.7, fps=25)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == done.stderr == ""
+    with caplog.at_level(logging.INFO, logger="memo"):
+        memo.track([np.zeros((64, 64), np.uint8)] * 3, height_m=1.7, fps=25)
+    assert "Nobody was seen" in caplog.text
+
+
+# Watching and interrupting
+
+
+def counted(call):
+    """What a call tells its `progress`."""
+    told = []
+    call(lambda done, total: told.append((done, total)))
+    return told
+
+
+def test_long_calls_tell_how_far_they_are(keypoints):
+    times_s, tracks, names = dots(240)
+    calls = {
+        "posture": lambda progress: memo.posture(keypoints, CAMERA, height_m=1.75, progress=progress),
+        "planar": lambda progress: memo.planar(tracks, times_s, names=names, progress=progress),
+        "demo_scene": lambda progress: memo.demo_scene(0, frames=5, progress=progress),
+    }
+    for name, call in calls.items():
+        told = counted(call)
+        done = [counts[0] for counts in told]
+        assert done == sorted(set(done)), name
+        assert told[-1][0] == told[-1][1], name
+
+
+class Alarm(Exception):
+    pass
+
+
+def raise_alarm(*_):
+    raise Alarm
+
+
+@pytest.fixture
+def alarm():
+    """A signal whose handler raises, as that of Ctrl-C does, a moment from now."""
+    if not hasattr(signal, "setitimer"):
+        pytest.skip("no timers on this system")
+    before = signal.signal(signal.SIGALRM, raise_alarm)
+    yield lambda after_s: signal.setitimer(signal.ITIMER_REAL, after_s)
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_a_signal_ends_a_long_call(alarm):
+    _, tracks, _ = dots()
+    many, counts = 400, []
+    long_px = np.concatenate([tracks] * many)
+    long_s = np.arange(len(long_px)) / 30
+    alarm(0.1)
+    with pytest.raises(Alarm):
+        memo.planar(long_px, long_s, progress=lambda *told: counts.append(told))
+    assert not counts or counts[-1][0] < counts[-1][1]
+
+
+def test_a_callback_that_raises_ends_the_call():
+    times_s, tracks, names = dots(600)
+
+    def refuse(done, total):
+        raise Alarm
+
+    with pytest.raises(Alarm):
+        memo.planar(tracks, times_s, names=names, progress=refuse)
+
+
+def test_a_tracker_loses_nothing_when_a_frame_is_interrupted(track, alarm):
+    scene = memo.demo_scene(0)
+    tracker = memo.Tracker(scene.height_m, scene.camera)
+    taken_all_the_same = 0
+    for frame, time_s in zip(scene.frames, scene.times_s.tolist(), strict=True):
+        try:
+            alarm(0.02)
+            tracker.update(frame, time_s)
+            alarm(0)
+        except Alarm:
+            try:
+                tracker.update(frame, time_s)  # the signal came before the core had it
+            except ValueError:
+                taken_all_the_same += 1
+    again = tracker.finish()
+    for name, column in track.columns.items():
+        np.testing.assert_array_equal(again.columns[name], column, err_msg=name)
+    assert taken_all_the_same > 0
