@@ -60,6 +60,7 @@ class Sequence:
     label: str
     """What it is: "the synthetic scene" or the name of a video."""
     height_m: float
+    walk: _memo.Walk
     track: Track
     """The longest walk alone."""
     examples: tuple[Look, Look]
@@ -70,11 +71,6 @@ class Sequence:
     """(N, 5): frame, left, top, right, bottom, pixels."""
     truth: dict[str, npt.NDArray[Any]] | None
     """Columns of `track.csv` that are known, where they are."""
-
-    @property
-    def walk(self) -> _memo.Walk:
-        """The walk."""
-        return self.track.walks[0]
 
     @property
     def camera(self) -> _memo.Camera:
@@ -140,9 +136,10 @@ def _sequence(
         if index % 25 == 24:
             progress(f"rohr: tracking {label}, frame {index + 1}")
     whole = tracker.finish()
-    if not whole.walks:
+    walks = [walk for walk in whole.walks if isinstance(walk, _memo.Walk)]
+    if not walks:
         raise NobodyTracked(f"{label}: {whole.summary['message']}")
-    longest = max(whole.walks, key=lambda walk: (walk.direction == "forward", len(walk)))
+    longest = max(walks, key=lambda walk: (walk.direction == "forward", len(walk)))
     track = Track([longest], whole.seek_report, whole.camera)
     row_of = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
     progress(f"rohr: looking at {label} again")
@@ -170,7 +167,9 @@ def _sequence(
             shown.append((row, here))
     if len(examples) < 2:
         raise NobodyTracked(f"{label}: nothing moves in the frames of the start")
-    return Sequence(label, height_m, track, (examples[0], examples[1]), shown, np.array(rectangles), truth)
+    return Sequence(
+        label, height_m, longest, track, (examples[0], examples[1]), shown, np.array(rectangles), truth
+    )
 
 
 def _spread(rows: Any, count: int) -> list[int]:
