@@ -337,7 +337,7 @@ def _draw_gait(figure: Figure) -> None:
 
 
 def _draw_states(figure: Figure) -> None:
-    states, spacing = 10, 100.0  # pixels
+    states, spacing = 10, 115.0  # pixels
     ax = figure.subplots()
     for k in range(states):
         segments, _, _ = _memo.model_contours(
