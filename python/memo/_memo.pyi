@@ -15,11 +15,19 @@ __all__ = [
     "Walk",
     "__version__",
     "_camera",
+    "body_parts",
     "change_mask",
     "edge_segments",
     "follow_person",
+    "gait_curves",
     "guess_layout",
     "head_points",
+    "hoffman_flinchbaugh_degenerate",
+    "hoffman_flinchbaugh_false_targets",
+    "hoffman_flinchbaugh_hinges",
+    "hoffman_flinchbaugh_rod",
+    "hoffman_flinchbaugh_rods",
+    "image_stages",
     "joint_name",
     "joint_names",
     "keypoint_layout",
@@ -27,7 +35,10 @@ __all__ = [
     "lee_chen_counts",
     "lee_chen_figures",
     "lee_chen_head",
+    "lee_chen_inputs",
     "lee_chen_last_stage",
+    "lee_chen_walker",
+    "model_contours",
     "moving_regions",
     "planar",
     "planar_hinges",
@@ -35,6 +46,9 @@ __all__ = [
     "pointlight",
     "posture",
     "posture_tree",
+    "rohr_deviations",
+    "rohr_numbers",
+    "search_windows",
     "segment_names",
     "side_pairs",
     "silhouettes",
@@ -42,6 +56,9 @@ __all__ = [
     "stick_joints",
     "unswap",
     "velocity_field",
+    "walk_filtered",
+    "walk_lines",
+    "walk_similarity",
     "walker_motion",
 ]
 
@@ -328,3 +345,39 @@ def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...
 def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
 def lee_chen_head() -> list[dict[str, Any]]: ...
 def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = ...) -> list[dict[str, Any]]: ...
+def lee_chen_inputs() -> dict[str, Any]: ...
+def lee_chen_walker(
+    sequence: str, frames: int
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def hoffman_flinchbaugh_rods(trials: int, seed: int) -> dict[str, Any]: ...
+def hoffman_flinchbaugh_hinges(trials: int, searched: int, seed: int) -> dict[str, Any]: ...
+def hoffman_flinchbaugh_false_targets(trials: int, seed: int) -> list[int]: ...
+def hoffman_flinchbaugh_degenerate(trials: int, seed: int) -> list[tuple[str, int]]: ...
+def hoffman_flinchbaugh_rod(views: npt.NDArray[np.float64]) -> dict[str, Any]: ...
+def rohr_numbers() -> list[tuple[str, float]]: ...
+def rohr_deviations(seed: int = 0) -> list[tuple[str, float]]: ...
+def gait_curves(gait: str, phases: Sequence[float]) -> npt.NDArray[np.float64]: ...
+def body_parts(height_m: float) -> list[tuple[str, float, float, float]]: ...
+def model_contours(
+    camera: Camera,
+    walkers: Sequence[tuple[float, float, float, float, float]],
+    *,
+    gait: str = "dense",
+    hidden: bool = False,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.int64]]: ...
+def image_stages(
+    before: npt.NDArray[np.uint8], frame: npt.NDArray[np.uint8], after: npt.NDArray[np.uint8]
+) -> dict[str, Any]: ...
+def search_windows(lines: npt.NDArray[np.float64], c_r: float = 0.25) -> npt.NDArray[np.float64]: ...
+def walk_filtered(walk: Walk) -> npt.NDArray[np.float64]: ...
+def walk_lines(
+    walk: Walk, row: int, phase: float | None = None
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]: ...
+def walk_similarity(
+    walk: Walk,
+    row: int,
+    edges: npt.NDArray[np.float64],
+    *,
+    along_m: float = 0.0,
+    height_m: float = 0.0,
+) -> dict[str, Any]: ...

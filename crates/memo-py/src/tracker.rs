@@ -161,8 +161,8 @@ fn positive(name: &str, value: Option<f32>) -> PyResult<Option<f32>> {
 /// One walk that has ended.
 #[pyclass(name = "Walk", module = "memo._memo", frozen)]
 pub struct PyWalk {
-    walk: TrackedWalk,
-    rows: Vec<Row>,
+    pub(crate) walk: TrackedWalk,
+    pub(crate) rows: Vec<Row>,
 }
 
 impl PyWalk {

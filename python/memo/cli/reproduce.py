@@ -1,23 +1,33 @@
-"""`memo reproduce`: a paper's tables and figures again.
+"""`memo reproduce`: what the papers print, beside what memo has.
 
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
+import contextlib
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Exit, guarded
-from memo.cli.given import check_writable
+from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded
+from memo.cli.given import check_apart, check_writable, checked_height, load_camera
 
 if TYPE_CHECKING:
     import typer
 
+    from memo.reproduce import Clip, Reproduction
 
-class Experiment(StrEnum):
-    """What can be reproduced: the names of `memo.reproduce.EXPERIMENTS`."""
 
+class Paper(StrEnum):
+    """What can be reproduced: the names of `memo.reproduce.EXPERIMENTS`, and all of them."""
+
+    ALL = "all"
+    ROHR = "rohr"
     LEE_CHEN = "lee-chen"
+    HOFFMAN_FLINCHBAUGH = "hoffman-flinchbaugh"
+
+
+HELP = "rohr: tracking (1994); lee-chen: postures (1985); hoffman-flinchbaugh: biological motion (1982)."
 
 
 def add_reproduce(app: "typer.Typer") -> None:
@@ -25,21 +35,153 @@ def add_reproduce(app: "typer.Typer") -> None:
 
     @app.command()
     def reproduce(
-        experiment: Annotated[Experiment, typer.Argument(help="lee-chen: Lee and Chen 1985, postures.")],
+        paper: Annotated[Paper, typer.Argument(help=HELP)] = Paper.ALL,
         out: Annotated[
-            Path | None, typer.Option(help="Folder for tables and figures; memo-out/EXPERIMENT.")
+            Path | None, typer.Option(help="Folder for rows and figures; memo-out/reproduce, or in it PAPER.")
         ] = None,
+        video: Annotated[
+            Path | None, typer.Option(help="rohr: figures of a real sequence, from this video of one walker.")
+        ] = None,
+        height: Annotated[float | None, typer.Option(help="Height of the walker in --video, metres.")] = None,
+        camera: Annotated[
+            Path | None, typer.Option(help="Calibration of --video: TOML, or Tsai XML.")
+        ] = None,
+        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        fps: Annotated[float | None, typer.Option(help="True frame rate of --video (slow motion).")] = None,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Computes a paper's tables and figures again, beside the printed numbers."""
-        folder = out or Path("memo-out") / experiment.value
-        raise typer.Exit(guarded(lambda: _reproduce(experiment, folder)))
+        """Computes every table, figure and number of the papers again that can be, beside the printed ones.
+
+        A row is the same, differs (and says why), is made in kind from other input, or cannot be made.
+        """
+        folder = out or (Path("memo-out/reproduce") / ("" if paper is Paper.ALL else paper.value))
+
+        def work() -> Exit:
+            clip = _clip(paper, video, height, camera, camera_name, fps)
+            return _reproduce(paper, clip, Delivery(folder, as_json=as_json, quiet=quiet))
+
+        raise typer.Exit(guarded(work))
 
 
-def _reproduce(experiment: Experiment, out: Path) -> Exit:
-    from memo.reproduce import EXPERIMENTS
+def _clip(
+    paper: Paper,
+    video: Path | None,
+    height: float | None,
+    camera: Path | None,
+    camera_name: str | None,
+    fps: float | None,
+) -> "Clip | None":
+    given = {
+        "--video": video,
+        "--height": height,
+        "--camera": camera,
+        "--camera-name": camera_name,
+        "--fps": fps,
+    }
+    named = [name for name, value in given.items() if value is not None]
+    if named and paper not in (Paper.ROHR, Paper.ALL):
+        raise InputError(f"{named[0]} is for rohr; {paper.value} has no image sequence")
+    if video is None:
+        if named:
+            raise InputError(f"{named[0]} needs --video")
+        return None
+    if camera is None and camera_name is not None:
+        raise InputError("--camera-name needs --camera")
+    from memo.reproduce import Clip
 
-    check_writable(out)
-    reproduction = EXPERIMENTS[experiment.value](out)
-    print("\n".join(reproduction.lines))
-    print(f"Written to {out}: {', '.join(path.name for path in reproduction.written)}.")
+    height_m = checked_height(1.75 if height is None else height)
+    return Clip(video, height_m, None if camera is None else load_camera(camera, camera_name), fps)
+
+
+def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
+    from memo.reproduce import EXPERIMENTS, NobodyTracked
+    from memo.reproduce.result import write_index
+
+    names = list(EXPERIMENTS) if paper is Paper.ALL else [paper.value]
+    check_writable(delivery.out)
+    if clip is not None:
+        check_apart([Path(clip.video)], [delivery.out / "reproduction.md"])
+    made: list[Reproduction] = []
+    written: list[Path] = []
+    try:
+        with _steps(delivery) as progress:
+            for name in names:
+                options: dict[str, Any] = {"clip": clip} if name == "rohr" else {}
+                made.append(EXPERIMENTS[name](progress=progress, **options))
+            for reproduction in made:
+                folder = delivery.out / (reproduction.name if paper is Paper.ALL else "")
+                written += reproduction.write(folder, progress)
+            if paper is Paper.ALL:
+                written.append(write_index(delivery.out, made))
+    except NobodyTracked as error:
+        complain(str(error))
+        return Exit.NOBODY
+    if delivery.as_json:
+        delivery.tell({"papers": [_summary(reproduction) for reproduction in made]}, [], written)
+    elif delivery.talks:
+        for reproduction in made:
+            _print(reproduction)
+        figures = sum(path.suffix == ".png" for path in written)
+        print(f"Written to {delivery.out}: reproduction.md and .csv, {figures} figures and the tables.")
     return Exit.DONE
+
+
+@contextlib.contextmanager
+def _steps(delivery: Delivery) -> Iterator[Callable[[str], object]]:
+    """What is being done and for how long already, on a terminal; gives the function that says it."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if delivery.quiet or not console.is_terminal:
+        yield lambda _: None
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("reproducing", total=None)
+        yield lambda what: progress.update(task, description=what)
+
+
+def _print(reproduction: "Reproduction") -> None:
+    """The rows as a table as wide as the terminal, and how many have which verdict."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(soft_wrap=False)
+    if not console.is_terminal:
+        console.width = 200
+    table = Table(title=reproduction.title, title_justify="left", expand=True)
+    for name, ratio in (("item", 3), ("quantity", 5), ("printed", 3), ("ours", 3)):
+        table.add_column(name, ratio=ratio, overflow="fold")
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("why", ratio=6, overflow="fold")
+    colours = {"same": "green", "differs": "red", "in kind": "yellow", "cannot": "dim"}
+    for row in reproduction.rows:
+        cells = (row.item, row.quantity, row.printed, row.ours, row.verdict.value, row.why)
+        table.add_row(*(_plain(cell) for cell in cells), style=colours[row.verdict.value])
+    console.print(table)
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in reproduction.counts.items())
+    console.print(f"{reproduction.name}: {counts}.", highlight=False)
+
+
+def _plain(text: str) -> str:
+    """Text in which rich sees no markup."""
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def _summary(reproduction: "Reproduction") -> dict[str, Any]:
+    return {
+        "name": reproduction.name,
+        "title": reproduction.title,
+        "counts": reproduction.counts,
+        "rows": [
+            {
+                **{name: getattr(row, name) for name in ("item", "quantity", "printed", "ours", "why")},
+                "verdict": row.verdict.value,
+            }
+            for row in reproduction.rows
+        ],
+    }

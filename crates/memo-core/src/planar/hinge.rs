@@ -207,6 +207,7 @@ pub fn fit_hinge(
 
 #[cfg(test)]
 mod tests {
+    use super::super::experiment::planes_by_search;
     use super::*;
     use crate::synth::Random;
 
@@ -284,46 +285,6 @@ mod tests {
         println!("recovered, flagged, refused: {:?}", plant_and_recover(1_000_000));
     }
 
-    /// All planes by brute force: the zeros of the two quadratic forms along every direction of slope.
-    ///
-    /// Along the direction u the first form fixes |g|^2 = -(X + Z) / (X ux^2 + 2 Y ux uy + Z uy^2); a plane
-    /// is a change of sign of the second form there.
-    fn planes_by_brute_force(first: &[DVec2; 2], second: &[DVec2; 2]) -> Vec<DVec2> {
-        let form = |rod: &[DVec2; 2], g: DVec2| {
-            let h = |d: DVec2| d.length_squared() + g.dot(d).powi(2);
-            h(rod[0]) - h(rod[1])
-        };
-        let on_first = |angle: f64| {
-            let u = DVec2::from_angle(angle);
-            let by_size = u.dot(first[0]).powi(2) - u.dot(first[1]).powi(2);
-            let size_sq = -(first[0].length_squared() - first[1].length_squared()) / by_size;
-            (size_sq > 0.0 && size_sq < 1e12).then(|| size_sq.sqrt() * u)
-        };
-        let step = std::f64::consts::PI / 7200.0;
-        let mut found: Vec<DVec2> = Vec::new();
-        for i in 0..7200 {
-            let (mut low, mut high) = (i as f64 * step, (i + 1) as f64 * step);
-            let value = |angle: f64| on_first(angle).map(|g| form(second, g));
-            let (Some(at_low), Some(at_high)) = (value(low), value(high)) else { continue };
-            if at_low.signum() == at_high.signum() {
-                continue;
-            }
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                match value(middle) {
-                    Some(v) if v.signum() == at_low.signum() => low = middle,
-                    _ => high = middle,
-                }
-            }
-            let Some(g) = on_first(low) else { continue };
-            // A pole of |g| changes the sign as well, without a zero.
-            if form(second, g).abs() < 1e-6 * (1.0 + g.length_squared()) {
-                found.push(g);
-            }
-        }
-        found
-    }
-
     #[test]
     fn brute_force_finds_one_plane_and_the_same() {
         let mut random = Random::new(31);
@@ -337,7 +298,7 @@ mod tests {
                 continue;
             }
             compared += 1;
-            let planes = planes_by_brute_force(&first, &second);
+            let planes = planes_by_search(&first, &second);
             assert_eq!(planes.len(), 1, "{slope} {angles:?} {planes:?}");
             assert!(Plane::from_slope(planes[0]).angle_up_to_mirror_rad(&hinge.plane) < 1e-6);
             assert!(Plane::from_slope(slope).angle_up_to_mirror_rad(&hinge.plane) < 1e-9);

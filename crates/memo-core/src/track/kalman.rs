@@ -148,57 +148,6 @@ fn smooth_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{SMatrix, SVector};
-
-    /// The paper's filter as printed: eight states, dense matrices.
-    fn dense_step(
-        p: &SVector<f64, 8>,
-        cov: &SMatrix<f64, 8, 8>,
-        z: &SVector<f64, 4>,
-        dt: f64,
-        noises: &[Noise; 4],
-    ) -> (SVector<f64, 8>, SMatrix<f64, 8, 8>) {
-        let mut phi = SMatrix::<f64, 8, 8>::identity();
-        let mut q = SMatrix::<f64, 8, 8>::zeros();
-        let mut h = SMatrix::<f64, 4, 8>::zeros();
-        let mut r = SMatrix::<f64, 4, 4>::zeros();
-        for i in 0..4 {
-            phi[(2 * i, 2 * i + 1)] = dt;
-            q[(2 * i + 1, 2 * i + 1)] = noises[i].velocity_variance_per_s * dt;
-            h[(i, 2 * i)] = 1.0;
-            r[(i, i)] = noises[i].measurement_variance;
-        }
-        let prior = phi * p;
-        let prior_cov = phi * cov * phi.transpose() + q;
-        let k = prior_cov * h.transpose() * (h * prior_cov * h.transpose() + r).try_inverse().unwrap();
-        (prior + k * (z - h * prior), (SMatrix::identity() - k * h) * prior_cov)
-    }
-
-    #[test]
-    fn four_small_filters_equal_the_printed_eight_state_filter() {
-        let o = FilterOptions::default();
-        let noises = [o.along, o.vertical, o.along, o.phase];
-        let mut states = [ConstantVelocity::new(0.0, 1.6, 0.04, 0.2); 4];
-        let mut p = SVector::<f64, 8>::zeros();
-        let mut cov = SMatrix::<f64, 8, 8>::zeros();
-        for i in 0..4 {
-            p[2 * i + 1] = 1.6;
-            cov[(2 * i, 2 * i)] = 0.04;
-            cov[(2 * i + 1, 2 * i + 1)] = 0.2;
-        }
-        for step in 0..50 {
-            let z = SVector::<f64, 4>::from_fn(|i, _| {
-                0.06 * f64::from(step) + 0.1 * f64::from((step * 7 + i as i32 * 3) % 5)
-            });
-            (p, cov) = dense_step(&p, &cov, &z, 0.04, &noises);
-            for i in 0..4 {
-                states[i] = states[i].predict(0.04, &noises[i]).update(z[i], &noises[i]);
-                assert!((states[i].position - p[2 * i]).abs() < 1e-12);
-                assert!((states[i].velocity - p[2 * i + 1]).abs() < 1e-12);
-                assert!((states[i].covariance[1] - cov[(2 * i, 2 * i + 1)]).abs() < 1e-12);
-            }
-        }
-    }
 
     #[test]
     fn printed_variances_are_reproduced_at_25_images_a_second() {

@@ -3,6 +3,7 @@
 mod active;
 mod column;
 pub mod evidence;
+pub mod experiment;
 pub mod explain;
 pub mod gait_parameters;
 pub mod kalman;

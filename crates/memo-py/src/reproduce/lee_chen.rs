@@ -1,11 +1,13 @@
-//! The papers' experiments.
+//! Lee and Chen (1985): the tables' inputs and results.
 
-use crate::array::numpy_from_figures;
+use crate::array::{numpy_from_column, numpy_from_figures, numpy_from_rows};
 use crate::error::value_error;
 use memo_core::posture::experiment::{self, Counts, LevelCounts, Reading, Sequence};
-use memo_core::posture::head::{HeadPoint, HeadTableColumn, table_2};
+use memo_core::posture::head::{HeadModel, HeadPoint, HeadTableColumn, exact_projections, table_2};
+use memo_core::posture::limits::{AngleRange, Limits};
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths};
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use memo_core::synth::stick_walker::FRAME_S;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -129,4 +131,62 @@ pub fn lee_chen_head(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         Ok(dict)
     };
     columns.into_iter().map(dict_of).collect()
+}
+
+/// What goes into the tables, as the code has it: `angles`, names with (least, largest) in degrees (Table 1);
+/// `lengths_cm`, names with lengths (A.1); `head_cm` (6, 3) and `projections_cm` (6, 2) of the head points
+/// seen from (400, 0, 0) with f = 5 (A.2); `frame_s`; `cameras_cm`, image planes of SEQ1 and SEQ2.
+#[pyfunction]
+pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let l = Limits::paper();
+    let range = |r: AngleRange| (r.min_rad.to_degrees(), r.max_rad.to_degrees());
+    let either = |rad: f64| (-rad.to_degrees(), rad.to_degrees());
+    let straight = (l.hip_swing.min_rad.to_degrees(), l.hip_flexion_straight_rad.to_degrees());
+    let angles = [
+        ("shoulder swing", range(l.shoulder_swing)),
+        ("shoulder abduction", range(l.shoulder_abduction)),
+        ("hip swing, straight knee", straight),
+        ("hip swing", range(l.hip_swing)),
+        ("hip abduction", range(l.hip_abduction)),
+        ("elbow", range(l.elbow)),
+        ("knee", range(l.knee)),
+        ("pelvis flexion", range(l.pelvis_flexion)),
+        ("pelvis rotation", either(l.pelvis_rotation_rad)),
+        ("pelvis bending", either(l.pelvis_bending_rad)),
+        ("neck flexion", range(l.neck_flexion)),
+        ("neck rotation", either(l.neck_rotation_rad)),
+        ("neck bending", either(l.neck_bending_rad)),
+    ];
+    let dict = PyDict::new(py);
+    dict.set_item("angles", angles.to_vec())?;
+    let lengths = SegmentLengths::lee_chen();
+    let lengths: Vec<(String, f64)> = lengths.named().map(|(name, length)| (name, 100.0 * length)).collect();
+    dict.set_item("lengths_cm", lengths)?;
+    let head = HeadModel::lee_chen().points_m.map(|point| (100.0 * point).to_array());
+    dict.set_item("head_cm", numpy_from_rows(py, head.to_vec())?)?;
+    let projections = exact_projections().map(|point| point.to_array());
+    dict.set_item("projections_cm", numpy_from_rows(py, projections.to_vec())?)?;
+    dict.set_item("frame_s", FRAME_S)?;
+    // The lens is f behind the image plane, which is what the paper calls the camera's position.
+    let plane = |sequence: Sequence| {
+        let lens = sequence.camera().lens_in_head;
+        (100.0 * (lens - 0.05 * lens.normalize_or_zero())).to_array()
+    };
+    dict.set_item("cameras_cm", Sequence::ALL.map(plane))?;
+    Ok(dict)
+}
+
+/// The walker made anew in frames of a sequence, counted from 0: joints (frames, 14, 3) in camera axes, metres,
+/// and the gait phase of each frame.
+#[pyfunction]
+#[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
+pub fn lee_chen_walker<'py>(
+    py: Python<'py>,
+    sequence: &str,
+    frames: usize,
+) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let (camera, walker) = (sequence_of(sequence)?.camera(), experiment::table_walker());
+    let figures: Vec<_> = (0..frames).map(|frame| camera.view(&walker, frame).figure).collect();
+    let phases = (0..frames).map(|frame| walker.phase(frame)).collect();
+    Ok((numpy_from_figures(py, &figures)?, numpy_from_column(py, phases)))
 }

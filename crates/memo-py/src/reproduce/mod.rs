@@ -1,0 +1,5 @@
+//! The papers' experiments.
+
+pub mod hoffman_flinchbaugh;
+pub mod lee_chen;
+pub mod rohr;

@@ -1,0 +1,300 @@
+//! Rohr (1994): constants, equations, model and the stages behind the figures.
+
+use crate::array::{
+    frame_from_numpy, numpy_from_column, numpy_from_flat, numpy_from_image, numpy_from_rows,
+    numpy_from_segments, segments_from_numpy,
+};
+use crate::camera::PyCamera;
+use crate::error::value_error;
+use crate::tracker::PyWalk;
+use glam::{DVec2, DVec3};
+use memo_core::image::{ChangeOptions, outlines, pair_changes};
+use memo_core::model::body::Part;
+use memo_core::model::{
+    Body, Camera, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours,
+};
+use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
+use memo_core::track::experiment;
+use memo_core::track::score::EdgeLine;
+use memo_core::track::search::Hypothesis;
+use memo_core::track::search::{Axis, Grid, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
+use numpy::{PyArray1, PyArray2, PyArrayDyn};
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// The paper's constants as the code has them, by name.
+#[pyfunction]
+pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
+    experiment::numbers()
+}
+
+/// By how much the two sides of each equation differ, computed in two ways, by name.
+#[pyfunction]
+#[pyo3(signature = (seed=0))]
+pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
+    py.detach(|| experiment::deviations(seed))
+}
+
+fn gait_of(name: &str) -> PyResult<Gait> {
+    match name {
+        "dense" => Ok(Gait::dense()),
+        "sampled_10" => Ok(Gait::sampled_10()),
+        other => Err(PyValueError::new_err(format!("gait must be 'dense' or 'sampled_10', got {other:?}"))),
+    }
+}
+
+/// The right side's curves at phases: (N, 5) of hip, knee, shoulder, elbow in degrees and the body's vertical
+/// displacement in metres.
+#[pyfunction]
+pub fn gait_curves<'py>(
+    py: Python<'py>,
+    gait: &str,
+    phases: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let gait = gait_of(gait)?;
+    let row = |phase: &f64| {
+        let a = gait.posture(*phase, &GaitStyle::default()).right;
+        let [hip, knee, shoulder, elbow] = [a.hip, a.knee, a.shoulder, a.elbow].map(f64::to_degrees);
+        [hip, knee, shoulder, elbow, gait.vertical_m(*phase)]
+    };
+    numpy_from_rows(py, phases.iter().map(row).collect())
+}
+
+/// The parts of a body: name, length and the two semi-axes, metres.
+#[pyfunction]
+pub fn body_parts(height_m: f64) -> PyResult<Vec<(String, f64, f64, f64)>> {
+    let body = Body::from_height(height_m).map_err(value_error)?;
+    let posed = body.pose(DVec3::ZERO, 0.0, &Gait::dense().posture(0.0, &GaitStyle::default()));
+    let row = |(part, cylinder): (Part, &memo_core::model::EllipticCylinder)| {
+        let a = cylinder.semi_axes;
+        (format!("{part:?}"), 2.0 * cylinder.half_length, a.x, a.y)
+    };
+    Ok(Part::ALL.into_iter().zip(&posed.cylinders).map(row).collect())
+}
+
+/// Segments (n, 2, 2) in pixels, and for each its part and its walker.
+type Contours<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>);
+
+/// Contours of walkers on the ground, each (x_m, y_m, heading_rad, phase, height_m): what one hides of itself
+/// and of others is removed unless `hidden` is wanted too.
+#[pyfunction]
+#[pyo3(signature = (camera, walkers, *, gait="dense", hidden=false))]
+pub fn model_contours<'py>(
+    py: Python<'py>,
+    camera: PyCamera,
+    walkers: Vec<[f64; 5]>,
+    gait: &str,
+    hidden: bool,
+) -> PyResult<Contours<'py>> {
+    let camera = camera.0;
+    let gait = gait_of(gait)?;
+    let mut cylinders = Vec::new();
+    for [x, y, heading_rad, phase, height_m] in walkers {
+        if ![x, y, heading_rad, phase].iter().all(|value| value.is_finite()) {
+            return Err(PyValueError::new_err("place, heading and phase of a walker must be finite"));
+        }
+        let body = Body::from_height(height_m).map_err(value_error)?;
+        let walker = Walker { body, gait: gait.clone(), style: GaitStyle::default() };
+        let centre = DVec3::new(x, y, walker.level_torso_height_m());
+        cylinders.extend(walker.pose(centre, heading_rad, phase).cylinders);
+    }
+    let options = VisibilityOptions { rims: true, ..VisibilityOptions::default() };
+    let mut visible = Vec::new();
+    if hidden {
+        for (part, cylinder) in cylinders.iter().enumerate() {
+            let mut alone = Vec::new();
+            visible_contours(std::slice::from_ref(cylinder), camera.position(), &options, &mut alone);
+            visible.extend(alone.into_iter().map(|piece| VisibleSegment { part, ..piece }));
+        }
+    } else {
+        visible_contours(&cylinders, camera.position(), &options, &mut visible);
+    }
+    let (mut segments, mut parts, mut owners) = (Vec::new(), Vec::new(), Vec::new());
+    for (segment, part) in in_pixels(&visible, &camera) {
+        segments.push(segment);
+        parts.push((part % Part::ALL.len()) as u8);
+        owners.push((part / Part::ALL.len()) as i64);
+    }
+    Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts), numpy_from_column(py, owners)))
+}
+
+/// The pieces in image pixels with their parts; those behind the camera are left out.
+fn in_pixels(visible: &[VisibleSegment], camera: &Camera) -> Vec<([[f64; 2]; 2], usize)> {
+    let pixel = |p: DVec3| camera.project(p).map(|q| q.to_array());
+    visible.iter().filter_map(|v| Some(([pixel(v.start)?, pixel(v.end)?], v.part))).collect()
+}
+
+/// What the image stages make of a frame between its neighbours: `changed`, eq. (1) against either; `cleaned`
+/// after the binary operations; `outlines`, a list of (n, 2) pixels; `rectangle` (left, top, right, bottom) of
+/// the largest candidate and `edges` (n, 5) in it, u0, v0, u1, v1 and gradient, or None where nothing moves.
+#[pyfunction]
+pub fn image_stages<'py>(
+    py: Python<'py>,
+    before: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+    after: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let arrays = [frame_from_numpy(before)?, frame_from_numpy(frame)?, frame_from_numpy(after)?];
+    let [before, frame, after] = [arrays[0].as_frame()?, arrays[1].as_frame()?, arrays[2].as_frame()?];
+    let options = EvidenceOptions::default();
+    let firm = ChangeOptions { min_threshold: options.rectangle_threshold, ..options.change };
+    let mut changed = pair_changes(&before, &frame, &firm).map_err(value_error)?;
+    let following = pair_changes(&frame, &after, &firm).map_err(value_error)?;
+    changed.pixels_mut().iter_mut().zip(following.pixels()).for_each(|(pixel, too)| *pixel |= too);
+    let mut stream = EvidenceStream::new(options);
+    let mut evidence = None;
+    for (index, frame) in [before, frame, after].iter().enumerate() {
+        evidence = stream.push(frame, index as f64).map_err(value_error)?;
+    }
+    let evidence = evidence.ok_or_else(|| PyValueError::new_err("three frames gave no evidence"))?;
+    let dict = PyDict::new(py);
+    let main = evidence.candidates(&options).into_iter().next();
+    let outline = |pixels: Vec<[usize; 2]>| {
+        numpy_from_rows(py, pixels.into_iter().map(|p| p.map(|v| v as f64)).collect())
+    };
+    let borders = outlines(&evidence.firm_mask).into_iter().map(|o| outline(o.pixels));
+    dict.set_item("outlines", borders.collect::<PyResult<Vec<_>>>()?)?;
+    let rectangle = main.as_ref().map(|region| {
+        let r = region.rectangle;
+        [r.left, r.top, r.right, r.bottom]
+    });
+    dict.set_item("rectangle", rectangle)?;
+    let edges = main
+        .map(|region| evidence.edges(&region.rectangle, None, &options))
+        .transpose()
+        .map_err(value_error)?
+        .map(|edges| numpy_from_rows(py, edges.iter().map(edge_row).collect()))
+        .transpose()?;
+    dict.set_item("edges", edges)?;
+    dict.set_item("changed", numpy_from_image(py, changed)?)?;
+    dict.set_item("cleaned", numpy_from_image(py, evidence.firm_mask)?)?;
+    Ok(dict)
+}
+
+fn edge_row(edge: &EdgeLine) -> [f64; 5] {
+    let ([a, b], [c, d]) = (edge.start, edge.end);
+    [a, b, c, d, edge.gradient].map(f64::from)
+}
+
+/// The search windows of contours (N, 2, 2): their corners (N, 4, 2), pixels.
+#[pyfunction]
+#[pyo3(signature = (lines, c_r=0.25))]
+pub fn search_windows<'py>(
+    py: Python<'py>,
+    lines: &Bound<'py, PyAny>,
+    c_r: f64,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let lines = segments_from_numpy(lines)?;
+    let point = |p: [f32; 2]| DVec2::from_array(p.map(f64::from));
+    let corners = |[start, end]: &[[f32; 2]; 2]| experiment::search_window(point(*start), point(*end), c_r);
+    let flat: Vec<f64> = lines.iter().flat_map(corners).flat_map(|corner| corner.to_array()).collect();
+    numpy_from_flat(py, flat, vec![lines.len(), 4, 2])
+}
+
+/// The Kalman filter's state after each frame of a walk, not smoothed: (rows, 6) of world x, z in metres, phase,
+/// and their standard deviations.
+#[pyfunction]
+pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let tracked = &walk.walk;
+    let path = &tracked.walk.path;
+    let row = |step: &memo_core::track::walk::Step| {
+        let s = &step.state;
+        let phase = s.phase.position.rem_euclid(1.0);
+        let z = s.height.position + tracked.walk.walker.gait.vertical_m(phase);
+        let sd_x = s.along.position_sd() * path.heading_rad.cos().abs();
+        let x = path.point(s.along.position, 0.0).x;
+        [x, z, phase, sd_x, s.height.position_sd(), s.phase.position_sd()]
+    };
+    numpy_from_rows(py, tracked.steps().iter().map(row).collect())
+}
+
+/// Visible side lines of a row's model, or of the same place at another phase: segments (n, 2, 2) in pixels and
+/// the part of each.
+#[pyfunction]
+#[pyo3(signature = (walk, row, phase=None))]
+#[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
+pub fn walk_lines<'py>(
+    py: Python<'py>,
+    walk: PyRef<'py, PyWalk>,
+    row: usize,
+    phase: Option<f64>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>)> {
+    let at = hypothesis(&walk, row)?;
+    let at = Hypothesis { phase: phase.unwrap_or(at.phase), ..at };
+    let camera = &walk.walk.camera;
+    let posed = walk.walk.scene().pose(&at);
+    let mut visible = Vec::new();
+    visible_contours(&posed.cylinders, camera.position(), &VisibilityOptions::default(), &mut visible);
+    let (segments, parts): (Vec<_>, Vec<_>) =
+        in_pixels(&visible, camera).into_iter().map(|(segment, part)| (segment, part as u8)).unzip();
+    Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
+}
+
+/// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels to a walk's model about a row's place, over
+/// the whole cycle: `scores` (phases, along, heights) and the values of the axes, the last two as differences
+/// in metres. `along_m` and `height_m` are half widths; 0 keeps the place.
+#[pyfunction]
+#[pyo3(signature = (walk, row, edges, *, along_m=0.0, height_m=0.0))]
+pub fn walk_similarity<'py>(
+    py: Python<'py>,
+    walk: PyRef<'py, PyWalk>,
+    row: usize,
+    edges: Vec<Vec<f64>>,
+    along_m: f64,
+    height_m: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    for (name, value) in [("along_m", along_m), ("height_m", height_m)] {
+        if !(0.0..=2.0).contains(&value) {
+            return Err(PyValueError::new_err(format!("{name} must lie between 0 and 2, got {value}")));
+        }
+    }
+    let at = hypothesis(&walk, row)?;
+    let tracked = &walk.walk;
+    let camera = &tracked.camera;
+    let ideal = |u: f64, v: f64| {
+        let p = DVec2::new(u, v);
+        camera.undistort(p).unwrap_or(p).as_vec2().to_array()
+    };
+    let edges: Vec<EdgeLine> = edges
+        .iter()
+        .map(|row| match row[..] {
+            [a, b, c, d, ..] => {
+                Ok(EdgeLine { start: ideal(a, b), end: ideal(c, d), gradient: 0.0, velocity: 0.0 })
+            }
+            _ => Err(PyValueError::new_err(format!("an edge has four numbers, got {}", row.len()))),
+        })
+        .collect::<PyResult<_>>()?;
+    let grid = Grid {
+        along: Axis::around(at.along_m, along_m, POSITION_STEP_M),
+        height: Axis::around(at.height_m, height_m, POSITION_STEP_M),
+        phase: Axis {
+            centre: 0.5 - 0.5 * PHASE_STEP,
+            step: PHASE_STEP,
+            count: (1.0 / PHASE_STEP).round() as usize,
+        },
+    };
+    let found = py.detach(|| {
+        let path: Path = tracked.walk.path;
+        let scene = Scene { walker: &tracked.walk.walker, camera, path: &path };
+        let options = &tracked.options;
+        search(&edges, &scene, &grid, &options.similarity, options.hidden_lines)
+    });
+    let values = |axis: &Axis, from: f64| (0..axis.count).map(|i| axis.at(i) - from).collect::<Vec<f64>>();
+    let shape = vec![grid.phase.count, grid.along.count, grid.height.count];
+    let best = found.best();
+    let dict = PyDict::new(py);
+    dict.set_item("scores", numpy_from_flat(py, found.scores, shape)?)?;
+    dict.set_item("phase", numpy_from_column(py, values(&grid.phase, 0.0)))?;
+    dict.set_item("along", numpy_from_column(py, values(&grid.along, at.along_m)))?;
+    dict.set_item("height", numpy_from_column(py, values(&grid.height, at.height_m)))?;
+    dict.set_item("best", (best.phase, best.along_m - at.along_m, best.height_m - at.height_m))?;
+    Ok(dict)
+}
+
+fn hypothesis(walk: &PyWalk, row: usize) -> PyResult<Hypothesis> {
+    let rows = &walk.rows;
+    rows.get(row)
+        .map(|row| row.hypothesis)
+        .ok_or_else(|| PyIndexError::new_err(format!("row {row} of a walk with {} rows", rows.len())))
+}
