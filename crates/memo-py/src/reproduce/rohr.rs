@@ -164,7 +164,7 @@ pub fn image_stages<'py>(
         .map(|region| evidence.edges(&region.rectangle, None, &options))
         .transpose()
         .map_err(value_error)?
-        .map(|edges| numpy_from_rows(py, edges.iter().map(edge_row).collect()))
+        .map(|edges| numpy_from_rows(py, edges.lines.iter().map(edge_row).collect()))
         .transpose()?;
     dict.set_item("edges", edges)?;
     dict.set_item("changed", numpy_from_image(py, changed)?)?;
