@@ -71,7 +71,14 @@ def _perform(task: Task) -> Record | None:
         return None
     task.folder.forget(task.name)
     unfinished = task.folder.unfinished(task.name)
-    results = unfinished / "results"
+    try:
+        return _tracked(task, unfinished / "results")
+    finally:  # also where the run has ended meanwhile, and has swept up before this folder was there
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _tracked(task: Task, results: Path) -> Record | None:
+    """Runs the child, and puts its results and the record of it in their places."""
     start = time.monotonic()
     with tempfile.TemporaryFile() as said, open(task.folder.log(task.name), "w+b") as complaints:
         command = [*(task.command or _COMMAND), "track", *task.arguments, "--out", str(results), "--json"]
@@ -96,7 +103,6 @@ def _perform(task: Task) -> Record | None:
         fingerprint=task.fingerprint,
     )
     task.folder.write_record(record)
-    shutil.rmtree(unfinished, ignore_errors=True)
     if not task.folder.log(task.name).stat().st_size:
         task.folder.log(task.name).unlink()
     return record
