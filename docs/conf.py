@@ -1,4 +1,4 @@
-"""Settings of the documentation; `sphinx-build -W -n -b html docs target/docs` builds it without a network."""
+"""Settings of the documentation: `sphinx-build -W -n -b html docs target/docs`, with or without a network."""
 
 import sys
 from pathlib import Path
@@ -28,6 +28,7 @@ nitpicky = True
 # Types of Python, numpy and the extras: their documentation is elsewhere, and this site needs no network.
 nitpick_ignore_regex = [
     (r"py:.*", r"(Any|Path|PathLike|Callable|Iterable|Iterator|Mapping|Sequence|ContextManager)"),
+    (r"py:.*", r"memo\..*\._\w+"),  # names of the inside
     (r"py:.*", r"(av|collections|datetime|matplotlib|np|npt|numpy|os|pathlib|typing|Axes|Figure)(\..*)?"),
     (r"py:.*", r"(Array|Whole|Column|Columns|Luma|NDArray|float64|uint8|bool_|int64|optional|TypeAlias)"),
 ]

@@ -2,8 +2,8 @@
 Exchanged legs
 ==============
 
-Keypoint detectors take the left leg for the right one now and then. `memo.unswap` finds where, from the motion of
-the points alone, and says what it did in every frame.
+Keypoint detectors take the left leg for the right one now and then. `memo.unswap` finds where, from the
+motion of the points alone, and says what it did in every frame.
 """
 
 import tempfile
@@ -14,7 +14,8 @@ import memo
 import numpy as np
 
 # %%
-# A walker seen from the side, with one pixel of noise. In frames 40 to 55 the labels of the legs are exchanged.
+# A walker seen from the side, with one pixel of noise. In frames 40 to 55 the labels of the legs are
+# exchanged.
 
 walker = memo.walker_motion(120, rate_hz=60, height_m=1.75)
 camera = memo.Camera.level((1280, 960), 60, 1.2, 4.0)

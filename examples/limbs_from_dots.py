@@ -2,8 +2,9 @@
 Limbs from unnamed dots
 =======================
 
-Which dots belong together, and how do they move in depth? Hoffman and Flinchbaugh (1982) answer for limbs that swing
-in a plane: a few views of the end points fix the lengths and the plane. No names, no camera and no body are needed.
+Which dots belong together, and how do they move in depth? Hoffman and Flinchbaugh (1982) answer for limbs
+that swing in a plane: a few views of the end points fix the lengths and the plane. No names, no camera and no
+body are needed.
 """
 
 import matplotlib.pyplot as plt
@@ -39,8 +40,8 @@ fig, ax = plt.subplots(figsize=(5, 6), layout="constrained")
 plot_linkage(ax, Points(names, times_s, tracks), figure, 0)
 
 # %%
-# Depth of the right shank's end against its knee, and the truth. A view of planar motion cannot tell a limb from its
-# mirror image in depth, so the sign is open; the picture takes the better one.
+# Depth of the right shank's end against its knee, and the truth. A view of planar motion cannot tell a limb
+# from its mirror image in depth, so the sign is open; the picture takes the better one.
 
 knee, ankle = names.index("RKN"), names.index("RAN")
 found = figure.depth[:, ankle] - figure.depth[:, knee]

@@ -2,8 +2,8 @@
 Point-light displays
 ====================
 
-A walker reduced to dots, and the controls that vision science compares it with. Every random choice follows from
-the seed; switching one control on does not change the others.
+A walker reduced to dots, and the controls that vision science compares it with. Every random choice follows
+from the seed; switching one control on does not change the others.
 """
 
 import tempfile
@@ -18,7 +18,8 @@ walker = memo.walker_motion(60, rate_hz=60)
 motion = (walker["positions"], walker["times_s"], walker["names"])
 
 # %%
-# Six displays of the same motion. Crosses are noise dots, which the display does not tell apart; here the labels do.
+# Six displays of the same motion. Crosses are noise dots, which the display does not tell apart; here the
+# labels do.
 
 displays = {
     "side": {},
@@ -41,8 +42,8 @@ for ax, (title, options) in zip(axes.flat, displays.items(), strict=True):
     ax.set_axis_off()
 
 # %%
-# As a video for an experiment: white dots on black, at the display's own times. `memo pointlight` writes the same,
-# with a table of the dots and one of what each dot shows.
+# As a video for an experiment: white dots on black, at the display's own times. `memo pointlight` writes the
+# same, with a table of the dots and one of what each dot shows.
 
 display = memo.pointlight(*motion, azimuth_deg=45)
 video = Path(tempfile.mkdtemp()) / "display.mp4"

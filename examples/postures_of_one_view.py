@@ -2,10 +2,13 @@
 Every posture of one view
 =========================
 
-A limb of known length ends at one of two places on the line of sight. Lee and Chen (1985) grow the tree of all
-combinations and cut what a body cannot do. Here a walker is projected into a camera, and its postures are found
-from the image points alone.
+A limb of known length ends at one of two places on the line of sight. Lee and Chen (1985) grow the tree of
+all combinations and cut what a body cannot do. Here a walker is projected into a camera, and its postures are
+found from the image points alone.
 """
+
+import tempfile
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import memo
@@ -22,10 +25,8 @@ points_px = np.stack([camera.project(joints) for joints in walker["positions"]])
 points_px += np.random.default_rng(0).normal(0, 1, points_px.shape)
 
 # %%
-# Keypoints usually come out of a detector's file with `memo.read_keypoints`. A table of named columns will do.
-
-import tempfile
-from pathlib import Path
+# Keypoints usually come out of a detector's file with `memo.read_keypoints`. A table of named columns will
+# do.
 
 folder = Path(tempfile.mkdtemp())
 header = ",".join(f"{name}_x,{name}_y" for name in walker["names"])
@@ -55,8 +56,8 @@ ax.set_xticks(range(14), [name.replace("_", " ") for name in postures.joints], r
 ax.legend()
 
 # %%
-# One frame leaves several postures (grey); from above one sees how limbs are mirrored in depth. The motion over all
-# frames decides between them (colour), and `p_mirrored` says how surely.
+# One frame leaves several postures (grey); from above one sees how limbs are mirrored in depth. The motion
+# over all frames decides between them (colour), and `p_mirrored` says how surely.
 
 fig, (side, above) = plt.subplots(1, 2, figsize=(9, 4.5), layout="constrained")
 plot_from_the_side(side, postures, row)
@@ -78,5 +79,7 @@ sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
 along = np.sum((found - true) * sight, axis=-1, keepdims=True)
 across = np.linalg.norm(found - true - along * sight, axis=-1)
 print(f"elbows, wrists, knees, ankles: {100 * np.median(across):.1f} cm across the line of sight,")
-print(f"{100 * np.median(along):.1f} cm along it, the same way in all frames: the distance of the whole figure")
+print(
+    f"{100 * np.median(along):.1f} cm along it, the same way in all frames: the distance of the whole figure"
+)
 print(f"is found to within a standard deviation of {100 * np.median(postures.anchor_sd_m):.0f} cm.")

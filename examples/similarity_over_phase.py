@@ -2,8 +2,9 @@
 Similarity over the gait cycle
 ==============================
 
-Rohr (1994, Fig. 19) holds the position fixed and asks for every gait phase how well the model's contours fit the
-edges of one frame. The curve has two high places half a cycle apart: from the side, left and right look alike.
+Rohr (1994, Fig. 19) holds the position fixed and asks for every gait phase how well the model's contours fit
+the edges of one frame. The curve has two high places half a cycle apart: from the side, left and right look
+alike.
 """
 
 import matplotlib.pyplot as plt
@@ -30,18 +31,20 @@ ax.set(xlabel="gait phase", ylabel="similarity, eq. (11)", title=f"frame {start[
 ax.legend()
 
 # %%
-# One frame cannot decide between the two. Phase grows steadily, so over the starting frames the best phases lie on
-# a line and on its twin; memo follows both and says how likely it is that the sides are interchanged.
+# One frame cannot decide between the two. Phase grows steadily, so over the starting frames the best phases
+# lie on a line and on its twin; memo follows both and says how likely it is that the sides are interchanged.
 
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
 plot_start(ax, track)
 print(f"probability that left and right are interchanged: {track.summary['p_swapped']:.3f}")
 
 # %%
-# Eq. (7) itself is a function, too: model lines and image edges in, overlap, distance and angle of each match out.
+# Eq. (7) itself is a function, too: model lines and image edges in, overlap, distance and angle of each match
+# out.
 
 model_line = np.array([[[100.0, 50.0], [100.0, 150.0]]])
 image_edge = np.array([[[104.0, 60.0], [106.0, 160.0]]])
 similarity, matches = memo.similarity(model_line, image_edge)
-line, edge, overlap, distance, angle = matches[0][:5]
-print(f"similarity {similarity:.3f}: overlap {overlap:.1f} px, distance {distance:.1f} px, angle {angle:.3f} rad")
+_, _, overlap_px, distance_px, angle_rad = matches[0][:5]
+print(f"similarity {similarity:.3f}")
+print(f"overlap {overlap_px:.1f} px, distance {distance_px:.1f} px, angle {angle_rad:.3f} rad")

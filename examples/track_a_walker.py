@@ -33,7 +33,8 @@ ax.imshow(draw_row(scene.frames[track.columns["frame"][row]], track, row))
 ax.set_axis_off()
 
 # %%
-# Against the truth. The knee's curve is that of average gait at the phase found; the walker here has no other.
+# Against the truth. The knee's curve is that of average gait at the phase found; the walker here has no
+# other.
 
 found, true = track.columns, scene.truth
 rows = np.searchsorted(true["frame"], found["frame"])

@@ -2,8 +2,8 @@
 What one frame says
 ===================
 
-Every step from grey values to a match can be looked at: what changed, where the moving region is, which straight
-edges it has, and which of them answer a contour of the model.
+Every step from grey values to a match can be looked at: what changed, where the moving region is, which
+straight edges it has, and which of them answer a contour of the model.
 """
 
 import matplotlib.pyplot as plt
@@ -18,8 +18,8 @@ frame = int(track.columns["frame"][row])
 before, now, after = scene.frames[frame - 1 : frame + 2]
 
 # %%
-# **Change** (eq. 1): a pixel changed if the second-order fits of its 5x5 window differ from those of the frame before
-# or after by more than a threshold, which follows from the noise.
+# **Change** (eq. 1): a pixel changed if the second-order fits of its 5x5 window differ from those of the
+# frame before or after by more than a threshold, which follows from the noise.
 
 mask = memo.change_mask(now, before) | memo.change_mask(now, after)
 left, top, right, bottom, area = memo.moving_regions(mask)[0]

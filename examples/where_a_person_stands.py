@@ -39,7 +39,7 @@ rng = np.random.default_rng(0)
 places = np.array([[x, y, 0.0] for x in (-1.5, 0.0, 1.5) for y in (-0.5, 1.0, 3.0)])
 fig, ax = plt.subplots(figsize=(7, 4.5), layout="constrained")
 for place in places:
-    ends = camera.project(np.stack([place, place + [0, 0, 1.75]]))
+    ends = camera.project(np.array([place, place + np.array([0, 0, 1.75])]))
     for _ in range(40):
         bottom, top = ends + rng.normal(0, 1, (2, 2)) * [[2], [6]]
         by_height = camera.position_from_rectangle(tuple(bottom), tuple(top), 1.75)

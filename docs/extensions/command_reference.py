@@ -1,4 +1,4 @@
-"""The command reference: written from the commands themselves whenever the site is built, so it cannot go stale."""
+"""The command reference, written from the commands whenever the site is built: it cannot go stale."""
 
 from __future__ import annotations
 
@@ -45,7 +45,14 @@ def _sections(group: Any, context: Any) -> list[str]:
 
 
 def _command(command: Any, context: Any) -> list[str]:
-    lines = ["```text", command.get_usage(context).removeprefix("Usage: "), "```", "", _plain(command.help), ""]
+    lines = [
+        "```text",
+        command.get_usage(context).removeprefix("Usage: "),
+        "```",
+        "",
+        _plain(command.help),
+        "",
+    ]
     rows = [row for parameter in command.params if (row := _row(parameter, context))]
     if rows:
         lines += [*rows, ""]

@@ -1,4 +1,4 @@
-"""Types for compiled functions: a compiled module knows its argument names, its stub file knows their types."""
+"""Types for compiled functions: a compiled module knows names of arguments, its stub knows their types."""
 
 from __future__ import annotations
 

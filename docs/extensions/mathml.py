@@ -1,4 +1,4 @@
-"""Equations as MathML: written into the page at build time, so that reading them needs neither script nor network."""
+"""Equations as MathML, written into the page at build time: reading them needs no script and no network."""
 
 from __future__ import annotations
 
