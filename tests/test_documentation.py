@@ -1,7 +1,7 @@
 """What the documentation tells people to type is typed here: blocks of README.md and docs/, and all examples.
 
 A page is run from top to bottom in a folder of its own, in which the files stand that its text takes for
-given: `walk.mp4`, `camera.toml`, `walk_json/`. A block with `<!-- not run: why -->` on the line above it is left
+given: `walk.mp4`, `camera.toml`, `walk_json/`. A block with `<!-- not run: why -->` on the line above is left
 out; how many these are is counted below, so that none is left out unseen.
 """
 

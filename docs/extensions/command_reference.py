@@ -45,14 +45,9 @@ def _sections(group: Any, context: Any) -> list[str]:
 
 
 def _command(command: Any, context: Any) -> list[str]:
-    lines = [
-        "```text",
-        command.get_usage(context).removeprefix("Usage: "),
-        "```",
-        "",
-        _plain(command.help),
-        "",
-    ]
+    given = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
+    usage = " ".join([context.command_path, "[OPTIONS]", *map(_placeholder, given)])
+    lines = ["```text", usage, "```", "", _plain(command.help), ""]
     rows = [row for parameter in command.params if (row := _row(parameter, context))]
     if rows:
         lines += [*rows, ""]
@@ -63,11 +58,17 @@ def _command(command: Any, context: Any) -> list[str]:
 
 def _row(parameter: Any, context: Any) -> str | None:
     if parameter.param_type_name == "argument":
-        return f"`{(parameter.metavar or parameter.name).upper()}`\n: {_plain(parameter.help)}\n"
+        return f"`{_placeholder(parameter)}`\n: {_plain(parameter.help)}\n"
     record = parameter.get_help_record(context)
     if record is None or "--help" in parameter.opts:
         return None
     return f"`{record[0]}`\n: {_plain(record[1])}\n"
+
+
+def _placeholder(argument: Any) -> str:
+    """How an argument is written in the usage, such as `VIDEO`, or `[MOTION]` where it may be left out."""
+    name = (argument.metavar or argument.name).upper().strip("[]")
+    return name if argument.required else f"[{name}]"
 
 
 def _plain(text: str | None) -> str:

@@ -1,8 +1,9 @@
-"""Types for compiled functions: a compiled module knows names of arguments, its stub knows their types."""
+"""Signatures as one would write them: types of compiled functions from their stub, arrays as `NDArray`."""
 
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,14 @@ def signatures() -> dict[str, tuple[str, str]]:
     return found
 
 
+_ARRAY = re.compile(r"(?:np\.|numpy\.)?ndarray\[tuple\[Any, \.\.\.\], (?:np\.|numpy\.)?dtype\[(\w+)\]\]")
+
+
+def short(text: str | None) -> str | None:
+    """The text with numpy's long name for an array of any shape replaced by the short one."""
+    return text and _ARRAY.sub(r"NDArray[\1]", text)
+
+
 def setup(app: Any) -> dict[str, bool]:
     known = signatures()
 
@@ -36,7 +45,9 @@ def setup(app: Any) -> dict[str, bool]:
         if what == "class" and getattr(obj, "__module__", "") == "memo._memo":
             return known.get(f"{below}.__new__", ("", ""))[0], ""
         compiled = type(obj).__name__ in ("builtin_function_or_method", "method_descriptor")
-        return known[below] if compiled and below in known else None
+        if compiled and below in known:
+            return known[below]
+        return short(arguments), short(result)
 
     app.connect("autodoc-process-signature", with_types)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
