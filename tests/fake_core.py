@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from memo.files import JOINTS, TRACK_COLUMNS
+from memo.gait import gait_table
 
 SPEED_MPS = 1.3
 STRIDES_PER_S = 0.9
@@ -37,6 +38,9 @@ class Camera:
     def from_tsai(*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad):
         assert len(pixel_mm) == len(centre_px) == 2 and len(translation_mm) == len(rotation_rad) == 3
         return Camera(size)
+
+    def parameters(self):
+        return {"size": list(self.size)}
 
     def project(self, points):
         width, height = self.size
@@ -64,6 +68,15 @@ class Track:
             "p_swapped": 0.4,
             "unknown": float("nan"),
         }
+        self.sentences = [self.summary["message"]]
+        if status == "tracked":
+            self.sentences.append(
+                "Left and right may be swapped (probability 40%): look before you use them."
+            )
+        self.gait_parameters = gait_table(
+            [[("speed", "", SPEED_MPS, "m/s", 1.2, 1.4, 3)]] if len(times_s) else []
+        )
+        self.records = []
         phases = np.arange(N_PHASE) / N_PHASE
         best = self.columns["phase"][:12]
         self.start = {
@@ -87,6 +100,7 @@ class Tracker:
 
     def __init__(self, height_m=1.75, camera=None, fov_deg=60.0):
         self.camera, self.times_s, self.seen = camera, [], False
+        self.options = {"height_m": height_m, "fov_deg": fov_deg}
 
     def update(self, frame, time_s):
         assert frame.dtype == np.uint8 and frame.ndim == 2

@@ -48,6 +48,7 @@ class Telling(memo.Tracker):
 memo.Tracker = Telling
 memo.cli.main()
 """
+TABLES = {"track.csv", "events.csv", "gait_parameters.csv", "run.json"}
 CAMERA = "[side]\nname = 'side'\nsize = [50, 36]\n[front]\nname = 'front'\nsize = [640, 480]\n"
 
 
@@ -82,7 +83,8 @@ def test_tracking_leaves_everything(memo_command, video, tmp_path):
     code, said, complaint = memo_command("track", video, "--out", out)
     assert (code, complaint) == (0, "")
     assert {path.name for path in out.iterdir()} == {
-        *("track.csv", "events.csv", "overlay.mp4"),
+        *TABLES,
+        "overlay.mp4",
         *("similarity.png", "start.png", "motion.png", "angles.png"),
     }
     assert said.startswith("20 frames, tracked.\nLeft and right may be swapped (probability 40%)")
@@ -94,7 +96,7 @@ def test_tracking_leaves_everything(memo_command, video, tmp_path):
 def test_results_go_to_memo_out_by_default(memo_command, video, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert memo_command("track", video, "--no-overlay", "--no-plots")[0] == 0
-    assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == {"track.csv", "events.csv"}
+    assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == TABLES
 
 
 def test_chosen_frames_keep_their_numbers(memo_command, video, tmp_path):
@@ -336,7 +338,7 @@ def test_interrupt_of_the_compiled_core(tmp_path):
     assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
     frames = read_track_csv(tmp_path / "out" / "track.csv")["frame"]
     assert frames[0] <= 12 and 45 <= frames[-1] < 90, "the walk up to the interrupt, not to its end"
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"track.csv", "events.csv"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == TABLES
 
 
 def test_a_frame_that_fails_costs_only_what_follows(tmp_path):

@@ -4,6 +4,7 @@ Frames are numpy arrays (H, W) uint8; metres and seconds throughout; world Z up;
 0 at the right heel strike.
 """
 
+from memo import explain, gait
 from memo._memo import (
     Camera,
     __version__,
@@ -41,6 +42,8 @@ __all__ = [
     "change_mask",
     "demo_scene",
     "edge_segments",
+    "explain",
+    "gait",
     "head_points",
     "layouts",
     "moving_regions",

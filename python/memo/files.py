@@ -28,6 +28,7 @@ __all__ = [
     "complete_file",
     "plain",
     "read_events_csv",
+    "read_text_columns",
     "read_track_csv",
     "read_tsai_xml",
     "write_columns_csv",
@@ -68,6 +69,9 @@ _DIGITS = {
     "_rad": 5,
     "_s": 6,
     "_nats": 3,
+    "value": 4,
+    "ci_low": 4,
+    "ci_high": 4,
     "phase": 5,
     "p_swapped": 6,
     "p_mirrored": 4,
@@ -142,6 +146,12 @@ def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
         {**row, "time_s": float(row["time_s"]), "frame": float(row["frame"])}
         for row in _read_rows(path, EVENT_COLUMNS)
     ]
+
+
+def read_text_columns(path: str | PathLike[str], names: tuple[str, ...]) -> dict[str, list[str]]:
+    """The columns of a table that has at least these, cell by cell as written."""
+    rows = _read_rows(path, names)
+    return {name: [row[name] or "" for row in rows] for name in names}
 
 
 def read_tsai_xml(path: str | PathLike[str]) -> dict[str, Any]:

@@ -10,8 +10,12 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import TRACK_COLUMNS
+from memo.gait import gait_table, lookup, symmetry_sentences
 
 __all__ = ["Track", "Tracker", "track"]
+
+LIKELY_SWAPPED = 0.2
+"""From one in five on, left and right should be looked at before they are used."""
 
 _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
 
@@ -49,20 +53,21 @@ class Tracker:
         full_velocity: float | None = None,
         part_weights: Sequence[float] | None = None,
     ) -> None:
-        self._core = _memo.Tracker(
-            height_m,
-            camera,
-            fov_deg=fov_deg,
-            gait=gait,
-            adapt=adapt,
-            start_frames=start_frames,
-            compensate_gain=compensate_gain,
-            background=background,
-            measure=measure,
-            full_gradient=full_gradient,
-            full_velocity=full_velocity,
-            part_weights=part_weights,
-        )
+        self.options: dict[str, Any] = {
+            "height_m": height_m,
+            "fov_deg": fov_deg,
+            "gait": gait,
+            "adapt": adapt,
+            "start_frames": start_frames,
+            "compensate_gain": compensate_gain,
+            "background": background,
+            "measure": measure,
+            "full_gradient": full_gradient,
+            "full_velocity": full_velocity,
+            "part_weights": part_weights,
+        }
+        """All options but the camera."""
+        self._core = _memo.Tracker(camera=camera, **self.options)
         self._camera = camera
         self._walks: list[_memo.Walk] = []
 
@@ -149,6 +154,32 @@ class Track:
         return [dict(zip(names, event, strict=True)) for walk in self.walks for event in walk.events()]
 
     @property
+    def gait_parameters(self) -> dict[str, npt.NDArray[Any]]:
+        """The columns of `gait_parameters.csv`, see `memo.gait.DEFINITIONS`; walk after walk."""
+        return gait_table(walk.gait_parameters() for walk in self.walks)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What was seen, walk after walk, in plain words."""
+        if not self.walks:
+            return [self.summary["message"]]
+        said = []
+        for index, walk in enumerate(self.walks):
+            told = [self._message(walk)]
+            if walk.p_swapped > LIKELY_SWAPPED:
+                chance = f"probability {walk.p_swapped:.0%}"
+                told.append(f"Left and right may be swapped ({chance}): look before you use them.")
+            told += symmetry_sentences(self.gait_parameters, index)
+            several = f"Walk {index + 1} of {len(self.walks)}: " if len(self.walks) > 1 else ""
+            said += [several + sentence for sentence in told]
+        return said
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """What `memo.explain` needs of every walk beside the video, plain numbers."""
+        return [walk.record() for walk in self.walks]
+
+    @property
     def camera(self) -> _memo.Camera | None:
         """The camera given, or the one guessed for the longest walk."""
         main = self._main
@@ -194,27 +225,12 @@ class Track:
         main = self._main
         if main is None:
             return {"status": self._why_nobody(), "message": _NOBODY[self._why_nobody()], "walks": 0}
-        columns = main.columns()
-        forward = main.direction == "forward"
-        moved = self._moves_right(main)
-        speed = float(np.median(np.abs(columns["speed_mps"])))
-        strikes = [event for event in main.events() if event[2] == "heel_strike"]
-        steps = np.diff([event[0] for event in strikes])
-        cadence = 60.0 / float(np.median(steps)) if len(steps) else float("nan")
-        way = "left to right" if moved else "right to left"
-        manner = "walks" if forward else "walks backwards"
-        sure = main.p_other_direction < 0.1
-        message = (
-            f"Somebody {manner} {way} for {columns['time_s'][-1] - columns['time_s'][0]:.1f} s "
-            f"at {speed:.2f} m/s"
-            + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
-            + ("." if sure else f"; which way round is not certain (p = {1 - main.p_other_direction:.2f}).")
-        )
+        speed, cadence = self._pace(main)
         return {
-            "status": "tracked" if forward else "walking backwards",
-            "message": message,
+            "status": "tracked" if main.direction == "forward" else "walking backwards",
+            "message": self._message(main),
             "walks": len(self.walks),
-            "direction": way,
+            "direction": self._way(main),
             "gait": main.direction,
             "p_other_gait": main.p_other_direction,
             "p_swapped": main.p_swapped,
@@ -223,10 +239,31 @@ class Track:
             "deviation": _deviation(main),
         }
 
+    @classmethod
+    def _message(cls, walk: _memo.Walk) -> str:
+        times_s = walk.columns()["time_s"]
+        speed, cadence = cls._pace(walk)
+        manner = "walks" if walk.direction == "forward" else "walks backwards"
+        sure = walk.p_other_direction < 0.1
+        return (
+            f"Somebody {manner} {cls._way(walk)} for {times_s[-1] - times_s[0]:.1f} s at {speed:.2f} m/s"
+            + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
+            + ("." if sure else f"; which way round is not certain (p = {1 - walk.p_other_direction:.2f}).")
+        )
+
     @staticmethod
-    def _moves_right(walk: _memo.Walk) -> bool:
-        columns = walk.columns()
-        return bool(columns["right_hip_u_px"][-1] > columns["right_hip_u_px"][0])
+    def _pace(walk: _memo.Walk) -> tuple[float, float]:
+        """Speed, m/s, never negative, and cadence, steps a minute; of a walk too short for it NaN."""
+        table = gait_table([walk.gait_parameters()])
+        speed, cadence = (float(lookup(table, 0, name)["value"]) for name in ("speed", "cadence"))
+        if np.isnan(speed):
+            speed = float(np.median(walk.columns()["speed_mps"]))
+        return abs(speed), cadence
+
+    @staticmethod
+    def _way(walk: _memo.Walk) -> str:
+        hip_px = walk.columns()["right_hip_u_px"]
+        return "left to right" if hip_px[-1] > hip_px[0] else "right to left"
 
     def _why_nobody(self) -> str:
         seek = self.seek_report

@@ -2,11 +2,15 @@
 
 use crate::array::{numpy_from_rows, points_from_numpy};
 use crate::error::value_error;
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
-use memo_core::model::{Camera, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters};
+use memo_core::model::{
+    Camera, Distortion, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters,
+};
 use numpy::PyArray2;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// A calibrated camera: OpenCV axes, world Z up, metres.
 #[pyclass(name = "Camera", module = "memo", frozen, from_py_object)]
@@ -61,6 +65,48 @@ impl PyCamera {
         Camera::level(size.into(), fov_deg.to_radians(), camera_height_m, distance_m)
             .map(Self)
             .map_err(value_error)
+    }
+
+    /// From what `parameters` gives.
+    #[staticmethod]
+    pub fn from_parameters(parameters: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let matrix: [[f64; 3]; 3] = parameter(parameters, "matrix")?;
+        let coefficients: [f64; 5] = parameter(parameters, "distortions")?;
+        let kappa: Option<f64> = parameters.get_item("tsai_kappa")?.map(|k| k.extract()).transpose()?;
+        let turn = DVec3::from_array(parameter(parameters, "rotation")?);
+        let camera = Camera {
+            size: parameter(parameters, "size")?,
+            focal_px: DVec2::new(matrix[0][0], matrix[1][1]),
+            centre_px: DVec2::new(matrix[0][2], matrix[1][2]),
+            distortion: kappa
+                .map_or_else(|| Distortion::from_opencv(coefficients), |kappa| Distortion::Tsai { kappa }),
+            rotation: DMat3::from_quat(DQuat::from_scaled_axis(turn)),
+            translation: DVec3::from_array(parameter(parameters, "translation")?),
+        };
+        camera.validated().map(Self).map_err(value_error)
+    }
+
+    /// As a section of a Pose2Sim TOML file holds them: `size`, `matrix`, `distortions` (k1, k2, p1, p2, k3),
+    /// `rotation` (axis times angle), `translation` (metres). Of Tsai's lens the distortions are the series, and
+    /// `tsai_kappa` is the number itself.
+    pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Camera { size, focal_px: f, centre_px: c, distortion, rotation, translation } = &self.0;
+        let coefficients = match *distortion {
+            Distortion::None => [0.0; 5],
+            Distortion::Brown { k1, k2, p1, p2, k3 } => [k1, k2, p1, p2, k3],
+            // x = x_d (1 + kappa r_d²) solved for x_d.
+            Distortion::Tsai { kappa } => [-kappa, 3.0 * kappa.powi(2), 0.0, 0.0, -12.0 * kappa.powi(3)],
+        };
+        let dict = PyDict::new(py);
+        dict.set_item("size", size)?;
+        dict.set_item("matrix", [[f.x, 0.0, c.x], [0.0, f.y, c.y], [0.0, 0.0, 1.0]])?;
+        dict.set_item("distortions", coefficients)?;
+        dict.set_item("rotation", DQuat::from_mat3(rotation).to_scaled_axis().to_array())?;
+        dict.set_item("translation", translation.to_array())?;
+        if let Distortion::Tsai { kappa } = *distortion {
+            dict.set_item("tsai_kappa", kappa)?;
+        }
+        Ok(dict)
     }
 
     /// Image width and height, pixels.
@@ -141,6 +187,15 @@ impl PyCamera {
             self.0.focal_px.x, p.x, p.y, p.z
         )
     }
+}
+
+fn parameter<'py, T: FromPyObjectOwned<'py>>(parameters: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
+    let item = parameters.get_item(key)?;
+    let item = item.ok_or_else(|| PyValueError::new_err(format!("camera: {key} is missing")))?;
+    item.extract::<T>().map_err(|error| {
+        let error: PyErr = error.into();
+        PyValueError::new_err(format!("camera: {key}: {error}"))
+    })
 }
 
 /// A way from the midpoints of a rectangle to a standing place.

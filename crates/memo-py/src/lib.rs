@@ -3,6 +3,7 @@
 mod array;
 mod camera;
 mod error;
+mod explain;
 mod image;
 mod keypoints;
 mod planar;
@@ -23,6 +24,8 @@ mod _memo {
 
     #[pymodule_export]
     use super::camera::PyCamera;
+    #[pymodule_export]
+    use super::explain::PyExplainer;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
     #[pymodule_export]

@@ -14,13 +14,23 @@ pub struct PyScene(SynthScene);
 #[pymethods]
 impl PyScene {
     #[new]
-    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=5.0, leftward=None))]
-    fn new(seed: u64, frames: usize, noise_sd: f32, leftward: Option<bool>) -> PyResult<Self> {
-        let options = SceneOptions { seed, frames, noise_sd, leftward, ..SceneOptions::default() };
+    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=5.0, leftward=None, late_left=0.0))]
+    fn new(
+        seed: u64,
+        frames: usize,
+        noise_sd: f32,
+        leftward: Option<bool>,
+        late_left: f64,
+    ) -> PyResult<Self> {
+        let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..SceneOptions::default() };
         if frames <= options.empty_frames || !(0.0..=255.0).contains(&noise_sd) {
             let wanted =
                 format!("frames must exceed {} and noise_sd lie between 0 and 255", options.empty_frames);
             return Err(PyValueError::new_err(format!("{wanted}; got {frames} and {noise_sd}")));
+        }
+        if !(-0.1..=0.1).contains(&late_left) {
+            let message = format!("late_left must lie between -0.1 and 0.1 of a cycle, got {late_left}");
+            return Err(PyValueError::new_err(message));
         }
         Ok(Self(SynthScene::new(options)))
     }

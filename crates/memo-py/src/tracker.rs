@@ -3,10 +3,12 @@
 use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::explain::record_of;
 use glam::{DVec2, DVec3};
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
 use memo_core::model::{SideJoints, VisibilityOptions, visible_contours};
+use memo_core::track::gait_parameters::GaitParameter;
 use memo_core::track::person::PersonOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
 use memo_core::track::score::Measure;
@@ -20,7 +22,7 @@ use pyo3::types::PyDict;
 
 /// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
 #[pyclass(name = "Tracker", module = "memo._memo")]
-pub struct PyTracker(Tracker);
+pub struct PyTracker(pub Tracker);
 
 #[pymethods]
 impl PyTracker {
@@ -194,6 +196,26 @@ impl PyWalk {
         }
         set("similarity", self.column(|r| r.similarity))?;
         Ok(dict)
+    }
+
+    /// Gait parameters: (parameter, side, value, unit, low, high, n); side "" for both, NaN where unknown.
+    #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
+    fn gait_parameters(&self) -> Vec<(&'static str, &'static str, f64, &'static str, f64, f64, usize)> {
+        let line = |p: GaitParameter| {
+            let side = match p.side {
+                Some(Side::Right) => "right",
+                Some(Side::Left) => "left",
+                None => "",
+            };
+            let [low, high] = p.interval.unwrap_or([f64::NAN; 2]);
+            (p.quantity.name(), side, p.value.unwrap_or(f64::NAN), p.quantity.unit(), low, high, p.n)
+        };
+        self.walk.gait_parameters().into_iter().map(line).collect()
+    }
+
+    /// What is needed beside the video to look at the frames again, as plain numbers: see `Explainer`.
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        record_of(py, &self.walk)
     }
 
     /// Gait events: (time_s, frame, event, side).

@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`.
+"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`, `report`.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -15,6 +15,7 @@ from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
 from memo.cli.pointlight import add_pointlight
 from memo.cli.posture import add_posture
+from memo.cli.report import add_report
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import EXIT_CODES, add_track
 from memo.cli.unswap import add_unswap
@@ -66,4 +67,5 @@ def _app() -> "typer.Typer":
     add_reproduce(app)
     add_pointlight(app)
     add_planar(app)
+    add_report(app)
     return app

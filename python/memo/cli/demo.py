@@ -15,6 +15,7 @@ from memo.cli.delivery import Delivery, Exit, guarded
 from memo.cli.given import check_writable
 from memo.cli.track import EXIT_CODES, deliver_interrupted, exit_code, follow, new_tracker, report, write_all
 from memo.files import JOINTS
+from memo.run import Source
 
 if TYPE_CHECKING:
     import typer
@@ -39,10 +40,11 @@ def _demo(out: Path, seed: int) -> Exit:
     check_writable(out)
     scene, frames = _draw_scene(seed)
     tracker = new_tracker({"height_m": scene.height_m, "camera": scene.camera})
-    track, interrupted = follow(frames, tracker, len(frames), 0, delivery)
+    rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
+    source = Source(None, (0, None), rate_hz, camera_given=True)
+    track, interrupted = follow(frames, tracker, len(frames), source, delivery)
     if interrupted:
         return deliver_interrupted(track, delivery)
-    rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
     written = write_all(track, frames, len(frames), rate_hz, delivery)
     report(track, written, delivery)
     for line in against_truth(track.columns, scene.truth):

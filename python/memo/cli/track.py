@@ -14,6 +14,8 @@ import memo
 from memo.cli.delivery import Delivery, Exit, InputError, Interrupt, complain, guarded, with_progress
 from memo.cli.given import check_writable, checked_height, load_camera
 from memo.files import write_events_csv, write_track_csv
+from memo.gait import write_gait_parameters_csv
+from memo.run import Source, write_run
 
 if TYPE_CHECKING:
     import typer
@@ -25,8 +27,6 @@ EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png")
-
-_LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at before they are used
 
 
 def add_track(app: "typer.Typer") -> None:
@@ -80,7 +80,8 @@ def _track_video(
         if "camera" not in tracker_options and reader.pixel_aspect != 1:
             complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
         tracker = new_tracker(tracker_options)
-        track, interrupted = follow(reader, tracker, reader.frame_count, frame_range[0], delivery)
+        source = Source(video, frame_range, reader.rate_hz, fps, "camera" in tracker_options)
+        track, interrupted = follow(reader, tracker, reader.frame_count, source, delivery)
         if reader.damage:
             complain(f"{video}: {reader.damage}")
     if interrupted:
@@ -98,29 +99,33 @@ def new_tracker(options: dict[str, Any]) -> Any:
 
 
 def follow(
-    frames: "Iterable[Frame]", tracker: Any, count: int | None, first_frame: int, delivery: Delivery
+    frames: "Iterable[Frame]", tracker: Any, count: int | None, source: Source, delivery: Delivery
 ) -> tuple[Any, bool]:
     """Gives all frames to the tracker; an interrupt ends it after the current frame.
 
     An error in the middle is raised again once the tables hold what was tracked until then.
     """
+    frames_read = 0
     try:
         with Interrupt() as interrupt:
             for frame in with_progress(frames, "tracking", count, delivery):
                 tracker.update(frame.luma, frame.time_s)
+                frames_read += 1
                 if interrupt.requested:
                     break
     except ValueError as error:
-        track = _snapshot(tracker.finish(), first_frame)
+        track = _snapshot(tracker, source, frames_read)
         if not len(track.columns["frame"]):
             raise
         _write_tables(track, delivery)
         raise InputError(f"{error}; the tables hold what was tracked until then") from error
-    return _snapshot(tracker.finish(), first_frame), interrupt.requested
+    return _snapshot(tracker, source, frames_read), interrupt.requested
 
 
-def _snapshot(track: Any, first_frame: int) -> Any:
+def _snapshot(tracker: Any, source: Source, frames_read: int) -> Any:
     """The track's tables, read once, with frames numbered as in the video (the tracker counts from 0)."""
+    track = tracker.finish()
+    first_frame = source.frames[0]
 
     def renumbered(table: dict[str, Any]) -> dict[str, Any]:
         return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else table
@@ -132,6 +137,11 @@ def _snapshot(track: Any, first_frame: int) -> Any:
         measured=renumbered(dict(track.measured)),
         contours=track.contours,
         summary=dict(track.summary),
+        sentences=list(track.sentences),
+        gait_parameters=dict(track.gait_parameters),
+        camera=track.camera,
+        records=track.records,
+        run=(tracker.options, source, frames_read),
     )
 
 
@@ -183,7 +193,9 @@ def _write_tables(track: Any, delivery: Delivery) -> list[Path]:
     table, events = delivery.out / "track.csv", delivery.out / "events.csv"
     write_track_csv(table, track.columns)
     write_events_csv(events, track.events)
-    return [table, events]
+    gait = delivery.out / "gait_parameters.csv"
+    write_gait_parameters_csv(gait, track.gait_parameters)
+    return [table, events, gait, write_run(delivery.out, track, *track.run)]
 
 
 def write_all(
@@ -212,13 +224,8 @@ def deliver_interrupted(track: Any, delivery: Delivery) -> Exit:
 
 
 def report(track: Any, written: list[Path], delivery: Delivery) -> None:
-    lines = [track.summary["message"]]
-    p_swapped = track.summary.get("p_swapped")
-    if p_swapped is not None and p_swapped > _LIKELY_SWAPPED:
-        lines.append(
-            f"Left and right may be swapped (probability {p_swapped:.0%}): look before you use them."
-        )
-    delivery.tell({**track.summary, "rows": len(track.columns["frame"])}, lines, written)
+    summary = {**track.summary, "rows": len(track.columns["frame"]), "sentences": track.sentences}
+    delivery.tell(summary, track.sentences, written)
 
 
 def exit_code(track: Any) -> Exit:

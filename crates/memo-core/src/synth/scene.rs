@@ -10,6 +10,7 @@ use crate::model::surface::{NO_PART, SurfaceMap, surface_map};
 use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
+use std::f64::consts::TAU;
 
 /// What is drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,9 @@ pub struct SceneOptions {
     pub noise_sd: f32,
     /// Whether the walker goes to the left; `None` lets the seed decide.
     pub leftward: Option<bool>,
+    /// By how much of a cycle the left heel strikes late, -0.1 to 0.1: the left step takes 0.5 + this of the
+    /// cycle, the right one the rest, at constant speed. 0, the symmetric gait.
+    pub late_left: f64,
 }
 
 impl Default for SceneOptions {
@@ -40,6 +44,7 @@ impl Default for SceneOptions {
             size: [640, 480],
             noise_sd: 5.0,
             leftward: None,
+            late_left: 0.0,
         }
     }
 }
@@ -126,10 +131,18 @@ impl SynthScene {
         let hypothesis = Hypothesis {
             along_m: self.start.along_m + self.speed_mps * time_s,
             height_m: self.start.height_m,
-            phase: (self.start.phase + self.rate_hz * time_s).rem_euclid(1.0),
+            phase: self.phase(self.start.phase + self.rate_hz * time_s),
         };
         let scene = Scene { walker: &self.walker, camera: &self.camera, path: &self.path };
         Some(Truth { frame, time_s, hypothesis, posed: scene.pose(&hypothesis) })
+    }
+
+    /// The gait phase after a number of cycles walked. phi(u) = u + c (cos 2 pi u - 1), which is 0 at 0, and 1/2
+    /// at u = 1/2 + late_left for c = late_left / (1 + cos 2 pi late_left).
+    fn phase(&self, cycles: f64) -> f64 {
+        let late = self.options.late_left;
+        let c = late / (1.0 + (TAU * late).cos());
+        (cycles + c * ((TAU * cycles).cos() - 1.0)).rem_euclid(1.0)
     }
 
     /// The grey frame.

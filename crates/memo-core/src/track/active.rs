@@ -32,6 +32,7 @@ pub(super) struct Active {
     pub(super) walk: Walk,
     /// Evidence kept until the person is fitted.
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
+    pub(super) gait_speed_mps: f64,
     pub(super) person_fit: Option<PersonFit>,
     pub(super) fitted: bool,
 }

@@ -5,9 +5,9 @@
 //! Two frames are kept, however long the stream.
 
 use super::score::EdgeLine;
-use crate::image::edge::{EdgeDomain, EdgeOptions, Window};
+use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chains};
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
-use crate::image::line::{LineError, LineOptions, edge_segments};
+use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
 use crate::image::{
     Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanError, CleanOptions, Frame,
     FrameError, GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions,
@@ -87,6 +87,17 @@ impl Default for EvidenceOptions {
 /// covers the parts of a limb that stood still between two frames.
 const EDGE_MARGIN_PX: f64 = 5.0;
 
+/// The edges found in a window of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowEdges {
+    /// Edge points, in image pixels.
+    pub chains: EdgeChains,
+    /// Straight edges, in image pixels.
+    pub segments: Vec<EdgeSegment>,
+    /// The same straight edges in ideal pixels of the camera, as they are compared with the model.
+    pub lines: Vec<EdgeLine>,
+}
+
 /// One frame with its change mask.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
@@ -110,28 +121,28 @@ impl Evidence {
         group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
     }
 
-    /// Straight edges in and near the changed pixels of a rectangle, in ideal pixels of the camera; in the
-    /// whole rectangle where nothing changed in it.
+    /// Straight edges in and near the changed pixels of a rectangle, with the edge points they were made of;
+    /// in the whole rectangle where nothing changed in it.
     pub fn edges(
         &self,
         window: &Rectangle,
         camera: Option<&Camera>,
         options: &EvidenceOptions,
-    ) -> Result<Vec<EdgeLine>, EvidenceError> {
+    ) -> Result<WindowEdges, EvidenceError> {
         let window = Window { x: window.left, y: window.top, width: window.width(), height: window.height() };
         let moving = self.mask_near(&window);
         let domain = EdgeDomain { mask: moving.as_ref(), window: Some(window) };
-        let segments = edge_segments(&self.grey.as_frame(), &domain, &options.edge, &options.line)?;
+        let chains = edge_chains(&self.grey.as_frame(), &domain, &options.edge).map_err(LineError::from)?;
+        let segments = segments_from_chains(&chains, &options.line)?;
         let ideal = |p: DVec2| camera.and_then(|c| c.undistort(p).ok()).unwrap_or(p).as_vec2().to_array();
-        Ok(segments
-            .iter()
-            .map(|s| EdgeLine {
-                start: ideal(s.start_px),
-                end: ideal(s.end_px),
-                gradient: s.mean_gradient as f32,
-                velocity: self.speed_px(s.midpoint_px()),
-            })
-            .collect())
+        let line = |s: &EdgeSegment| EdgeLine {
+            start: ideal(s.start_px),
+            end: ideal(s.end_px),
+            gradient: s.mean_gradient as f32,
+            velocity: self.speed_px(s.midpoint_px()),
+        };
+        let lines = segments.iter().map(line).collect();
+        Ok(WindowEdges { chains, segments, lines })
     }
 
     /// Speed of the image at a point, pixels per frame; 0 where it is not known.

@@ -3,6 +3,8 @@
 mod active;
 mod column;
 pub mod evidence;
+pub mod explain;
+pub mod gait_parameters;
 pub mod kalman;
 pub mod locate;
 pub mod person;

@@ -20,10 +20,14 @@ pub struct TrackedWalk {
     pub walk: Walk,
     /// The camera given or guessed.
     pub camera: Camera,
+    /// Whether no camera was given.
+    pub camera_is_guessed: bool,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
     /// What the starting phase found.
     pub start: StartReport,
+    /// The speed the average gait was made for, metres a second.
+    pub gait_speed_mps: f64,
     /// The fit of the person, where one was made.
     pub person_fit: Option<PersonFit>,
     /// Options it was followed with.

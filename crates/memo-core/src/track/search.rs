@@ -73,6 +73,26 @@ impl Scene<'_> {
         visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), &LINES_ONLY, &mut visible);
         visible.iter().filter_map(|segment| project(segment, self.camera)).collect()
     }
+
+    /// The side lines that [`search`] compares at a hypothesis, in ideal pixels, cut to the image: what is
+    /// visible at the middle height of the grid's column, raised to the hypothesis's own.
+    pub fn searched_lines(
+        &self,
+        hypothesis: &Hypothesis,
+        middle_height_m: f64,
+        hidden_lines: HiddenLines,
+    ) -> Vec<ModelLine> {
+        if hidden_lines == HiddenLines::PerHypothesis {
+            return self.lines(hypothesis);
+        }
+        let middle = self.pose(&Hypothesis { height_m: middle_height_m, ..*hypothesis });
+        let raised = DVec3::Z * (hypothesis.height_m - middle_height_m);
+        let mut visible = Vec::new();
+        visible_contours(&middle.cylinders, self.camera.position(), &LINES_ONLY, &mut visible);
+        let moved =
+            |s: &VisibleSegment| VisibleSegment { start: s.start + raised, end: s.end + raised, ..*s };
+        visible.iter().filter_map(|segment| project(&moved(segment), self.camera)).collect()
+    }
 }
 
 const LINES_ONLY: VisibilityOptions = VisibilityOptions { rims: false, rim_chords: 0 };

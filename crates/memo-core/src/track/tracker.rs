@@ -130,6 +130,12 @@ impl TrackerOptions {
             walk: WalkOptions::default(),
         }
     }
+
+    /// The average walker of the given height; the gait is made for a speed, metres a second.
+    pub fn walker(&self, gait_speed_mps: f64) -> Result<Walker, BodyError> {
+        let body = Body::from_height(self.height_m)?;
+        Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })
+    }
 }
 
 /// A walk is handed out after this many frames and goes on as a new one.
@@ -257,6 +263,11 @@ impl Tracker {
         })
     }
 
+    /// The options it works with.
+    pub fn options(&self) -> &TrackerOptions {
+        &self.options
+    }
+
     /// Counts of candidates and refused starts so far.
     pub fn seek_report(&self) -> SeekReport {
         self.report
@@ -319,8 +330,8 @@ impl Tracker {
 
     fn edges(&self, evidence: &Evidence, window: &Rectangle) -> Result<FrameEdges, TrackError> {
         let camera = self.walking.as_ref().map(|active| &active.camera).or(self.options.camera.as_ref());
-        let edges = evidence.edges(window, camera, &self.options.evidence)?;
-        Ok(FrameEdges { frame: evidence.frame, time_s: evidence.time_s, edges })
+        let edges = evidence.edges(window, camera, &self.options.evidence)?.lines;
+        Ok(FrameEdges { frame: evidence.frame, time_s: evidence.time_s, window: *window, edges })
     }
 
     /// Starts a walk on the collected sightings, or drops the oldest ones.
@@ -345,12 +356,12 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) {
             return None;
         }
-        let crown_m = self.walker(COMFORTABLE_MPS)?.level_crown_height_m();
+        let crown_m = self.options.walker(COMFORTABLE_MPS).ok()?.level_crown_height_m();
         let (camera, course) = self.course(&sightings, size, crown_m).ok()?;
         if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
             return None;
         }
-        let walker = self.walker(course.speed_mps)?;
+        let walker = self.options.walker(course.speed_mps).ok()?;
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
         let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
         if start.contrast() < LEAST_CONTRAST {
@@ -367,6 +378,7 @@ impl Tracker {
             start,
             walk,
             kept,
+            gait_speed_mps: course.speed_mps,
             person_fit: None,
             fitted: false,
         })
@@ -384,11 +396,6 @@ impl Tracker {
         };
         let course = locate(sightings, &camera, crown_m)?;
         Ok((camera, course))
-    }
-
-    fn walker(&self, speed_mps: f64) -> Option<Walker> {
-        let body = Body::from_height(self.options.height_m).ok()?;
-        Some(Walker { body, gait: self.options.gait.gait(&body, speed_mps), style: GaitStyle::default() })
     }
 
     /// Follows the person into a frame, or ends the walk.
@@ -448,6 +455,8 @@ impl Tracker {
                 camera: active.camera,
                 depth_sd_m: active.depth_sd_m,
                 start: active.start,
+                camera_is_guessed: self.options.camera.is_none(),
+                gait_speed_mps: active.gait_speed_mps,
                 person_fit: active.person_fit,
                 options: self.options.walk,
             });

@@ -8,6 +8,7 @@ use super::kalman::{ConstantVelocity, FilterOptions};
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
 use super::start::{SwapModel, swap_probability};
+use crate::image::Rectangle;
 use crate::model::{Camera, Walker};
 
 /// Options of the following stage.
@@ -84,6 +85,17 @@ impl State {
     }
 }
 
+/// Where in a frame one twin was looked for: with the frame, all that its similarity hangs on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The part of the image edges were taken from.
+    pub window: Rectangle,
+    /// The heights of the search grid; hidden lines were removed at the middle one.
+    pub heights: Axis,
+    /// The grid point of the highest similarity; the prediction where nothing was matched.
+    pub best: Hypothesis,
+}
+
 /// One frame of one twin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
@@ -95,8 +107,10 @@ pub struct Step {
     pub state: State,
     /// The best hypothesis of the frame; `None` where nothing was matched and the filter coasted.
     pub measured: Option<Hypothesis>,
-    /// Its similarity, 0 where nothing matched.
+    /// The similarity of the best grid point, 0 where nothing matched.
     pub similarity: f32,
+    /// Where it was looked for.
+    pub look: Look,
 }
 
 /// One of the two half-cycle hypotheses.
@@ -130,6 +144,8 @@ pub struct FrameEdges {
     pub frame: usize,
     /// Time of the frame, seconds.
     pub time_s: f64,
+    /// The part of the image they were taken from.
+    pub window: Rectangle,
     /// Straight edges in ideal pixels.
     pub edges: Vec<EdgeLine>,
 }
@@ -231,9 +247,12 @@ impl Walk {
 
 /// Searches around a prediction and updates the state with what was found.
 fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options: &WalkOptions) -> Step {
-    let found = search(&edges.edges, scene, &predicted.grid(), &options.similarity, options.hidden_lines);
+    let grid = predicted.grid();
+    let found = search(&edges.edges, scene, &grid, &options.similarity, options.hidden_lines);
     let similarity = found.best_score();
     let measured = (similarity > 0.0).then(|| found.refined());
     let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &options.filter));
-    Step { frame: edges.frame, time_s: edges.time_s, state, measured, similarity }
+    let best = measured.map_or(predicted.hypothesis(), |_| found.best());
+    let look = Look { window: edges.window, heights: grid.height, best };
+    Step { frame: edges.frame, time_s: edges.time_s, state, measured, similarity, look }
 }

@@ -1,0 +1,162 @@
+//! Why a frame was understood as it was: the terms of eqs. (7)-(11) at the chosen hypothesis, and the similarity
+//! over the whole gait cycle (Rohr 1994, section 4.3, Figs. 18 and 19).
+//!
+//! Nothing is kept while tracking but where each frame was looked at ([`Look`]). The frame is looked at again
+//! with the code, the window, the grid and the person the tracker used in the end, so the numbers are the ones
+//! it used. The curve is that of one place: the best grid point's. The search itself also moved the body along
+//! the path and up and down at every phase, but only near the predicted phase; a phase far away could score
+//! somewhat higher at a place of its own.
+
+use super::evidence::{Evidence, EvidenceError, EvidenceOptions, WindowEdges};
+use super::score::{ModelLine, Similarity, similarity};
+use super::search::{Axis, Grid, Hypothesis, Scene, search};
+use super::walk::{Look, WalkOptions};
+
+/// Phases of [`Explanation::cycle`]: twice as many as the search's grid has in a cycle.
+const CYCLE_PHASES: usize = 100;
+
+/// What a frame showed and how the chosen hypothesis fits it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// Edge points and straight edges of the window.
+    pub edges: WindowEdges,
+    /// Visible contours of the model at the chosen hypothesis, ideal pixels.
+    pub lines: Vec<ModelLine>,
+    /// Eq. (11) there, with the edge that answers each line. Differs from the search's own value, whose
+    /// exponential is a fast one, by some 1e-6.
+    pub similarity: Similarity,
+    /// Similarity over the whole cycle at the chosen place and height, by the search itself.
+    pub cycle: Vec<PhaseScore>,
+    /// The chosen hypothesis: the best point of the tracker's grid.
+    pub chosen: Hypothesis,
+}
+
+/// Similarity at a phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhaseScore {
+    /// Gait phase in [0, 1).
+    pub phase: f64,
+    /// s(p) of eq. (11).
+    pub similarity: f32,
+}
+
+/// Looks at a frame again as the tracker did.
+///
+/// `scene` is the walk's with the person as fitted ([`TrackedWalk::scene`](super::result::TrackedWalk::scene)),
+/// `look` that of the frame's step.
+pub fn explain(
+    evidence: &Evidence,
+    look: &Look,
+    scene: &Scene<'_>,
+    evidence_options: &EvidenceOptions,
+    options: &WalkOptions,
+) -> Result<Explanation, EvidenceError> {
+    // 1. The edges of the window.
+    let edges = evidence.edges(&look.window, Some(scene.camera), evidence_options)?;
+    // 2. The model's contours, each with the edge that answers it.
+    let lines = scene.searched_lines(&look.best, look.heights.centre, options.hidden_lines);
+    let similarity = similarity(&lines, &edges.lines, &options.similarity);
+    // 3. The other phases.
+    let grid = cycle_at(look);
+    let found = search(&edges.lines, scene, &grid, &options.similarity, options.hidden_lines);
+    let row = nearest(&look.heights, look.best.height_m);
+    let scores = found.scores.chunks_exact(grid.height.count).map(|heights| heights[row]);
+    let score = |(index, similarity): (usize, f32)| PhaseScore {
+        phase: grid.phase.at(index).rem_euclid(1.0),
+        similarity,
+    };
+    let mut cycle: Vec<PhaseScore> = scores.enumerate().map(score).collect();
+    cycle.sort_by(|a, b| a.phase.total_cmp(&b.phase));
+    Ok(Explanation { edges, lines, similarity, cycle, chosen: look.best })
+}
+
+/// All phases at the chosen place; the chosen phase is among them, and the heights are those of the search.
+fn cycle_at(look: &Look) -> Grid {
+    let step = 1.0 / CYCLE_PHASES as f64;
+    Grid {
+        along: Axis { centre: look.best.along_m, step: 0.0, count: 1 },
+        height: look.heights,
+        phase: Axis { centre: look.best.phase - 0.5 * step, step, count: CYCLE_PHASES },
+    }
+}
+
+/// Index of the value nearest to a given one.
+fn nearest(axis: &Axis, value: f64) -> usize {
+    let off = |index: &usize| (axis.at(*index) - value).abs();
+    (0..axis.count).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{SceneOptions, SynthScene};
+    use crate::track::evidence::EvidenceStream;
+    use crate::track::result::TrackedWalk;
+    use crate::track::tracker::{Tracker, TrackerOptions};
+
+    fn tracked(scene: &SynthScene, options: &TrackerOptions) -> TrackedWalk {
+        let mut tracker = Tracker::new(options.clone()).unwrap();
+        for k in 0..scene.len() {
+            tracker.update(&scene.frame(k).as_frame(), scene.time_s(k)).unwrap();
+        }
+        tracker.finish().unwrap();
+        tracker.take_finished().remove(0)
+    }
+
+    fn explained(
+        scene: &SynthScene,
+        walk: &TrackedWalk,
+        options: &TrackerOptions,
+    ) -> Vec<(f32, Explanation)> {
+        let mut stream = EvidenceStream::new(options.evidence);
+        let mut all = Vec::new();
+        let mut add = |evidence: Evidence| {
+            if let Some(step) = walk.steps().iter().find(|s| s.frame == evidence.frame) {
+                let why =
+                    explain(&evidence, &step.look, &walk.scene(), &options.evidence, &walk.options).unwrap();
+                all.push((step.similarity, why));
+            }
+        };
+        for k in 0..scene.len() {
+            stream.push(&scene.frame(k).as_frame(), scene.time_s(k)).unwrap().map(&mut add);
+        }
+        stream.finish().unwrap().map(&mut add);
+        all
+    }
+
+    #[test]
+    fn the_tracker_s_own_similarity_comes_out_again_and_no_near_phase_beats_it() {
+        let scene = SynthScene::new(SceneOptions { seed: 3, frames: 60, ..SceneOptions::default() });
+        let options = TrackerOptions {
+            camera: Some(scene.camera.clone()),
+            ..TrackerOptions::for_height(scene.walker.body.height_m)
+        };
+        let walk = tracked(&scene, &options);
+        let all = explained(&scene, &walk, &options);
+        assert_eq!(all.len(), walk.steps().len());
+        for (tracked, why) in &all {
+            let off = |p: f64| {
+                let d = p - why.chosen.phase;
+                (d - d.round()).abs()
+            };
+            let here = why.cycle.iter().find(|s| off(s.phase) < 1e-9).expect("the chosen phase is sampled");
+            assert!((here.similarity - tracked).abs() < 2e-6, "curve {} tracked {tracked}", here.similarity);
+            assert!(
+                (why.similarity.value - tracked).abs() < 1e-4,
+                "plain {} tracked {tracked}",
+                why.similarity.value
+            );
+            // The search's own grid has every second of these phases.
+            let near = why.cycle.iter().filter(|s| {
+                off(s.phase) < 0.05
+                    && (off(s.phase) / 0.02).fract().min(1.0 - (off(s.phase) / 0.02).fract()) < 1e-6
+            });
+            assert!(near.clone().count() >= 5);
+            assert!(near.into_iter().all(|s| s.similarity <= tracked + 2e-6));
+            assert_eq!(why.cycle.len(), CYCLE_PHASES);
+            assert!(why.cycle.windows(2).all(|w| w[0].phase < w[1].phase));
+            let sum: f32 = why.similarity.matches.iter().map(|m| m.similarity_px).sum();
+            assert!((sum / why.similarity.model_px - why.similarity.value).abs() < 1e-6);
+        }
+    }
+}

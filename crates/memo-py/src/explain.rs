@@ -1,0 +1,280 @@
+//! `Explainer`: frames looked at again as the tracker did.
+
+use crate::array::{
+    frame_from_numpy, numpy_from_column, numpy_from_image, numpy_from_rows, numpy_from_segments,
+};
+use crate::camera::PyCamera;
+use crate::error::value_error;
+use crate::tracker::PyTracker;
+use glam::{DVec2, Vec2};
+use memo_core::image::Rectangle;
+use memo_core::model::{Camera, Walker};
+use memo_core::track::evidence::{Evidence, EvidenceStream};
+use memo_core::track::explain::{Explanation, explain};
+use memo_core::track::person::Deviation;
+use memo_core::track::result::TrackedWalk;
+use memo_core::track::search::{Axis, Hypothesis, POSITION_STEP_M, Path, Scene};
+use memo_core::track::tracker::TrackerOptions;
+use memo_core::track::walk::Look;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::{HashMap, HashSet};
+
+/// What is needed beside the video to look at a walk's frames again, as plain numbers.
+pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk) -> PyResult<Bound<'py, PyDict>> {
+    let steps = walk.steps();
+    let deviation =
+        walk.person_fit.filter(|fit| fit.is_believed).map(|fit| fit.deviation).unwrap_or_default();
+    let Deviation { hip_rad, knee_rad, shoulder_height, hip_height } = deviation;
+    let window = |r: &Rectangle| [r.left, r.top, r.right, r.bottom];
+    let dict = PyDict::new(py);
+    dict.set_item("camera", PyCamera(walk.camera.clone()).parameters(py)?)?;
+    dict.set_item("origin_m", walk.walk.path.origin.to_array())?;
+    dict.set_item("heading_rad", walk.walk.path.heading_rad)?;
+    dict.set_item("gait_speed_mps", walk.gait_speed_mps)?;
+    dict.set_item("deviation", [hip_rad, knee_rad, shoulder_height, hip_height])?;
+    dict.set_item("frame", steps.iter().map(|s| s.frame).collect::<Vec<_>>())?;
+    dict.set_item("window_px", steps.iter().map(|s| window(&s.look.window)).collect::<Vec<_>>())?;
+    dict.set_item("middle_height_m", steps.iter().map(|s| s.look.heights.centre).collect::<Vec<_>>())?;
+    dict.set_item("heights", steps.iter().map(|s| s.look.heights.count).collect::<Vec<_>>())?;
+    dict.set_item("along_m", steps.iter().map(|s| s.look.best.along_m).collect::<Vec<_>>())?;
+    dict.set_item("height_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
+    dict.set_item("similarity", steps.iter().map(|s| s.similarity).collect::<Vec<_>>())?;
+    dict.set_item("phase", steps.iter().map(|s| s.look.best.phase).collect::<Vec<_>>())?;
+    Ok(dict)
+}
+
+/// A walk as its record tells it.
+struct Recorded {
+    camera: Camera,
+    walker: Walker,
+    path: Path,
+    looks: HashMap<usize, Look>,
+}
+
+/// Most heights a grid can have: the tracker's own has eleven.
+const MOST_HEIGHTS: usize = 1000;
+
+impl Recorded {
+    fn read(record: &Bound<'_, PyDict>, options: &TrackerOptions) -> PyResult<Self> {
+        let camera: Bound<'_, PyDict> = value(record, "camera")?;
+        let speed: f64 = number(record, "gait_speed_mps")?;
+        let average = options.walker(speed).map_err(value_error)?;
+        let [hip_rad, knee_rad, shoulder_height, hip_height] =
+            finite("deviation", value(record, "deviation")?)?;
+        let deviation = Deviation { hip_rad, knee_rad, shoulder_height, hip_height };
+        let origin = DVec2::from_array(finite("origin_m", value(record, "origin_m")?)?);
+        Ok(Self {
+            camera: PyCamera::from_parameters(&camera)?.0,
+            walker: deviation.apply(&average),
+            path: Path { origin, heading_rad: number(record, "heading_rad")? },
+            looks: looks(record)?,
+        })
+    }
+}
+
+fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
+    let frames: Vec<usize> = value(record, "frame")?;
+    let windows: Vec<[usize; 4]> = column(record, "window_px", frames.len())?;
+    let counts: Vec<usize> = column(record, "heights", frames.len())?;
+    let [middles, alongs, heights, phases] = [
+        numbers(record, "middle_height_m", frames.len())?,
+        numbers(record, "along_m", frames.len())?,
+        numbers(record, "height_m", frames.len())?,
+        numbers(record, "phase", frames.len())?,
+    ];
+    let look = |k: usize| {
+        let [left, top, right, bottom] = windows[k];
+        if left > right || top > bottom {
+            return Err(refused("window_px", format!("{:?} is no rectangle", windows[k])));
+        }
+        if !(1..=MOST_HEIGHTS).contains(&counts[k]) {
+            return Err(refused("heights", format!("{} heights are not searched", counts[k])));
+        }
+        let heights_of = Axis { centre: middles[k], step: POSITION_STEP_M, count: counts[k] };
+        let best = Hypothesis { along_m: alongs[k], height_m: heights[k], phase: phases[k].rem_euclid(1.0) };
+        Ok((frames[k], Look { window: Rectangle { left, top, right, bottom }, heights: heights_of, best }))
+    };
+    (0..frames.len()).map(look).collect()
+}
+
+fn value<'py, T: FromPyObjectOwned<'py>>(record: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
+    let item = record.get_item(key)?.ok_or_else(|| refused(key, "is missing".to_owned()))?;
+    item.extract::<T>().map_err(|error| {
+        let error: PyErr = error.into();
+        refused(key, error.to_string())
+    })
+}
+
+fn column<'py, T: FromPyObjectOwned<'py>>(
+    record: &Bound<'py, PyDict>,
+    key: &str,
+    wanted: usize,
+) -> PyResult<Vec<T>> {
+    let values: Vec<T> = value(record, key)?;
+    if values.len() != wanted {
+        return Err(refused(key, format!("has {} values for {wanted} frames", values.len())));
+    }
+    Ok(values)
+}
+
+fn number(record: &Bound<'_, PyDict>, key: &str) -> PyResult<f64> {
+    finite(key, [value(record, key)?]).map(|[x]| x)
+}
+
+fn numbers(record: &Bound<'_, PyDict>, key: &str, wanted: usize) -> PyResult<Vec<f64>> {
+    let values: Vec<f64> = column(record, key, wanted)?;
+    if values.iter().all(|x| x.is_finite()) {
+        Ok(values)
+    } else {
+        Err(refused(key, "is not finite".to_owned()))
+    }
+}
+
+fn finite<const N: usize>(key: &str, values: [f64; N]) -> PyResult<[f64; N]> {
+    if values.iter().all(|x| x.is_finite()) {
+        Ok(values)
+    } else {
+        Err(refused(key, "is not finite".to_owned()))
+    }
+}
+
+fn refused(key: &str, why: String) -> PyErr {
+    PyValueError::new_err(format!("record of a walk: {key}: {why}"))
+}
+
+/// Frames in, the wanted ones explained, one frame later.
+#[pyclass(name = "Explainer", module = "memo._memo")]
+pub struct PyExplainer {
+    options: TrackerOptions,
+    walks: Vec<Recorded>,
+    wanted: HashSet<usize>,
+    stream: Option<EvidenceStream>,
+}
+
+#[pymethods]
+impl PyExplainer {
+    /// From a tracker with the options of the run, the records of its walks, and the frames wanted, counted from
+    /// the first given.
+    #[new]
+    fn new(
+        tracker: &Bound<'_, PyTracker>,
+        records: Vec<Bound<'_, PyDict>>,
+        wanted: HashSet<usize>,
+    ) -> PyResult<Self> {
+        let options = tracker.borrow().0.options().clone();
+        let walks = records.iter().map(|r| Recorded::read(r, &options)).collect::<PyResult<_>>()?;
+        let stream = Some(EvidenceStream::new(options.evidence));
+        Ok(Self { options, walks, wanted, stream })
+    }
+
+    /// Takes the next frame, (H, W) uint8, and its time in seconds; gives the frame before, if it is wanted and
+    /// in a walk.
+    fn update<'py>(
+        &mut self,
+        py: Python<'py>,
+        frame: &Bound<'py, PyAny>,
+        time_s: f64,
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let array = frame_from_numpy(frame)?;
+        let frame = array.as_frame()?;
+        let Some(stream) = &mut self.stream else {
+            return Err(PyValueError::new_err("the frames have ended"));
+        };
+        let evidence = py.detach(|| stream.push(&frame, time_s)).map_err(value_error)?;
+        evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
+    }
+
+    /// Gives the last frame.
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(stream) = self.stream.take() else { return Ok(None) };
+        let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
+        evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
+    }
+}
+
+impl PyExplainer {
+    fn explained<'py>(&self, py: Python<'py>, evidence: Evidence) -> PyResult<Option<Bound<'py, PyDict>>> {
+        if !self.wanted.contains(&evidence.frame) {
+            return Ok(None);
+        }
+        let of = |walk: &Recorded| walk.looks.get(&evidence.frame).copied();
+        let Some((index, look)) = self.walks.iter().enumerate().find_map(|(k, w)| Some((k, of(w)?))) else {
+            return Ok(None);
+        };
+        let (width, height) = (evidence.grey.width(), evidence.grey.height());
+        if look.window.right >= width || look.window.bottom >= height {
+            let message = format!("{:?} lies outside frames of {width}x{height} pixels", look.window);
+            return Err(refused("window_px", message));
+        }
+        let Recorded { walker, camera, path, .. } = &self.walks[index];
+        let scene = Scene { walker, camera, path };
+        let why = py
+            .detach(|| explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))
+            .map_err(value_error)?;
+        dict_of(py, evidence, index, &look, &why, camera).map(Some)
+    }
+}
+
+fn dict_of<'py>(
+    py: Python<'py>,
+    evidence: Evidence,
+    walk: usize,
+    look: &Look,
+    why: &Explanation,
+    camera: &Camera,
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("frame", evidence.frame)?;
+    dict.set_item("time_s", evidence.time_s)?;
+    dict.set_item("walk", walk)?;
+    let Rectangle { left, top, right, bottom } = look.window;
+    dict.set_item("window_px", (left, top, right, bottom))?;
+    dict.set_item("luma", numpy_from_image(py, evidence.grey)?)?;
+    dict.set_item("change_mask", numpy_from_image(py, evidence.mask)?)?;
+    let points = why.edges.chains.edgels().iter().map(|e| e.position_px.as_dvec2().to_array()).collect();
+    dict.set_item("edge_points", numpy_from_rows(py, points)?)?;
+    let segments = why.edges.segments.iter().map(|s| [s.start_px.to_array(), s.end_px.to_array()]).collect();
+    dict.set_item("segments", numpy_from_segments(py, segments)?)?;
+    set_model(&dict, why, camera)?;
+    let cycle = why.cycle.iter();
+    dict.set_item("phase_grid", numpy_from_column(py, cycle.clone().map(|s| s.phase).collect()))?;
+    dict.set_item("similarity", numpy_from_column(py, cycle.map(|s| f64::from(s.similarity)).collect()))?;
+    dict.set_item("phase", why.chosen.phase)?;
+    dict.set_item("chosen_similarity", f64::from(why.similarity.value))?;
+    Ok(dict)
+}
+
+/// The model's lines in image pixels with what answers each.
+fn set_model(dict: &Bound<'_, PyDict>, why: &Explanation, camera: &Camera) -> PyResult<()> {
+    let py = dict.py();
+    let count = why.lines.len();
+    let pixel = |p: [f32; 2]| camera.distort(Vec2::from(p).as_dvec2()).unwrap_or(DVec2::NAN).to_array();
+    let length =
+        |l: &memo_core::track::score::ModelLine| f64::from(Vec2::from(l.start).distance(Vec2::from(l.end)));
+    let mut edge = vec![-1i64; count];
+    let mut terms = [const { Vec::new() }; 4];
+    terms.iter_mut().for_each(|column| column.resize(count, f64::NAN));
+    for m in &why.similarity.matches {
+        edge[m.line] = m.edge as i64;
+        for (column, term) in
+            terms.iter_mut().zip([m.overlap_px, m.distance_px, m.angle_rad, m.similarity_px])
+        {
+            column[m.line] = f64::from(term);
+        }
+    }
+    let [overlap, distance, angle, similarity] = terms;
+    let answered: Vec<f64> = similarity.iter().map(|s| if s.is_nan() { 0.0 } else { *s }).collect();
+    let lengths: Vec<f64> = why.lines.iter().map(length).collect();
+    let lines = why.lines.iter().map(|l| [pixel(l.start), pixel(l.end)]).collect();
+    dict.set_item("model", numpy_from_segments(py, lines)?)?;
+    dict.set_item("model_part", numpy_from_column(py, why.lines.iter().map(|l| l.part).collect()))?;
+    dict.set_item("model_px", numpy_from_column(py, lengths))?;
+    dict.set_item("model_edge", numpy_from_column(py, edge))?;
+    dict.set_item("overlap_px", numpy_from_column(py, overlap))?;
+    dict.set_item("distance_px", numpy_from_column(py, distance))?;
+    dict.set_item("angle_rad", numpy_from_column(py, angle))?;
+    dict.set_item("similarity_px", numpy_from_column(py, answered))?;
+    Ok(())
+}

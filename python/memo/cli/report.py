@@ -1,0 +1,71 @@
+"""`memo report`: the results of a run as one HTML file.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
+from memo.cli.track import _frame_range as frame_range
+
+if TYPE_CHECKING:
+    import typer
+
+EXIT_CODES = """Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage;
+4 the app extra is not installed; 130 interrupted (an older page stays as it was)."""
+
+
+def add_report(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def report(
+        folder: Annotated[Path, typer.Argument(help="What memo track or memo posture left.", metavar="DIR")],
+        out: Annotated[Path | None, typer.Option(help="The file to write; DIR/report.html.")] = None,
+        frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
+        every: Annotated[
+            int | None, typer.Option(help="Every N-th frame; else as many as fit in about 25 MB.", min=1)
+        ] = None,
+        why: Annotated[bool, typer.Option(help="Show what each frame was matched to.")] = True,
+        open_: Annotated[bool, typer.Option("--open", help="Show it in the browser.")] = False,
+        as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Makes one HTML file of the results in DIR, to be read without memo or a network."""
+
+        def work() -> Exit:
+            path = folder / "report.html" if out is None else _checked_file(out)
+            delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
+            written = deliver_report(folder, path, delivery, frames=frame_range(frames), every=every, why=why)
+            if open_:
+                webbrowser.open(written.resolve().as_uri())
+            return Exit.DONE
+
+        raise typer.Exit(guarded(work))
+
+
+def deliver_report(folder: Path, path: Path, delivery: Delivery, **options: Any) -> Path:
+    """Writes the page with progress and says what is in it."""
+    from memo.report import write_report
+
+    report = write_report(
+        folder, path, watch=lambda items, what, count: with_progress(items, what, count, delivery), **options
+    )
+    contents = report.contents
+    if report.kind == "memo track":
+        line = f"{contents['pictures']} frames with pictures, {contents['explained']} explained"
+    else:
+        line = f"{contents['frames']} frames"
+    lines = [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
+    delivery.tell({"kind": report.kind, "bytes": report.bytes, **contents}, lines, [report.path])
+    return report.path
+
+
+def _checked_file(path: Path) -> Path:
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; --out names the file to write")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    return path

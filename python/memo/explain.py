@@ -1,0 +1,201 @@
+"""Why memo saw a frame as it did: the evidence of a finished run, computed again from its video.
+
+A run's folder keeps where the tracker looked in every frame and with which person and camera (`run.json`).
+With the video, the change mask, the edges, the model's contours, the terms of Rohr's eqs. (7)-(11) and the
+similarity over the whole gait cycle come out again as they were: by the same code, at the best point of the
+tracker's grid. The phase in `track.csv` lies near that point, not on it: it is refined between grid points
+and smoothed over all frames. The similarity is the one in `track.csv`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo
+from memo.run import NAME, RunError, read_run
+
+if TYPE_CHECKING:
+    from memo.video import VideoReader
+
+__all__ = ["Why", "explain"]
+
+Floats = npt.NDArray[np.float64]
+
+# The video given is another one when the similarity of a frame comes out this far from the tracker's.
+_SAME_SIMILARITY = 0.01
+
+
+@dataclass(frozen=True)
+class Why:
+    """The evidence of one frame and how the model fits it; pixels have their centre at whole numbers."""
+
+    frame: int
+    """Number of the frame in the video."""
+    time_s: float
+    """Seconds since frame 0."""
+    walk: int
+    """Number of the walk in the run."""
+    luma: npt.NDArray[np.uint8]
+    """(H, W) grey values."""
+    change_mask: npt.NDArray[np.bool_]
+    """(H, W) pixels that change against the frame before and the frame after, cleaned: eq. (1)."""
+    window_px: tuple[int, int, int, int]
+    """Left, top, right and bottom of the part in which edges were looked for."""
+    edge_points: Floats
+    """(N, 2) edge points, pixels."""
+    segments: Floats
+    """(M, 2, 2) straight image edges, pixels."""
+    model: Floats
+    """(K, 2, 2) visible side lines of the model, pixels."""
+    model_part: npt.NDArray[np.uint8]
+    """(K,) their body parts, as in `Track.contour_parts`."""
+    model_px: Floats
+    """(K,) their lengths l_M, undistorted pixels; lines below 1 px are left out of the sums."""
+    model_edge: npt.NDArray[np.int64]
+    """(K,) the image edge of `segments` that answers each, -1 where none does."""
+    overlap_px: Floats
+    """(K,) l: length of that edge within the line's window, undistorted pixels; NaN where none."""
+    distance_px: Floats
+    """(K,) d: distance of its midpoint from the line; NaN where none."""
+    angle_rad: Floats
+    """(K,) angle between edge and line; NaN where none."""
+    similarity_px: Floats
+    """(K,) s_i of eq. (7), weighted; their sum over that of `model_px` is the similarity of the frame."""
+    matched: Floats
+    """(K,) s_i / l_M: how well each line is supported by an image edge, 0 to 1."""
+    matched_edges: Floats
+    """(J, 2, 2) the image edges that answer a line, each once, pixels."""
+    phase_grid: Floats
+    """(P,) phases in [0, 1), ascending, `phase` among them."""
+    similarity: Floats
+    """(P,) similarity at these phases with the trunk where it was found (eq. 11, Fig. 19)."""
+    phase: float
+    """The phase chosen: of the tracker's grid, in [0, 1)."""
+    chosen_similarity: float
+    """Similarity there, that of `track.csv`."""
+
+    @property
+    def twin_phase(self) -> float:
+        """Half a cycle on, where left and right are interchanged."""
+        return (self.phase + 0.5) % 1.0
+
+    @property
+    def twin_similarity(self) -> float:
+        """Similarity there."""
+        off = np.abs((self.phase_grid - self.twin_phase + 0.5) % 1.0 - 0.5)
+        return float(self.similarity[np.argmin(off)])
+
+
+def explain(
+    run_folder: str | PathLike[str],
+    frames: Iterable[int] | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    *,
+    video: str | PathLike[str] | None = None,
+) -> Iterator[Why]:
+    """Explains frames of a run of `memo track`, one after the other in their order in the video.
+
+    `frames`: numbers in the video, all tracked ones by default. `progress` is called with the number of
+    frames read and that of all to be read. `video`: where the video is now, if it was moved. Memory does not
+    grow with the number of frames. Needs the `app` extra for reading the video.
+    """
+    run = read_run(run_folder)
+    file = Path(run_folder) / NAME
+    first = run["frames"][0]
+    try:
+        tracked = {first + int(frame) for walk in run["walks"] for frame in walk["frame"]}
+    except (KeyError, TypeError, ValueError):
+        raise RunError(f"{file}: walks: frame must be whole numbers") from None
+    wanted = tracked if frames is None else {int(frame) for frame in frames}
+    if unknown := sorted(wanted - tracked):
+        seen = f"{min(tracked)} to {max(tracked)}" if tracked else "none"
+        raise RunError(f"{run_folder}: frame {unknown[0]} was not tracked; tracked are {seen}")
+    path = _video(run, file, video)
+    try:
+        tracker = _memo.Tracker(**run["options"])
+        explainer = _memo.Explainer(tracker, run["walks"], {frame - first for frame in wanted})
+    except (TypeError, ValueError, OverflowError) as error:
+        raise RunError(f"{file}: {error}") from None
+    return _explained(run, file, path, wanted, explainer, progress)
+
+
+def _video(run: dict[str, Any], file: Path, given: str | PathLike[str] | None) -> Path:
+    if given is not None:
+        return Path(given)
+    if run["video"] is None:
+        raise RunError(f"{file}: the frames came from no video, so they cannot be explained")
+    path = Path(run["video"])
+    if not path.exists():
+        raise RunError(f"{file}: the video is not at {path} any more; give its place as video=")
+    return path
+
+
+def _explained(
+    run: dict[str, Any],
+    file: Path,
+    video: Path,
+    wanted: set[int],
+    explainer: _memo.Explainer,
+    progress: Callable[[int, int], object] | None,
+) -> Iterator[Why]:
+    from memo.video import VideoReader
+
+    first, count = run["frames"][0], run["frames_read"]
+    # A frame's changes need the one after it.
+    last = min(first + count, max(wanted, default=first - 1) + 2)
+    if last <= first:
+        return
+    similarities = {
+        first + frame: similarity
+        for walk in run["walks"]
+        for frame, similarity in zip(walk["frame"], walk.get("similarity", ()), strict=False)
+    }
+    left = set(wanted)
+    with VideoReader(video, start=first, stop=last, rate_hz=run["fps_given"]) as reader:
+        for found in _found(reader, explainer, last - first, progress):
+            why = _why(found, first)
+            tracked = similarities.get(why.frame, why.chosen_similarity)
+            if abs(why.chosen_similarity - tracked) > _SAME_SIMILARITY:
+                raise RunError(
+                    f"{video}: not the video of {file}: the similarity in frame {why.frame} was "
+                    f"{tracked:.3f}, here it is {why.chosen_similarity:.3f}"
+                )
+            left.discard(why.frame)
+            yield why
+    if left:
+        raise RunError(f"{video}: ends before frame {min(left)}, which {file} says was tracked")
+
+
+def _found(
+    reader: VideoReader,
+    explainer: _memo.Explainer,
+    total: int,
+    progress: Callable[[int, int], object] | None,
+) -> Iterator[dict[str, Any]]:
+    for done, frame in enumerate(reader, 1):
+        found = explainer.update(frame.luma, frame.time_s)
+        if progress is not None:
+            progress(done, total)
+        if found is not None:
+            yield found
+    found = explainer.finish()
+    if found is not None:
+        yield found
+
+
+def _why(found: dict[str, Any], first: int) -> Why:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        matched = np.where(found["model_px"] > 0, found["similarity_px"] / found["model_px"], 0.0)
+    edges = np.unique(found["model_edge"][found["model_edge"] >= 0])
+    return Why(
+        **{**found, "frame": found["frame"] + first},
+        matched=np.clip(matched, 0.0, 1.0),
+        matched_edges=found["segments"][edges],
+    )

@@ -1,0 +1,128 @@
+"""Gait parameters of walks: the table, what its lines mean, and what they say in plain words.
+
+The numbers come from the core (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
+the height that was given: lengths scale with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo.files import read_text_columns, write_columns_csv
+
+__all__ = [
+    "DEFINITIONS",
+    "GAIT_COLUMNS",
+    "gait_table",
+    "read_gait_parameters_csv",
+    "symmetry_sentences",
+    "write_gait_parameters_csv",
+]
+
+GAIT_COLUMNS = ("walk", "parameter", "side", "value", "unit", "ci_low", "ci_high", "n")
+"""Columns of `gait_parameters.csv`, in order; an empty cell is not known."""
+
+DEFINITIONS: dict[str, str] = {
+    "cadence": "Steps a minute. Measured: the rate of the gait phase over all frames of the walk. "
+    "Interval: scatter of the frames about that rate, a step counting as one independent observation.",
+    "speed": "Speed of the trunk along its straight path, negative when walking backwards. Measured: the "
+    "rate of its place over all frames. Interval: scatter about that rate, and the scale (distance from "
+    "the camera as the person's height in the picture tells it; without a camera file also the assumed "
+    "field of view, as far as the path runs along the line of sight).",
+    "stride_time": "Duration of a cycle of two steps, 120 / cadence. Measured.",
+    "stride_length": "Way of the trunk in a cycle, speed times stride time. Measured; interval with the "
+    "scale.",
+    "step_time": "From the other foot's heel strike to this side's; without a side, half the stride "
+    "time. Measured where the phase of the model fitted to single frames passes heel strike, before "
+    "smoothing, which would even the sides out; so it can differ by some hundredths of a second from the "
+    "times in events.csv. Interval: scatter over the steps (Student's t, held by a scatter of 3 % "
+    "expected beforehand that counts as 4 steps), and how differently people strike right and left "
+    "against the average gait.",
+    "step_length": "Way of the trunk from the other foot's heel strike to this side's; without a side, "
+    "half the stride length. The model's feet land equally far ahead of the trunk, so a difference in "
+    "how far the two feet reach is not seen; the interval allows for 1.5 cm of it, beside what step_time "
+    "and speed allow for.",
+    "step_time_symmetry": "100 (right - left) / mean of the two step times; 0 is symmetric, positive "
+    "when the right step takes longer. Interval as for the sides; small asymmetries are not resolved.",
+    "step_length_symmetry": "100 (right - left) / mean of the two step lengths; 0 is symmetric, positive "
+    "when the right step is longer. Of a difference only what shows in the timing of the steps is "
+    "measured.",
+    "stance": "Share of the cycle in which a foot stands. Assumed, not measured: 61 %, adults at free "
+    "speed; n is 0 and there is no interval.",
+    "double_support": "Share of the cycle in which both feet stand. Assumed, not measured: 22 %; n is 0 "
+    "and there is no interval.",
+}
+"""One sentence or more on every parameter: what it is, whether it is measured, what its interval holds."""
+
+SYMMETRY = "step_time_symmetry", "step_length_symmetry"
+
+Table = dict[str, npt.NDArray[Any]]
+
+
+def gait_table(walks: Iterable[Iterable[tuple[str, str, float, str, float, float, int]]]) -> Table:
+    """The columns of `gait_parameters.csv` from the core's lines, walk after walk."""
+    lines = [
+        (walk, parameter, side, value, unit, low, high, n)
+        for walk, table in enumerate(walks)
+        for parameter, side, value, unit, low, high, n in table
+    ]
+    kinds: tuple[Any, ...] = (np.int64, object, object, float, object, float, float, np.int64)
+    columns = list(zip(*lines, strict=True)) or [()] * len(GAIT_COLUMNS)
+    return {
+        name: np.array(column, dtype=kind)
+        for name, column, kind in zip(GAIT_COLUMNS, columns, kinds, strict=True)
+    }
+
+
+def lookup(
+    table: Mapping[str, npt.NDArray[Any]], walk: int, parameter: str, side: str = ""
+) -> dict[str, Any]:
+    """One line of the table as a dict of its columns."""
+    here = (table["walk"] == walk) & (table["parameter"] == parameter) & (table["side"] == side)
+    return {name: table[name][here][0] for name in GAIT_COLUMNS}
+
+
+def symmetry_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:
+    """What is said of a walk's sides: a difference only where its interval leaves zero out."""
+    said = []
+    for parameter, unit, per_unit, digits in (("step_length", "cm", 100, 0), ("step_time", "s", 1, 2)):
+        symmetry = lookup(table, walk, f"{parameter}_symmetry")
+        if not symmetry["ci_low"] * symmetry["ci_high"] > 0:
+            continue
+        right, left = (lookup(table, walk, parameter, side)["value"] for side in ("right", "left"))
+        less, more = ("left", "right") if right > left else ("right", "left")
+        by = per_unit * abs(right - left)
+        ends = sorted(abs(symmetry[end]) * (right + left) / 200 * per_unit for end in ("ci_low", "ci_high"))
+        said.append(
+            f"The {less} step {'is' if unit == 'cm' else 'takes'} {by:.{digits}f} {unit} "
+            f"{'shorter' if unit == 'cm' else 'less'} than the {more} "
+            f"({ends[0]:.{digits}f} to {ends[1]:.{digits}f})."
+        )
+    return said
+
+
+def write_gait_parameters_csv(path: str | PathLike[str], table: Mapping[str, npt.ArrayLike]) -> None:
+    """Writes the columns of a table of gait parameters, which must be `GAIT_COLUMNS`."""
+    absent, unknown = set(GAIT_COLUMNS) - set(table), set(table) - set(GAIT_COLUMNS)
+    if absent or unknown:
+        raise ValueError(f"gait parameters: missing {sorted(absent)}, unknown {sorted(unknown)}")
+    write_columns_csv(path, {name: table[name] for name in GAIT_COLUMNS})
+
+
+def read_gait_parameters_csv(path: str | PathLike[str]) -> Table:
+    """Reads what `write_gait_parameters_csv` wrote; NaN for empty numbers, whole numbers as int64."""
+    kinds = {"walk": np.int64, "n": np.int64, "value": float, "ci_low": float, "ci_high": float}
+    table: Table = {}
+    for name, texts in read_text_columns(path, GAIT_COLUMNS).items():
+        kind = kinds.get(name)
+        try:
+            filled = [text or "nan" for text in texts] if kind else texts
+            table[name] = np.array(filled, dtype=object).astype(kind or object)
+        except ValueError as error:
+            raise ValueError(f"{path}: column {name}: {error}") from None
+    return table

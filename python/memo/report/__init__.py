@@ -1,0 +1,84 @@
+"""`memo report`: a folder of results as one HTML file that needs neither a network nor memo to be read.
+
+The page holds pictures, a figure in 3D that can be turned, curves and tables, and for a tracked walk what the
+model was matched to, frame by frame. It needs the `app` extra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from memo.files import complete_file
+from memo.report.choice import Choice
+from memo.report.posture import posture_page
+from memo.report.track import track_page
+
+__all__ = ["KINDS", "Report", "write_report"]
+
+KINDS = {"track.csv": "memo track", "postures.json": "memo posture"}
+"""The file that tells a kind of folder, and the command that leaves it."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was written."""
+
+    path: Path
+    """The HTML file."""
+    kind: str
+    """The command whose results it shows."""
+    bytes: int
+    """Size of the file."""
+    contents: dict[str, Any]
+    """How many pictures and explanations are in it, every how many-th frame has one, and `notes`: what could
+    not be shown, and why."""
+
+
+def write_report(
+    folder: str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    *,
+    frames: tuple[int, int | None] = (0, None),
+    every: int | None = None,
+    why: bool = True,
+    watch: Callable[[Iterable[Any], str, int | None], Iterable[Any]] = lambda items, what, count: items,
+) -> Report:
+    """Writes `out`, by default `report.html` in the folder, from what a command left there (`KINDS`).
+
+    `frames` are those from the first up to, not including, the second; `every` n-th of them is shown, by
+    default as many as keep the file under about 25 MB. `why=False` leaves out what explains the frames of a
+    walk, for which the video is read again. `watch(items, what, count)` gives the items back and may show
+    progress.
+
+    Raises ValueError where the folder holds nothing of this kind or a table in it cannot be used.
+    """
+    folder = Path(folder)
+    kind = _kind(folder)
+    choice = Choice(*frames, every, why)
+    if kind == "memo track":
+        page, contents = track_page(folder, choice, watch)
+    else:
+        page, contents = posture_page(folder, choice)
+    path = folder / "report.html" if out is None else Path(out)
+    written = page.html().encode("utf-8")
+    with complete_file(path) as temporary:
+        temporary.write_bytes(written)
+    return Report(path, kind, len(written), contents)
+
+
+def _kind(folder: Path) -> str:
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder")
+    found = [command for name, command in KINDS.items() if (folder / name).is_file()]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise ValueError(
+            f"{folder}: holds results of {' and of '.join(found)}; give a folder with one of them"
+        )
+    known = ", ".join(f"{name} of {command}" for name, command in KINDS.items())
+    raise ValueError(f"{folder}: holds no results a report can be made of ({known})")

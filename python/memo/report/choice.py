@@ -1,0 +1,39 @@
+"""Which frames go into a page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Choice"]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The frames from `first` up to, not including, `stop`, and how many of them."""
+
+    first: int = 0
+    stop: int | None = None
+    every: int | None = None
+    """Every n-th; None for as many as keep the file small."""
+    why: bool = True
+    """Whether frames of a walk are explained."""
+
+    def takes(self, frame: int) -> bool:
+        """Whether a frame is among those asked for."""
+        return frame >= self.first and (self.stop is None or frame < self.stop)
+
+    def told(self, every: int) -> list[str]:
+        """What should be said where not all frames are in the page, every n-th being there."""
+        sentences = []
+        if every > 1:
+            sentences.append(f"Every {ordinal(every)} frame is in this page, to keep it small.")
+        if self.first or self.stop is not None:
+            stop = "the end" if self.stop is None else str(self.stop - 1)
+            sentences.append(f"Of the frames, {self.first} to {stop} were asked for.")
+        return sentences
+
+
+def ordinal(count: int) -> str:
+    """2nd, 3rd, 11th, ..."""
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(count % 10 if count % 100 not in (11, 12, 13) else 0, "th")
+    return f"{count}{ending}"

