@@ -124,7 +124,10 @@ def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
     columns: dict[str, Column] = {}
     for name in TRACK_COLUMNS:
         kind = np.int64 if name in ("frame", "walk") else np.float64
-        columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
+        try:
+            columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
+        except (ValueError, OverflowError) as error:
+            raise ValueError(f"{path}: column {name}: {error}") from None
     return columns
 
 

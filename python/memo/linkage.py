@@ -144,6 +144,53 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` where there is that. Empty cells
     are unseen.
     """
+    table = read_number_table(path)
+    names, positions = table.points(dimensions)
+    scales = table.numbers[:, table.column["scale"]] if "scale" in table.column else None
+    return Points([_SHORT.get(name, name) for name in names], table.times_s(rate_hz), positions, scales)
+
+
+@dataclass(frozen=True)
+class NumberTable:
+    """A CSV file of numbers with one header row, and the comments before it."""
+
+    path: str | PathLike[str]
+    column: dict[str, int]
+    """Place of each column, by its name."""
+    numbers: Array
+    """(rows, columns), NaN for empty cells."""
+    comments: list[str]
+
+    def points(self, dimensions: int) -> tuple[list[str], Array]:
+        """Names and positions (T, K, 2) or (T, K, 3) of the points, as `read_points_csv` finds them."""
+        known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
+        for axes in known:
+            names = list(
+                dict.fromkeys(
+                    name.removesuffix(f"_{axis}")
+                    for axis in axes
+                    for name in self.column
+                    if name.endswith(f"_{axis}") and name != f"_{axis}"
+                )
+            )
+            if not names:
+                continue
+            for name in names:
+                absent = [f"{name}_{axis}" for axis in axes if f"{name}_{axis}" not in self.column]
+                if absent:
+                    raise ValueError(f"{self.path}: point {name} has no column {absent[0]}")
+            picked = [[self.column[f"{name}_{axis}"] for axis in axes] for name in names]
+            return names, self.numbers[:, np.array(picked)]
+        wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
+        raise ValueError(f"{self.path}: no columns {wanted}; it has {', '.join([*self.column][:6])}")
+
+    def times_s(self, rate_hz: float | None) -> Array:
+        """The column time_s, which a given rate may not contradict; else from the rate given or stated."""
+        return _times(self.path, self.column, self.numbers, self.comments, rate_hz)
+
+
+def read_number_table(path: str | PathLike[str]) -> NumberTable:
+    """Reads a CSV file of numbers; words are refused in columns of coordinates and times."""
     lines = _lines(path)
     comments = [line for line in lines if line.startswith("#")]
     try:
@@ -153,38 +200,17 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     if len(rows) < 2:
         raise ValueError(f"{path}: no header and rows of numbers")
     header, body = [name.strip() for name in rows[0]], rows[1:]
-    for name in header:
-        if header.count(name) > 1:
-            raise ValueError(f"{path}: column {name} occurs {header.count(name)} times")
-    table = np.full((len(body), len(header)), np.nan)
+    twice = next((name for name, count in Counter(header).items() if count > 1), None)
+    if twice is not None:
+        raise ValueError(f"{path}: column {twice} occurs {header.count(twice)} times")
     for number, row in enumerate(body):
         if len(row) != len(header):
             raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
+    table = np.full((len(body), len(header)), np.nan)
+    for number, row in enumerate(body):
         for index, cell in enumerate(row):
             table[number, index] = _number(path, number, header[index], cell)
-    column = {name: index for index, name in enumerate(header)}
-    known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
-    for axes in known:
-        names = list(
-            dict.fromkeys(
-                name.removesuffix(f"_{axis}")
-                for axis in axes
-                for name in header
-                if name.endswith(f"_{axis}") and name != f"_{axis}"
-            )
-        )
-        if not names:
-            continue
-        for name in names:
-            absent = [f"{name}_{axis}" for axis in axes if f"{name}_{axis}" not in column]
-            if absent:
-                raise ValueError(f"{path}: point {name} has no column {absent[0]}")
-        picked = [[column[f"{name}_{axis}"] for axis in axes] for name in names]
-        scales = table[:, column["scale"]] if "scale" in column else None
-        times_s = _times(path, column, table, comments, rate_hz)
-        return Points([_SHORT.get(name, name) for name in names], times_s, table[:, np.array(picked)], scales)
-    wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
-    raise ValueError(f"{path}: no columns {wanted}; it has {', '.join(header[:6])}")
+    return NumberTable(path, {name: index for index, name in enumerate(header)}, table, comments)
 
 
 def _lines(path: str | PathLike[str]) -> list[str]:
@@ -203,7 +229,7 @@ def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> floa
     try:
         value = float(cell)
     except ValueError:
-        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "scale"):
+        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "deg", "scale"):
             return np.nan
         raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
     if np.isinf(value):

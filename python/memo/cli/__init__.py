@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`, `report`.
+"""The command line: a command a file of this package.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
 import memo
+from memo.cli.convert import add_convert
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
@@ -68,4 +69,5 @@ def _app() -> "typer.Typer":
     add_pointlight(app)
     add_planar(app)
     add_report(app)
+    add_convert(app)
     return app

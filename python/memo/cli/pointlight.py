@@ -31,7 +31,8 @@ def add_pointlight(app: "typer.Typer") -> None:
         motion: Annotated[
             Path | None,
             typer.Argument(
-                help="CSV of NAME_x, NAME_y, NAME_z in metres, or a folder with track.csv; a walker."
+                help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
+                " (.c3d, .bvh, .trc); a walker."
             ),
         ] = None,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
@@ -85,14 +86,14 @@ def add_pointlight(app: "typer.Typer") -> None:
 def _pointlight(
     motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
 ) -> Exit:
-    from memo.linkage import Points, read_points_csv, write_points_csv
+    from memo.linkage import Points, write_points_csv
     from memo.linkage_plot import write_display_video
 
     _check_period(options["period_s"], options["scramble_phase"] is not None)
     if motion is None:
         points = _walker_points(seconds, 60.0 if fps is None else fps)
     else:
-        points = read_points_csv(motion / "track.csv" if motion.is_dir() else motion, 3, fps)
+        points = _read_points(motion, fps)
     check_writable(out)
     display = _new_display(points, options)
     shown, labels = display["positions_px"], display["labels"]
@@ -108,6 +109,26 @@ def _pointlight(
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
         print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
+
+
+def _read_points(path: Path, fps: float | None) -> Any:
+    """All points of a table; of a motion file or the folder of a track the joints alone."""
+    from memo.formats import READERS, FormatError, read_motion
+    from memo.formats.names import joint_points
+    from memo.linkage import Points, read_points_csv
+
+    if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
+        return read_points_csv(path, 3, fps)
+    motion = read_motion(path)
+    if fps is not None:
+        raise InputError(f"{path}: has times of its own: leave --fps out")
+    for note in motion.notes:
+        print(note)
+    try:
+        joints = joint_points(motion)
+    except FormatError as error:
+        raise InputError(f"{path}: {error}") from None
+    return Points(list(joints.names), joints.times_s, joints.points)
 
 
 def _check_period(period_s: float | None, scrambles_phase: bool) -> None:

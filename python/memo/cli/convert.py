@@ -1,0 +1,156 @@
+"""`memo convert`: results and motion files in the formats of other programs.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import json
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
+from memo.cli.given import check_apart, check_writable
+from memo.files import plain
+
+if TYPE_CHECKING:
+    import typer
+
+EXIT_CODES = """Exit codes: 0 TARGET was written; 1 the input cannot be used; 2 wrong usage;
+4 the app extra is not installed."""
+
+
+class Axis(StrEnum):
+    z = "z"
+    y = "y"
+
+
+def add_convert(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def convert(
+        source: Annotated[
+            Path,
+            typer.Argument(
+                help="A folder of `memo track` or `memo posture`, or a motion file:"
+                " .c3d, .bvh, .trc, .mot, .sto, .csv."
+            ),
+        ],
+        target: Annotated[
+            Path,
+            typer.Argument(
+                help=".trc, .csv: joints; .mot, .sto: joint angles; .c3d: joints, angles and events;"
+                " .bvh: a skeleton."
+            ),
+        ],
+        up: Annotated[
+            Axis | None, typer.Option(help="Up axis of TARGET; its usual one: y, but z for .c3d and .csv.")
+        ] = None,
+        from_up: Annotated[Axis | None, typer.Option(help="Up axis of SOURCE, whatever it says.")] = None,
+        rate: Annotated[
+            float | None, typer.Option(help="Frame rate of TARGET, Hz: linear between frames.")
+        ] = None,
+        fill: Annotated[
+            float | None, typer.Option(help="Bridge gaps up to this long, seconds, by straight lines.")
+        ] = None,
+        walk: Annotated[int | None, typer.Option(help="One walk of a track, from 0; all of them.")] = None,
+        fps: Annotated[float | None, typer.Option(help="Frame rate of a table without times.")] = None,
+        unit: Annotated[
+            str | None, typer.Option(help="Unit of a .bvh SOURCE: m, cm, mm, or metres in one unit.")
+        ] = None,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Writes SOURCE in another format, chosen by the ending of TARGET's name."""
+        delivery = Delivery(target.parent, as_json=as_json, quiet=quiet)
+
+        def work() -> Exit:
+            given = {"rate_hz": _checked(fps, "--fps"), "unit_m": _unit_m(unit)}
+            reading = {"up": None if from_up is None else from_up.value, "walk": walk, **given}
+            changes = (_checked(rate, "--rate"), _checked(fill, "--fill"))
+            return _convert(source, target, reading, up, *changes, delivery)
+
+        raise typer.Exit(guarded(work))
+
+
+def _convert(
+    source: Path,
+    target: Path,
+    reading: dict[str, Any],
+    up: Axis | None,
+    rate_hz: float | None,
+    fill_s: float | None,
+    delivery: Delivery,
+) -> Exit:
+    from memo.formats import WRITERS, read_motion, write_motion
+    from memo.formats.run_folder import sources
+
+    if target.suffix.lower() not in WRITERS:
+        raise InputError(f"{target}: the ending must be one of {', '.join(sorted(WRITERS))}")
+    if target.is_dir():
+        raise InputError(f"{target}: is a folder")
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder")
+    check_writable(target.parent)
+    check_apart(sources(source) if source.is_dir() else [source], [target])
+    with with_elapsed("converting", delivery):
+        motion = read_motion(source, **reading)
+        notes = [*motion.notes]
+        if fill_s is not None:
+            motion, filled = motion.filled(fill_s)
+            notes.append(f"Filled by straight lines: {filled} missing values.")
+        if rate_hz is not None:
+            motion = motion.resampled(rate_hz)
+        notes += write_motion(target, motion, None if up is None else up.value)
+    summary = {
+        "source": str(source),
+        "target": str(target),
+        "frames": len(motion.times_s),
+        "first_s": float(motion.times_s[0]),
+        "last_s": float(motion.times_s[-1]),
+        "points": list(motion.names),
+        "missing": float(np.isnan(motion.points[..., 0]).mean()) if motion.names else 0.0,
+        "angles": list(motion.angles),
+        "events": len(motion.events),
+        "notes": notes,
+    }
+    _tell(summary, target, delivery)
+    return Exit.DONE
+
+
+def _tell(summary: dict[str, Any], target: Path, delivery: Delivery) -> None:
+    if delivery.as_json:
+        print(json.dumps(plain({**summary, "files": [str(target)]})))
+    elif delivery.talks:
+        span = f"{summary['first_s']:.2f} to {summary['last_s']:.2f} s"
+        held = [f"{summary['frames']} frames", f"{len(summary['points'])} points"]
+        held += [f"{len(summary['angles'])} joint angles"] * bool(summary["angles"])
+        held += [f"{summary['events']} events"] * bool(summary["events"])
+        missing = f"; {summary['missing']:.1%} of the points missing" if summary["missing"] else ""
+        print(f"Read {', '.join(held)}, {span}{missing}.")
+        for note in summary["notes"]:
+            print(note)
+        print(f"Written to {target}.")
+
+
+# What the user gave, checked before any work.
+
+
+def _checked(value: float | None, option: str) -> float | None:
+    if value is not None and not (math.isfinite(value) and value > 0):
+        raise InputError(f"{option} {value:g} must be positive and finite")
+    return value
+
+
+def _unit_m(unit: str | None) -> float | None:
+    from memo.formats.reading import UNITS_M
+
+    if unit is None:
+        return None
+    try:
+        return UNITS_M[unit.lower()] if unit.lower() in UNITS_M else _checked(float(unit), "--unit")
+    except ValueError:
+        raise InputError(f"--unit {unit} is neither m, cm, mm nor a number of metres") from None

@@ -1,0 +1,125 @@
+"""Motion files, read and written: TRC, MOT and STO, C3D, BVH and tables of joints.
+
+`read_motion` and `write_motion` choose the format by the ending of the file's name; `READERS` and
+`WRITERS` hold what each ending is done by, and a new format is one entry in each. What was assumed in
+reading is in `Motion.notes`; what a format has no place for is returned by `write_motion`. A file appears
+complete or not at all, and whatever is wrong with one is a `FormatError` that names the file and the
+line, byte or field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+
+from memo.formats.bvh import read_bvh, write_bvh
+from memo.formats.c3d import read_c3d, write_c3d
+from memo.formats.mot import read_mot, write_mot
+from memo.formats.motion import FormatError, GaitEvent, Motion, Up
+from memo.formats.reading import Given
+from memo.formats.run_folder import read_run_folder
+from memo.formats.table import read_table, write_table
+from memo.formats.trc import read_trc, write_trc
+
+__all__ = [
+    "READERS",
+    "WRITERS",
+    "FormatError",
+    "GaitEvent",
+    "Given",
+    "Motion",
+    "read_motion",
+    "write_motion",
+]
+
+Reader = Callable[[Path, Given], Motion]
+"""Reads a file; raises `FormatError` without the name of the file, which `read_motion` puts before it."""
+
+Writer = Callable[[Path, Motion, Up | None], list[str]]
+"""Writes a file whole, with the up axis asked for or the format's usual one; says what was left out."""
+
+READERS: dict[str, Reader] = {
+    ".bvh": read_bvh,
+    ".c3d": read_c3d,
+    ".csv": read_table,
+    ".mot": read_mot,
+    ".sto": read_mot,
+    ".trc": read_trc,
+}
+"""What reads the files of each ending."""
+
+WRITERS: dict[str, Writer] = {
+    ".bvh": write_bvh,
+    ".c3d": write_c3d,
+    ".csv": write_table,
+    ".mot": write_mot,
+    ".sto": write_mot,
+    ".trc": write_trc,
+}
+"""What writes the files of each ending."""
+
+
+def read_motion(
+    path: str | PathLike[str],
+    *,
+    up: Up | None = None,
+    rate_hz: float | None = None,
+    unit_m: float | None = None,
+    walk: int | None = None,
+) -> Motion:
+    """Reads a motion file, or the folder of `memo track` or `memo posture`.
+
+    `up`: the file's up axis, whatever it says itself. `rate_hz`: frame rate of a table without times.
+    `unit_m`: metres in one unit of a BVH file. `walk`: one walk of a track, from 0; all of them otherwise.
+    """
+    path = Path(path)
+    check_up(up)
+    given = Given(up, rate_hz, unit_m)
+    for name, value in (("rate_hz", rate_hz), ("unit_m", unit_m)):
+        if value is not None and not 0 < value < 1e9:
+            raise FormatError(f"{name} must be positive and finite, got {value:g}")
+    try:
+        if path.is_dir():
+            return read_run_folder(path, given, walk)
+        if path.name == "track.csv":
+            return read_run_folder(path, given, walk)
+        if walk is not None:
+            raise FormatError("only track.csv counts walks")
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
+            raise FormatError(
+                f"no motion is read from {path.suffix or 'a file without ending'}: {endings(READERS)}"
+            )
+        return reader(path, given)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from None
+    except MemoryError:
+        raise FormatError(f"{path}: does not fit in memory") from None
+
+
+def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None) -> list[str]:
+    """Writes a motion in the format of the ending; returns what it has no place for, in sentences.
+
+    `up`: "z" or "y"; without it the format's usual one, Y for TRC, MOT, STO and BVH, else Z.
+    """
+    path = Path(path)
+    check_up(up)
+    writer = WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise FormatError(
+            f"{path}: no motion is written to {path.suffix or 'a file without ending'}: {endings(WRITERS)}"
+        )
+    try:
+        return writer(path, motion, up)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def check_up(up: str | None) -> None:
+    if up not in ("z", "y", None):
+        raise FormatError(f"the up axis must be z or y, got {up!r}")
+
+
+def endings(table: dict[str, Reader] | dict[str, Writer]) -> str:
+    return "wanted " + ", ".join(sorted(table))

@@ -1,0 +1,191 @@
+"""MOT and STO (OpenSim, SIMM): joint angles over time, as text.
+
+A header of `key=value` lines up to `endheader`, a row of labels that begins with `time`, a row an
+instant; `nColumns` counts the time. Both endings hold the same here. The older header of SIMM
+(`datacolumns`, `datarows`) is read too.
+
+Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`, flexion positive as in
+the model of Rajagopal 2016; in gait2392 the knee has the other sign) and are written in degrees. Where
+both hips or the pelvis are known, the pelvis' position is written as `pelvis_tx`, `pelvis_ty`,
+`pelvis_tz`, metres, Y up unless asked otherwise; the header says which. Pelvis angles are not known and
+not written. Instants at
+which a value is missing are left out, since OpenSim stops reading there.
+
+In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point, and columns of forces, moments and the
+like are left out. All other columns are taken to be angles, as the format does not say. Tables of vectors
+(`DataType=Vec3`) are not read.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from memo.files import complete_file
+from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
+from memo.formats.names import joints_found
+from memo.formats.reading import Given, chosen_up
+from memo.formats.text import numbers, read_lines, whole_number
+
+__all__ = ["read_mot", "write_mot"]
+
+OPENSIM = {
+    f"{side}_{part}": f"{name}_{side[0]}"
+    for side in ("right", "left")
+    for part, name in (
+        ("hip", "hip_flexion"),
+        ("knee", "knee_angle"),
+        ("shoulder", "arm_flex"),
+        ("elbow", "elbow_flex"),
+    )
+}
+"""OpenSim's coordinate for each flexion of `track.csv`."""
+
+_OURS = {name: joint for joint, name in OPENSIM.items()}
+_NO_ANGLES = ("force", "moment", "torque", "ground_", "activation", "power", "emg")
+_MOST_HEADER_LINES = 1000
+
+
+def read_mot(path: Path, given: Given) -> Motion:
+    """Reads the angles, in degrees, and the points given by translations."""
+    lines = read_lines(path)
+    header, start = _header(lines)
+    if header.get("datatype", "double") != "double":
+        raise FormatError(f"field DataType: tables of {header['datatype']} are not read, only of double")
+    while start < len(lines) and not lines[start].strip():
+        start += 1
+    labels = lines[start].split() if start < len(lines) else []
+    if not labels or labels[0].lower() != "time":
+        raise FormatError(f"line {start + 1}: wanted a row of labels that begins with time")
+    if len(set(labels)) < len(labels):
+        repeated = next(name for k, name in enumerate(labels) if name in labels[:k])
+        raise FormatError(f"line {start + 1}: column {repeated} occurs twice")
+    _check_count(header, ("ncolumns", "datacolumns"), len(labels), "labels")
+    table = _rows(lines, start + 1, labels)
+    _check_count(header, ("nrows", "datarows"), len(table), "rows of numbers")
+    column = {name: table[:, k] for k, name in enumerate(labels)}
+    up, up_note = chosen_up(given, header.get("up"), "y", "OpenSim's files have")
+    names, points, up_note = _points(column, up, up_note)
+    in_degrees = header.get("indegrees")
+    if in_degrees not in ("yes", "no", None):
+        raise FormatError(f"field inDegrees: {in_degrees!r}, wanted yes or no")
+    angles, others = {}, []
+    for name in labels[1:]:
+        if any(name == f"{point}_t{axis}" for point in names for axis in "xyz"):
+            continue
+        if any(word in name.lower() for word in _NO_ANGLES):
+            others.append(name)
+            continue
+        values = column[name]
+        angles[_OURS.get(name, name)] = np.rad2deg(values) if in_degrees == "no" else values
+    notes = [*up_note]
+    if in_degrees is None:
+        notes.append("The file does not say whether angles are in degrees: they were taken to be.")
+    if others:
+        notes.append(f"Left out, no angles: {len(others)} columns, the first {others[0]}.")
+    if not names and not angles:
+        raise FormatError(f"line {start + 1}: no column of an angle or a position")
+    metadata = {"format": "mot", "up": up}
+    return Motion(tuple(names), column["time"], points, (), angles, metadata, tuple(notes))
+
+
+def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
+    """Writes the angles and the pelvis' position; returns what was left out, in sentences."""
+    up = up or "y"
+    if not motion.angles:
+        raise FormatError(
+            "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
+        )
+    columns = {"time": motion.times_s}
+    pelvis = _pelvis(motion)
+    if pelvis is not None:
+        turned = from_z_up(pelvis, up)
+        columns |= {f"pelvis_t{axis}": turned[:, k] for k, axis in enumerate("xyz")}
+    columns |= {OPENSIM.get(name, name): values for name, values in motion.angles.items()}
+    columns = {name: values for name, values in columns.items() if np.isfinite(values).any()}
+    for name in columns:
+        if not name.isprintable() or " " in name:
+            raise FormatError(f"angle {name!r}: the labels of a MOT file have no white space")
+    table = np.column_stack(list(columns.values()))
+    known = np.isfinite(table).all(axis=1)
+    if len(columns) == 1 or not known.any():
+        raise FormatError("no instant at which all angles are known")
+    table = table[known]
+    head = [
+        path.stem.replace("\n", " "),
+        "version=1",
+        f"nRows={len(table)}",
+        f"nColumns={len(columns)}",
+        "inDegrees=yes",
+        f"up={up.upper()}",
+        "endheader",
+        "\t".join(columns),
+    ]
+    with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
+        file.writelines(line + "\n" for line in head)
+        for row in table.tolist():
+            file.write("\t".join(f"{x:.7f}" for x in row) + "\n")
+    gaps = len(known) - len(table)
+    notes = [f"{gaps} instants at which an angle or the pelvis is missing were left out."] if gaps else []
+    left_out = ["events"] * bool(motion.events)
+    left_out += ["points but the pelvis"] * (len(motion.names) > 1)
+    return notes + [f"A MOT or STO file has no place for {what}: left out." for what in left_out]
+
+
+def _header(lines: list[str]) -> tuple[dict[str, str], int]:
+    """Keys (small letters) with their values, and the index of the line after `endheader`."""
+    header: dict[str, str] = {}
+    for index, line in enumerate(lines[:_MOST_HEADER_LINES]):
+        text = line.strip()
+        if text.lower() == "endheader":
+            return header, index + 1
+        key, is_pair, value = text.partition("=")
+        if not is_pair:
+            key, _, value = text.partition(" ")
+        header.setdefault(key.strip().lower(), value.strip().lower())
+    raise FormatError(f"no line endheader among the first {min(len(lines), _MOST_HEADER_LINES)}")
+
+
+def _check_count(header: dict[str, str], keys: tuple[str, str], count: int, what: str) -> None:
+    for key in keys:
+        if key in header and whole_number(header[key], f"field {key}") != count:
+            raise FormatError(f"field {key}: {header[key]}, but there are {count} {what}")
+
+
+def _rows(lines: list[str], start: int, labels: list[str]) -> np.ndarray:
+    rows = []
+    for index, line in enumerate(lines[start:], start + 1):
+        cells = line.split()
+        if not cells:
+            continue
+        if len(cells) != len(labels):
+            raise FormatError(f"line {index}: {len(cells)} cells, wanted {len(labels)}")
+        rows.append(numbers(cells, index, labels))
+        if len(rows) > 1 and not rows[-1][0] > rows[-2][0]:
+            raise FormatError(f"line {index}, column time: {cells[0]} does not come after {rows[-2][0]:g}")
+    return np.array(rows).reshape(len(rows), len(labels))
+
+
+def _points(
+    column: dict[str, np.ndarray], up: Up, up_note: tuple[str, ...]
+) -> tuple[list[str], np.ndarray, tuple[str, ...]]:
+    """Names and (T, K, 3) of the points given by translations; without any, the up axis needs no note."""
+    names = [
+        name.removesuffix("_tx")
+        for name in column
+        if name.endswith("_tx") and all(f"{name[:-1]}{axis}" in column for axis in "yz")
+    ]
+    if not names:
+        return [], np.empty((len(column["time"]), 0, 3)), ()
+    points = [np.stack([column[f"{name}_t{axis}"] for axis in "xyz"], axis=-1) for name in names]
+    return names, to_z_up(np.stack(points, axis=1), up), up_note
+
+
+def _pelvis(motion: Motion) -> np.ndarray | None:
+    """(T, 3) the point between the hips, else the pelvis, where either is known."""
+    found = joints_found(motion.names)
+    if "right_hip" in found and "left_hip" in found:
+        middle: np.ndarray = motion.points[:, [found["right_hip"], found["left_hip"]]].mean(axis=1)
+        return middle
+    return motion.points[:, found["pelvis"]] if "pelvis" in found else None

@@ -1,0 +1,238 @@
+"""The one value that every motion file is read into and written from, and its clock.
+
+World right-handed, Z up, metres, seconds, degrees for joint angles. A file whose up axis is Y is turned
+about X: `x, y, z` of the world are `x, -z, y` of the file, so what points forwards along X still does.
+
+Formats with a frame rate instead of time stamps need a constant one: `Motion.at_constant_rate` finds it
+and puts empty frames where frames are absent, and refuses stamps that fit no rate. Nothing is
+interpolated unless `resampled` or `filled` is called, and nothing is ever extrapolated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["FormatError", "GaitEvent", "Motion", "Up", "from_z_up", "to_z_up"]
+
+Array = npt.NDArray[np.float64]
+
+Up = Literal["z", "y"]
+
+EVENT_KINDS = ("heel_strike", "toe_off")
+SIDES = ("right", "left")
+
+MAX_FRAMES = 10_000_000
+_STAMP_ERROR_S = 1.1e-3  # containers round stamps to milliseconds; two rounded stamps make a grid
+_LONGEST_GAP = 20  # times as many empty frames as frames
+
+
+class FormatError(ValueError):
+    """A motion that cannot be read or written; one line says which file, where in it, and why."""
+
+    def __init__(self, message: str) -> None:
+        # Names and cells of damaged files may hold anything.
+        super().__init__("".join(c if c.isprintable() else "?" for c in message[:600]))
+
+
+class GaitEvent(NamedTuple):
+    """A foot that comes to the ground or leaves it."""
+
+    time_s: float
+    """Seconds on the clock of `Motion.times_s`."""
+    kind: str
+    """ "heel_strike" or "toe_off"."""
+    side: str
+    """ "right" or "left"."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Points in space over T frames. World: right-handed, Z up, metres."""
+
+    names: tuple[str, ...]
+    """The K points, as the file spells them."""
+    times_s: Array
+    """(T,) seconds, increasing."""
+    points: Array
+    """(T, K, 3) metres; NaN where a point is missing, all three of it."""
+    events: tuple[GaitEvent, ...] = ()
+    """In order of time."""
+    angles: Mapping[str, Array] = field(default_factory=dict)
+    """Joint angles (T,) in degrees, NaN where missing: `right_knee` is flexion, as in `track.csv`."""
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    """What the file says besides: `format`, `up`, `unit`, `rate_hz`."""
+    notes: tuple[str, ...] = ()
+    """What was assumed and what was left out in reading, in sentences."""
+
+    def __post_init__(self) -> None:
+        times_s = np.asarray(self.times_s, np.float64)
+        points = np.array(self.points, np.float64)
+        angles = {name: np.asarray(values, np.float64) for name, values in self.angles.items()}
+        if times_s.ndim != 1 or points.shape != (len(times_s), len(self.names), 3):
+            wanted = f"times (T,) and points (T, {len(self.names)}, 3)"
+            raise FormatError(f"wanted {wanted}, got {times_s.shape} and {points.shape}")
+        if not len(times_s):
+            raise FormatError("no frames")
+        if not self.names and not angles:
+            raise FormatError("neither points nor angles")
+        for what, names in (("point", self.names), ("angle", tuple(angles))):
+            if len(set(names)) < len(names) or "" in names:
+                wrong = next(name for name, count in Counter(names).items() if count > 1 or not name)
+                raise FormatError(f"the name of {what} {wrong!r} is empty or occurs twice")
+        for name, values in angles.items():
+            if values.shape != times_s.shape:
+                raise FormatError(f"angle {name}: wanted {times_s.shape}, got {values.shape}")
+            if np.isinf(values).any():
+                raise FormatError(f"angle {name}: infinite in frame {np.flatnonzero(np.isinf(values))[0]}")
+        _check_clock(times_s)
+        if np.isinf(points).any():
+            frame, point = np.argwhere(np.isinf(points))[0][:2]
+            raise FormatError(f"point {self.names[point]}: infinite in frame {frame}")
+        points[np.isnan(points).any(axis=2)] = np.nan
+        for event in self.events:
+            if event.kind not in EVENT_KINDS or event.side not in SIDES or not math.isfinite(event.time_s):
+                raise FormatError(f"no gait event: {tuple(event)}")
+        for name, value in (("times_s", times_s), ("points", points), ("angles", angles)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "events", tuple(sorted(self.events)))
+
+    def at_constant_rate(self) -> tuple[float, Motion]:
+        """The frame rate in Hz and the motion on its grid, empty frames where frames are absent.
+
+        Raises `FormatError` where the time stamps fit no constant rate within a millisecond.
+        """
+        steps, rate_hz = self._steps()
+        count = int(steps[-1]) + 1
+        times_s = self.times_s[0] + np.arange(count) / rate_hz
+        if count == len(steps):
+            return rate_hz, replace(self, times_s=times_s)
+        points = np.full((count, len(self.names), 3), np.nan)
+        points[steps] = self.points
+        angles = {name: np.full(count, np.nan) for name in self.angles}
+        for name, values in self.angles.items():
+            angles[name][steps] = values
+        return rate_hz, replace(self, times_s=times_s, points=points, angles=angles)
+
+    def resampled(self, rate_hz: float) -> Motion:
+        """The motion at another rate, each value linear between the two frames around it.
+
+        The new frames begin at the first time stamp and end before the last. A value is missing where one of
+        the two is, or where they are more than three usual intervals apart.
+        """
+        if not (math.isfinite(rate_hz) and rate_hz > 0):
+            raise FormatError(f"a rate must be positive and finite, got {rate_hz:g}")
+        span_s = float(self.times_s[-1] - self.times_s[0])
+        if span_s * rate_hz > MAX_FRAMES:
+            raise FormatError(f"{span_s:g} s at {rate_hz:g} Hz are more than {MAX_FRAMES} frames")
+        count = int(span_s * rate_hz + 1e-6) + 1
+        times_s = self.times_s[0] + np.arange(count) / rate_hz
+        if len(self.times_s) == 1:
+            return replace(self, metadata={**self.metadata, "rate_hz": rate_hz})
+        intervals = np.diff(self.times_s)
+        after = np.clip(np.searchsorted(self.times_s, times_s, side="right"), 1, len(self.times_s) - 1)
+        weight = np.clip((times_s - self.times_s[after - 1]) / intervals[after - 1], 0, 1)
+        weight[np.abs(weight) < 1e-9], weight[np.abs(weight - 1) < 1e-9] = 0, 1
+        weight[(intervals[after - 1] > 3 * np.median(intervals)) & (weight > 0) & (weight < 1)] = np.nan
+        return replace(
+            self,
+            times_s=times_s,
+            points=_between(self.points[after - 1], self.points[after], weight[:, None, None]),
+            angles={
+                name: _between(v[after - 1], v[after - 1] + _turn_deg(v[after] - v[after - 1]), weight)
+                for name, v in self.angles.items()
+            },
+            metadata={**self.metadata, "rate_hz": rate_hz},
+        )
+
+    def filled(self, longest_s: float) -> tuple[Motion, int]:
+        """The motion with gaps up to `longest_s` bridged by straight lines, and the number of values filled.
+
+        A gap is as long as the time between the frames at its two ends. What is missing at the beginning or
+        at the end of a point's track stays missing.
+        """
+        points, filled = self.points.copy(), 0
+        for k in range(len(self.names)):
+            known = np.flatnonzero(np.isfinite(points[:, k, 0]))
+            wide = np.diff(known) > 1
+            for a, b in zip(known[:-1][wide], known[1:][wide], strict=True):
+                if self.times_s[b] - self.times_s[a] <= longest_s * (1 + 1e-9):
+                    part = (self.times_s[a + 1 : b] - self.times_s[a]) / (self.times_s[b] - self.times_s[a])
+                    points[a + 1 : b, k] = points[a, k] + part[:, None] * (points[b, k] - points[a, k])
+                    filled += int(b - a - 1)
+        return replace(self, points=points), filled
+
+    def _steps(self) -> tuple[npt.NDArray[np.int64], float]:
+        """(T,) numbers of the frames on the grid, from 0, and the rate of the grid."""
+        if len(self.times_s) == 1:
+            rate_hz = self.metadata.get("rate_hz")
+            if rate_hz is None:
+                raise FormatError("one frame has no frame rate: give --rate")
+            return np.zeros(1, np.int64), float(rate_hz)
+        intervals = np.diff(self.times_s)
+        period_s = float(np.median(intervals))
+        ratios = np.round(intervals / period_s)
+        if ratios.sum() >= _LONGEST_GAP * len(self.times_s) + 1000:
+            raise FormatError(
+                f"the times {self.times_s[0]:g} to {self.times_s[-1]:g} s are mostly gaps at"
+                f" {1 / period_s:.4g} Hz: split the motion, or give --rate"
+            )
+        steps = np.concatenate([[0.0], np.cumsum(ratios)])
+        slope = np.polyfit(steps, self.times_s, 1)[0] if ratios.min() >= 1 else period_s
+        rate_hz = _nominal(1 / float(slope), float(steps[-1]))
+        drift_s = self.times_s - steps / rate_hz
+        off_s = float(np.abs(drift_s - (drift_s.max() + drift_s.min()) / 2).max())
+        if ratios.min() < 1 or off_s > min(_STAMP_ERROR_S, 0.25 / rate_hz):
+            rates = f"{1 / intervals.max():.4g} to {1 / intervals.min():.4g}"
+            raise FormatError(
+                f"the time stamps have no constant rate ({rates} Hz from frame to frame,"
+                f" {rate_hz:.4g} Hz in the middle): give --rate {round(rate_hz) or 1} to interpolate"
+            )
+        return steps.astype(np.int64), rate_hz
+
+
+def to_z_up(points: npt.ArrayLike, up: Up) -> Array:
+    """Points (..., 3) with the given up axis, in axes with Z up."""
+    points = np.asarray(points, np.float64)
+    return points if up == "z" else np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1)
+
+
+def from_z_up(points: npt.ArrayLike, up: Up) -> Array:
+    """Points (..., 3) of a world with Z up, in axes with the given up axis."""
+    points = np.asarray(points, np.float64)
+    return points if up == "z" else np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
+
+
+def _check_clock(times_s: Array) -> None:
+    bad = np.flatnonzero(~np.isfinite(times_s))
+    if len(bad):
+        raise FormatError(f"frame {bad[0]}: the time is not a number")
+    late = np.flatnonzero(~(np.diff(times_s) > 0))
+    if len(late):
+        a, b = times_s[late[0]], times_s[late[0] + 1]
+        raise FormatError(f"frame {late[0] + 1}: times must increase, {b:g} s follows {a:g} s")
+
+
+def _nominal(rate_hz: float, steps: float) -> float:
+    """The whole rate, or that of NTSC, if the difference shows in no stamp; else the rate itself."""
+    for nominal in (round(rate_hz), round(rate_hz * 1.001) / 1.001):
+        if nominal > 0 and abs(steps / nominal - steps / rate_hz) < _STAMP_ERROR_S / 4:
+            return float(nominal)
+    return rate_hz
+
+
+def _between(a: Array, b: Array, weight: Array) -> Array:
+    """a at weight 0, b at 1, linear between; a missing neighbour counts only where it has weight."""
+    mixed = (1 - weight) * a + weight * b
+    return np.where(weight == 0, a, np.where(weight == 1, b, mixed))
+
+
+def _turn_deg(difference: Array) -> Array:
+    """The same turn by at most half a circle."""
+    return difference - 360 * np.round(difference / 360)

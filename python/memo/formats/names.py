@@ -1,0 +1,118 @@
+"""Which point of a file is which joint: the twelve of memo, by the names in use.
+
+A file is read by one naming scheme, the one in which most of the joints are found, since the same word
+means different joints in different schemes: `RightShoulder` is the shoulder in a list of keypoints, and
+the inner end of the collar bone in a BVH file, where the shoulder is called `RightArm`. Plug-in Gait's
+skin markers are no joints and are not taken for them; its virtual points are (`RFEP`, the proximal end of
+the femur, is the hip).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from memo.files import JOINTS
+from memo.formats.motion import FormatError, Motion
+
+__all__ = ["SHORT", "joint_points", "joints_found"]
+
+_PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+
+SHORT = {
+    f"{side}_{part}": side[0].upper() + short
+    for side in ("right", "left")
+    for part, short in zip(_PARTS, ("SH", "EL", "WR", "HP", "KN", "AN"), strict=True)
+}
+"""memo's short name of each joint, as in point-light displays."""
+
+_MIDDLE = {
+    "head": ("head", "headtop", "nose"),
+    "neck": ("neck", "c7"),
+    "pelvis": ("pelvis", "hips", "midhip", "root"),
+}
+
+
+def _sided(**parts: str) -> dict[str, tuple[str, ...]]:
+    """Names of a scheme with `{}` for the side; letters, lower case."""
+    table = {}
+    for part, names in parts.items():
+        for side in ("right", "left"):
+            spelled = []
+            for name in names.split():
+                if "{s}" in name:
+                    spelled.append(name.format(s=side[0]))
+                else:
+                    spelled += [side + name, side[0] + name, name + side, name + side[0]]
+            table[f"{side}_{part}"] = tuple(spelled)
+    return table
+
+
+_SCHEMES: tuple[dict[str, tuple[str, ...]], ...] = (
+    # Keypoints and joint centres: right_shoulder, RShoulder, R_Shoulder, shoulder_r, RSH.
+    _sided(
+        shoulder="shoulder {s}sh {s}sjc shoulderjoint",
+        elbow="elbow {s}el {s}ejc",
+        wrist="wrist {s}wr {s}wjc",
+        hip="hip {s}hp {s}hjc hipjoint",
+        knee="knee {s}kn {s}kjc",
+        ankle="ankle {s}an {s}ajc",
+    )
+    | _MIDDLE,
+    # Motion capture skeletons: the joint is called after the bone that begins there.
+    _sided(
+        shoulder="arm upperarm uparm",
+        elbow="forearm lowerarm loarm",
+        wrist="hand wrist",
+        hip="upleg upperleg thigh",
+        knee="leg lowerleg lowleg shin calf",
+        ankle="foot ankle",
+    )
+    | {"head": ("head",), "neck": ("neck", "neck1"), "pelvis": ("hips", "hip", "pelvis", "root")},
+    # Plug-in Gait's virtual points: O is the distal end of a segment, P the proximal one.
+    _sided(shoulder="{s}clo", elbow="{s}huo", wrist="{s}rao", hip="{s}fep", knee="{s}feo", ankle="{s}tio")
+    | {"head": ("hedo",), "neck": ("trxo",), "pelvis": ("pelo",)},
+)
+
+
+def joints_found(names: Sequence[str]) -> dict[str, int]:
+    """Where memo's joints are among the names: the twelve, and head, neck and pelvis where there are."""
+    plain: dict[str, int] = {}
+    for index, name in enumerate(names):
+        plain.setdefault(_letters(name), index)
+    found = [
+        {joint: plain[spelled[0]] for joint, names in scheme.items() if (spelled := _those(names, plain))}
+        for scheme in _SCHEMES
+    ]
+    return max(found, key=lambda joints: sum(joint in joints for joint in JOINTS))
+
+
+def joint_points(motion: Motion) -> Motion:
+    """The motion of the twelve joints alone, in memo's order, and of the head where it is known.
+
+    They have memo's short names (`RSH`, `HEAD`), by which point-light displays know limbs.
+    """
+    found = joints_found(motion.names)
+    absent = [joint for joint in JOINTS if joint not in found]
+    if absent:
+        raise FormatError(f"no points for {', '.join(absent)}; the file has {listed(motion.names)}")
+    kept = [*JOINTS, *(("head",) if "head" in found else ())]
+    names = tuple(SHORT.get(joint, joint.upper()) for joint in kept)
+    return replace(motion, names=names, points=motion.points[:, [found[joint] for joint in kept]])
+
+
+def listed(names: Sequence[str], most: int = 40) -> str:
+    """Names in a message, not too many of them."""
+    shown = ", ".join(names[:most]) or "none"
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _letters(name: str) -> str:
+    """A name without the name of its subject ("Anna:RKNE"), in small letters and digits."""
+    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
+
+
+def _those(spelled: Sequence[str], plain: dict[str, int]) -> list[str]:
+    """The spellings that are there."""
+    return [name for name in spelled if name in plain]

@@ -1,0 +1,80 @@
+"""The folders that `memo track` and `memo posture` write, as motions.
+
+Several walks of one `track.csv` are one motion; between them nobody was tracked and no frame is there.
+Where a format wants a frame at every instant, those frames are empty.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from memo.files import ANGLES, JOINTS, SIDES, read_events_csv, read_track_csv
+from memo.formats.motion import FormatError, GaitEvent, Motion
+from memo.formats.reading import Given
+from memo.formats.table import read_table
+
+__all__ = ["read_run_folder", "sources"]
+
+
+def sources(path: Path) -> list[Path]:
+    """The files that are read for a folder of results, or for the `track.csv` in one."""
+    folder = path if path.is_dir() else path.parent
+    if (folder / "track.csv").exists():
+        return [folder / "track.csv", folder / "events.csv"]
+    return [folder / "postures.csv"]
+
+
+def read_run_folder(path: Path, given: Given, walk: int | None) -> Motion:
+    """Reads `track.csv` with `events.csv`, or `postures.csv`; of a track one walk, or all."""
+    table, *others = sources(path)
+    if not table.is_file():
+        raise FormatError("holds neither track.csv of `memo track` nor postures.csv of `memo posture`")
+    if given.up == "y":
+        raise FormatError(f"{table.name} has Z up")
+    if table.name == "track.csv":
+        return _track(table, others[0], walk)
+    if walk is not None:
+        raise FormatError("only track.csv counts walks")
+    return read_table(table, given)
+
+
+def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
+    columns = _read(read_track_csv, table)
+    events = _read(read_events_csv, events_table) if events_table.is_file() else []
+    chosen = np.ones(len(columns["walk"]), bool) if walk is None else columns["walk"] == walk
+    if not len(chosen):
+        raise FormatError("track.csv has no frames: nobody was tracked")
+    if not chosen.any():
+        raise FormatError(f"there is no walk {walk}, only {columns['walk'].min()} to {columns['walk'].max()}")
+    times_s = columns["time_s"][chosen]
+    names = tuple(joint for joint in JOINTS if np.isfinite(columns[f"{joint}_x_m"][chosen]).any())
+    points = (
+        np.stack(
+            [np.stack([columns[f"{name}_{axis}_m"][chosen] for axis in "xyz"], axis=-1) for name in names],
+            axis=1,
+        )
+        if names
+        else np.empty((len(times_s), 0, 3))
+    )
+    angles = {f"{side}_{angle}": columns[f"{side}_{angle}_deg"][chosen] for side in SIDES for angle in ANGLES}
+    walks = len(np.unique(columns["walk"]))
+    notes = [f"{walks} walks: between them nobody was tracked."] if walk is None and walks > 1 else []
+    kept = [
+        GaitEvent(event["time_s"], event["event"], event["side"])
+        for event in events
+        if walk is None or times_s[0] <= event["time_s"] <= times_s[-1]
+    ]
+    metadata = {"format": "track", "up": "z", "unit": "m"}
+    return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes))
+
+
+def _read(reader: Callable[[Path], Any], path: Path) -> Any:
+    try:
+        return reader(path)
+    except (ValueError, TypeError, csv.Error) as error:
+        raise FormatError(f"{path.name}: {str(error).removeprefix(f'{path}: ')}") from None

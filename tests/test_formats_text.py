@@ -1,0 +1,286 @@
+"""TRC, MOT, STO and tables: what memo writes, read by others; real files and damaged ones, read by memo."""
+
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+from memo.files import JOINTS
+from memo.formats import FormatError, Motion, read_motion, write_motion
+from motions import ANGLES, assert_same_points, shared_motion, walk
+
+
+def by_pandas(path, skip, **options):
+    return pd.read_csv(path, sep="\t", skiprows=skip, **options)
+
+
+def test_a_stranger_reads_the_trc_that_is_written(tmp_path):
+    motion, path = walk(start_s=0.4), tmp_path / "walk.trc"
+    left_out = write_motion(path, motion)
+    assert left_out == [
+        "A TRC file has no place for events: left out.",
+        "A TRC file has no place for joint angles: left out.",
+    ]
+    table = by_pandas(path, 6, header=None).to_numpy()
+    assert table.shape == (20, 2 + 36) and table[:, 0].tolist() == [*range(1, 21)]
+    assert np.allclose(table[:, 1], motion.times_s, atol=1e-7)
+    x, y, z = (table[:, 2 + k :: 3] for k in range(3))
+    for column, wanted in ((x, 0), (y, 2)):
+        assert np.allclose(column, motion.points[..., wanted], atol=1e-7, equal_nan=True)
+    assert np.allclose(z, -motion.points[..., 1], atol=1e-7, equal_nan=True)
+    head = path.read_text().split("\n")[:6]
+    assert head[2].split("\t") == ["50", "50", "20", "12", "m", "50", "1", "20"]
+    assert [name for name in head[3].split("\t")[2:] if name] == [*JOINTS]
+    assert head[4].split("\t")[2:5] == ["X1", "Y1", "Z1"] and head[5] == ""
+
+
+def test_a_reader_of_trc_reads_it(tmp_path):
+    trc = pytest.importorskip("trc")
+    motion, path = walk(), tmp_path / "walk.trc"
+    write_motion(path, motion, "z")
+    data = trc.TRCData()
+    data.load(str(path))
+    assert tuple(data["Markers"]) == JOINTS and data["DataRate"] == 50 and data["Units"] == "m"
+    for k, name in enumerate(JOINTS):
+        assert np.allclose(data[name], motion.points[:, k], atol=1e-7, equal_nan=True)
+
+
+def test_opensim_reads_trc_and_mot(tmp_path):
+    opensim = pytest.importorskip("opensim")
+    motion = walk()
+    write_motion(tmp_path / "walk.trc", motion)
+    write_motion(tmp_path / "walk.mot", motion)
+    table = opensim.TimeSeriesTableVec3(str(tmp_path / "walk.trc"))
+    assert tuple(table.getColumnLabels()) == JOINTS and table.getTableMetaDataString("Units") == "m"
+    for frame in range(20):
+        row = table.getRowAtIndex(frame)
+        read = np.array([[row.getElt(0, k).get(axis) for axis in range(3)] for k in range(12)])
+        wanted = motion.points[frame] @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+        assert np.allclose(read, wanted, atol=1e-7, equal_nan=True)
+    angles = opensim.TimeSeriesTable(str(tmp_path / "walk.mot"))
+    assert angles.getTableMetaDataString("inDegrees") == "yes"
+    knee = angles.getDependentColumn("knee_angle_r").to_numpy()
+    assert np.allclose(knee, np.delete(motion.angles["right_knee"], 4), atol=1e-7)
+    assert opensim.Storage(str(tmp_path / "walk.mot")).getSize() == 19
+
+
+def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
+    motion = walk()
+    for name in ("walk.mot", "walk.sto"):
+        left_out = write_motion(tmp_path / name, motion)
+        assert left_out == [
+            "1 instants at which an angle or the pelvis is missing were left out.",
+            "A MOT or STO file has no place for events: left out.",
+            "A MOT or STO file has no place for points but the pelvis: left out.",
+        ]
+        lines = (tmp_path / name).read_text().split("\n")
+        assert lines[1:7] == ["version=1", "nRows=19", "nColumns=7", "inDegrees=yes", "up=Y", "endheader"]
+        table = by_pandas(tmp_path / name, 7)
+        assert [*table] == [
+            *("time", "pelvis_tx", "pelvis_ty", "pelvis_tz"),
+            *("hip_flexion_r", "knee_angle_r", "knee_angle_l"),
+        ]
+        known = np.isfinite(motion.angles["left_knee"])
+        assert np.allclose(table["time"], motion.times_s[known], atol=1e-7)
+        assert np.allclose(table["knee_angle_l"], motion.angles["left_knee"][known], atol=1e-7)
+        hips = [JOINTS.index("right_hip"), JOINTS.index("left_hip")]
+        middle = motion.points[known][:, hips].mean(axis=1)
+        assert np.allclose(table["pelvis_ty"], middle[:, 2], atol=1e-7)
+        assert np.allclose(table["pelvis_tz"], -middle[:, 1], atol=1e-7)
+        read = read_motion(tmp_path / name)
+        assert read.names == ("pelvis",) and [*read.angles] == [*ANGLES] and read.notes == ()
+        assert np.allclose(read.points[:, 0], middle, atol=1e-7)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_memo_reads_its_own_tables_back(tmp_path, up):
+    motion = walk(start_s=0.4)
+    for name in ("walk.trc", "walk.csv"):
+        write_motion(tmp_path / name, motion, up)
+        read = read_motion(tmp_path / name)
+        assert_same_points(read, motion, 1e-6)
+        assert read.metadata["up"] == up and read.notes == ()
+    assert np.allclose(read.angles["right_knee"], motion.angles["right_knee"], atol=1e-6)
+    table = pd.read_csv(tmp_path / "walk.csv", comment="#")
+    wanted = motion.points[:, 3, 2] if up == "z" else -motion.points[:, 3, 1]
+    assert np.allclose(table["right_hip_z_m"], wanted, atol=1e-6)
+
+
+def test_the_trc_of_pose2sim_is_read_as_pandas_reads_it():
+    path = shared_motion(
+        "keypoints", "pose2sim_balancing", "S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc"
+    )
+    motion = read_motion(path)
+    table = by_pandas(path, 5, header=None).to_numpy()
+    x, y, z = (table[:, 2 + k : 65 : 3] for k in range(3))
+    assert np.array_equal(motion.points, np.stack([x, -z, y], axis=-1))
+    assert np.array_equal(motion.times_s, table[:, 1])
+    assert motion.names[:3] == ("RHip", "RKnee", "RAnkle") and motion.names[-1] == "LWrist"
+    assert motion.notes == (
+        "The file does not say which axis is up: Y was assumed, as OpenSim's files have.",
+    )
+    assert motion.at_constant_rate()[0] == 60
+    assert np.array_equal(read_motion(path, up="z").points, np.stack([x, y, z], axis=-1))
+
+
+def test_millimetres_empty_cells_and_missing_blank_rows_are_read(tmp_path):
+    path = tmp_path / "old.trc"
+    path.write_bytes(
+        b"PathFileType\t4\t(X/Y/Z)\tC:\\trials\\old.trc\t\r\n"
+        b"DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\r\n"
+        b"120.000000\t120.000000\t2\t2\tmm\t120.000000\t1\t2\r\n"
+        b"Frame#\tTime\tL.Kn\xe9e\t\t\tV Sacral\t\t\t\r\n"
+        b"\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t\r\n"
+        b"1\t0.000\t1000\t2000\t3000\t\t\t\t\r\n"
+        b"2\t0.008\t1001\t2000\t3000\t10\t20\t30\t\r\n"
+    )
+    motion = read_motion(path)
+    assert motion.names == ("L.Knée", "V Sacral")
+    assert motion.points[0, 0].tolist() == [1, -3, 2] and np.isnan(motion.points[0, 1]).all()
+    assert motion.points[1, 1] == pytest.approx([0.01, -0.03, 0.02])
+
+
+MOT = """old
+datacolumns 5
+datarows 2
+range 0 0.1
+endheader
+time hip_flexion_r toes_tx toes_ty toes_tz
+0 10 1 2 3
+0.1 20 1 2 3
+"""
+
+
+def test_the_older_header_radians_and_forces_of_mot(tmp_path):
+    path = tmp_path / "old.mot"
+    path.write_text(MOT)
+    motion = read_motion(path)
+    assert motion.names == ("toes",) and motion.points[0, 0].tolist() == [1, -3, 2]
+    assert motion.angles["right_hip"].tolist() == [10, 20]
+    assert [note.split(":")[0] for note in motion.notes] == [
+        "The file does not say which axis is up",
+        "The file does not say whether angles are in degrees",
+    ]
+    path.write_text(
+        "x\nnRows=1\nnColumns=3\ninDegrees=no\nendheader\n\ntime\tlumbar\tground_force_vx\n0\t1\t700\n"
+    )
+    motion = read_motion(path)
+    assert motion.angles["lumbar"] == pytest.approx([180 / np.pi])
+    assert motion.notes == ("Left out, no angles: 1 columns, the first ground_force_vx.",)
+
+
+def edited(text, line, edit):
+    lines = text.split("\n")
+    lines[line - 1] = edit(lines[line - 1])
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("line", "edit", "says"),
+    [
+        (1, lambda line: "time,x", "line 1: no TRC file"),
+        (1, lambda line: line.replace("X/Y/Z", "X/Z/Y"), r"line 1: coordinates in the order '\(X/Z/Y\)'"),
+        (1, lambda line: line.replace("up=Y", "up=X"), "the up axis is 'x'"),
+        (
+            3,
+            lambda line: line.replace("\tm\t", "\tinch\t"),
+            "line 3, field Units: 'inch', wanted m, cm or mm",
+        ),
+        (3, lambda line: line.replace("\t20\t12", "\t21\t12"), "field NumFrames: 21, but there are 20 rows"),
+        (3, lambda line: line.replace("\t12\t", "\t13\t"), "line 4: 12 labels, NumMarkers is 13"),
+        (
+            3,
+            lambda line: line.replace("\t12\t", "\t1e99\t"),
+            "line 3, field NumMarkers: wanted a whole number",
+        ),
+        (3, lambda line: "100" + line[2:], "field DataRate: 100 Hz, but the column Time has 50 Hz"),
+        (4, lambda line: line.replace("left_hip", "left_knee"), "point 'left_knee' is empty or occurs twice"),
+        (5, lambda line: line.replace("Y3", "Z3"), "line 5: wanted X1 Y1 Z1"),
+        (9, lambda line: line + "\t1", "line 9: 39 cells, wanted 38"),
+        (
+            9,
+            lambda line: line.replace("NaN", "1e400"),
+            "line 10|line 9, column right_.*: '1e400' is no finite",
+        ),
+        (
+            10,
+            lambda line: line.replace("0.0600000", "0.04"),
+            "line 10, column Time: 0.04 does not come after",
+        ),
+    ],
+)
+def test_what_is_wrong_in_a_trc_is_said_with_its_line(tmp_path, line, edit, says):
+    path = tmp_path / "bad.trc"
+    write_motion(path, walk())
+    good = path.read_text()
+    if "1e400" in says:
+        line = 10
+    path.write_text(edited(good, line, edit))
+    assert path.read_text() != good
+    with pytest.raises(FormatError, match=says) as caught:
+        read_motion(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "says"),
+    [
+        ("endheader", "", "no line endheader among the first"),
+        ("datacolumns 5", "nColumns=4", "field ncolumns: 4, but there are 5 labels"),
+        ("datarows 2", "nRows=9", "field nrows: 9, but there are 2 rows"),
+        ("time hip", "t hip", "line 6: wanted a row of labels that begins with time"),
+        ("toes_ty", "toes_tx", "line 6: column toes_tx occurs twice"),
+        ("0.1 20", "0.0 20", "line 8, column time: 0.0 does not come after 0"),
+        ("20 1 2 3", "20 1 2", "line 8: 4 cells, wanted 5"),
+        ("20 1 2 3", "20 1 2,5 3", "line 8, column toes_ty: '2,5' is no finite number"),
+        ("old", "inDegrees=maybe", "field inDegrees: 'maybe', wanted yes or no"),
+        ("old", "DataType=Vec3", "field DataType: tables of vec3 are not read"),
+    ],
+)
+def test_what_is_wrong_in_a_mot_is_said_with_its_line(tmp_path, was, becomes, says):
+    path = tmp_path / "bad.mot"
+    path.write_text(MOT.replace(was, becomes, 1))
+    with pytest.raises(FormatError, match=says):
+        read_motion(path)
+
+
+def test_what_is_wrong_in_a_table_is_said_with_its_column(tmp_path):
+    path = tmp_path / "bad.csv"
+    for text, says in (
+        ("time_s,a_x_m,a_y_m\n0,1,2\n", "point a has no column a_z_m"),
+        ("time_s,a_x_m,a_y_m,a_z_m\n0,1,2,far\n", "row 0, column a_z_m: far is no number"),
+        ("time_s,knee_deg,a_x_m,a_y_m,a_z_m\n0,x,1,2,3\n", "row 0, column knee_deg: x is no number"),
+        ("a_x_m,a_y_m,a_z_m\n1,2,3\n", "no column time_s and no frame rate"),
+        ("time_s,b\n0,1\n", "no columns NAME_x_m"),
+    ):
+        path.write_text(text)
+        with pytest.raises(FormatError, match=says):
+            read_motion(path)
+    path.write_text("a_x_m,a_y_m,a_z_m\n1,2,3\n4,5,6\n")
+    assert read_motion(path, rate_hz=4).times_s.tolist() == [0, 0.25]
+
+
+def test_what_a_format_has_no_place_for_at_all_is_refused(tmp_path):
+    points = Motion(("a",), [0, 1], np.zeros((2, 1, 3)))
+    angles = Motion((), [0, 1], np.zeros((2, 0, 3)), angles={"knee": [1, 2]})
+    spaced = Motion(("a b",), [0, 1], np.zeros((2, 1, 3)))
+    for name, motion, says in (
+        ("x.mot", points, "holds joint angles, and there are none"),
+        ("x.trc", angles, "holds points, and there are none"),
+        ("x.csv", angles, "holds points, and there are none"),
+        ("x.trc", spaced, "no white space"),
+        ("x.xyz", points, "no motion is written to .xyz: wanted .bvh, .c3d"),
+    ):
+        with pytest.raises(FormatError, match=says):
+            write_motion(tmp_path / name, motion)
+    assert [*tmp_path.iterdir()] == []
+    (tmp_path / "x.xyz").touch()
+    with pytest.raises(FormatError, match=r"no motion is read from .xyz"):
+        read_motion(tmp_path / "x.xyz")
+
+
+def test_a_table_is_read_by_the_oldest_parser_there_is(tmp_path):
+    write_motion(tmp_path / "walk.csv", walk())
+    text = (tmp_path / "walk.csv").read_text()
+    table = np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
+    assert np.allclose(table["left_ankle_z_m"], walk().points[:, -1, 2], atol=1e-6)
