@@ -10,7 +10,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -27,8 +27,10 @@ __all__ = [
     "TRACK_COLUMNS",
     "complete_file",
     "plain",
+    "read_columns_csv",
     "read_events_csv",
     "read_text_columns",
+    "read_track",
     "read_track_csv",
     "read_tsai_xml",
     "write_columns_csv",
@@ -101,6 +103,32 @@ def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.Array
     _write_rows(path, columns, zip(*texts, strict=True))
 
 
+def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
+    """Reads any table written here: a column is int64, float64 with NaN for empty cells, or texts."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a table: {error}") from None
+    if not header or len(set(header)) < len(header):
+        raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
+    cells = zip(*rows, strict=True) if rows else ((),) * len(header)
+    return {name: _column(own) for name, own in zip(header, cells, strict=True)}
+
+
+def _column(cells: Sequence[str]) -> Column:
+    """Cells as whole numbers, numbers or texts, whichever all of them are."""
+    for kind, texts in ((np.int64, cells), (np.float64, [cell or "nan" for cell in cells])):
+        try:
+            return np.array(texts, dtype=object).astype(kind)
+        except (ValueError, OverflowError):
+            pass
+    return np.array(cells, dtype=object)
+
+
 def write_json(path: str | PathLike[str], value: Any) -> None:
     """Writes a value as JSON, null for what is not finite."""
     with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
@@ -129,6 +157,31 @@ def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
         except (ValueError, OverflowError) as error:
             raise ValueError(f"{path}: column {name}: {error}") from None
     return columns
+
+
+def read_track(path: str | PathLike[str]) -> dict[str, Column]:
+    """The columns of `track.csv` or `track.parquet`, or of the one in a folder, as `read_track_csv` has them.
+
+    Parquet needs the extra `parquet`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        names = [path / name for name in ("track.csv", "track.parquet") if (path / name).is_file()]
+        if not names:
+            raise ValueError(f"{path}: a folder without track.csv or track.parquet")
+        path = names[0]
+    if path.suffix.lower() != ".parquet":
+        return read_track_csv(path)
+    from memo.formats.parquet import read_parquet
+
+    columns = read_parquet(path)
+    absent = sorted(set(TRACK_COLUMNS) - set(columns))
+    if absent:
+        raise ValueError(f"{path}: columns missing: {absent}")
+    texts = [name for name in TRACK_COLUMNS if columns[name].dtype.kind not in "iuf"]
+    if texts:
+        raise ValueError(f"{path}: column {texts[0]} holds no numbers")
+    return {name: columns[name] for name in TRACK_COLUMNS}
 
 
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:

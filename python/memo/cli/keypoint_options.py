@@ -6,7 +6,11 @@ from typing import Annotated
 import typer
 
 KeypointsPath = Annotated[
-    Path, typer.Argument(help="OpenPose folder, COCO or AlphaPose JSON, or a table (CSV).")
+    Path,
+    typer.Argument(
+        help="OpenPose folder, COCO or AlphaPose JSON, Sports2D's TRC in pixels, a table (CSV or "
+        "Parquet), or a folder with track.csv."
+    ),
 ]
 Fps = Annotated[
     float | None,

@@ -3,6 +3,7 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,12 +11,25 @@ import memo
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
 from memo.cli.given import check_apart, check_writable
 from memo.files import write_flips_csv
+from memo.keypoints import write_keypoints
 
 if TYPE_CHECKING:
     import typer
 
 UNSWAP_EXIT_CODES = """Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong usage;
 4 the app extra is not installed; 130 interrupted (nothing is written)."""
+
+
+class Written(StrEnum):
+    """What the keypoints are written as: like the file read, or one of `memo.keypoints.WRITERS`."""
+
+    SAME = "same"
+    OPENPOSE = "openpose"
+    COCO = "coco"
+    CSV = "csv"
+
+
+_ENDS = {Written.OPENPOSE: "_json", Written.COCO: ".json", Written.CSV: ".csv"}
 
 
 def add_unswap(app: "typer.Typer") -> None:
@@ -29,6 +43,14 @@ def add_unswap(app: "typer.Typer") -> None:
         fps: Fps = None,
         layout: LayoutName = None,
         person: Person = None,
+        written: Annotated[
+            Written,
+            typer.Option(
+                "--format",
+                help="Write the file as it was read but for the exchanges (same), or this person alone as "
+                "OpenPose (BODY_25, a folder), COCO results (17 points) or a table.",
+            ),
+        ] = Written.SAME,
         out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -39,18 +61,27 @@ def add_unswap(app: "typer.Typer") -> None:
         """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
         options = {"fps": fps, "layout": layout, "person": person}
-        raise typer.Exit(guarded(lambda: _unswap(keypoints, options, delivery)))
+        raise typer.Exit(guarded(lambda: _unswap(keypoints, options, written, delivery)))
 
 
-def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
+def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
     check_writable(delivery.out)
-    written = [delivery.out / path.resolve().name, delivery.out / "flips.csv"]
     with with_elapsed("looking at right and left", delivery):
         repair = memo.unswap(memo.read_keypoints(path, **options))
-        check_apart([path], written)
+        source = repair.keypoints.source.path.resolve()
+        stem = source.stem.removesuffix("_json")
+        name = source.name if as_format is Written.SAME else stem + _ENDS[as_format]
+        written = [delivery.out / name, delivery.out / "flips.csv"]
+        check_apart([path, source], written)
         if written[0].name == written[1].name:
             raise InputError(f"{path}: is called as the table of changes; rename it")
-        repair.keypoints.write(written[0])
+        if as_format is Written.SAME and repair.keypoints.source.write_like is None:
+            raise InputError(f"{path}: is not written as it was read; give --format openpose, coco or csv")
+        left_out: tuple[str, ...] = ()
+        if as_format is Written.SAME:
+            repair.keypoints.write(written[0])
+        else:
+            left_out = write_keypoints(written[0], repair.keypoints, as_format.value)
         write_flips_csv(written[1], repair.flips)
     frames = len(repair.keypoints.frames)
     summary = {
@@ -59,9 +90,12 @@ def _unswap(path: Path, options: dict[str, Any], delivery: Delivery) -> Exit:
         "guessed": repair.guessed,
         "undecided": repair.undecided,
         "p_global": repair.p_global,
+        "left_out": left_out,
     }
-    line = f"Right and left exchanged, of {frames} frames: {exchanges(repair)}; {_majority(repair)}."
-    delivery.tell(summary, [line], written)
+    lines = [f"Right and left exchanged, of {frames} frames: {exchanges(repair)}; {_majority(repair)}."]
+    if left_out:
+        lines.append(f"{as_format.value} has no place for {', '.join(left_out)}.")
+    delivery.tell(summary, lines, written)
     return Exit.DONE
 
 

@@ -1,0 +1,159 @@
+"""Tables as Parquet, the unit of every column in its metadata. Needs the extra `parquet` (pyarrow).
+
+Columns and their names are those of the CSV files. A value that is not known is null: NaN and the empty texts
+of columns that otherwise hold numbers. The unit stands under `unit` in the metadata of a column (`cycle` for
+`phase`, `1` for a pure number), the version that wrote the file under `memo` in that of the table.
+
+What it cannot do: nested columns, and tables beyond 100 million cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from memo._memo import __version__
+from memo.files import complete_file
+
+__all__ = ["ParquetError", "read_parquet", "unit_of", "write_parquet"]
+
+_MAX_CELLS = 100_000_000
+_UNITS = {
+    "_mps": "m/s",
+    "_per_min": "1/min",
+    "_percent": "%",
+    "_deg": "deg",
+    "_rad": "rad",
+    "_nats": "nat",
+    "_px": "px",
+    "_hz": "Hz",
+    "_m": "m",
+    "_s": "s",
+    "phase": "cycle",
+    "p_swapped": "1",
+    "p_mirrored": "1",
+    "probability": "1",
+    "similarity": "1",
+}
+
+
+class ParquetError(ValueError):
+    """A Parquet file that cannot be read or written; the message says which and why, in one line."""
+
+    def __init__(self, message: str) -> None:
+        # Damaged files may hold anything, and Arrow's messages go over several lines.
+        line = " ".join(message.split())
+        super().__init__("".join(character if character.isprintable() else "?" for character in line)[:600])
+
+
+def unit_of(name: str) -> str | None:
+    """The unit that the end of a column's name says, None for counts, names and numbers of frames."""
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), None)
+
+
+def write_parquet(
+    path: str | PathLike[str],
+    columns: Mapping[str, npt.ArrayLike],
+    *,
+    units: Mapping[str, str] | None = None,
+    about: Mapping[str, str] | None = None,
+) -> None:
+    """Writes columns of one length: numbers, texts or truth values.
+
+    `units` are those of columns whose names do not end on them; `about` goes into the table's metadata.
+    """
+    pa, pq = _arrow()
+    arrays = {name: _array(pa, name, np.asarray(values)) for name, values in columns.items()}
+    lengths = {name: len(array) for name, array in arrays.items()}
+    if not lengths or len(set(lengths.values())) > 1:
+        raise ParquetError(f"{path}: columns of one length are needed, got {lengths}")
+    known = {name: (units or {}).get(name) or unit_of(name) for name in arrays}
+    fields = [
+        pa.field(name, array.type, metadata=None if known[name] is None else {"unit": known[name]})
+        for name, array in arrays.items()
+    ]
+    schema = pa.schema(fields, metadata={"memo": __version__, **(about or {})})
+    with complete_file(path) as temporary:
+        pq.write_table(pa.table(list(arrays.values()), schema=schema), temporary)
+
+
+def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
+    """Reads any flat table: whole numbers as int64 (float64 where some are null), texts as objects.
+
+    Null becomes NaN, and an empty text among texts.
+    """
+    path = Path(path)
+    pa, pq = _arrow()
+    try:
+        with pq.ParquetFile(path, memory_map=False) as file:
+            cells = file.metadata.num_rows * file.metadata.num_columns
+            if not 0 <= cells <= _MAX_CELLS:
+                raise ParquetError(f"{path}: {cells} cells; at most {_MAX_CELLS} are read")
+            schema = file.schema_arrow
+            _check_flat(pa, path, schema)
+            table = file.read(use_threads=False)
+        table.validate(full=True)
+        return {name: _values(pa, table.column(index)) for index, name in enumerate(schema.names)}
+    except FileNotFoundError:
+        raise ParquetError(f"{path}: no such file") from None
+    except (pa.ArrowException, OSError, UnicodeDecodeError, MemoryError, OverflowError) as error:
+        raise ParquetError(f"{path}: not Parquet that can be read: {error}") from None
+
+
+def _arrow() -> tuple[ModuleType, ModuleType]:
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError:
+        raise ParquetError('Parquet needs pyarrow: pip install "memo-motion[parquet]"') from None
+
+
+def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
+    """A column of Arrow's, null where not known."""
+    if values.ndim != 1:
+        raise ParquetError(f"column {name}: wanted one value a row, got shape {values.shape}")
+    if values.dtype.kind not in "fiubUO":
+        raise ParquetError(f"column {name}: {values.dtype} is neither number, text nor truth value")
+    if values.dtype.kind == "f":
+        return pa.array(values, mask=np.isnan(values))
+    if values.dtype.kind == "O":
+        known = [None if value is None or value == "" else value for value in values.tolist()]
+        numbers = all(value is None or type(value) in (int, float) for value in known)
+        return pa.array(known if numbers and any(value is not None for value in known) else map(str, values))
+    return pa.array(values)
+
+
+def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
+    if len(set(schema.names)) < len(schema.names):
+        raise ParquetError(f"{path}: a name of a column stands there twice")
+    types = pa.types
+    for name, kind in zip(schema.names, schema.types, strict=True):
+        own = kind.value_type if types.is_dictionary(kind) else kind
+        checks = (
+            types.is_integer,
+            types.is_floating,
+            types.is_boolean,
+            types.is_string,
+            types.is_large_string,
+        )
+        if not any(check(own) for check in checks):
+            raise ParquetError(f"{path}: column {name}: {kind} is neither number, text nor truth value")
+
+
+def _values(pa: ModuleType, column: Any) -> npt.NDArray[Any]:
+    kind = column.type
+    if pa.types.is_dictionary(kind):
+        column = column.cast(kind.value_type)
+        kind = kind.value_type
+    if pa.types.is_floating(kind) or (pa.types.is_integer(kind) and column.null_count):
+        return np.asarray(column.cast(pa.float64()).to_numpy(), np.float64)
+    if pa.types.is_integer(kind):
+        return np.asarray(column.cast(pa.int64()).to_numpy())
+    if pa.types.is_boolean(kind) and not column.null_count:
+        return np.asarray(column.to_numpy())
+    return np.array(["" if value is None else value for value in column.to_pylist()], dtype=object)

@@ -1,0 +1,40 @@
+"""Keypoints of a detector: read from what it wrote, written back there or in another format.
+
+Formats, told apart by their content:
+
+- OpenPose: a folder of JSON files, one a frame; the last number in a file's name is the number of its frame.
+- COCO results, also AlphaPose (COCO-17, Halpe-26): one JSON list of `{image_id, keypoints, score}`.
+- AlphaPose in the forms of OpenPose and CMU: one JSON object of frames by the name of their image.
+- COCO annotations: one JSON object with `annotations`; visibility 0, 1, 2 becomes the score 0, 0.5, 1.
+- Tables: CSV, wide (`frame` or `time_s`, `<joint>_x`, `<joint>_y`, optionally `<joint>_score`) or long
+  (`frame` or `time_s`, `joint`, `x`, `y`, optionally `score`), either with `person` for several people. The
+  projected joints of `track.csv` are such a table; a folder that holds one may be given. The same as Parquet.
+- TRC in pixels, as Sports2D writes it (`*_px_*.trc`).
+
+A point at (0, 0) or without coordinates is missing: NaN here. Missing frames inside the sequence are missing
+points. `Keypoints.write` changes the points that differ from what was read, and nothing else in the file;
+`write_openpose`, `write_coco`, `write_csv` write this one person and what the format has a place for.
+
+What it cannot do: follow a person through a crowd (see `read_keypoints`), read 3D points, guess a frame rate.
+"""
+
+from memo.keypoints.coco import write_coco
+from memo.keypoints.openpose import write_openpose
+from memo.keypoints.points import Keypoints, KeypointsError, layouts
+from memo.keypoints.reading import read_keypoints
+from memo.keypoints.table import write_csv
+from memo.keypoints.track import keypoints_of_track
+from memo.keypoints.writing import WRITERS, write_keypoints
+
+__all__ = [
+    "WRITERS",
+    "Keypoints",
+    "KeypointsError",
+    "keypoints_of_track",
+    "layouts",
+    "read_keypoints",
+    "write_coco",
+    "write_csv",
+    "write_keypoints",
+    "write_openpose",
+]

@@ -1,0 +1,64 @@
+"""AlphaPose, where it differs from COCO and OpenPose.
+
+Its usual results are COCO's list with names of images in place of numbers (read by `coco`). With
+`--format open` or `cmu` they are one object, OpenPose's frames by the name of the image:
+`{"7.jpg": {"people": [...]}}`. Scores beyond 1, which older versions wrote, stay as they are.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from memo.keypoints.found import Found, Person, check_all_placed
+from memo.keypoints.openpose import change_person, frame_people
+from memo.keypoints.points import MAX_FRAME, Keypoints, KeypointsError, Source
+from memo.keypoints.text import content_of, json_text, last_number, parsed, short, write_text
+
+__all__ = ["image_number", "is_by_image", "read_by_image"]
+
+
+def image_number(image_id: Any, where: str) -> int:
+    """The number of a frame from an image's number or, as AlphaPose has it, name."""
+    number = last_number(Path(image_id).stem) if isinstance(image_id, str) else image_id
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise KeypointsError(f"{where}: image_id {short(image_id)} has no frame number")
+    if not 0 <= number <= MAX_FRAME:
+        raise KeypointsError(f"{where}: image_id {short(image_id)} is not the number of a frame")
+    return number
+
+
+def is_by_image(data: Any) -> bool:
+    """Whether this is an object of frames by the name of their image."""
+    first = next(iter(data.values()), None) if isinstance(data, dict) else None
+    return isinstance(first, dict) and ("people" in first or "bodies" in first)
+
+
+def read_by_image(path: Path, data: dict[str, Any]) -> Found:
+    """Everybody in an object of frames by the name of their image."""
+    people = []
+    names: dict[int, str] = {}
+    for image, frame_data in data.items():
+        where = f"{path}: {short(image)}"
+        frame = image_number(image, where)
+        if frame in names:
+            raise KeypointsError(
+                f"{path}: {short(names[frame])} and {short(image)} are both frame {frame}; one camera a file"
+            )
+        names[frame] = image
+        for place, values in frame_people(frame_data, where):
+            people.append(Person(frame, values, (image, place)))
+    return Found(Source(path, _write_by_image), people, frames=tuple(names))
+
+
+def _write_by_image(out: Path, keypoints: Keypoints) -> None:
+    check_all_placed(keypoints)
+    source = keypoints.source
+    content = content_of(source.path)
+    data = parsed(source.path, content)
+    for row, place in enumerate(source.places):
+        if place is not None:
+            image, person = place
+            frame = data.get(image) if isinstance(data, dict) else None
+            change_person(frame, person, keypoints, row, f"{source.path}: {short(image)}")
+    write_text(out, json_text(data, content))

@@ -1,0 +1,199 @@
+"""One person's image points over time: the value that every format gives and takes.
+
+A point at (0, 0) or without coordinates is missing, NaN here. Frames are numbered without gaps: frames that
+are missing are missing points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo
+
+__all__ = ["Array", "Keypoints", "KeypointsError", "Source", "layouts"]
+
+Array = npt.NDArray[np.float64]
+
+MAX_FRAME = 10**9
+# A sequence may have gaps, but frame numbers that are mostly gaps are not those of a video.
+_MAX_FRAMES_PER_SEEN = 20
+_MAX_GAP = 1000
+
+
+class KeypointsError(ValueError):
+    """Keypoints that cannot be read or written; the message says which file and why, in one line."""
+
+    def __init__(self, message: str) -> None:
+        # Names and cells of damaged files may hold anything.
+        super().__init__("".join(character if character.isprintable() else "?" for character in message))
+
+
+def layouts() -> dict[str, tuple[str, ...]]:
+    """The orders of points known: the names of the joints of each layout."""
+    return {name: tuple(_memo.keypoint_layout(name)[1]) for name in _memo.keypoint_layouts()}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where points came from, and how they are written back there."""
+
+    path: Path
+    #: Writes a file or folder like the one read, with other points; None where there is none to be like.
+    write_like: Callable[[Path, Keypoints], None] | None
+    #: For each frame what tells the person's place in the file, or None.
+    places: tuple[Any, ...] = ()
+    #: For a folder: all its files.
+    files: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class Keypoints:
+    """One person's image points over time."""
+
+    points: Array
+    """(T, K, 2) pixels, u right and v down; NaN where missing."""
+    scores: Array
+    """(T, K) the detector's confidence; 0 where missing."""
+    names: tuple[str, ...]
+    """The K joints, in this project's spelling."""
+    times_s: Array
+    """(T,) seconds."""
+    frames: npt.NDArray[np.int64]
+    """(T,) frame numbers, without gaps."""
+    layout: str | None
+    """Name of the detector's order of points; `None` for a table, which names its points itself."""
+    image_size: tuple[int, int] | None
+    """Width and height of the images, pixels, where the file tells."""
+    people: npt.NDArray[np.int64]
+    """(T,) how many people the file has in each frame."""
+    source: Source
+    """What is needed to write back."""
+
+    @classmethod
+    def from_arrays(
+        cls,
+        points: npt.ArrayLike,
+        scores: npt.ArrayLike | None = None,
+        *,
+        names: Sequence[str] | str,
+        times_s: npt.ArrayLike | None = None,
+        fps: float | None = None,
+        frames: npt.ArrayLike | None = None,
+        image_size: tuple[int, int] | None = None,
+    ) -> Keypoints:
+        """Keypoints in memory: `points` (T, K, 2) pixels, NaN where missing; `scores` (T, K), else 1.
+
+        `names`: the K joints, or the name of a layout such as "COCO_17". `frames` (T,): increasing whole
+        numbers, else 0, 1, ...; their gaps become missing points. Either `times_s` (T,), seconds, or `fps`.
+        """
+        layout, own_names = _named(names)
+        given = np.array(points, np.float64)
+        if given.ndim != 3 or given.shape[1:] != (len(own_names), 2) or not len(given):
+            raise KeypointsError(f"wanted points of shape (T, {len(own_names)}, 2), got {given.shape}")
+        count = len(given)
+        confidence = np.ones(given.shape[:2]) if scores is None else np.array(scores, np.float64)
+        if confidence.shape != given.shape[:2]:
+            raise KeypointsError(f"wanted scores of shape {given.shape[:2]}, got {confidence.shape}")
+        numbers, times = _timeline(frames, times_s, fps, count)
+        missing = np.isnan(given).any(axis=2)
+        given[missing] = np.nan
+        confidence[missing] = 0
+        if np.isinf(given).any() or not np.isfinite(confidence).all():
+            raise KeypointsError("points must be finite or NaN, scores finite")
+        every = np.arange(numbers[0], numbers[-1] + 1)
+        rows = numbers - numbers[0]
+        all_points = np.full((len(every), len(own_names), 2), np.nan)
+        all_scores = np.zeros((len(every), len(own_names)))
+        all_points[rows], all_scores[rows] = given, confidence
+        return cls(
+            points=all_points,
+            scores=all_scores,
+            names=own_names,
+            times_s=np.interp(every, numbers, times),
+            frames=every.astype(np.int64),
+            layout=layout,
+            image_size=image_size,
+            people=np.isfinite(all_points).any(axis=(1, 2)).astype(np.int64),
+            source=Source(Path("arrays"), None),
+        )
+
+    def replaced(self, points: npt.ArrayLike, scores: npt.ArrayLike) -> Keypoints:
+        """The same with other points and scores of the same shapes."""
+        new_points = np.array(points, np.float64)
+        new_scores = np.array(scores, np.float64)
+        for name, new, own in (("points", new_points, self.points), ("scores", new_scores, self.scores)):
+            if new.shape != own.shape:
+                raise KeypointsError(f"wanted {name} of shape {own.shape}, got {new.shape}")
+        return replace(self, points=new_points, scores=new_scores)
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Writes a file or folder like the one that was read, with these points in it.
+
+        All else stays as it was: other people, other fields, other columns. The result appears complete or
+        not at all. The input is never overwritten, nor a folder that holds anything but an earlier result.
+        `write_keypoints` writes a format of your choice.
+        """
+        out = Path(path)
+        source = self.source.path
+        if self.source.write_like is None:
+            raise KeypointsError(f"{source}: no file to write one like; use write_keypoints")
+        if out.resolve() == source.resolve() or (out.exists() and source.exists() and out.samefile(source)):
+            raise KeypointsError(f"{out}: is what was read; write to another place")
+        self.source.write_like(out, self)
+
+
+def frame_range(where: object, seen: set[int]) -> range:
+    """The frames from the first to the last seen; refused where nearly all of them would be gaps."""
+    first, last = min(seen), max(seen)
+    span = last - first + 1
+    if span > _MAX_FRAMES_PER_SEEN * len(seen) + _MAX_GAP:
+        raise KeypointsError(f"{where}: frames {first} to {last}, but only {len(seen)} of them are there")
+    return range(first, last + 1)
+
+
+def check_finite(keypoints: Keypoints) -> None:
+    """Refuses what no format can hold."""
+    if np.isinf(keypoints.points).any() or not np.isfinite(keypoints.scores).all():
+        raise KeypointsError("points must be finite or NaN, scores finite")
+
+
+def _named(names: Sequence[str] | str) -> tuple[str | None, tuple[str, ...]]:
+    """The layout, if one is named, and the joints in this project's spelling."""
+    try:
+        if isinstance(names, str):
+            layout, joints = _memo.keypoint_layout(names)
+            return layout, tuple(joints)
+        spelt = [_memo.joint_name(name) for name in names]
+    except ValueError as error:
+        raise KeypointsError(str(error)) from None
+    unknown = [name for name, joint in zip(names, spelt, strict=True) if joint is None]
+    if unknown or len(set(spelt)) < len(spelt):
+        raise KeypointsError(f"names of different joints are needed, got {', '.join(unknown or names)}")
+    return None, tuple(joint for joint in spelt if joint is not None)
+
+
+def _timeline(
+    frames: npt.ArrayLike | None, times_s: npt.ArrayLike | None, fps: float | None, count: int
+) -> tuple[npt.NDArray[np.int64], Array]:
+    """Frame numbers and times, checked."""
+    numbers = np.arange(count) if frames is None else np.asarray(frames)
+    whole = numbers.shape == (count,) and numbers.dtype.kind in "iu"
+    if not whole or numbers[0] < 0 or numbers[-1] > MAX_FRAME or (np.diff(numbers) <= 0).any():
+        raise KeypointsError(f"wanted {count} increasing frame numbers, whole and not below 0")
+    frame_range("arrays", set(numbers.tolist()))
+    if (times_s is None) == (fps is None):
+        raise KeypointsError("give either times_s or fps")
+    if fps is not None and not 0 < fps < math.inf:
+        raise KeypointsError(f"the frame rate must be positive, got {fps}")
+    times = np.asarray(times_s, np.float64) if fps is None else numbers / fps
+    if times.shape != (count,) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise KeypointsError(f"wanted {count} increasing times_s")
+    return numbers.astype(np.int64), times

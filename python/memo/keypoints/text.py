@@ -1,0 +1,75 @@
+"""Text and JSON of keypoint files: read with bounds, written complete or not at all."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from memo.files import complete_file
+from memo.keypoints.points import MAX_FRAME, KeypointsError
+
+__all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_text"]
+
+MAX_FRAME_FILE_BYTES = 64 << 20
+MAX_FILE_BYTES = 512 << 20
+LONGEST_NAME = 60
+
+
+def content_of(path: Path, most: int = MAX_FILE_BYTES) -> str:
+    """The text of a file in UTF-8 of at most so many bytes."""
+    try:
+        size = path.stat().st_size
+        if size > most:
+            raise KeypointsError(f"{path}: {size >> 20} MiB; at most {most >> 20} MiB are read")
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise KeypointsError(f"{path}: not text in UTF-8 (byte {error.start})") from None
+    except OSError as error:
+        raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def parsed(path: Path, content: str) -> Any:
+    """The JSON of a file."""
+    try:
+        return json.loads(content)
+    except json.JSONDecodeError as error:
+        raise KeypointsError(f"{path}: not JSON: {error.msg} in line {error.lineno}") from None
+    except (ValueError, RecursionError) as error:
+        raise KeypointsError(f"{path}: not JSON that can be read: {short(str(error))}") from None
+
+
+def json_text(data: Any, like: str) -> str:
+    """The data as JSON, with or without spaces as in the text it came from."""
+    compact = re.search(r'"\s*:\s', like) is None
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":") if compact else None)
+
+
+def write_text(out: Path, text: str) -> None:
+    """Writes a file that appears complete or not at all."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with complete_file(out) as temporary:
+            temporary.write_bytes(text.encode("utf-8", "surrogatepass"))
+    except OSError as error:
+        raise KeypointsError(f"{out}: cannot be written: {error.strerror or error}") from None
+
+
+def last_number(text: str) -> int | None:
+    """The last number in a name, which is that of its frame."""
+    digits = re.findall(r"[0-9]{1,18}", text)
+    number = int(digits[-1]) if digits else None
+    return number if number is not None and number <= MAX_FRAME else None
+
+
+def short(value: Any) -> str:
+    """A value as it goes into a message."""
+    text = (
+        value
+        if isinstance(value, str)
+        else type(value).__name__
+        if isinstance(value, dict | list)
+        else repr(value)
+    )
+    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 3]}..."
