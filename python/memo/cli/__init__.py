@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import memo
 from memo.cli.convert import add_convert
+from memo.cli.batch import add_batch
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
@@ -62,6 +63,7 @@ def _app() -> "typer.Typer":
     ) -> None: ...
 
     add_track(app)
+    add_batch(app)
     add_unswap(app)
     add_posture(app)
     add_demo(app)

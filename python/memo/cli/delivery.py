@@ -33,6 +33,7 @@ class Exit(IntEnum):
     BAD_INPUT = 1
     NOBODY = 3  # or no posture of anybody
     NO_EXTRA = 4
+    SOME_FAILED = 5  # of many videos
     INTERRUPTED = 130
 
 
@@ -93,7 +94,7 @@ def with_progress(
     """The same frames; on a terminal, a bar with the time left."""
     from rich.progress import track
 
-    console = _console(delivery)
+    console = terminal(delivery)
     yield from track(frames, what, total=count, console=console, transient=True, disable=console is None)
 
 
@@ -101,7 +102,7 @@ def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextMan
     """While one step of unknown length lasts; on a terminal, what it is and for how long already."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    console = _console(delivery)
+    console = terminal(delivery)
     if console is None:
         return contextlib.nullcontext()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -110,7 +111,7 @@ def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextMan
     return progress
 
 
-def _console(delivery: Delivery) -> Console | None:
+def terminal(delivery: Delivery) -> Console | None:
     """The terminal progress is shown on, if there is one and it is wanted."""
     from rich.console import Console
 

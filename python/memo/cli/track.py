@@ -55,8 +55,8 @@ def add_track(app: "typer.Typer") -> None:
         delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
 
         def work() -> Exit:
-            tracker_options = _tracker_options(height, camera, camera_name, fov_deg)
-            return _track_video(video, _frame_range(frames), fps, tracker_options, delivery)
+            tracker_options = checked_options(height, camera, camera_name, fov_deg)
+            return _track_video(video, parsed_frames(frames), fps, tracker_options, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -148,7 +148,7 @@ def _snapshot(tracker: Any, source: Source, frames_read: int) -> Any:
 # What the user gave, checked before any work.
 
 
-def _tracker_options(
+def checked_options(
     height_m: float, camera: Path | None, camera_name: str | None, fov_deg: float | None
 ) -> dict[str, Any]:
     options: dict[str, Any] = {"height_m": checked_height(height_m)}
@@ -165,7 +165,7 @@ def _tracker_options(
     return options
 
 
-def _frame_range(text: str) -> tuple[int, int | None]:
+def parsed_frames(text: str) -> tuple[int, int | None]:
     start, colon, stop = text.partition(":")
     try:
         first, end = int(start or 0), int(stop) if stop else None

@@ -1,0 +1,430 @@
+"""A run over a manifest: what is to be done, who does it, what became of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from memo._memo import __version__
+from memo.batch.folder import STATES, BatchError, OutFolder, Record, check_ours
+from memo.batch.manifest import Manifest, ManifestError, Row, read_manifest
+from memo.batch.tables import write_status, write_table
+from memo.batch.task import Task, perform
+
+__all__ = ["BatchResult", "Progress", "prepared", "run"]
+
+_ATTEMPTS_OF_WORKERS = 3  # a worker may be lost for no fault of the video, so others try
+_BYTES_A_VIDEO = 1 << 20  # of results without an overlay
+_RESERVE_BYTES = 50 << 20  # with less on the disk, errors are not the videos'
+_TELL_S = 0.5
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is."""
+
+    total: int
+    """Videos of this shard."""
+    counts: Mapping[str, int]
+    """How many of them are in each of `STATES`, those of earlier runs included."""
+    running: int
+    record: Record | None
+    """The video that has just come to an end, if this tells of one."""
+
+    @property
+    def ended(self) -> int:
+        """How many have come to an end, good or bad."""
+        return sum(self.counts.values())
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What a run has led to."""
+
+    out: Path
+    records: list[Record]
+    """Of the videos of this shard, in the order of the manifest, those of earlier runs included."""
+    left: list[str]
+    """Names of the videos that have not come to an end."""
+    seconds: float
+    """Wall time of this run."""
+    done_now: int
+    """How many videos came to an end in this run."""
+    notes: list[str] = field(default_factory=list)
+    """Sentences about what the user should know."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many videos are in each of `STATES`."""
+        counted = Counter(record.state for record in self.records)
+        return {state: counted[state] for state in STATES}
+
+    @property
+    def unfinished(self) -> int:
+        """How many videos have no results: failed, crashed, too slow, or left."""
+        return len(self.left) + sum(not record.finished for record in self.records)
+
+    @property
+    def files(self) -> list[Path]:
+        """The tables over all videos."""
+        return [self.out / "status.csv", self.out / "gait_parameters.csv"]
+
+
+def run(
+    manifest: str | PathLike[str] | Iterable[Mapping[str, Any]],
+    out: str | PathLike[str],
+    *,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    shard: tuple[int, int] = (1, 1),
+    resume: bool = False,
+    retry_failed: bool = False,
+    skip_bad: bool = False,
+    overlay: bool = False,
+    plots: bool = False,
+    timeout_s: float | None = None,
+    memory_mb: int | None = None,
+    command: Sequence[str] | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> BatchResult:
+    """Tracks the videos of a manifest, each in a process of its own, with results in `out/NAME`.
+
+    `jobs` videos at a time (as many as there are processors), or as many as the `executor` takes: any of
+    `concurrent.futures`, Dask's `client.get_executor()`, `memo.batch.RayExecutor`; its workers need memo and
+    the same paths. `shard=(2, 4)` does the second of four parts of the manifest; parts may run at the same
+    time on machines that share `out`.
+
+    A run in a folder that holds results needs `resume`: what was done stays, what a kill left undone is done,
+    and what has changed since, in the manifest or on the disk, is done again. `retry_failed` also does again
+    what failed. Rows that cannot be tracked as they stand are refused, or recorded as failed if `skip_bad`.
+
+    `timeout_s` and `memory_mb` (resident, on Linux) are for each video. `command` replaces
+    `python -m memo.batch.leash`, which is given the arguments of `memo`; it must end when its standard input
+    does. `progress` is called for each video, and in between.
+
+    Raises `ManifestError` (with all problems) or `BatchError` before anything is done, and `BatchError` when
+    the disk is full. When interrupted, ends the running processes, writes the tables and raises
+    `KeyboardInterrupt`.
+    """
+    read = prepared(manifest, skip_bad=skip_bad, overlay=overlay, plots=plots)
+    _check_numbers(jobs, shard, timeout_s, memory_mb)
+    start = time.monotonic()
+    folder = OutFolder(Path(out).absolute(), shard)
+    mine = read.rows[shard[0] - 1 :: shard[1]]
+    resume = resume or retry_failed
+    check_folder(folder.out, [row for row in mine if folder.record(row.name) is None])
+    with folder.taken() as name:
+        known = {row.name: folder.record(row.name) for row in mine}
+        if not resume and any(known.values()):
+            done = sum(record is not None for record in known.values())
+            raise BatchError(f"{out}: {done} of the {len(mine)} videos have been run here; resume to go on")
+        fingerprints = {row.name: row.fingerprint for row in mine}
+        to_do = [row for row in mine if _is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
+        notes = _notes(read, folder, known, to_do, fingerprints)
+        for row in to_do:
+            if row.problems:
+                folder.forget(row.name)
+                message = "; ".join(row.problems)
+                folder.write_record(
+                    Record(row.name, "failed", message, 0.0, 1, __version__, fingerprints[row.name])
+                )
+        processors = _processors()
+        jobs = jobs or processors
+        tasks = [
+            Task(
+                name=row.name,
+                arguments=tuple(row.arguments),
+                fingerprint=fingerprints[row.name],
+                attempt=_attempt(known[row.name], fingerprints[row.name]),
+                folder=folder,
+                run=name,
+                timeout_s=timeout_s,
+                memory_mb=memory_mb,
+                threads=1 if executor is not None else max(1, processors // jobs),
+                command=None if command is None else tuple(command),
+            )
+            for row in to_do
+            if not row.problems
+        ]
+        teller = _Teller(read.rows, mine, folder, progress)
+        teller.expect(tasks)
+        try:
+            teller.tell()
+            with ThreadPoolExecutor(jobs) if executor is None else contextlib.nullcontext(executor) as crew:
+                notes += _work(tasks, crew, folder, teller)
+        finally:
+            _write_tables(folder, read.rows, status_only=False)
+    found = [folder.record(row.name) for row in mine]
+    return BatchResult(
+        out=folder.out,
+        records=[record for record in found if record is not None],
+        left=[row.name for row, record in zip(mine, found, strict=True) if record is None],
+        seconds=time.monotonic() - start,
+        done_now=teller.told,
+        notes=notes,
+    )
+
+
+def prepared(
+    manifest: str | PathLike[str] | Iterable[Mapping[str, Any]],
+    *,
+    skip_bad: bool = False,
+    overlay: bool = False,
+    plots: bool = False,
+) -> Manifest:
+    """The manifest, read and checked; raises `ManifestError` with all that is in the way of a run."""
+    read = read_manifest(manifest, {"overlay": overlay, "plots": plots})
+    problems = read.problems + [problem for row in read.rows for problem in row.problems if not skip_bad]
+    if problems:
+        raise ManifestError(problems)
+    return read
+
+
+# Before the work.
+
+
+def _check_numbers(
+    jobs: int | None, shard: tuple[int, int], timeout_s: float | None, memory_mb: int | None
+) -> None:
+    if jobs is not None and jobs < 1:
+        raise BatchError(f"{jobs} videos at a time are too few")
+    if not 1 <= shard[0] <= shard[1]:
+        raise BatchError(f"shard {shard[0]}/{shard[1]} is not one of 1/{shard[1]} to {shard[1]}/{shard[1]}")
+    if timeout_s is not None and not timeout_s > 0:
+        raise BatchError(f"a time limit of {timeout_s:g} s is too short")
+    if memory_mb is not None and memory_mb < 1:
+        raise BatchError(f"a memory limit of {memory_mb} MB is too small")
+
+
+def _is_to_do(record: Record | None, fingerprint: dict[str, Any], retry_failed: bool) -> bool:
+    if record is None or record.fingerprint != fingerprint:
+        return True
+    return retry_failed and not record.finished
+
+
+def _attempt(record: Record | None, fingerprint: dict[str, Any]) -> int:
+    """Which attempt comes now."""
+    same = record is not None and record.fingerprint == fingerprint
+    return record.attempt + 1 if record is not None and same else 1
+
+
+def notes_on(rows: Sequence[Row]) -> list[str]:
+    """What the user should know of the manifest."""
+    without = sum("height_m" not in row.options for row in rows)
+    return [f"{_videos(without)} without height_m: 1.75 m is taken."] if without else []
+
+
+def _notes(
+    manifest: Manifest,
+    folder: OutFolder,
+    known: Mapping[str, Record | None],
+    to_do: Sequence[Row],
+    fingerprints: Mapping[str, dict[str, Any]],
+) -> list[str]:
+    """What the user should know of the plan."""
+    notes = notes_on(manifest.rows)
+    changed = [row for row in to_do if (record := known[row.name]) is not None and record.finished]
+    if changed:
+        what = Counter(
+            key
+            for row in changed
+            for key in {**fingerprints[row.name], **known[row.name].fingerprint}  # type: ignore[union-attr]
+            if fingerprints[row.name].get(key) != known[row.name].fingerprint.get(key)  # type: ignore[union-attr]
+        )
+        told = ", ".join(f"{key} of {count}" for key, count in what.most_common())
+        notes.append(f"{_videos(len(changed))} changed since the last run and done again ({told}).")
+    strange = set(folder.names()) - {row.name for row in manifest.rows}
+    if strange:
+        example = min(strange)
+        notes.append(f"{_videos(len(strange))} no longer in the manifest ({example}, ...): left as they are.")
+    older = {record.memo for record in known.values() if record is not None} - {__version__}
+    if older:
+        notes.append(f"Some videos were tracked by memo {', '.join(sorted(older))}, not {__version__}.")
+    return notes
+
+
+def _videos(count: int) -> str:
+    return "1 video" if count == 1 else f"{count} videos"
+
+
+def check_folder(out: Path, to_do: Sequence[Row]) -> None:
+    """Refuses a folder of other files, and a disk that will not hold the results.
+
+    An overlay is taken to be as large as its video.
+    """
+    check_ours(out)
+    there = next(folder for folder in [out, *out.absolute().parents] if folder.exists())
+    if not os.access(there, os.W_OK):
+        raise BatchError(f"{out}: cannot be written to")
+    needed = _RESERVE_BYTES + sum(
+        _BYTES_A_VIDEO + (row.video.stat().st_size if row.options.get("overlay") else 0)
+        for row in to_do
+        if not row.problems
+    )
+    free = shutil.disk_usage(there).free
+    if free < needed:
+        raise BatchError(f"{out}: {free >> 20} MB are free, about {needed >> 20} MB are needed")
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+# The work.
+
+
+class _Teller:
+    """Counts what came to an end, tells of it, and keeps `status.csv` young."""
+
+    def __init__(
+        self,
+        rows: Sequence[Row],
+        mine: Sequence[Row],
+        folder: OutFolder,
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self._rows, self._mine, self._folder, self._progress = rows, mine, folder, progress
+        self._counts: Counter[str] = Counter()
+        self._next_status_s = 0.0
+        self.told = 0
+        """How many videos came to an end."""
+
+    def expect(self, tasks: Iterable[Task]) -> None:
+        """Counts the videos of earlier runs: all but those that are done now."""
+        names = {task.name for task in tasks}
+        for row in self._mine:
+            record = self._folder.record(row.name)
+            if record is not None and row.name not in names:
+                self._counts[record.state] += 1
+
+    def tell(self, record: Record | None = None) -> None:
+        """Tells how far the run is, and of a video that came to an end."""
+        if record is not None:
+            self.told += 1
+            self._counts[record.state] += 1
+        now_s = time.monotonic()
+        if now_s >= self._next_status_s:
+            _write_tables(self._folder, self._rows, status_only=True)
+            took_s = time.monotonic() - now_s
+            self._next_status_s = now_s + max(5.0, 50 * took_s)
+        if self._progress is not None:
+            counts = {state: self._counts[state] for state in STATES}
+            self._progress(Progress(len(self._mine), counts, self._folder.running(), record))
+
+
+def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: _Teller) -> list[str]:
+    """Has the executor do all tasks; gives sentences about what went wrong beyond single videos."""
+    waiting: dict[Future[Record | None], Task] = {}
+    ended: SimpleQueue[Future[Record | None]] = SimpleQueue()
+    losses: Counter[str] = Counter()
+
+    def submit(task: Task) -> None:
+        future = executor.submit(perform, task)
+        waiting[future] = task
+        future.add_done_callback(ended.put)
+
+    try:
+        broken = _submit_all(tasks, submit)
+        while waiting:
+            try:
+                future = ended.get(timeout=_TELL_S)
+            except Empty:
+                teller.tell()
+                continue
+            task = waiting.pop(future)
+            try:
+                record = future.result()
+            except BatchError as error:
+                raise BatchError(str(error).strip().splitlines()[-1]) from error
+            except BrokenExecutor as error:
+                broken = error
+                record = _own_record(task)
+            except Exception as error:  # of the executor: the worker is lost, and whatever it was doing
+                record = _own_record(task)
+                losses[task.name] += 1
+                if record is None and losses[task.name] < _ATTEMPTS_OF_WORKERS:
+                    submit(task)
+                elif record is None:
+                    record = _record_loss(task, error)
+            if record is not None:
+                if not record.finished and shutil.disk_usage(folder.out).free < _RESERVE_BYTES:
+                    folder.forget(task.name)
+                    raise BatchError(f"{folder.out}: the disk is full; make room and resume")
+                teller.tell(record)
+    except BaseException:
+        folder.stop()
+        for future in waiting:
+            future.cancel()
+        wait(waiting, timeout=30)
+        raise
+    notes = []
+    if broken is not None:
+        notes.append(f"The executor broke: {broken} What is left can be resumed.")
+    if losses:
+        notes.append(f"Workers were lost {losses.total()} times; their videos were given to others.")
+    return notes
+
+
+def _submit_all(tasks: Iterable[Task], submit: Callable[[Task], None]) -> BrokenExecutor | None:
+    for task in tasks:
+        try:
+            submit(task)
+        except BrokenExecutor as error:
+            return error
+    return None
+
+
+def _own_record(task: Task) -> Record | None:
+    """The record that a worker wrote before it was lost, if it got that far."""
+    record = task.folder.record(task.name)
+    return record if record is not None and record.fingerprint == task.fingerprint else None
+
+
+def _record_loss(task: Task, error: Exception) -> Record:
+    """Keeps that a video has cost one worker after the other."""
+    task.folder.forget(task.name)
+    text = " ".join(str(error).split())[:200]
+    message = f"{_ATTEMPTS_OF_WORKERS} workers were lost over it: {type(error).__name__}: {text}"
+    record = Record(task.name, "crashed", message, 0.0, task.attempt, __version__, task.fingerprint)
+    task.folder.write_record(record)
+    return record
+
+
+def _write_tables(folder: OutFolder, rows: Sequence[Row], status_only: bool) -> None:
+    with folder.merging():
+        with folder.replaced(folder.out / "status.csv") as temporary:
+            write_status(folder, rows, temporary)
+        if not status_only:
+            with folder.replaced(folder.out / "gait_parameters.csv") as temporary:
+                write_table(folder, rows, temporary)
+
+
+def described(result: BatchResult) -> Iterator[str]:
+    """What came out, in sentences."""
+    counts = result.counts
+    told = {
+        "done": "tracked",
+        "nobody": "without a walker",
+        "failed": "failed",
+        "crashed": "crashed",
+        "timeout": "took too long",
+    }
+    parts = [f"{counts[state]} {words}" for state, words in told.items() if counts[state]]
+    if result.left:
+        parts.append(f"{len(result.left)} left")
+    total = len(result.records) + len(result.left)
+    yield f"{_videos(total)}: {', '.join(parts) or 'nothing done'}."
+    if result.done_now:
+        each = result.seconds / result.done_now
+        yield f"{result.done_now} in this run, {result.seconds:.0f} s, {each:.2f} s a video."
+    yield from result.notes

@@ -1,0 +1,287 @@
+"""The folder of a run: what lies where, one run at a time, and records that survive a kill at any byte.
+
+```
+OUT/NAME/              results of one video; the folder appears when it is complete
+OUT/status.csv         every video of the manifest and its state
+OUT/gait_parameters.csv
+OUT/logs/NAME.log      what the last attempt complained of
+OUT/.batch/records/    one small file a video: the truth that `status.csv` shows
+OUT/.batch/K-of-N.lock held while shard K of N runs     K-of-N.run  the run that holds it
+OUT/.batch/K-of-N.work unfinished files; emptied before and after each run
+```
+Every file is written among the unfinished ones and renamed. Locks are the system's and go with the process;
+on a network file system they hold where it supports them (NFS does, unless mounted with `nolock`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+import uuid
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+__all__ = ["STATES", "BatchError", "OutFolder", "Record", "check_ours"]
+
+STATES = ("done", "nobody", "failed", "crashed", "timeout")
+"""A walker was tracked; there is none in the video; the input cannot be used; the process died; too long."""
+
+
+class BatchError(ValueError):
+    """A run that cannot start here, and why."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What became of a video."""
+
+    name: str
+    state: str
+    """One of `STATES`."""
+    message: str
+    seconds: float
+    """Wall time of the last attempt."""
+    attempt: int
+    """Which attempt it was, from 1, since the row or the video last changed."""
+    memo: str
+    """Version of memo."""
+    fingerprint: dict[str, Any]
+    """What the result depends on, see `Row.fingerprint`."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether there are results: a walker, or the knowledge that there is none."""
+        return self.state in ("done", "nobody")
+
+
+@dataclass(frozen=True)
+class OutFolder:
+    """The folder of a run as one shard of it sees it; `shard` is (1, 1) where one machine does all."""
+
+    out: Path
+    shard: tuple[int, int] = (1, 1)
+
+    @property
+    def _state(self) -> Path:
+        return self.out / ".batch"
+
+    @property
+    def _shard_name(self) -> str:
+        return f"{self.shard[0]}-of-{self.shard[1]}"
+
+    @property
+    def _run_file(self) -> Path:
+        return self._state / f"{self._shard_name}.run"
+
+    @property
+    def work(self) -> Path:
+        """Where this shard's unfinished files are."""
+        return self._state / f"{self._shard_name}.work"
+
+    def results(self, name: str) -> Path:
+        """The folder of a video's results."""
+        return self.out / name
+
+    def log(self, name: str) -> Path:
+        """What the last attempt at a video complained of."""
+        return self.out / "logs" / f"{name}.log"
+
+    # Records.
+
+    def _record_file(self, name: str) -> Path:
+        return self._state / "records" / f"{name}.json"
+
+    def record(self, name: str) -> Record | None:
+        """What became of a video, if anything did and its results are still there."""
+        try:
+            record = Record(**json.loads(self._record_file(name).read_text(encoding="utf-8")))
+        except (FileNotFoundError, NotADirectoryError, TypeError, json.JSONDecodeError):
+            return None
+        return None if record.finished and not self.results(name).is_dir() else record
+
+    def write_record(self, record: Record) -> None:
+        """Keeps what became of a video."""
+        with self.replaced(self._record_file(record.name)) as temporary:
+            temporary.write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
+
+    def names(self) -> list[str]:
+        """All videos there are records of."""
+        return sorted(file.stem for file in (self._state / "records").glob("*.json"))
+
+    def forget(self, name: str) -> None:
+        """Removes a video's record, then its results: what is left without a record is not believed."""
+        self._record_file(name).unlink(missing_ok=True)
+        _remove(self.results(name))
+
+    def place(self, finished: Path, name: str) -> None:
+        """Gives a finished folder its final name."""
+        for file in [*finished.rglob("*"), finished]:
+            _settle(file)
+        _remove(self.results(name))
+        os.replace(finished, self.results(name))
+        _settle(self.out)
+
+    @contextlib.contextmanager
+    def replaced(self, path: Path) -> Iterator[Path]:
+        """Gives a name among the unfinished files; what is written there takes the name `path`."""
+        temporary = self.work / f"{uuid.uuid4().hex}-{path.name}"
+        try:
+            yield temporary
+            _settle(temporary)
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def unfinished(self, name: str) -> Path:
+        """A new empty folder among the unfinished files."""
+        return Path(tempfile.mkdtemp(prefix=f"{name}-", dir=self.work))
+
+    def running(self) -> int:
+        """How many videos this shard is at, on whatever machine."""
+        with contextlib.suppress(OSError):
+            return sum(entry.is_dir() for entry in os.scandir(self.work))
+        return 0
+
+    # One run at a time.
+
+    @contextlib.contextmanager
+    def taken(self) -> Iterator[str]:
+        """Takes the folder for one run, whose name it gives; raises `BatchError` while another has it."""
+        check_ours(self.out)
+        lock = self._state / f"{self._shard_name}.lock"
+        try:
+            for folder in (self._state / "records", self.out / "logs", self.work):
+                folder.mkdir(parents=True, exist_ok=True)
+            lock.touch()
+        except OSError as error:
+            raise BatchError(f"{self.out}: cannot be written to: {error.strerror}") from None
+        with _locked(lock) as free:
+            if not free:
+                raise BatchError(f"{self.out}: another run is at work here")
+            self._check_other_shards()
+            _empty(self.work)
+            run = uuid.uuid4().hex
+            with self.replaced(self._run_file) as temporary:
+                temporary.write_text(run)
+            try:
+                yield run
+            finally:
+                self.stop()
+                _empty(self.work)
+
+    def _check_other_shards(self) -> None:
+        """Refuses to run beside a run that divided the videos in another way, and clears up after such."""
+        for lock in self._state.glob("*-of-*.lock"):
+            shards = re.fullmatch(r"(\d+)-of-(\d+)", lock.stem)
+            if shards is None or int(shards[2]) == self.shard[1]:
+                continue
+            with _locked(lock) as free:
+                if not free:
+                    raise BatchError(
+                        f"{self.out}: shard {shards[1]}/{shards[2]} is at work here; divide alike"
+                    )
+                _empty(lock.with_suffix(".work"))
+
+    def stop(self) -> None:
+        """Tells every process of this shard's run, on whatever machine, to leave its video."""
+        self._run_file.unlink(missing_ok=True)
+
+    def is_current(self, run: str) -> bool:
+        """Whether a run is the one that has this shard."""
+        try:
+            return self._run_file.read_text() == run
+        except OSError:
+            return False
+
+    @contextlib.contextmanager
+    def merging(self) -> Iterator[None]:
+        """Holds the tables of all shards for as long as one of them reads the records and writes."""
+        path = self._state / "tables.lock"
+        while True:
+            with _locked(path) as free:
+                if free:
+                    yield
+                    return
+            time.sleep(0.1)
+
+
+def check_ours(out: Path) -> None:
+    """Refuses to write into a folder that holds other files than those of an earlier run."""
+    if out.exists() and not out.is_dir():
+        raise BatchError(f"{out}: is a file")
+    if out.is_dir() and not (out / ".batch").is_dir() and any(out.iterdir()):
+        raise BatchError(f"{out}: holds files that are not of `memo batch`; give an empty folder")
+
+
+# Files open for a lock. A forked process would hold the lock beyond the life of the one that took it.
+_LOCKS: set[int] = set()
+
+
+def _drop_inherited_locks() -> None:
+    for descriptor in _LOCKS:
+        os.close(descriptor)
+    _LOCKS.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_drop_inherited_locks)
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[bool]:
+    """Locks a file for as long as this process lives or the block lasts; gives whether that was possible."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    _LOCKS.add(descriptor)
+    try:
+        yield _lock(descriptor)
+    finally:
+        _LOCKS.discard(descriptor)
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
+
+
+def _settle(path: Path) -> None:
+    """Has the system write a file or folder to the disk, so that a rename never outlives its content."""
+    if os.name == "nt" and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _remove(folder: Path) -> None:
+    if folder.is_dir() and not folder.is_symlink():
+        shutil.rmtree(folder)
+
+
+def _empty(work: Path) -> None:
+    """Removes what killed processes left; those that are still dying may write a moment longer."""
+    for _ in range(50):
+        shutil.rmtree(work, ignore_errors=True)
+        if not work.exists():
+            break
+        time.sleep(0.02)
+    work.mkdir(parents=True, exist_ok=True)

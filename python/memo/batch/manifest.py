@@ -1,0 +1,389 @@
+"""The manifest: which videos, and what is known of each, as CSV or TOML; all of it checked before any work.
+
+CSV has a header row and one row a video; TOML has a table `[[video]]` a video and may have `[defaults]` for
+all. Both know the same names: `video`, `name` and the options of `memo track` in `OPTIONS`. Relative paths
+are relative to the manifest; an empty cell is an option not given.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import hashlib
+import math
+import re
+import tomllib
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple
+
+__all__ = ["OPTIONS", "Manifest", "ManifestError", "Row", "read_manifest"]
+
+Value = str | float | bool | Path
+
+
+class Option(NamedTuple):
+    """How a column is given to `memo track`."""
+
+    flag: str
+    kind: type
+
+
+OPTIONS = {
+    "camera": Option("--camera", Path),
+    "camera_name": Option("--camera-name", str),
+    "height_m": Option("--height", float),
+    "fov_deg": Option("--fov-deg", float),
+    "frames": Option("--frames", str),
+    "fps": Option("--fps", float),
+    "overlay": Option("--overlay", bool),
+    "plots": Option("--plots", bool),
+}
+"""Columns that are options of `memo track`."""
+
+_KNOWN = ("video", "name", *OPTIONS)
+_TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+_TAKEN = ("logs", "status.csv", "gait_parameters.csv")  # names in the results' folder that are no video's
+_LONGEST_NAME = 150  # bytes; file systems take 255, and temporary names are a little longer
+
+
+class ManifestError(ValueError):
+    """What is wrong with a manifest: every problem in a line of its own, in `problems` too."""
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(self.problems))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One video of the manifest."""
+
+    name: str
+    """Name of the video's folder of results."""
+    video: Path
+    """Absolute path."""
+    options: Mapping[str, Value]
+    """What was given, by column; paths are absolute."""
+    place: str
+    """Where it stands: `walks.csv, line 3`."""
+    problems: tuple[str, ...] = ()
+    """Why the video cannot be tracked as it stands, each with the place; empty if nothing is wrong."""
+
+    @property
+    def arguments(self) -> list[str]:
+        """The row as arguments of `memo track`."""
+        arguments = [str(self.video)]
+        for name, value in self.options.items():
+            flag = OPTIONS[name].flag
+            if isinstance(value, bool):
+                arguments.append(flag if value else flag.replace("--", "--no-", 1))
+            else:
+                arguments += [flag, str(value)]
+        return arguments
+
+    @property
+    def fingerprint(self) -> dict[str, Any]:
+        """What the result depends on: options, size and time of the video, content of the camera file."""
+        video = [file for file in _files(self.video) if file.is_file()]
+        stats = [file.stat() for file in video]
+        print_: dict[str, Any] = {
+            "video_bytes": sum(stat.st_size for stat in stats),
+            "video_files": len(video),
+            "video_modified_s": max((int(stat.st_mtime) for stat in stats), default=0),
+            **self.options,
+        }
+        camera = self.options.get("camera")
+        if isinstance(camera, Path):
+            print_["camera"] = hashlib.sha256(camera.read_bytes()).hexdigest() if camera.is_file() else None
+        return print_
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The rows, in order, and what concerns none or several of them."""
+
+    rows: list[Row]
+    problems: list[str] = field(default_factory=list)
+    """What must be mended before anything can be run: unknown columns, names given twice."""
+
+
+class _Given(NamedTuple):
+    """A row as it was written."""
+
+    place: str
+    cells: dict[str, Any]
+
+
+def read_manifest(
+    manifest: str | PathLike[str] | Iterable[Mapping[str, Any]], defaults: Mapping[str, Value] | None = None
+) -> Manifest:
+    """Reads and checks a manifest: a CSV or TOML file, or mappings with the same keys (`None`: not given).
+
+    `defaults` are options for rows that do not give them. Videos are looked at from outside only: whether
+    they are there. Raises `ManifestError` for a file that is no manifest at all.
+    """
+    problems: list[str] = []
+    if isinstance(manifest, str | PathLike):
+        path = Path(manifest)
+        base = path.resolve().parent
+        given = _read_toml(path, problems) if path.suffix.lower() == ".toml" else _read_csv(path)
+    else:
+        base = Path.cwd()
+        given = [_Given(f"row {k}", dict(row)) for k, row in enumerate(manifest, 1)]
+        problems += [
+            f"{row.place}: unknown key {_suggested(key)}"
+            for row in given
+            for key in row.cells
+            if key not in _KNOWN
+        ]
+    if not given and not problems:
+        raise ManifestError([f"{manifest}: holds no video"])
+    unnamed = [_row(row, base, defaults or {}) for row in given]
+    rows = [_checked(row) for row in _named(unnamed)]
+    return Manifest(rows, problems + _name_problems(rows))
+
+
+# The two notations.
+
+
+def _read_csv(path: Path) -> list[_Given]:
+    text = _text(path)
+    lines = text.splitlines() or [""]
+    delimiter = max(",;\t", key=lines[0].count)
+    try:
+        table = csv.reader(text.splitlines(keepends=True), delimiter=delimiter, strict=True)
+        header = [name.strip() for name in next(table, [])]
+        problems = [
+            f"{path}, line 1: unknown column {_suggested(name)}" for name in header if name not in _KNOWN
+        ]
+        problems += [f"{path}, line 1: column {name!r} twice" for name, n in Counter(header).items() if n > 1]
+        if "video" not in header:
+            problems.append(f"{path}, line 1: no column 'video'")
+        given = []
+        line = table.line_num + 1
+        for cells in table:
+            here = f"{path}, line {line}"
+            line = table.line_num + 1
+            cells = [cell.strip() for cell in cells]
+            if not any(cells):
+                continue
+            if len(cells) > len(header):
+                problems.append(f"{here}: {len(cells)} cells under {len(header)} columns")
+            pairs = zip(header, cells, strict=False)
+            given.append(_Given(here, {name: cell for name, cell in pairs if cell}))
+    except csv.Error as error:
+        raise ManifestError([f"{path}, line {table.line_num}: {error}"]) from None
+    if problems:
+        raise ManifestError(problems)
+    return given
+
+
+def _read_toml(path: Path, problems: list[str]) -> list[_Given]:
+    text = _text(path)
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ManifestError([f"{path}: {error}"]) from None
+    lines = text.splitlines()
+    for key in tables:
+        if key not in ("video", "defaults"):
+            problems.append(f"{path}{_line_of(lines, key)}: unknown key {key!r}; videos are tables [[video]]")
+    videos, defaults = tables.get("video", []), tables.get("defaults", {})
+    if not (isinstance(videos, list) and all(isinstance(video, dict) for video in videos)):
+        raise ManifestError([f"{path}: each video is a table [[video]]"])
+    if not isinstance(defaults, dict):
+        raise ManifestError([f"{path}: [defaults] is a table"])
+    starts = [k for k, line in enumerate(lines) if re.match(r"\s*\[\[\s*video\s*\]\]", line)]
+    for key in defaults:
+        if key not in OPTIONS:
+            problems.append(f"{path}{_line_of(lines, key)}: unknown key {_suggested(key)} in [defaults]")
+    given = []
+    for k, video in enumerate(videos):
+        start = starts[k] if len(starts) == len(videos) else None
+        place = f"{path}, video {k + 1}" if start is None else f"{path}, line {start + 1}"
+        for key in video:
+            if key not in _KNOWN:
+                line = _line_of(lines, key, start or 0)
+                problems.append(f"{path}{line}: unknown key {_suggested(key)}")
+        given.append(_Given(place, {**defaults, **video}))
+    return given
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ManifestError([f"{path}: not text in UTF-8"]) from None
+    except OSError as error:
+        raise ManifestError([f"{path}: cannot be read: {error.strerror}"]) from None
+
+
+def _line_of(lines: list[str], key: str, start: int = 0) -> str:
+    """`, line 7` where the key is given at or after line `start`, counted from 0."""
+    pattern = re.compile(rf"\s*(\[+\s*)?[\"']?{re.escape(key)}[\"']?\s*[\]=]")
+    return next((f", line {k + 1}" for k in range(start, len(lines)) if pattern.match(lines[k])), "")
+
+
+def _suggested(name: str) -> str:
+    near = difflib.get_close_matches(name, _KNOWN, n=1)
+    return f"{name!r} (is it {near[0]!r}?)" if near else f"{name!r} (known: {', '.join(_KNOWN)})"
+
+
+# A row.
+
+
+def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
+    """The row with its values converted, and without a name if none is given."""
+    cells = {key: value for key, value in given.cells.items() if value is not None and value != ""}
+    problems = []
+    options: dict[str, Value] = dict(defaults)
+    for key, option in OPTIONS.items():
+        if key in cells:
+            try:
+                options[key] = _converted(cells[key], option.kind, base)
+            except ValueError as error:
+                problems.append(f"{given.place}: {key} {error}")
+    video = cells.get("video")
+    if video is None:
+        problems.append(f"{given.place}: no video")
+    elif not isinstance(video, str | PathLike):
+        problems.append(f"{given.place}: video {video!r} is not a path")
+        video = None
+    name = cells.get("name", "")
+    if not isinstance(name, str):
+        problems.append(f"{given.place}: name {name!r} is not text")
+        name = ""
+    # a missing video has the path of the folder's parent, which `_checked` does not look at again
+    path = base / Path(video).expanduser() if video is not None else base
+    return Row(name, path, options, given.place, tuple(problems))
+
+
+def _converted(value: Any, kind: type, base: Path) -> Value:
+    """A cell's text, or a value of TOML, as the option wants it."""
+    if kind is bool:
+        truth = value if isinstance(value, bool) else _TRUTHS.get(str(value).lower())
+        if truth is None:
+            raise ValueError(f"{value!r} is not true or false")
+        return truth
+    if kind is float:
+        try:
+            if isinstance(value, bool):
+                raise ValueError
+            return float(value)
+        except (TypeError, ValueError):
+            hint = ": write a point" if re.fullmatch(r"\d+,\d+", str(value)) else ""
+            raise ValueError(f"{value!r} is not a number{hint}") from None
+    if not isinstance(value, str | PathLike):
+        raise ValueError(f"{value!r} is not text")
+    return base / Path(value).expanduser() if kind is Path else str(value)
+
+
+def _named(rows: list[Row]) -> list[Row]:
+    """Gives nameless rows the video's name, with as many folders before it as set it apart: `s01-walk`."""
+    depth = [1] * len(rows)
+
+    def name(k: int) -> str:
+        row = rows[k]
+        if row.name:
+            return row.name
+        last = row.video.name if row.video.is_dir() else row.video.stem
+        folders = row.video.parts[1:-1]
+        return "-".join([*folders[len(folders) - depth[k] + 1 :], last] if depth[k] > 1 else [last])
+
+    while True:
+        alike = defaultdict(list)
+        for k in range(len(rows)):
+            alike[name(k).casefold()].append(k)
+        deeper = [
+            k
+            for several in alike.values()
+            if len({rows[k].video for k in several}) > 1
+            for k in several
+            if not rows[k].name and depth[k] < len(rows[k].video.parts) - 1
+        ]
+        if not deeper:
+            break
+        for k in deeper:
+            depth[k] += 1
+    return [Row(name(k), row.video, row.options, row.place, row.problems) for k, row in enumerate(rows)]
+
+
+def _name_problems(rows: list[Row]) -> list[str]:
+    """Names that cannot be a folder's, and names that several rows have."""
+    problems = []
+    alike = defaultdict(list)
+    for row in rows:
+        alike[row.name.casefold()].append(row)
+        unfit = re.search(r"[/\\:*?\"<>|\x00-\x1f]", row.name) or row.name.startswith(".")
+        if unfit or row.name.casefold() in _TAKEN or not 0 < len(row.name.encode()) <= _LONGEST_NAME:
+            problems.append(
+                f"{row.place}: {row.name!r} cannot be the name of a folder here; give another name"
+            )
+    for several in alike.values():
+        if len(several) > 1:
+            others = ", ".join(row.place.rpartition(", ")[2] for row in several[1:])
+            problems.append(
+                f"{several[0].place}: the name {several[0].name!r} is that of {others} too; give other names"
+            )
+    return problems
+
+
+def _checked(row: Row) -> Row:
+    """The row with everything that can be known to be wrong before the video is opened."""
+    problems = list(row.problems)
+    if not problems:
+        for check in (_check_video, _check_options):
+            try:
+                check(row)
+            except (ValueError, OSError) as error:
+                text = " ".join(str(error).split())
+                for column, option in OPTIONS.items():
+                    text = re.sub(rf"{option.flag}\b(?!-)", column, text)
+                problems.append(f"{row.place}: {text}")
+    return Row(row.name, row.video, row.options, row.place, tuple(problems))
+
+
+def _check_video(row: Row) -> None:
+    if not row.video.exists():
+        raise ValueError(f"{row.video}: no such video")
+    if row.video.is_dir() and "fps" not in row.options:
+        raise ValueError(f"{row.video}: a folder of images has no time stamps; give fps")
+    if row.video.is_file():
+        if row.video.stat().st_size == 0:
+            raise ValueError(f"{row.video}: the file is empty")
+        with open(row.video, "rb"):
+            pass
+
+
+def _check_options(row: Row) -> None:
+    from memo.cli.track import checked_options, parsed_frames
+
+    options: dict[str, Any] = dict(row.options)
+    fps = options.get("fps")
+    if fps is not None and not (math.isfinite(fps) and fps > 0):
+        raise ValueError(f"fps {fps:g} is not a frame rate")
+    parsed_frames(options.get("frames", ":"))
+    camera, name = options.get("camera"), options.get("camera_name")
+    height = options.get("height_m", 1.75)
+    if camera is None or options.get("fov_deg") is not None:
+        checked_options(height, camera, name, options.get("fov_deg"))
+    else:
+        checked_options(height, None, None, None)
+        _check_camera(camera, name, camera.stat().st_mtime_ns if camera.is_file() else 0)
+
+
+@cache
+def _check_camera(camera: Path, name: str | None, modified_ns: int) -> None:
+    """Reads a camera once for all the rows that share it."""
+    from memo.cli.given import load_camera
+
+    load_camera(camera, name)
+
+
+def _files(video: Path) -> list[Path]:
+    return sorted(video.iterdir()) if video.is_dir() else [video]

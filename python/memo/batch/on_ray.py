@@ -1,0 +1,49 @@
+"""Ray as an executor: `memo.batch.run(manifest, out, executor=RayExecutor())`.
+
+Each video is a task of one processor. A worker that is lost loses its video alone, which goes to another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Any
+
+__all__ = ["RayExecutor"]
+
+
+class RayExecutor(Executor):
+    """Submits to a Ray cluster: the one at `address`, the one already connected to, or a new local one."""
+
+    def __init__(self, address: str | None = None, *, processors_per_video: float = 1) -> None:
+        try:
+            import ray
+        except ImportError:
+            raise ModuleNotFoundError('Ray is not installed: pip install "memo-motion[ray]"') from None
+        self._ray = ray
+        self._processors = processors_per_video
+        self._connected_here = not ray.is_initialized()
+        if self._connected_here:
+            ray.init(address=address, log_to_driver=False, configure_logging=False)
+        self._references: dict[Future[Any], Any] = {}
+
+    def submit(self, work: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """Starts a task; its future ends with `WorkerCrashedError` if the worker is lost."""
+        remote = self._ray.remote(num_cpus=self._processors, max_retries=0)(work)
+        reference = remote.remote(*arguments, **named)
+        future: Future[Any] = reference.future()
+        self._references[future] = reference  # Ray forgets tasks that nobody refers to
+        future.add_done_callback(lambda ended: self._references.pop(ended, None))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Ends the tasks that have not begun if so wished, and the connection if it was made here."""
+        if cancel_futures:
+            for reference in list(self._references.values()):
+                self._ray.cancel(reference)
+        if wait:
+            from concurrent.futures import wait as wait_for
+
+            wait_for(list(self._references))
+        if self._connected_here:
+            self._ray.shutdown()

@@ -1,0 +1,262 @@
+"""`memo batch`: the videos of a manifest, each in a process of its own.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import contextlib
+import json
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from memo.batch import BatchResult, ManifestError, Progress, RayExecutor, Record, run
+from memo.batch.engine import check_folder, described, notes_on, prepared
+from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, terminal
+
+if TYPE_CHECKING:
+    import typer
+
+EXIT_CODES = """Exit codes: 0 every video was tracked or has nobody in it; 1 the manifest or the folder cannot
+be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are left, see status.csv;
+130 interrupted."""
+
+_FEW = 5  # videos that are named where there are many
+
+
+class Backend(StrEnum):
+    """Who runs the processes."""
+
+    LOCAL = "local"
+    RAY = "ray"
+
+
+def add_batch(app: "typer.Typer") -> None:
+    import typer
+
+    @app.command(epilog=EXIT_CODES)
+    def batch(
+        manifest: Annotated[
+            Path,
+            typer.Argument(
+                help="CSV or TOML, a row a video: video, name, camera, camera_name, height_m, fov_deg, "
+                "frames, fps, overlay, plots."
+            ),
+        ],
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/MANIFEST.")] = None,
+        jobs: Annotated[
+            int | None, typer.Option(help="Videos at a time; as many as processors.", min=1)
+        ] = None,
+        resume: Annotated[
+            bool, typer.Option("--resume", help="Go on where a run ended or was killed.")
+        ] = False,
+        retry_failed: Annotated[
+            bool, typer.Option("--retry-failed", help="Go on, and try again what failed.")
+        ] = False,
+        check: Annotated[
+            bool, typer.Option("--check", help="Only say what is wrong in the manifest.")
+        ] = False,
+        skip_bad: Annotated[
+            bool, typer.Option("--skip-bad", help="Record bad rows as failed instead of refusing to start.")
+        ] = False,
+        shard: Annotated[
+            str, typer.Option(help="Part I of N, for several machines on one folder.", metavar="I/N")
+        ] = "1/1",
+        timeout: Annotated[float | None, typer.Option(help="Longest time for a video, seconds.")] = None,
+        max_memory: Annotated[int | None, typer.Option(help="Most memory for a video, MB (Linux).")] = None,
+        overlay: Annotated[bool, typer.Option(help="Write overlay.mp4; a row may say otherwise.")] = False,
+        plots: Annotated[bool, typer.Option(help="Write plots; a row may say otherwise.")] = False,
+        backend: Annotated[Backend, typer.Option(help="Who runs the processes.")] = Backend.LOCAL,
+        ray_address: Annotated[
+            str | None, typer.Option(help="Of the Ray cluster; without, the one at hand or a local one.")
+        ] = None,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
+    ) -> None:
+        """Tracks the videos of MANIFEST. Any may fail or crash, and the run be killed: none is lost."""
+        delivery = Delivery(out or Path("memo-out") / manifest.stem, overlay, plots, as_json, quiet)
+
+        def work() -> Exit:
+            try:
+                return checked_work()
+            except ManifestError as error:
+                for problem in error.problems:
+                    complain(problem)
+                return Exit.BAD_INPUT
+
+        def checked_work() -> Exit:
+            if check:
+                return _check(manifest, delivery)
+            if ray_address is not None and backend is not Backend.RAY:
+                raise InputError("--ray-address needs --backend ray")
+            if jobs is not None and backend is Backend.RAY:
+                raise InputError("--jobs is for --backend local; Ray starts as many as it has processors")
+            options = {
+                "jobs": jobs,
+                "shard": _parsed_shard(shard),
+                "resume": resume,
+                "retry_failed": retry_failed,
+                "skip_bad": skip_bad,
+                "timeout_s": timeout,
+                "memory_mb": max_memory,
+            }
+            return _batch(manifest, delivery, options, backend, ray_address)
+
+        raise typer.Exit(guarded(work))
+
+
+def _parsed_shard(text: str) -> tuple[int, int]:
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+        raise InputError(f"--shard {text} is not I/N with 1 <= I <= N")
+    return int(part), int(parts)
+
+
+def _check(manifest: Path, delivery: Delivery) -> Exit:
+    """Says what is wrong with the manifest, and where results would go."""
+    read = prepared(manifest, overlay=delivery.overlay, plots=delivery.plots)
+    check_folder(delivery.out, read.rows)
+    if delivery.as_json:
+        print(json.dumps({"videos": len(read.rows), "names": [row.name for row in read.rows]}))
+    elif delivery.talks:
+        names = [row.name for row in read.rows]
+        more = ", ..." if len(names) > _FEW else ""
+        print(f"{len(names)} videos can be run; their folders: {', '.join(names[:_FEW])}{more}")
+        for note in notes_on(read.rows):
+            print(note)
+    return Exit.DONE
+
+
+def _batch(
+    manifest: Path, delivery: Delivery, options: dict[str, Any], backend: Backend, ray_address: str | None
+) -> Exit:
+    try:
+        with (
+            _termination_as_interrupt(),
+            _executor(backend, ray_address) as executor,
+            _shown(delivery) as show,
+        ):
+            result = run(
+                manifest,
+                delivery.out,
+                executor=executor,
+                overlay=delivery.overlay,
+                plots=delivery.plots,
+                progress=show,
+                **options,
+            )
+    except KeyboardInterrupt:
+        again = [argument for argument in sys.argv[1:] if argument not in ("--resume", "--retry-failed")]
+        complain("interrupted: what was finished is kept, the rest is done by")
+        complain(f"  memo {shlex.join([*again, '--resume'])}")
+        return Exit.INTERRUPTED
+    _tell(result, delivery)
+    return Exit.SOME_FAILED if result.unfinished else Exit.DONE
+
+
+def _executor(
+    backend: Backend, ray_address: str | None
+) -> contextlib.AbstractContextManager[Executor | None]:
+    return RayExecutor(ray_address) if backend is Backend.RAY else contextlib.nullcontext()
+
+
+@contextlib.contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """Schedulers of clusters announce the end with SIGTERM: it is treated as Ctrl-C."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _tell(result: BatchResult, delivery: Delivery) -> None:
+    summary = {
+        "videos": len(result.records) + len(result.left),
+        **result.counts,
+        "left": len(result.left),
+        "seconds": round(result.seconds, 3),
+        "out": str(delivery.out),
+        "notes": result.notes,
+    }
+    delivery.tell(summary, [*described(result), *_failures(result)], result.files)
+
+
+def _failures(result: BatchResult) -> Iterator[str]:
+    """The first videos without results, and how to try again."""
+    failed = [record for record in result.records if not record.finished]
+    for record in failed[:_FEW]:
+        yield f"  {_line(record)}"
+    if len(failed) > _FEW:
+        yield f"  and {len(failed) - _FEW} more: see status.csv and logs/"
+    if failed:
+        yield "--retry-failed tries them again."
+
+
+def _line(record: Record) -> str:
+    return f"{record.name}: {record.state}, {record.seconds:.1f} s. {record.message}"
+
+
+# While it runs.
+
+
+@contextlib.contextmanager
+def _shown(delivery: Delivery) -> Iterator[Callable[[Progress], None] | None]:
+    """Shows how far the run is: a bar on a terminal, else a line a video."""
+    console = terminal(delivery)
+    if delivery.quiet:
+        yield None
+    elif console is None:
+        yield _Lines().show
+    else:
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+        from rich.progress import Progress as Bar
+
+        columns = (
+            *(BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}", markup=False)),
+            *(TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn()),
+        )
+        with Bar(*columns, console=console, transient=True, speed_estimate_period=3600) as bar:
+            task = bar.add_task("", total=None)
+
+            def show(now: Progress) -> None:
+                if bar.tasks[task].total is None:  # what earlier runs did says nothing of the speed
+                    bar.reset(task, total=now.total, completed=now.ended)
+                bar.update(task, completed=now.ended, description=_counted(now))
+                if now.record is not None and not now.record.finished:
+                    console.print(_line(now.record), markup=False, highlight=False)
+
+            yield show
+
+
+def _counted(now: Progress) -> str:
+    counts = [f"{count} {state}" for state, count in now.counts.items() if count]
+    return ", ".join([*counts, f"{now.running} running"])
+
+
+class _Lines:
+    """A line for each video that comes to an end, for logs."""
+
+    def __init__(self) -> None:
+        self._start_s: float | None = None
+
+    def show(self, now: Progress) -> None:
+        if self._start_s is None:
+            self._start_s, self._before = time.monotonic(), now.ended
+        if now.record is None:
+            return
+        each_s = (time.monotonic() - self._start_s) / max(1, now.ended - self._before)
+        left_s = (now.total - now.ended) * each_s
+        left = f"{left_s / 60:.0f} min left" if left_s > 90 else f"{left_s:.0f} s left"
+        print(f"[{now.ended}/{now.total}, {left}] {_line(now.record)}", file=sys.stderr, flush=True)

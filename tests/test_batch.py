@@ -1,0 +1,711 @@
+"""Many videos: what a manifest may hold, and that no kill, crash or second run loses or changes a result.
+
+Most runs have a stand-in for `memo` as child, which does what its "video", a text file, tells it to.
+`MEMO_FULL=1` repeats the kills many times.
+"""
+
+import csv
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from pathlib import Path
+
+import pytest
+from memo import batch
+from memo.batch.engine import Progress
+from memo.batch.folder import OutFolder
+
+FULL = bool(os.environ.get("MEMO_FULL"))
+KILLS = 60 if FULL else 4
+
+CHILD = """
+import os, signal, sys, threading, time
+def leash():
+    os.read(0, 1)
+    os._exit(1)
+threading.Thread(target=leash, daemon=True).start()
+_, track, video, *options = sys.argv
+out = options[options.index("--out") + 1]
+height = options[options.index("--height") + 1] if "--height" in options else "1.75"
+todo = open(video).read().split()
+if todo[0] == "fails":
+    sys.exit("memo: " + video + ": not a video")
+if todo[0] in ("SIGSEGV", "SIGKILL", "SIGABRT"):
+    os.kill(os.getpid(), getattr(signal, todo[0]))
+if todo[0] == "defect":
+    sys.exit(70)
+if todo[0] == "kills-its-worker" and not (len(todo) > 1 and os.path.exists(todo[1])):
+    if len(todo) > 1:
+        open(todo[1], "w").close()
+    os.kill(os.getppid(), signal.SIGKILL)
+if todo[0] == "grows":
+    hoard = []
+    while True:
+        hoard.append(b"x" * 1000000)
+        time.sleep(0.002)
+os.makedirs(out)
+for name in ("track.csv", "gait_parameters.csv"):
+    with open(os.path.join(out, name), "w") as file:
+        file.write("walk,parameter,side,value,unit,ci_low,ci_high,n\\n")
+        file.flush()
+        if todo[0] == "sleeps":
+            time.sleep(float(todo[1]))
+        if todo[0] != "nobody":
+            file.write("0,stride_time,right," + height + ",s,1.0,1.2,3\\n")
+            file.write("0,cadence,," + height + ",1/min,,,6\\n")
+with open(os.path.join(out, "run.json"), "w") as file:
+    file.write('{"summary": {"status": "tracked", "direction": "left to right", "p_swapped": 0.01}}')
+print('{"message": "said of ' + os.path.basename(video) + '"}')
+if todo[0] == "no-table":
+    os.remove(os.path.join(out, "track.csv"))
+sys.exit(3 if todo[0] == "nobody" else 0)
+"""
+
+DRIVER = """
+import sys
+from memo import batch
+manifest, out, child = sys.argv[1:4]
+command = [sys.executable, "-S", "-E", child]
+batch.run(manifest, out, jobs=3, resume=True, retry_failed="--retry" in sys.argv, command=command)
+"""
+
+
+@pytest.fixture
+def lab(tmp_path):
+    return Lab(tmp_path)
+
+
+class Lab:
+    """A folder with videos that tell the stand-in what to do, a manifest and results."""
+
+    def __init__(self, folder):
+        self.folder, self.out, self.manifest = folder, folder / "out", folder / "walks.csv"
+        self.child = folder / "child.py"
+        self.child.write_text(CHILD)
+        self.command = [sys.executable, "-S", "-E", str(self.child)]
+
+    def videos(self, *todo, heights=None):
+        """One video for each thing to do, and the manifest of all."""
+        lines = ["video,height_m"]
+        for k, text in enumerate(todo):
+            path = self.folder / f"v{k:02}.mp4"
+            if not (path.exists() and path.read_text() == text):
+                path.write_text(text)
+            lines.append(f"{path.name},{heights[k] if heights else 1.7}")
+        self.manifest.write_text("\n".join(lines) + "\n")
+
+    def run(self, out=None, **options):
+        return batch.run(self.manifest, out or self.out, **{"jobs": 3, "command": self.command, **options})
+
+    def start(self, *arguments):
+        """A run in a process of its own, the head of a process group."""
+        driver = self.folder / "driver.py"
+        driver.write_text(DRIVER)
+        return subprocess.Popen(
+            [sys.executable, str(driver), str(self.manifest), str(self.out), str(self.child), *arguments],
+            start_new_session=True,
+            stderr=subprocess.PIPE,
+        )
+
+    def results(self, out=None):
+        """Every file a user finds, by name; what is said of time and attempts is left out."""
+        out = out or self.out
+        found = {}
+        for file in sorted(out.rglob("*")):
+            name = str(file.relative_to(out))
+            if file.is_file() and not name.startswith((".batch", "logs")):
+                found[name] = file.read_bytes()
+        found["status.csv"] = [(row["name"], row["state"], row["message"]) for row in self.status(out)]
+        return found
+
+    def status(self, out=None):
+        return table(out or self.out, "status.csv")
+
+    def states(self):
+        return {row["name"]: row["state"] for row in self.status()}
+
+    def strays(self):
+        """Unfinished files, and anything in the folder of results that is nobody's."""
+        known = {"status.csv", "gait_parameters.csv", "logs", ".batch"} | {
+            row["name"] for row in self.status()
+        }
+        work = [path for path in (self.out / ".batch").glob("*.work/*")]
+        return work + [path for path in self.out.iterdir() if path.name not in known]
+
+    def processes(self):
+        """Command lines of living processes that have to do with this folder."""
+        found = []
+        for process in Path("/proc").glob("[0-9]*"):
+            try:
+                line = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+            except OSError:
+                continue
+            if str(self.folder) in line and int(process.name) != os.getpid():
+                found.append((int(process.name), line))
+        return found
+
+
+def table(out, name):
+    with open(out / name, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def problems_of(manifest):
+    with pytest.raises(batch.ManifestError) as refused:
+        batch.run(manifest, "/nonexistent/out")
+    return refused.value.problems
+
+
+# Manifests.
+
+
+def test_csv_and_toml_say_the_same(tmp_path):
+    for name in ("a.mp4", "b.mp4", "side.toml"):
+        (tmp_path / name).write_text("x")
+    (tmp_path / "side.toml").write_text(CAMERA)
+    (tmp_path / "m.csv").write_text(
+        "video;camera;height_m;frames;overlay\na.mp4;side.toml;1.7;3:9;yes\n\nb.mp4;;1.6;;\n",
+        encoding="utf-8-sig",
+    )
+    (tmp_path / "m.toml").write_text(
+        "[defaults]\nheight_m = 1.6\n[[video]]\nvideo = 'a.mp4'\ncamera = 'side.toml'\nheight_m = 1.7\n"
+        "frames = '3:9'\noverlay = true\n[[video]]\nvideo = 'b.mp4'\n"
+    )
+    of_csv, of_toml = (batch.read_manifest(tmp_path / name).rows for name in ("m.csv", "m.toml"))
+    of_dicts = batch.read_manifest(
+        [
+            {"video": tmp_path / "a.mp4", "camera": tmp_path / "side.toml", "height_m": 1.7}
+            | {"frames": "3:9", "overlay": True},
+            {"video": str(tmp_path / "b.mp4"), "height_m": 1.6, "fps": None},
+        ]
+    ).rows
+    assert [row.problems for row in of_csv] == [(), ()]
+    for rows in (of_toml, of_dicts):
+        assert [(row.name, row.arguments) for row in rows] == [(row.name, row.arguments) for row in of_csv]
+    assert of_csv[0].arguments == [
+        *(str(tmp_path / "a.mp4"), "--camera", str(tmp_path / "side.toml"), "--height", "1.7"),
+        *("--frames", "3:9", "--overlay"),
+    ]
+    assert of_csv[1].place == f"{tmp_path / 'm.csv'}, line 4"
+    assert of_toml[1].place == f"{tmp_path / 'm.toml'}, line 9"
+
+
+def test_every_option_of_track_is_a_column():
+    import typer
+    from memo import cli
+
+    track = typer.main.get_command(cli._app()).commands["track"]
+    flags = {option.opts[0] for option in track.params if option.opts[0].startswith("--")}
+    assert {option.flag for option in batch.OPTIONS.values()} == flags - {
+        "--out",
+        "--json",
+        "--quiet",
+        "--help",
+    }
+
+
+def test_all_problems_are_told_together_with_their_lines(tmp_path):
+    (tmp_path / "a.mp4").write_text("x")
+    (tmp_path / "empty.mp4").touch()
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "bad.toml").write_text("[side]\nsize = 3\n")
+    manifest = tmp_path / "m.csv"
+    rows = [
+        ("nobody-has-it.mp4,,,,", "nobody-has-it.mp4: no such video"),
+        ("a.mp4,168,,,", "height_m 168 looks like centimetres: give height_m 1.68"),
+        ('a.mp4,"1,68",,,', "height_m '1,68' is not a number: write a point"),
+        ("a.mp4,1.7,bad.toml,,", "bad.toml: "),
+        ("a.mp4,1.7,none.toml,,", "none.toml: no such camera file"),
+        ("a.mp4,1.7,,9:3,", "frames 9:3 is not A:B"),
+        ("a.mp4,1.7,,,0", "fps 0 is not a frame rate"),
+        ("empty.mp4,1.7,,,", "the file is empty"),
+        ("frames,1.7,,,", "give fps"),
+        (",1.7,,,", "no video"),
+    ]
+    lines = [f"v{k},{row}" for k, (row, _) in enumerate(rows)]
+    manifest.write_text("\n".join(["name,video,height_m,camera,frames,fps", *lines]) + "\n")
+    problems = problems_of(manifest)
+    assert len(problems) == len(rows)
+    for k, (problem, (_, expected)) in enumerate(zip(problems, rows, strict=True)):
+        assert problem.startswith(f"{manifest}, line {k + 2}: ") and expected in problem, problem
+
+
+@pytest.mark.parametrize(
+    "text, expected",
+    [
+        ("video,heigth_m\na,1.7\n", ["line 1: unknown column 'heigth_m' (is it 'height_m'?)"]),
+        (
+            "vidoe,subject\na,1\n",
+            ["'vidoe' (is it 'video'?)", "'subject' (known: video,", "no column 'video'"],
+        ),
+        ("video,video\na,b\n", ["column 'video' twice"]),
+        ("video\na,b\n", ["line 2: 2 cells under 1 columns"]),
+        ('video\n"a\n', ["line 2: "]),
+        ("", ["no column 'video'"]),
+        ("video\n", ["holds no video"]),
+    ],
+)
+def test_what_is_no_csv_manifest(tmp_path, text, expected):
+    (tmp_path / "m.csv").write_text(text)
+    problems = problems_of(tmp_path / "m.csv")
+    assert len(problems) == len(expected)
+    assert all(part in problem for part, problem in zip(expected, problems, strict=True)), problems
+
+
+@pytest.mark.parametrize(
+    "text, expected",
+    [
+        ("[[video]\n", "m.toml: "),
+        (
+            "[[video]]\nvideo = 'a'\n\nheigth_m = 2\n",
+            "m.toml, line 4: unknown key 'heigth_m' (is it 'height_m'?)",
+        ),
+        ("[all]\n[[video]]\nvideo = 'a'\n", "m.toml, line 1: unknown key 'all'"),
+        ("[defaults]\nname = 'x'\n[[video]]\nvideo = 'a'\n", "m.toml, line 2: unknown key 'name'"),
+        ("[video]\nvideo = 'a'\n", "m.toml: each video is a table"),
+        ("[[video]]\nvideo = 3\n", "m.toml, line 1: video 3 is not a path"),
+        ("[[video]]\nvideo = 'm.toml'\nheight_m = true\n", "m.toml, line 1: height_m True is not a number"),
+    ],
+)
+def test_what_is_no_toml_manifest(tmp_path, text, expected):
+    (tmp_path / "m.toml").write_text(text)
+    assert any(expected in problem for problem in problems_of(tmp_path / "m.toml"))
+
+
+def test_files_that_are_no_manifest(tmp_path):
+    (tmp_path / "latin.csv").write_bytes("video\nG\xe4nge.mp4\n".encode("latin-1"))
+    assert "not text in UTF-8" in problems_of(tmp_path / "latin.csv")[0]
+    assert "No such file" in problems_of(tmp_path / "none.csv")[0]
+    assert "unknown key 'vdeo'" in problems_of([{"vdeo": "a"}])[0]
+
+
+def test_names_follow_from_paths_and_differ(tmp_path):
+    for path in ("s1/walk.mp4", "s2/walk.mp4", "s2/run.mp4", "s2/fast/walk.mp4"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_text("x")
+    (tmp_path / "m.csv").write_text("video\ns1/walk.mp4\ns2/walk.mp4\ns2/run.mp4\ns2/fast/walk.mp4\n")
+    rows = batch.read_manifest(tmp_path / "m.csv").rows
+    assert [row.name for row in rows] == ["s1-walk", "s2-walk", "run", "fast-walk"]
+    (tmp_path / "m.csv").write_text("video,name\ns2/run.mp4,\ns1/walk.mp4,RUN\n")
+    assert [row.name for row in batch.read_manifest(tmp_path / "m.csv").rows] == ["s2-run", "RUN"]
+    (tmp_path / "m.csv").write_text("video,frames\ns2/run.mp4,:9\ns1/walk.mp4,\ns2/run.mp4,9:\n")
+    assert "line 2: the name 'run' is that of line 4 too" in problems_of(tmp_path / "m.csv")[0]
+    for name in ("..", "a/b", ".x", "logs", "status.csv", "x" * 200, "a\x07"):
+        assert (
+            "cannot be the name of a folder" in problems_of([{"video": tmp_path / "s2/run.mp4", "name": name}])[0]
+        )
+
+
+CAMERA = """
+[side]
+name = "side"
+size = [64.0, 48.0]
+matrix = [[60.0, 0.0, 32.0], [0.0, 60.0, 24.0], [0.0, 0.0, 1.0]]
+distortions = [0.0, 0.0, 0.0, 0.0]
+rotation = [1.5, 0.0, 0.0]
+translation = [0.0, 1.0, 5.0]
+"""
+
+
+# What becomes of a video.
+
+
+def test_each_end_is_known_for_what_it_is(lab):
+    lab.videos("ok", "nobody", "fails", "SIGSEGV", "SIGKILL", "defect", "sleeps 60", "no-table", "ok")
+    told = []
+    result = lab.run(timeout_s=1.0, progress=told.append)
+    assert list(lab.states().values()) == [
+        *("done", "nobody", "failed", "crashed", "crashed", "crashed", "timeout", "crashed", "done")
+    ]
+    messages = [record.message for record in result.records]
+    assert messages[0] == "said of v00.mp4" and messages[2].endswith("v02.mp4: not a video")
+    assert messages[3] == "killed by SIGSEGV" and messages[4] == "killed by SIGKILL"
+    assert messages[6] == "ended after 1 s" and "without track.csv" in messages[7]
+    assert (lab.out / "logs" / "v02.log").read_text().endswith("not a video\n")
+    assert sorted(path.name for path in lab.out.iterdir() if path.is_dir()) == [
+        *(".batch", "logs", "v00", "v01", "v08")
+    ]
+    assert result.counts == {"done": 2, "nobody": 1, "failed": 1, "crashed": 4, "timeout": 1}
+    assert result.unfinished == 6 and not lab.strays() and not lab.processes()
+    ended = [now for now in told if now.record is not None]
+    assert len(ended) == 9 and ended[-1].ended == 9 and isinstance(ended[0], Progress)
+
+
+def test_one_table_of_all_walks(lab):
+    lab.videos("ok", "nobody", "fails", heights=[1.6, 1.7, 1.8])
+    lab.run()
+    first, second, third = table(lab.out, "gait_parameters.csv")
+    assert first["name"] == "v00" and first["walk"] == "0" and first["direction"] == "left to right"
+    assert first["stride_time_right_s"] == "1.6" and first["stride_time_right_s_ci_high"] == "1.2"
+    assert first["stride_time_right_s_n"] == "3" and first["cadence_per_min"] == "1.6"
+    assert (second["state"], second["walk"], second["cadence_per_min"]) == ("nobody", "", "")
+    assert (third["state"], third["walk"]) == ("failed", "")
+
+
+def test_a_second_run_goes_on_only_when_told(lab):
+    lab.videos("ok", "fails", "ok")
+    lab.run()
+    before = lab.results()
+    with pytest.raises(batch.BatchError, match="3 of the 3 videos have been run here"):
+        lab.run()
+    assert lab.run(resume=True).done_now == 0
+    assert lab.results() == before
+    assert lab.run(retry_failed=True).done_now == 1
+    assert [row["attempt"] for row in lab.status()] == ["1", "2", "1"]
+    lab.videos("ok", "ok", "ok")
+    result = lab.run(resume=True)  # the video has changed
+    assert result.done_now == 1 and [row["attempt"] for row in lab.status()] == ["1", "1", "1"]
+
+
+def test_a_changed_row_is_done_again_and_told(lab):
+    lab.videos("ok", "ok", heights=[1.6, 1.7])
+    lab.run()
+    lab.videos("ok", "ok", heights=[1.6, 1.8])
+    result = lab.run(resume=True)
+    assert result.done_now == 1
+    assert "1 video changed since the last run and done again (height_m of 1)." in result.notes
+    assert [row["cadence_per_min"] for row in table(lab.out, "gait_parameters.csv")] == ["1.6", "1.8"]
+    assert lab.run(resume=True, overlay=True).done_now == 2
+    lab.videos("ok")
+    result = lab.run(resume=True, overlay=True)
+    assert any("no longer in the manifest (v01" in note for note in result.notes)
+    assert (lab.out / "v01").is_dir() and len(lab.status()) == 1
+
+
+def test_a_row_that_now_fails_leaves_no_old_results(lab):
+    lab.videos("ok", "ok")
+    lab.run()
+    lab.videos("ok", "fails")
+    lab.run(resume=True)
+    assert lab.states() == {"v00": "done", "v01": "failed"} and not (lab.out / "v01").exists()
+
+
+def test_results_that_were_removed_are_made_again(lab):
+    lab.videos("ok", "ok")
+    lab.run()
+    shutil.rmtree(lab.out / "v01")
+    assert lab.run(resume=True).done_now == 1 and (lab.out / "v01" / "track.csv").is_file()
+
+
+def test_bad_rows_can_be_skipped(lab):
+    lab.videos("ok", "ok")
+    (lab.folder / "v01.mp4").unlink()
+    with pytest.raises(batch.ManifestError):
+        lab.run()
+    assert not lab.out.exists()
+    result = lab.run(skip_bad=True)
+    assert lab.states() == {"v00": "done", "v01": "failed"}
+    assert "line 3" in result.records[1].message and "no such video" in result.records[1].message
+    (lab.folder / "v01.mp4").write_text("ok")
+    lab.run(resume=True)
+    assert lab.states() == {"v00": "done", "v01": "done"}
+
+
+def test_where_it_does_not_start(lab, monkeypatch):
+    lab.videos("ok")
+    (lab.folder / "other").mkdir()
+    (lab.folder / "other" / "thesis.tex").write_text("years of work")
+    with pytest.raises(batch.BatchError, match="holds files that are not"):
+        lab.run(lab.folder / "other", resume=True)
+    with pytest.raises(batch.BatchError, match="is a file"):
+        lab.run(lab.manifest)
+    for wrong in ({"jobs": 0}, {"shard": (3, 2)}, {"shard": (0, 2)}, {"timeout_s": 0.0}, {"memory_mb": 0}):
+        with pytest.raises(batch.BatchError):
+            lab.run(**wrong)
+    usage = shutil.disk_usage("/")
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1 << 20))
+    with pytest.raises(batch.BatchError, match="1 MB are free, about 51 MB are needed"):
+        lab.run()
+    assert not lab.out.exists()
+
+
+def test_a_disk_that_fills_up_stops_the_run_and_not_the_videos(lab, monkeypatch):
+    lab.videos("ok", "fails", "ok", "ok")
+    usage, full = shutil.disk_usage("/"), lab.out / "v00"
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1 if full.exists() else 1 << 40))
+    with pytest.raises(batch.BatchError, match="the disk is full"):
+        lab.run(jobs=1)
+    monkeypatch.undo()
+    lab.run(resume=True)
+    assert list(lab.states().values()) == ["done", "failed", "done", "done"]
+
+
+# Kills.
+
+
+def test_killed_at_any_moment_it_resumes_to_the_same_results(lab):
+    lab.videos(*["sleeps 0.05", "ok", "nobody", "fails", "SIGSEGV"] * 3)
+    lab.run(lab.folder / "undisturbed")
+    expected = lab.results(lab.folder / "undisturbed")
+    chance = random.Random(1)
+    kills = while_running = 0
+    while kills < KILLS:
+        shutil.rmtree(lab.out, ignore_errors=True)
+        for _ in range(100):
+            run = lab.start()
+            try:
+                _, complaints = run.communicate(timeout=chance.uniform(0.05, 1.3))
+                assert run.returncode == 0, complaints.decode()
+                break
+            except subprocess.TimeoutExpired:
+                kills += 1
+                while_running += bool(list((lab.out / ".batch").glob("1-of-1.work/*")))
+                os.kill(run.pid, signal.SIGKILL) if chance.random() < 0.5 else os.killpg(
+                    run.pid, signal.SIGKILL
+                )
+                run.communicate()
+        else:
+            pytest.fail("a run does not end")
+        assert lab.results() == expected
+        assert not lab.strays()
+        wait_for(lambda: not lab.processes())
+    assert while_running > kills / 10  # the moments were not all before the work or after it
+    print(f"{kills} kills, {while_running} of them with unfinished files")
+
+
+def wait_for(condition, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def test_children_end_with_a_killed_run_and_the_lock_with_it(lab):
+    lab.videos("sleeps 60", "sleeps 60", "ok")
+    run = lab.start()
+    wait_for(
+        lambda: len([line for _, line in lab.processes() if "--out" in line]) == 2 and lab_done(lab, "v02")
+    )
+    with pytest.raises(batch.BatchError, match="another run is at work here"):
+        lab.run(resume=True)
+    run.kill()
+    run.communicate()
+    wait_for(lambda: not lab.processes())
+    lab.videos("ok", "ok", "ok")
+    assert lab.run(resume=True).done_now == 2 and set(lab.states().values()) == {"done"}
+
+
+def lab_done(lab, name):
+    return OutFolder(lab.out).record(name) is not None
+
+
+def test_a_child_killed_from_outside_costs_its_video_alone(lab):
+    lab.videos("sleeps 60", "ok", "ok", "ok")
+    done = []
+    thread = threading.Thread(target=lambda: done.append(lab.run()))
+    thread.start()
+    wait_for(lambda: any("v00.mp4" in line for _, line in lab.processes()))
+    for pid, line in lab.processes():
+        if "v00.mp4" in line:
+            os.kill(pid, signal.SIGKILL)
+    thread.join(20)
+    assert lab.states() == {"v00": "crashed", "v01": "done", "v02": "done", "v03": "done"}
+    assert done[0].records[0].message == "killed by SIGKILL"
+
+
+def test_interrupted_it_ends_its_children_and_keeps_what_is_done(lab):
+    lab.videos("ok", "sleeps 60", "sleeps 60", "sleeps 60", "ok")
+    run = lab.start()
+    wait_for(lambda: lab_done(lab, "v00") and sum("--out" in line for _, line in lab.processes()) == 3)
+    run.send_signal(signal.SIGINT)
+    _, complaints = run.communicate(timeout=20)
+    assert b"KeyboardInterrupt" in complaints
+    assert not lab.processes() and not lab.strays()
+    assert list(lab.states().values()) == ["done", "waiting", "waiting", "waiting", "waiting"]
+
+
+# Several machines.
+
+
+def test_shards_do_every_video_once_and_their_tables_are_one(lab):
+    lab.videos(*["ok", "nobody", "fails", "ok"] * 3, heights=[1.5 + 0.02 * k for k in range(12)])
+    lab.run(lab.folder / "whole")
+    results = {}
+
+    def work(part):
+        results[part] = lab.run(shard=(part, 3), jobs=2)
+
+    threads = [threading.Thread(target=work, args=(part,)) for part in (1, 2, 3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert lab.results() == lab.results(lab.folder / "whole") and not lab.strays()
+    assert [result.done_now for result in results.values()] == [4, 4, 4]
+    with pytest.raises(batch.BatchError, match="have been run here"):
+        lab.run(shard=(2, 3))
+    assert lab.run(shard=(1, 2), resume=True).done_now == 0
+
+
+def test_shards_of_another_division_are_refused_meanwhile(lab):
+    lab.videos("ok", "ok")
+    with OutFolder(lab.out, (1, 2)).taken():
+        with pytest.raises(batch.BatchError, match="shard 1/2 is at work here"):
+            lab.run(shard=(1, 3))
+        assert lab.run(shard=(2, 2)).done_now == 1
+    assert lab.run(resume=True).done_now == 1
+
+
+def test_any_executor_will_do(lab):
+    lab.videos("ok", "SIGSEGV", "nobody", "fails")
+    lab.run(lab.folder / "here")
+    with ProcessPoolExecutor(2) as pool:
+        lab.run(executor=pool)
+    assert lab.results() == lab.results(lab.folder / "here")
+
+    class Serial(Executor):
+        def submit(self, work, /, *arguments, **named):
+            future = Future()
+            future.set_result(work(*arguments, **named))
+            return future
+
+    lab.run(lab.folder / "serial", executor=Serial())
+    assert lab.results(lab.folder / "serial") == lab.results(lab.folder / "here")
+
+
+def test_a_broken_pool_is_told_and_loses_nothing_for_good(lab):
+    lab.videos("ok", f"kills-its-worker {lab.folder / 'killed'}", "sleeps 0.2", "ok", "ok")
+    with ProcessPoolExecutor(2) as pool:
+        result = lab.run(executor=pool)
+    assert result.left and any("The executor broke" in note for note in result.notes)
+    assert len(result.left) + len(result.records) == 5 and result.unfinished == len(result.left)
+    assert not lab.strays()
+    lab.run(resume=True)
+    assert set(lab.states().values()) == {"done"}
+
+
+def test_an_interrupted_pool_is_not_left_with_children(lab):
+    lab.videos("sleeps 60", "sleeps 60", "ok")
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    with ProcessPoolExecutor(2) as pool, pytest.raises(KeyboardInterrupt):
+        lab.run(executor=pool, progress=lambda now: interrupt(now) if now.running == 2 else None)
+    assert not lab.processes() and not lab.strays()
+
+
+def test_a_ray_worker_that_is_killed_loses_its_video_alone(lab, monkeypatch):
+    ray = pytest.importorskip("ray")
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    lab.videos(
+        "ok", "kills-its-worker", f"kills-its-worker {lab.folder / 'killed'}", "nobody", "SIGSEGV", "ok"
+    )
+    ray.init(num_cpus=2, log_to_driver=False, include_dashboard=False)
+    try:
+        with batch.RayExecutor() as executor:
+            result = lab.run(executor=executor)
+    finally:
+        ray.shutdown()
+    assert list(lab.states().values()) == ["done", "crashed", "done", "nobody", "crashed", "done"]
+    assert "3 workers were lost over it" in result.records[1].message
+    assert any("Workers were lost 4 times" in note for note in result.notes)
+    assert not lab.processes() and not lab.strays()
+
+
+# With memo itself as the child.
+
+
+@pytest.fixture
+def clip(write_video, luma_frames):
+    return write_video("clip.mp4", luma_frames(count=8))
+
+
+def test_memo_as_the_child(clip, tmp_path):
+    (tmp_path / "text.mp4").write_text("no video at all")
+    rows = [
+        {"video": clip},
+        {"video": tmp_path / "text.mp4"},
+        {"video": clip, "name": "late", "frames": "50:60"},
+    ]
+    result = batch.run(rows, tmp_path / "out")
+    assert [record.state for record in result.records] == ["nobody", "failed", "failed"]
+    assert "not a video" in result.records[1].message
+    assert "frame 50 was asked for" in result.records[2].message
+    assert (tmp_path / "out" / "clip" / "track.csv").is_file()
+    alone = tmp_path / "alone"
+    subprocess.run([sys.executable, "-m", "memo.cli", "track", str(clip), "--out", str(alone), "--quiet"])
+    for file in ("track.csv", "events.csv"):
+        assert (alone / file).read_bytes() == (tmp_path / "out" / "clip" / file).read_bytes()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is looked at on Linux")
+def test_memory_is_limited(lab):
+    lab.videos("grows", "ok")
+    result = lab.run(memory_mb=100)
+    assert [record.state for record in result.records] == ["crashed", "done"]
+    assert result.records[0].message == "ended for more than 100 MB of memory"
+
+
+def memo_command(*arguments):
+    return [sys.executable, "-m", "memo.cli", "batch", *map(str, arguments)]
+
+
+def test_the_command_line(clip, tmp_path):
+    manifest, out = tmp_path / "walks.csv", tmp_path / "out"
+    manifest.write_text("video,height_m,name\nclip.mp4,1.7,\nclip.mp4,170,cm\nnone.mp4,1.7,\n")
+    checked = subprocess.run(memo_command(manifest, "--check", "--out", out), capture_output=True, text=True)
+    assert checked.returncode == 1 and not out.exists()
+    assert [line.partition("csv, ")[2][:6] for line in checked.stderr.splitlines()] == ["line 3", "line 4"]
+    ran = subprocess.run(
+        memo_command(manifest, "--skip-bad", "--json", "--out", out), capture_output=True, text=True
+    )
+    assert ran.returncode == 5
+    summary = json.loads(ran.stdout)
+    assert (summary["videos"], summary["nobody"], summary["failed"], summary["left"]) == (3, 1, 2, 0)
+    assert re.search(r"^\[3/3, 0 s left\] clip: nobody", ran.stderr, re.MULTILINE)
+    manifest.write_text("video,height_m,name\nclip.mp4,1.7,\n")
+    again = subprocess.run(memo_command(manifest, "--out", out), capture_output=True, text=True)
+    assert again.returncode == 1 and "resume" in again.stderr
+    resumed = subprocess.run(
+        memo_command(manifest, "--out", out, "--resume", "--quiet"), capture_output=True, text=True
+    )
+    assert (resumed.returncode, resumed.stdout, resumed.stderr) == (0, "", "")
+
+
+@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+def test_the_command_line_interrupted(clip, tmp_path, signal_):
+    manifest, out = tmp_path / "walks.csv", tmp_path / "out"
+    manifest.write_text("video,name\n" + "".join(f"clip.mp4,v{k}\n" for k in range(30)))
+    run = subprocess.Popen(
+        memo_command(manifest, "--out", out, "--jobs", 1), stderr=subprocess.PIPE, text=True
+    )
+    wait_for(lambda: (out / "status.csv").exists())
+    run.send_signal(signal_)
+    _, complaints = run.communicate(timeout=20)
+    assert run.returncode == 130
+    assert f"memo batch {manifest} --out {out} --jobs 1 --resume" in complaints
+    assert not list((out / ".batch").glob("*.work/*"))
+
+
+@pytest.mark.skipif(not FULL, reason="takes minutes")
+def test_memo_killed_at_any_moment_resumes_to_the_same_results(clip, tmp_path):
+    manifest, out = tmp_path / "walks.csv", tmp_path / "out"
+    manifest.write_text("video,name\n" + "".join(f"clip.mp4,v{k}\n" for k in range(6)))
+    lab = Lab(tmp_path)
+    batch.run(manifest, tmp_path / "undisturbed")
+    expected = lab.results(tmp_path / "undisturbed")
+    chance, kills = random.Random(2), 0
+    while kills < 50:
+        shutil.rmtree(out, ignore_errors=True)
+        while True:
+            run = subprocess.Popen(
+                memo_command(manifest, "--out", out, "--resume", "--quiet"), process_group=0
+            )
+            try:
+                assert run.wait(chance.uniform(0.5, 4.0)) == 0
+                break
+            except subprocess.TimeoutExpired:
+                kills += 1
+                (os.kill if chance.random() < 0.5 else os.killpg)(run.pid, signal.SIGKILL)
+                run.wait()
+        assert lab.results() == expected and not lab.strays()
+        wait_for(lambda: not lab.processes())
