@@ -10,8 +10,8 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
 import memo
-from memo.cli.convert import add_convert
 from memo.cli.batch import add_batch
+from memo.cli.convert import add_convert
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar

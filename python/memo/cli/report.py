@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
-from memo.cli.track import _frame_range as frame_range
+from memo.cli.track import parsed_frames
 
 if TYPE_CHECKING:
     import typer
@@ -38,7 +38,9 @@ def add_report(app: "typer.Typer") -> None:
         def work() -> Exit:
             path = folder / "report.html" if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
-            written = deliver_report(folder, path, delivery, frames=frame_range(frames), every=every, why=why)
+            written = deliver_report(
+                folder, path, delivery, frames=parsed_frames(frames), every=every, why=why
+            )
             if open_:
                 webbrowser.open(written.resolve().as_uri())
             return Exit.DONE

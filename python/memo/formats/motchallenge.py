@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+
 from memo.files import JOINTS, complete_file
 
 if TYPE_CHECKING:

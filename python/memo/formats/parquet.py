@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from memo._memo import __version__
 from memo.files import complete_file
 
