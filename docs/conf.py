@@ -18,9 +18,9 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
-    "command_reference",
     "compiled_signatures",
     "mathml",
+    "written_pages",
 ]
 exclude_patterns = ["extensions"]
 default_role = "code"
@@ -28,8 +28,11 @@ nitpicky = True
 # Types of Python, numpy and the extras: their documentation is elsewhere, and this site needs no network.
 nitpick_ignore_regex = [
     (r"py:.*", r"(Any|Path|PathLike|Callable|Iterable|Iterator|Mapping|Sequence|ContextManager)"),
-    (r"py:.*", r"memo\..*\._\w+"),  # names of the inside
-    (r"py:.*", r"(av|collections|datetime|matplotlib|np|npt|numpy|os|pathlib|typing|Axes|Figure)(\..*)?"),
+    (r"py:.*", r"memo\.(.*\._\w+|batch\.manifest\.Manifest|keypoints\.points\.Source)"),  # of the inside
+    (
+        r"py:.*",
+        r"(av|collections|concurrent|datetime|matplotlib|np|npt|numpy|os|pathlib|typing|Axes|Figure)(\..*)?",
+    ),
     (r"py:.*", r"(Array|Whole|Column|Columns|Luma|NDArray|float64|uint8|bool_|int64|optional|TypeAlias)"),
 ]
 

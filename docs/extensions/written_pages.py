@@ -1,4 +1,7 @@
-"""The command reference, written from the commands whenever the site is built: it cannot go stale."""
+"""Pages written from the package whenever the site is built, so that they cannot go stale.
+
+`reference/commands.md` from the commands, `reference/gait.md` from the definitions of gait parameters.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import Any
 
 import typer
 from memo.cli import _app
+from memo.gait import DEFINITIONS
 
 HEAD = """# Commands
 
@@ -19,11 +23,22 @@ def setup(app: Any) -> dict[str, bool]:
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
+GAIT = """# Gait parameters
+
+What `gait_parameters.csv` has. Intervals are of 95 %, for the height that was given: lengths scale with it.
+
+"""
+
+
 def write(app: Any) -> None:
-    page = Path(app.srcdir) / "reference" / "commands.md"
-    text = reference()
-    if not page.is_file() or page.read_text(encoding="utf-8") != text:  # else Sphinx would read it anew
-        page.write_text(text, encoding="utf-8")
+    for name, text in (("commands", reference()), ("gait", definitions())):
+        page = Path(app.srcdir) / "reference" / f"{name}.md"
+        if not page.is_file() or page.read_text(encoding="utf-8") != text:  # else Sphinx would read it anew
+            page.write_text(text, encoding="utf-8")
+
+
+def definitions() -> str:
+    return GAIT + "\n".join(f"`{name}`\n: {_plain(text)}\n" for name, text in DEFINITIONS.items())
 
 
 def reference() -> str:
