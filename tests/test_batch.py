@@ -62,7 +62,8 @@ for name in ("track.csv", "gait_parameters.csv"):
             file.write("0,stride_time,right," + height + ",s,1.0,1.2,3\\n")
             file.write("0,cadence,," + height + ",1/min,,,6\\n")
 with open(os.path.join(out, "run.json"), "w") as file:
-    file.write('{"summary": {"status": "tracked", "direction": "left to right", "p_swapped": 0.01}}')
+    options = '"options": {"height_m": ' + height + '}, "camera_given": false'
+    file.write('{"summary": {"direction": "left to right", "p_swapped": 0.01}, ' + options + "}")
 print('{"message": "said of ' + os.path.basename(video) + '"}')
 if todo[0] == "no-table":
     os.remove(os.path.join(out, "track.csv"))
@@ -287,6 +288,42 @@ def test_files_that_are_no_manifest(tmp_path):
     assert "unknown key 'vdeo'" in problems_of([{"vdeo": "a"}])[0]
 
 
+def test_no_manifest_however_mangled_is_more_than_refused(tmp_path):
+    (tmp_path / "a.mp4").write_text("x")
+    (tmp_path / "c.toml").write_text(CAMERA)
+    header = b"video,name,camera,camera_name,height_m,fov_deg,frames,fps,overlay\n"
+    of_csv = header + b"a.mp4,x,c.toml,side,1.7,,3:9,,yes\n"
+    of_toml = (
+        b"[defaults]\nheight_m = 1.6\n[[video]]\nvideo = 'a.mp4'\nframes = '3:9'\noverlay = true\nfps = 25\n"
+    )
+    chance = random.Random(3)
+    accepted = refused = 0
+    for k in range(100_000 if FULL else 400):
+        suffix, text = ((".csv", of_csv), (".toml", of_toml))[k % 2]
+        mangled = bytearray(text)
+        for _ in range(chance.randrange(1, 6)):
+            at = chance.randrange(len(mangled))
+            change = chance.randrange(4)
+            if change == 0:
+                mangled[at] = chance.randrange(256)
+            elif change == 1:
+                del mangled[at : at + chance.randrange(1, 9)]
+            elif change == 2:
+                mangled[at:at] = bytes(chance.choices(b"\0\n\r\"',;[]=.-/~9e", k=chance.choice((1, 2, 900))))
+            else:
+                mangled[at:at] = mangled[chance.randrange(len(mangled)) :][:20]
+        (tmp_path / f"m{suffix}").write_bytes(mangled)
+        try:
+            read = batch.read_manifest(tmp_path / f"m{suffix}")
+        except batch.ManifestError as error:
+            assert error.problems and all(str(tmp_path) in problem for problem in error.problems)
+            refused += 1
+        else:
+            assert all(row.fingerprint is not None and row.arguments for row in read.rows)
+            accepted += 1
+    assert accepted > 10 and refused > 10
+
+
 def test_names_follow_from_paths_and_differ(tmp_path):
     for path in ("s1/walk.mp4", "s2/walk.mp4", "s2/run.mp4", "s2/fast/walk.mp4"):
         (tmp_path / path).parent.mkdir(exist_ok=True)
@@ -300,7 +337,8 @@ def test_names_follow_from_paths_and_differ(tmp_path):
     assert "line 2: the name 'run' is that of line 4 too" in problems_of(tmp_path / "m.csv")[0]
     for name in ("..", "a/b", ".x", "logs", "status.csv", "x" * 200, "a\x07"):
         assert (
-            "cannot be the name of a folder" in problems_of([{"video": tmp_path / "s2/run.mp4", "name": name}])[0]
+            "cannot be the name of a folder"
+            in problems_of([{"video": tmp_path / "s2/run.mp4", "name": name}])[0]
         )
 
 
@@ -344,6 +382,7 @@ def test_one_table_of_all_walks(lab):
     lab.run()
     first, second, third = table(lab.out, "gait_parameters.csv")
     assert first["name"] == "v00" and first["walk"] == "0" and first["direction"] == "left to right"
+    assert (first["height_m"], first["camera_given"], first["p_swapped"]) == ("1.6", "no", "0.010000")
     assert first["stride_time_right_s"] == "1.6" and first["stride_time_right_s_ci_high"] == "1.2"
     assert first["stride_time_right_s_n"] == "3" and first["cadence_per_min"] == "1.6"
     assert (second["state"], second["walk"], second["cadence_per_min"]) == ("nobody", "", "")

@@ -82,7 +82,7 @@ class BatchResult:
 
 def run(
     manifest: str | PathLike[str] | Iterable[Mapping[str, Any]],
-    out: str | PathLike[str],
+    out: str | PathLike[str] | None = None,
     *,
     jobs: int | None = None,
     executor: Executor | None = None,
@@ -98,6 +98,8 @@ def run(
     progress: Callable[[Progress], None] | None = None,
 ) -> BatchResult:
     """Tracks the videos of a manifest, each in a process of its own, with results in `out/NAME`.
+
+    `out` is `memo-out/` and the name of the manifest's file if not given.
 
     `jobs` videos at a time (as many as there are processors), or as many as the `executor` takes: any of
     `concurrent.futures`, Dask's `client.get_executor()`, `memo.batch.RayExecutor`; its workers need memo and
@@ -119,7 +121,8 @@ def run(
     read = prepared(manifest, skip_bad=skip_bad, overlay=overlay, plots=plots)
     _check_numbers(jobs, shard, timeout_s, memory_mb)
     start = time.monotonic()
-    folder = OutFolder(Path(out).absolute(), shard)
+    out = default_out(manifest) if out is None else Path(out)
+    folder = OutFolder(out.absolute(), shard)
     mine = read.rows[shard[0] - 1 :: shard[1]]
     resume = resume or retry_failed
     check_folder(folder.out, [row for row in mine if folder.record(row.name) is None])
@@ -173,6 +176,11 @@ def run(
         done_now=teller.told,
         notes=notes,
     )
+
+
+def default_out(manifest: object) -> Path:
+    """Where results go if nothing is said."""
+    return Path("memo-out") / (Path(manifest).stem if isinstance(manifest, str | PathLike) else "batch")
 
 
 def prepared(

@@ -102,7 +102,7 @@ class OutFolder:
         """What became of a video, if anything did and its results are still there."""
         try:
             record = Record(**json.loads(self._record_file(name).read_text(encoding="utf-8")))
-        except (FileNotFoundError, NotADirectoryError, TypeError, json.JSONDecodeError):
+        except (FileNotFoundError, NotADirectoryError, TypeError, ValueError):
             return None
         return None if record.finished and not self.results(name).is_dir() else record
 

@@ -7,10 +7,12 @@ are relative to the manifest; an empty cell is an option not given.
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import difflib
 import hashlib
 import math
+import os
 import re
 import tomllib
 from collections import Counter, defaultdict
@@ -89,11 +91,10 @@ class Row:
     @property
     def fingerprint(self) -> dict[str, Any]:
         """What the result depends on: options, size and time of the video, content of the camera file."""
-        video = [file for file in _files(self.video) if file.is_file()]
-        stats = [file.stat() for file in video]
+        stats = [file.stat() for file in _files(self.video)]
         print_: dict[str, Any] = {
             "video_bytes": sum(stat.st_size for stat in stats),
-            "video_files": len(video),
+            "video_files": len(stats),
             "video_modified_s": max((int(stat.st_mtime) for stat in stats), default=0),
             **self.options,
         }
@@ -291,7 +292,7 @@ def _named(rows: list[Row]) -> list[Row]:
         row = rows[k]
         if row.name:
             return row.name
-        last = row.video.name if row.video.is_dir() else row.video.stem
+        last = row.video.name if _is_folder(row.video) else row.video.stem
         folders = row.video.parts[1:-1]
         return "-".join([*folders[len(folders) - depth[k] + 1 :], last] if depth[k] > 1 else [last])
 
@@ -386,4 +387,11 @@ def _check_camera(camera: Path, name: str | None, modified_ns: int) -> None:
 
 
 def _files(video: Path) -> list[Path]:
-    return sorted(video.iterdir()) if video.is_dir() else [video]
+    """The files that a video consists of, as far as they are there and can be looked at."""
+    with contextlib.suppress(OSError, ValueError):
+        return [file for file in (video.iterdir() if video.is_dir() else [video]) if file.is_file()]
+    return []
+
+
+def _is_folder(path: Path) -> bool:
+    return os.path.isdir(path)  # unlike `Path.is_dir`, no error for what is no name of a file

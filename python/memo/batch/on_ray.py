@@ -9,6 +9,8 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from typing import Any
 
+from memo.batch.folder import BatchError
+
 __all__ = ["RayExecutor"]
 
 
@@ -24,7 +26,10 @@ class RayExecutor(Executor):
         self._processors = processors_per_video
         self._connected_here = not ray.is_initialized()
         if self._connected_here:
-            ray.init(address=address, log_to_driver=False, configure_logging=False)
+            try:
+                ray.init(address=address, log_to_driver=False, configure_logging=False)
+            except Exception as error:
+                raise BatchError(f"Ray cannot be reached: {' '.join(str(error).split())[:200]}") from None
         self._references: dict[Future[Any], Any] = {}
 
     def submit(self, work: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:

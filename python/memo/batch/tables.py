@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from memo.batch.folder import OutFolder
+from memo.batch.folder import BatchError, OutFolder
 from memo.batch.manifest import Row
+from memo.files import read_text_columns
+from memo.gait import GAIT_COLUMNS
 
 __all__ = ["STATUS_COLUMNS", "write_status", "write_table"]
 
@@ -17,7 +19,7 @@ STATUS_COLUMNS = ("name", "state", "attempt", "seconds", "message", "video")
 """Columns of `status.csv`, in order; a state is one of `STATES`, or `waiting`."""
 
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
-_SUMMARY = ("direction", "gait", "p_swapped")  # of the summary of a video, in this order
+_LEADING = ("name", "state", "walk", "height_m", "camera_given", "direction", "gait", "p_swapped")
 
 
 def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
@@ -39,9 +41,8 @@ def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
     A parameter has columns such as `stride_time_right_s`, and with `_ci_low`, `_ci_high` (95 %) and `_n`.
     """
     table = [walk for row in rows for walk in _walks(folder, row)]
-    leading = ("name", "state", "walk", *_SUMMARY)
-    parameters = dict.fromkeys(column for walk in table for column in walk if column not in leading)
-    header = (*leading, *parameters)
+    parameters = dict.fromkeys(column for walk in table for column in walk if column not in _LEADING)
+    header = (*_LEADING, *parameters)
     _write(path, header, ([walk.get(column, "") for column in header] for walk in table))
 
 
@@ -54,27 +55,29 @@ def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
     results = folder.results(row.name)
     common = {"name": row.name, "state": state, **_summary(results / "run.json")}
     walks: dict[str, dict[str, Any]] = {}
-    for cells in _read(results / "gait_parameters.csv"):
-        walk = walks.setdefault(cells["walk"], {**common, "walk": cells["walk"]})
-        side = f"_{cells['side']}" if cells["side"] else ""
-        column = f"{cells['parameter']}{side}{_UNITS.get(cells['unit'], '')}"
-        walk[column] = cells["value"]
-        walk |= {f"{column}_{name}": cells[name] for name in ("ci_low", "ci_high", "n")}
+    lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS)
+    for walk, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
+        column = f"{parameter}{'_' if side else ''}{side}{_UNITS.get(unit, '')}"
+        cells = {column: value, f"{column}_ci_low": low, f"{column}_ci_high": high, f"{column}_n": n}
+        walks.setdefault(walk, {**common, "walk": walk}).update(cells)
     return list(walks.values()) or [common]
 
 
 def _summary(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        return {}
-    summary: Mapping[str, Any] = json.loads(path.read_text(encoding="utf-8"))["summary"]
-    return {name: summary[name] for name in _SUMMARY if summary.get(name) is not None}
-
-
-def _read(path: Path) -> list[dict[str, str]]:
-    if not path.is_file():
-        return []
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    """What holds for all walks of a video."""
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+        height_m, summary = run["options"]["height_m"], run["summary"]
+        p_swapped = summary.get("p_swapped")
+        return {
+            "height_m": height_m,
+            "camera_given": "yes" if run["camera_given"] else "no",
+            "direction": summary.get("direction", ""),
+            "gait": summary.get("gait", ""),
+            "p_swapped": "" if p_swapped is None else f"{p_swapped:.6f}",
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise BatchError(f"{path}: not as memo track writes it: {error!r}") from None
 
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.batch import BatchResult, ManifestError, Progress, RayExecutor, Record, run
-from memo.batch.engine import check_folder, described, notes_on, prepared
+from memo.batch.engine import check_folder, default_out, described, notes_on, prepared
 from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, terminal
 
 if TYPE_CHECKING:
@@ -79,11 +79,14 @@ def add_batch(app: "typer.Typer") -> None:
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Tracks the videos of MANIFEST. Any may fail or crash, and the run be killed: none is lost."""
-        delivery = Delivery(out or Path("memo-out") / manifest.stem, overlay, plots, as_json, quiet)
+        delivery = Delivery(out or default_out(manifest), overlay, plots, as_json, quiet)
 
         def work() -> Exit:
             try:
                 return checked_work()
+            except ModuleNotFoundError as error:  # Ray
+                complain(str(error))
+                return Exit.NO_EXTRA
             except ManifestError as error:
                 for problem in error.problems:
                     complain(problem)
@@ -135,6 +138,8 @@ def _check(manifest: Path, delivery: Delivery) -> Exit:
 def _batch(
     manifest: Path, delivery: Delivery, options: dict[str, Any], backend: Backend, ray_address: str | None
 ) -> Exit:
+    if backend is Backend.RAY:
+        prepared(manifest, skip_bad=options["skip_bad"])  # a mistake is told before a cluster is looked for
     try:
         with (
             _termination_as_interrupt(),
@@ -151,7 +156,7 @@ def _batch(
                 **options,
             )
     except KeyboardInterrupt:
-        again = [argument for argument in sys.argv[1:] if argument not in ("--resume", "--retry-failed")]
+        again = [argument for argument in sys.argv[1:] if argument != "--resume"]
         complain("interrupted: what was finished is kept, the rest is done by")
         complain(f"  memo {shlex.join([*again, '--resume'])}")
         return Exit.INTERRUPTED
