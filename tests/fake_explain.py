@@ -1,6 +1,6 @@
-"""Stand-ins for `memo.explain` and `memo.gait`: what was seen in a frame is planted, not found."""
+"""A stand-in for `memo.explain.explain`: what was seen in a frame is planted, not found."""
 
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 from memo.files import read_track_csv
@@ -8,7 +8,7 @@ from memo.files import read_track_csv
 SIZE = (64, 48)
 
 
-def explain(run_folder, frames=None, progress=None):
+def explain(run_folder, frames=None, progress=None, *, video=None):
     """A box for a model, and everything about it known."""
     width, height = SIZE
     chosen = read_track_csv(run_folder / "track.csv")["frame"] if frames is None else frames
@@ -32,11 +32,3 @@ def explain(run_folder, frames=None, progress=None):
             similarity=np.cos(np.linspace(0, 6, 20)) ** 2,
             phase=0.3,
         )
-
-
-def modules():
-    """The two modules by name, as `sys.modules` holds them."""
-    explaining, gait = ModuleType("memo.explain"), ModuleType("memo.gait")
-    explaining.explain = explain
-    gait.DEFINITIONS = {"cadence": "Steps a minute."}
-    return {"memo.explain": explaining, "memo.gait": gait}

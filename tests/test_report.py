@@ -6,6 +6,7 @@ import hashlib
 import html
 import io
 import json
+import os
 import re
 import shutil
 import sys
@@ -15,8 +16,10 @@ import fake_explain
 import memo
 import numpy as np
 import pytest
+from conftest import shared_video
 from memo import cli
 from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
+from memo.gait import DEFINITIONS
 from memo.report import normative, write_report
 from memo.report.choice import ordinal
 from memo.report.page import number
@@ -26,14 +29,14 @@ from PIL import Image
 HOSTILE = "<script>document.title='taken'</script>&\"'.mp4"
 
 
-@pytest.fixture(autouse=True)
-def stand_ins(monkeypatch):
-    for name, module in fake_explain.modules().items():
-        monkeypatch.setitem(sys.modules, name, module)
+@pytest.fixture
+def stand_in(monkeypatch):
+    """Frames are explained by the stand-in."""
+    monkeypatch.setattr("memo.report.track.explain", fake_explain.explain)
 
 
 @pytest.fixture
-def run_folder(tmp_path, write_video, luma_frames):
+def run_folder(tmp_path, write_video, luma_frames, stand_in):
     """Makes a folder as `memo track` leaves it; `without` names files that are not there."""
 
     def make(count=20, *, without=(), summary=None, **told):
@@ -48,6 +51,7 @@ def run_folder(tmp_path, write_video, luma_frames):
             "command": "track",
             "video": str(video),
             "frames": [0, None],
+            "frames_read": 20,
             "rate_hz": 25.0,
             "fps_given": None,
             "camera_given": False,
@@ -55,6 +59,7 @@ def run_folder(tmp_path, write_video, luma_frames):
             "options": {"height_m": 1.75, "adapt": True},
             "summary": summary or track.summary,
             "sentences": ["Somebody walks from left to right."],
+            "walks": [],
         } | told
         (folder / "run.json").write_text(json.dumps(memo.files.plain(run)))
         (folder / "gait_parameters.csv").write_text(
@@ -102,10 +107,10 @@ def test_the_page_holds_the_tables_as_they_are(run_folder):
     assert len(data["events"]) == 2 and data["events"][0]["side"] == "right"
     for told in (
         "Somebody walks from left to right.",
-        "Steps a minute.",
+        DEFINITIONS["cadence"],
         "101.5 to 115.0",
         "108.2",
-        "may be swapped",
+        "The camera was guessed",
     ):
         assert told in written
     assert report.contents["pictures"] == report.contents["explained"] == 20
@@ -189,7 +194,7 @@ def test_strings_from_files_do_not_act(run_folder, tmp_path):
         video=str(tmp_path / HOSTILE.replace("/", "")),
     )
     (folder / "gait_parameters.csv").write_text(
-        f"walk,parameter,side,value,unit,ci_low,ci_high,n\n<b>,{HOSTILE.replace(',', '')},<i>,1,<u>,,,\n"
+        f"walk,parameter,side,value,unit,ci_low,ci_high,n\n0,{HOSTILE.replace(',', '')},<i>,1,<u>,,,0\n"
     )
     written, data, _ = page_of(folder)
     assert written.count("<script") == 2 and "<b>" not in re.sub(r"(?s)<script.*", "", written).replace(
@@ -230,9 +235,9 @@ def test_nobody_tracked_is_still_a_page(run_folder):
 def test_what_is_missing_is_said(run_folder, tmp_path):
     folder = run_folder(without=("run.json", "gait_parameters.csv", "events.csv"))
     written, data, _ = page_of(folder)
-    assert "Not in the folder: events.csv, gait_parameters.csv, run.json." in written
+    assert "Not in the folder: run.json, events.csv, gait_parameters.csv." in written
     assert "neither the video nor overlay.mp4" in written and data["pictures"]["uri"] == []
-    assert len(data["track"]["frame"]) == 20
+    assert len(data["track"]["frame"]) == 20 and "walk 1 may be swapped (probability 40%)" in written
     folder = run_folder(video=str(tmp_path / "gone.mp4"))
     assert "gone.mp4: no such file" in page_of(folder)[0]
 
@@ -253,11 +258,11 @@ def test_a_video_of_another_size_is_not_taken(run_folder, write_video, luma_fram
 
 
 def test_frames_that_cannot_be_explained(run_folder, monkeypatch):
-    def broken(folder, frames=None, progress=None):
+    def broken(folder, frames=None, **_):
         yield next(fake_explain.explain(folder, frames))
         raise ValueError("the video has changed")
 
-    monkeypatch.setattr(sys.modules["memo.explain"], "explain", broken)
+    monkeypatch.setattr("memo.report.track.explain", broken)
     written, data, _ = page_of(run_folder())
     assert len(data["why"]) == 1 and "Frames cannot be explained (the video has changed)." in written
 
@@ -270,8 +275,8 @@ def test_several_walks_and_backwards(run_folder):
     write_track_csv(folder / "track.csv", table)
     written, data, _ = page_of(folder)
     assert (
-        "Walk 1 goes backwards" in written
-        and "Walk 0 goes" not in written
+        "Walk 2 goes backwards" in written
+        and "Walk 1 goes" not in written
         and "10 to 19" in written
         and data["track"]["walk"][-1] == 1
     )
@@ -303,15 +308,15 @@ def test_unknown_numbers_are_dashes(run_folder):
         ("track.csv", "frame,time_s\n1,2\n", "track.csv: columns missing"),
         ("track.csv", None, "track.csv"),
         ("run.json", "{", "run.json: "),
-        ("run.json", "[1]", "run.json: not an object"),
-        ("run.json", '{"summary": "x"}', 'run.json: summary is "x"'),
-        ("run.json", '{"frames": ["a"]}', "run.json: frames is"),
+        ("run.json", "[1]", "run.json: an object was wanted"),
+        ("run.json", '{"memo": 1}', "run.json: memo must be str"),
+        ("run.json", '{"memo": "1"}', "run.json: command is missing"),
         ("run.json", "[" * 100_000, "run.json: "),
         ("gait_parameters.csv", "a,b\n", "gait_parameters.csv: columns missing"),
         (
             "gait_parameters.csv",
             "walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,many,,,,\n",
-            "gait_parameters.csv: line 2: value 'many' is not a number",
+            "gait_parameters.csv: column value: could not convert string to float: 'many'",
         ),
         ("events.csv", "time_s,frame,event,side\nsoon,1,heel_strike,right\n", "events.csv: "),
     ],
@@ -381,10 +386,10 @@ def test_an_interrupt_leaves_the_older_page(run_folder, monkeypatch, capsys):
     folder = run_folder()
     (folder / "report.html").write_text("older")
 
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["memo.explain"], "explain", interrupted)
+    monkeypatch.setattr("memo.report.track.explain", interrupted)
     assert memo_command(monkeypatch, capsys, "report", folder)[0] == 130
     assert (folder / "report.html").read_text() == "older" and not list(folder.glob(".*"))
 
@@ -499,9 +504,43 @@ def test_a_broken_postures_json_is_named(posture_folder, monkeypatch, capsys, co
     assert code == 1 and "postures.json: " in err and err.count("\n") == 1
 
 
+# Files that something else has written into
+
+
+def mutated(value, random, depth=0):
+    """The value with something in it exchanged for what may not stand there."""
+    instead = [None, True, -1, 1e308, "", HOSTILE, [], {}, [[[]]], {"a": [1]}, 10**30, "nan"]
+    if isinstance(value, dict | list) and value and random.random() < 0.9:
+        keys = list(value) if isinstance(value, dict) else range(len(value))
+        key = keys[random.integers(len(keys))]
+        if isinstance(value, dict):
+            return {**value, key: mutated(value[key], random, depth + 1)}
+        return [*value[:key], mutated(value[key], random, depth + 1), *value[key + 1 :]]
+    return instead[random.integers(len(instead))]
+
+
+@pytest.mark.parametrize("name", ["run.json", "postures.json"])
+def test_a_mutated_file_is_refused_in_one_line_or_shown(name, run_folder, posture_folder, tmp_path):
+    folder = run_folder(video=str(tmp_path / "gone.mp4")) if name == "run.json" else posture_folder
+    whole = json.loads((folder / name).read_text())
+    random = np.random.default_rng(7)
+    refused = 0
+    for _ in range(20_000 if os.environ.get("MEMO_FULL") else 60):
+        (folder / name).write_text(json.dumps(mutated(whole, random)))
+        try:
+            written = write_report(folder).path.read_text()
+        except ValueError as error:
+            refused += 1
+            assert name in str(error) and "\n" not in str(error)
+        else:
+            assert written.count("<script") == 2 and written.endswith("</html>\n")
+    assert refused
+
+
 # In a browser
 
 PHONE_PX, DESK_PX = 390, 1280
+WHY = ("why-change", "why-edges", "why-model", "why-match")
 
 
 @pytest.fixture(scope="module")
@@ -570,7 +609,7 @@ def test_the_slider_moves_the_frame_and_everything_with_it(run_folder, opened):
     folder = run_folder()
     page = opened(write_report(folder).path)
     table = read_track_csv(folder / "track.csv")
-    seen = {name: {pixels(page, name)} for name in ("stage", "view", "why-change", "why-model", "why-match")}
+    seen = {name: {pixels(page, name)} for name in ("stage", "view", *WHY)}
     slider = page.find_element("id", "slider")
     for row in range(1, 4):
         slider.send_keys(Keys.ARROW_RIGHT)
@@ -705,3 +744,34 @@ def test_dark_and_paper(run_folder, opened):
         printed.startswith(b"%PDF")
         and 1 <= printed.count(b"/Type /Page\n") + printed.count(b"/Type/Page\n") <= 9
     )
+
+
+# A real run, from the command line to the browser
+
+
+def test_a_tracked_video_and_its_page(monkeypatch, capsys, tmp_path, opened):
+    """All that the page shows of real footage is in the tables, and comes from the frames themselves."""
+    video = shared_video("weizmann_ido_walk") / "ido_walk.avi"
+    folder = tmp_path / "run"
+    code, out, err = memo_command(
+        monkeypatch, capsys, "track", video, "--out", folder, "--report", "--no-plots"
+    )
+    assert code == 0, err
+    assert "report.html" in out
+    written = (folder / "report.html").read_text()
+    assert len(written) < 1_000_000
+    data = json.loads(re.search(r'id="data">(.*?)</script>', written, re.DOTALL)[1])
+    table = read_track_csv(folder / "track.csv")
+    run = json.loads((folder / "run.json").read_text())
+    assert [why["frame"] for why in data["why"]] == data["track"]["frame"] == table["frame"].tolist()
+    for why, similarity in zip(data["why"], table["similarity"], strict=True):
+        best = why["similarity"][int(np.argmin(np.abs(np.array(why["phase_grid"]) - why["phase"])))]
+        assert best == pytest.approx(similarity, abs=2e-3)
+    for sentence in run["sentences"]:
+        assert html.escape(sentence) in written
+    page = opened(folder / "report.html")
+    seen = {name: pixels(page, name) for name in ("stage", "view", *WHY)}
+    page.find_element("tag name", "body").send_keys("\ue014" * 3)  # arrow right
+    assert all(pixels(page, name) != before for name, before in seen.items())
+    phase = table["phase"][3]
+    assert shown_text(page, "#clock") == f"frame 3, {table['time_s'][3]:.2f} s, phase {phase:.2f}"

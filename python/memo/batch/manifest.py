@@ -362,13 +362,14 @@ def _check_video(row: Row) -> None:
 
 
 def _check_options(row: Row) -> None:
-    from memo.cli.track import checked_options, parsed_frames
+    from memo.cli.given import frame_range
+    from memo.cli.track import checked_options
 
     options: dict[str, Any] = dict(row.options)
     fps = options.get("fps")
     if fps is not None and not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps {fps:g} is not a frame rate")
-    parsed_frames(options.get("frames", ":"))
+    frame_range(options.get("frames", ":"))
     camera, name = options.get("camera"), options.get("camera_name")
     height = options.get("height_m", 1.75)
     if camera is None or options.get("fov_deg") is not None:

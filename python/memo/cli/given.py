@@ -29,6 +29,18 @@ def checked_height(height_m: float) -> float:
     return height_m
 
 
+def frame_range(text: str) -> tuple[int, int | None]:
+    """`--frames A:B` as first frame and the one after the last, None for the end."""
+    start, colon, stop = text.partition(":")
+    try:
+        first, end = int(start or 0), int(stop) if stop else None
+    except ValueError:
+        first, end, colon = 0, None, ""
+    if not colon or first < 0 or (end is not None and end <= first):
+        raise InputError(f"--frames {text} is not A:B with 0 <= A < B")
+    return first, end
+
+
 def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
     """Refuses to write over what is read, by whatever name or link, or into a folder that is read."""
     for file in written:

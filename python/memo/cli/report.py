@@ -4,14 +4,17 @@
 """
 
 import webbrowser
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
-from memo.cli.track import parsed_frames
+from memo.cli.given import frame_range
 
 if TYPE_CHECKING:
     import typer
+
+    from memo.report import Report
 
 EXIT_CODES = """Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage;
 4 the app extra is not installed; 130 interrupted (an older page stays as it was)."""
@@ -29,6 +32,7 @@ def add_report(app: "typer.Typer") -> None:
             int | None, typer.Option(help="Every N-th frame; else as many as fit in about 25 MB.", min=1)
         ] = None,
         why: Annotated[bool, typer.Option(help="Show what each frame was matched to.")] = True,
+        video: Annotated[Path | None, typer.Option(help="Where the video is now, if it was moved.")] = None,
         open_: Annotated[bool, typer.Option("--open", help="Show it in the browser.")] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -38,31 +42,37 @@ def add_report(app: "typer.Typer") -> None:
         def work() -> Exit:
             path = folder / "report.html" if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
-            written = deliver_report(
-                folder, path, delivery, frames=parsed_frames(frames), every=every, why=why
-            )
+            if video is not None and not video.exists():
+                raise InputError(f"{video}: no such video")
+            options = {"frames": frame_range(frames), "every": every, "why": why, "video": video}
+            report = write_page(folder, path, delivery, **options)
+            told = {"kind": report.kind, "bytes": report.bytes, **report.contents}
+            delivery.tell(told, _lines(report), [report.path])
             if open_:
-                webbrowser.open(written.resolve().as_uri())
+                webbrowser.open(report.path.resolve().as_uri())
             return Exit.DONE
 
         raise typer.Exit(guarded(work))
 
 
-def deliver_report(folder: Path, path: Path, delivery: Delivery, **options: Any) -> Path:
-    """Writes the page with progress and says what is in it."""
+def write_page(folder: Path, path: Path, delivery: Delivery, **options: Any) -> "Report":
+    """Writes the page of a folder, with progress."""
     from memo.report import write_report
 
-    report = write_report(
-        folder, path, watch=lambda items, what, count: with_progress(items, what, count, delivery), **options
-    )
+    def watch(items: Iterable[Any], what: str, count: int | None) -> Iterable[Any]:
+        return with_progress(items, what, count, delivery)
+
+    return write_report(folder, path, watch=watch, **options)
+
+
+def _lines(report: "Report") -> list[str]:
+    """What is in the page, in sentences."""
     contents = report.contents
     if report.kind == "memo track":
         line = f"{contents['pictures']} frames with pictures, {contents['explained']} explained"
     else:
         line = f"{contents['frames']} frames"
-    lines = [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
-    delivery.tell({"kind": report.kind, "bytes": report.bytes, **contents}, lines, [report.path])
-    return report.path
+    return [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
 
 
 def _checked_file(path: Path) -> Path:

@@ -12,7 +12,8 @@ import numpy as np
 
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, Interrupt, complain, guarded, with_progress
-from memo.cli.given import check_writable, checked_height, load_camera
+from memo.cli.given import check_writable, checked_height, frame_range, load_camera
+from memo.cli.report import write_page
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
 from memo.run import Source, write_run
@@ -26,7 +27,7 @@ EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 
 3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
 (what was tracked until then is written)."""
 
-_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png")
+_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
 
 
 def add_track(app: "typer.Typer") -> None:
@@ -48,6 +49,7 @@ def add_track(app: "typer.Typer") -> None:
         ] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
         plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
+        page: Annotated[bool, typer.Option("--report", help="Write report.html (memo report).")] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
@@ -56,7 +58,7 @@ def add_track(app: "typer.Typer") -> None:
 
         def work() -> Exit:
             tracker_options = checked_options(height, camera, camera_name, fov_deg)
-            return _track_video(video, parsed_frames(frames), fps, tracker_options, delivery)
+            return _track_video(video, frame_range(frames), fps, tracker_options, page, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -66,6 +68,7 @@ def _track_video(
     frame_range: tuple[int, int | None],
     fps: float | None,
     tracker_options: dict[str, Any],
+    page: bool,
     delivery: Delivery,
 ) -> Exit:
     from memo.video import VideoReader
@@ -88,6 +91,8 @@ def _track_video(
         return deliver_interrupted(track, delivery)
     with opened() as reader:
         written = write_all(track, reader, reader.frame_count, reader.rate_hz, delivery)
+    if page:
+        written.append(write_page(delivery.out, delivery.out / "report.html", delivery).path)
     report(track, written, delivery)
     if "camera" not in tracker_options and delivery.talks:
         print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
@@ -163,17 +168,6 @@ def checked_options(
             raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
         options["fov_deg"] = fov_deg
     return options
-
-
-def parsed_frames(text: str) -> tuple[int, int | None]:
-    start, colon, stop = text.partition(":")
-    try:
-        first, end = int(start or 0), int(stop) if stop else None
-    except ValueError:
-        first, end, colon = 0, None, ""
-    if not colon or first < 0 or (end is not None and end <= first):
-        raise InputError(f"--frames {text} is not A:B with 0 <= A < B")
-    return first, end
 
 
 def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:

@@ -66,7 +66,10 @@ def number(value: object, digits: int = 2) -> str:
     """A number with that many digits after the point; a dash for what is not known."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.generic):
         return text(value)
-    value = float(value)
+    try:
+        value = float(value)
+    except OverflowError:  # a whole number beyond all
+        return UNKNOWN
     if not math.isfinite(value):
         return UNKNOWN
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")

@@ -82,7 +82,7 @@ class Thinned(Generic[Kept]):
 def jpeg_uri(pixels: npt.NDArray[np.uint8], longest_px: int) -> str:
     """(H, W) grey or (H, W, 3) RGB pixels as JPEG, made smaller where a side is longer than `longest_px`."""
     image = Image.fromarray(np.ascontiguousarray(pixels))
-    image.thumbnail((longest_px, longest_px), Image.Resampling.LANCZOS)
+    image.thumbnail((longest_px, longest_px), Image.Resampling.BILINEAR)
     return _uri("jpeg", image, quality=JPEG_QUALITY, optimize=True)
 
 
@@ -90,7 +90,7 @@ def mask_uri(mask: npt.NDArray[np.bool_], colour: tuple[int, int, int]) -> str:
     """(H, W) mask as a PNG of one bit a pixel: `colour` where it is true, transparent elsewhere."""
     image = Image.fromarray(np.ascontiguousarray(mask).astype(np.uint8), "P")
     image.putpalette([0, 0, 0, *colour])
-    return _uri("png", image, transparency=0, bits=1, optimize=True)
+    return _uri("png", image, transparency=0, bits=1)
 
 
 def packed(points_px: npt.ArrayLike) -> str:

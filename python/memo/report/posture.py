@@ -10,42 +10,22 @@ import memo
 from memo.report.choice import Choice
 from memo.report.page import UNKNOWN, Page, number, rows_table, text
 from memo.report.pictures import Thinned
+from memo.report.posture_file import FRAME_SHAPES, read_postures_json
 
 __all__ = ["posture_page"]
 
 _BYTES = 20_000_000
 _MOST_GROUPS = 12
 
-# What the page shows of a frame, and what stands in where a file has it not.
-_SHOWN: dict[str, Any] = {
-    "frame": 0,
-    "time_s": None,
-    "points_px": [],
-    "weights": [],
-    "anchor_m": None,
-    "anchor_sd_m": None,
-    "survivors": 0,
-    "group_count": None,
-    "groups_m": [],
-    "cut_all": None,
-    "problem": None,
-    "linked_breaks": [],
-    "margin_nats": None,
-    "linked_m": [],
-    "smoothed_m": [],
-    "sd_m": [],
-    "gap_m": [],
-    "p_mirrored": [],
-}
-
 
 def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
     """The page of a folder of `memo posture`, and how many frames are in it and what could not be shown."""
-    document = _read(folder / "postures.json")
+    document = read_postures_json(folder / "postures.json")
     thinned: Thinned[dict[str, Any]] = Thinned(_BYTES, choice.every)
     for frame in document["per_frame"]:
-        if choice.takes(int(frame["frame"])) and thinned.wants_next():
-            item = {name: frame.get(name, instead) for name, instead in _SHOWN.items()}
+        if choice.takes(frame["frame"]) and thinned.wants_next():
+            item = {name: frame[name] for name in ("frame", *FRAME_SHAPES)}
+            item |= {name: frame.get(name) for name in ("problem", "cut_all", "linked_breaks")}
             item["groups_m"] = item["groups_m"][:_MOST_GROUPS]
             thinned.keep(item, len(json.dumps(item)))
     notes = choice.told(thinned.every)
@@ -62,25 +42,6 @@ def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
         },
     )
     return page, {"frames": len(thinned.items), "every": thinned.every, "notes": notes}
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: not JSON: {error}") from None
-    if not isinstance(document, dict):
-        raise ValueError(f"{path}: not what memo posture writes")
-    for name in ("joints", "per_frame"):
-        if not isinstance(document.get(name), list):
-            raise ValueError(f"{path}: {name} is missing or not a list: not what memo posture writes")
-    for row, frame in enumerate(document["per_frame"]):
-        if not isinstance(frame, dict) or not isinstance(frame.get("frame"), int):
-            raise ValueError(f"{path}: per_frame {row} has no frame number: not what memo posture writes")
-        for name in [name for name, instead in _SHOWN.items() if instead == []]:
-            if not isinstance(frame.get(name, []), list):
-                raise ValueError(f"{path}: {name} of frame {frame['frame']} is not a list")
-    return document
 
 
 def _second(second: dict[str, Any], frames: list[dict[str, Any]]) -> dict[str, Any]:
@@ -110,13 +71,13 @@ def _sentences(document: dict[str, Any]) -> list[str]:
     count = document.get("frames", len(document["per_frame"]))
     told = [
         f"In {document.get('frames_with_survivors', UNKNOWN)} of {count} frames postures are left, "
-        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest motion "
-        f"breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
+        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest "
+        f"motion breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
     ]
     most = document.get("most_cut")
     if most:
         told.append(
-            f"Most is cut by: {most['sentence']} ({most['branches']} branches in {most['frames']} frames)."
+            f"Most is cut by: {most.get('sentence')} ({most['branches']} branches in {most['frames']} frames)."
         )
     second = document.get("second")
     if second:
@@ -135,8 +96,8 @@ def _reasons(document: dict[str, Any]) -> str:
         return "<p>Nothing was cut.</p>"
     rows = [
         (
-            text(total["sentence"]),
-            text(str(total["joint"]).replace("_", " ")),
+            text(total.get("sentence")),
+            text(str(total.get("joint")).replace("_", " ")),
             text(total["branches"]),
             text(total["frames"]),
         )

@@ -1,25 +1,22 @@
 """What `memo track` left in a folder, read for the page, with what is missing said in sentences.
 
 The tables must be right where they are there: an error names the file. What other files would add
-(`run.json`, `gait_parameters.csv`, the overlay) may be absent, as after an interrupt or from an older memo.
+(`run.json`, `gait_parameters.csv`, the overlay) may be absent, as in the folder of an older memo.
 """
 
 from __future__ import annotations
 
 import csv
-import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from memo.files import read_events_csv, read_track_csv
+from memo.gait import read_gait_parameters_csv
+from memo.run import read_run
 
-__all__ = ["PARAMETER_COLUMNS", "RunFolder", "read_run_folder"]
-
-PARAMETER_COLUMNS = ("walk", "parameter", "side", "value", "unit", "ci_low", "ci_high", "n")
-"""Columns of `gait_parameters.csv`."""
-
-_MOST_BYTES = 64 << 20  # run.json is a few kilobytes
+__all__ = ["RunFolder", "read_run_folder"]
 
 
 @dataclass(frozen=True)
@@ -31,12 +28,14 @@ class RunFolder:
     """`track.csv`: an array per column; no rows where nobody was tracked."""
     events: list[dict[str, Any]]
     """`events.csv`."""
-    parameters: list[dict[str, Any]]
-    """`gait_parameters.csv`: numbers as float, None where empty."""
+    parameters: dict[str, Any]
+    """`gait_parameters.csv`: an array per column; empty where it is not there."""
     run: dict[str, Any]
     """`run.json`; empty where it is not there."""
     missing: list[str]
-    """Files a finished run has that are not there."""
+    """Files of a run that are not there."""
+    video: Path | None
+    """The video that was tracked, as the run tells or the user; it need not be there any more."""
 
     @property
     def overlay(self) -> Path | None:
@@ -45,16 +44,21 @@ class RunFolder:
         return path if path.is_file() else None
 
     @property
-    def video(self) -> Path | None:
-        """The video that was tracked, as the run tells; it need not be there any more."""
-        name = self.run.get("video")
-        return Path(name) if name else None
+    def frames(self) -> list[int]:
+        """Numbers of the tracked frames in the video."""
+        return [int(frame) for frame in self.columns["frame"]]
 
     @property
     def first_frame(self) -> int:
         """Number in the video of the first frame the run read."""
-        frames = self.run.get("frames")
-        return int(frames[0]) if frames else 0
+        return int(self.run["frames"][0]) if self.run else 0
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the video, pixels, where the run has a camera."""
+        camera = self.run.get("camera") or {}
+        size = camera.get("size")
+        return (int(size[0]), int(size[1])) if size else None
 
     @property
     def name(self) -> str:
@@ -62,68 +66,42 @@ class RunFolder:
         return self.video.name if self.video else self.path.resolve().name
 
 
-def read_run_folder(folder: Path) -> RunFolder:
-    """Reads a folder of `memo track`; ValueError names the file that cannot be used."""
+def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
+    """Reads a folder of `memo track`; `video` is where its video is now, if not where `run.json` says.
+
+    ValueError names the file that cannot be used.
+    """
     missing = []
 
-    def read(name: str, reader: Any, instead: Any) -> Any:
+    def read(name: str, reader: Callable[[Path], Any], instead: Any) -> Any:
         path = folder / name
         if not path.is_file():
             missing.append(name)
             return instead
         try:
             return reader(path)
-        except (ValueError, OverflowError, csv.Error, RecursionError) as error:
-            told = str(error) if str(path) in str(error) else f"{path}: {error}"
-            raise ValueError(told) from None
+        except (ValueError, OverflowError, csv.Error) as error:
+            raise ValueError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
+    columns = read("track.csv", read_track_csv, {})
+    run = read("run.json", lambda path: _checked(path, read_run(path.parent)), {})
     return RunFolder(
         path=folder,
-        columns=read("track.csv", read_track_csv, {}),
+        columns=columns,
         events=read("events.csv", read_events_csv, []),
-        parameters=read("gait_parameters.csv", _read_parameters, []),
-        run=read("run.json", _read_run, {}),
+        parameters=read("gait_parameters.csv", read_gait_parameters_csv, {}),
+        run=run,
         missing=missing,
+        video=video if video is not None or not run.get("video") else Path(run["video"]),
     )
 
 
-def _read_parameters(path: Path) -> list[dict[str, Any]]:
-    with open(path, newline="", encoding="utf-8") as file:
-        table = csv.DictReader(file)
-        absent = set(PARAMETER_COLUMNS) - set(table.fieldnames or ())
-        if absent:
-            raise ValueError(f"{path}: columns missing: {sorted(absent)}")
-        return [_parameter(path, table.line_num, row) for row in table]
-
-
-def _parameter(path: Path, line: int, row: dict[str, str]) -> dict[str, Any]:
-    parameter: dict[str, Any] = {name: row[name] or "" for name in PARAMETER_COLUMNS}
-    for name in ("value", "ci_low", "ci_high", "n"):
-        try:
-            parameter[name] = float(parameter[name]) if parameter[name] else None
-        except ValueError:
-            raise ValueError(f"{path}: line {line}: {name} {parameter[name]!r} is not a number") from None
-    return parameter
-
-
-def _read_run(path: Path) -> dict[str, Any]:
-    if path.stat().st_size > _MOST_BYTES:
-        raise ValueError(f"{path}: {path.stat().st_size} bytes are no run.json")
-    run = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(run, dict):
-        raise ValueError(f"{path}: not an object")
-    expected = {
-        "video": str,
-        "frames": list,
-        "camera": dict,
-        "options": dict,
-        "summary": dict,
-        "sentences": list,
-    }
-    for name, kind in expected.items():
-        if not isinstance(run.get(name, None), kind | None):
-            raise ValueError(f"{path}: {name} is {json.dumps(run[name])[:40]}")
-    frames = run.get("frames")
-    if frames is not None and not (frames and isinstance(frames[0], int)):
-        raise ValueError(f"{path}: frames is {json.dumps(frames)[:40]}, not [first, stop]")
+def _checked(path: Path, run: dict[str, Any]) -> dict[str, Any]:
+    """The run, where its camera is one: the page draws it."""
+    camera = run["camera"] or {}
+    for name, count in (("size", 2), ("rotation", 3), ("translation", 3)):
+        values = camera.get(name, [0] * count)
+        numbers = isinstance(values, list) and all(isinstance(value, int | float) for value in values)
+        if not numbers or len(values) != count:
+            raise ValueError(f"{path}: camera {name} must be {count} numbers, got {str(values)[:60]}")
     return run

@@ -6,14 +6,16 @@ Bookkeeping alone: what is drawn was computed by the core, in the run or when a 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 import memo
+from memo.explain import Why, explain
 from memo.files import JOINTS
+from memo.gait import DEFINITIONS, GAIT_COLUMNS
 from memo.report import normative
 from memo.report.choice import Choice, ordinal
 from memo.report.page import UNKNOWN, Page, columns, number, rows_table, text
@@ -29,6 +31,7 @@ _WHY_BYTES = 8_000_000
 _MOST_EXPLAINED = 400
 _CROP_MARGIN = 0.25
 _MOST_REGIONS = 5
+_DEEPEST = 4
 _LIKELY_SWAPPED = 0.2
 
 _CHANGED = (0, 158, 115)  # of the palette of Okabe and Ito, like the colours of the sides
@@ -59,9 +62,11 @@ Item = TypeVar("Item")
 Watch = Callable[[Iterable[Item], str, "int | None"], Iterable[Item]]
 
 
-def track_page(folder: Path, choice: Choice, watch: Watch[Any]) -> tuple[Page, dict[str, Any]]:
+def track_page(
+    folder: Path, choice: Choice, watch: Watch[Any], video: Path | None = None
+) -> tuple[Page, dict[str, Any]]:
     """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
-    run = read_run_folder(folder)
+    run = read_run_folder(folder, video)
     notes: list[str] = []
     pictures, drawn, size, every = _pictures(run, choice, watch, notes)
     explained, why_every = _explained(run, choice, watch, notes)
@@ -120,17 +125,17 @@ def _pictures(
         except (ValueError, OSError) as error:
             notes.append(f"The overlay cannot be read ({_one_line(error)}).")
     notes.append("There are no pictures: neither the video nor overlay.mp4 can be read.")
-    return [], False, _size(run), 1
+    return [], False, run.size, 1
 
 
 def _video_pictures(
     run: RunFolder, video: Path, choice: Choice, watch: Watch[Any], notes: list[str]
 ) -> tuple[list[Picture], int, tuple[int, int]]:
-    stop = run.run.get("frames", [0, None])[1:] or [None]
+    stop = run.first_frame + run.run["frames_read"] if run.run else None
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
-    nobody = not _frames(run)  # then what moves is shown, for that is where memo looks for a walker
-    with VideoReader(video, start=run.first_frame, stop=stop[0], rate_hz=run.run.get("fps_given")) as reader:
-        size = _size(run)
+    nobody = not run.frames  # then what moves is shown, for that is where memo looks for a walker
+    with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=run.run.get("fps_given")) as reader:
+        size = run.size
         if size is not None and tuple(size) != reader.size:
             raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")
         before = None
@@ -149,7 +154,7 @@ def _overlay_pictures(
     run: RunFolder, overlay: Path, choice: Choice, watch: Watch[Any]
 ) -> tuple[list[Picture], int]:
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
-    times = dict(zip(_frames(run), run.columns.get("time_s", ()), strict=True))
+    times = dict(zip(run.frames, run.columns["time_s"], strict=True))
     for index, time_s, rgb in watch(colour_frames(overlay), "reading the overlay", None):
         frame = index + run.first_frame
         if choice.takes(frame) and thinned.wants_next():
@@ -171,14 +176,14 @@ def _explained(
     run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str]
 ) -> tuple[list[dict[str, Any]], int]:
     """Frames with what was seen in them, and every how many-th of the tracked ones they are."""
-    frames = [frame for frame in _frames(run) if choice.takes(frame)]
+    frames = [frame for frame in run.frames if choice.takes(frame)]
     if not (choice.why and run.run and frames):
         return [], 1
     every = choice.every or -(-len(frames) // _MOST_EXPLAINED)
     chosen = frames[::every]
     thinned: Thinned[dict[str, Any]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
     try:
-        for why in watch(_explanations(run.path, chosen), "explaining frames", len(chosen)):
+        for why in watch(explain(run.path, chosen, video=run.video), "explaining frames", len(chosen)):
             if thinned.wants_next():
                 item = _why(why)
                 thinned.keep(item, len(json.dumps(item)))
@@ -187,21 +192,15 @@ def _explained(
     return thinned.items, every * thinned.every
 
 
-def _explanations(folder: Path, frames: list[int]) -> Iterator[Any]:
-    from memo.explain import explain
-
-    return explain(folder, frames)
-
-
-def _why(why: Any) -> dict[str, Any]:
+def _why(why: Why) -> dict[str, Any]:
     """What was seen around the walker in one frame; pixels count from the corner of the part shown."""
     left, top, right, bottom = _around(why)
     corner = np.array([left, top], np.float64)
     part = np.s_[top:bottom, left:right]
     edges = np.zeros(why.luma.shape, bool)
-    u, v = np.round(np.asarray(why.edge_points, np.float64).reshape(-1, 2)).astype(int).T
-    inside = (u >= 0) & (v >= 0) & (u < edges.shape[1]) & (v < edges.shape[0])
-    edges[v[inside], u[inside]] = True
+    places = np.round(why.edge_points).astype(int)
+    inside = places[((places >= 0) & (places < why.luma.shape[::-1])).all(axis=1)]
+    edges[inside[:, 1], inside[:, 0]] = True
 
     def lines(segments: Any, clipped: bool = False) -> str:
         segments = np.asarray(segments, np.float64).reshape(-1, 2, 2)
@@ -228,7 +227,7 @@ def _why(why: Any) -> dict[str, Any]:
     }
 
 
-def _around(why: Any) -> tuple[int, int, int, int]:
+def _around(why: Why) -> tuple[int, int, int, int]:
     """Left, top, right, bottom of the part of the frame with the model and a margin; all without a model."""
     height, width = why.luma.shape
     points = np.asarray(why.model, np.float64).reshape(-1, 2)
@@ -245,8 +244,6 @@ def _around(why: Any) -> tuple[int, int, int, int]:
 def _track(run: RunFolder) -> dict[str, Any]:
     """The rows: what is plotted, and joints as (rows, 12, 3) metres and (rows, 12, 2) pixels."""
     table = run.columns
-    if not table:
-        return {"frame": [], "walk": []}
     points = [np.stack([table[f"{joint}_{axis}_m"] for axis in "xyz"], axis=1) for joint in JOINTS]
     pixels = [np.stack([table[f"{joint}_{axis}_px"] for axis in "uv"], axis=1) for joint in JOINTS]
     return {
@@ -260,19 +257,10 @@ def _track(run: RunFolder) -> dict[str, Any]:
 
 
 def _camera(run: RunFolder) -> dict[str, Any] | None:
-    camera = run.run.get("camera") or {}
-    if not {"rotation", "translation"} <= set(camera):
+    camera = run.run.get("camera")
+    if camera is None or not {"rotation", "translation"} <= set(camera):
         return None
     return {"rotation": camera["rotation"], "translation": camera["translation"]}
-
-
-def _size(run: RunFolder) -> list[int] | None:
-    size = (run.run.get("camera") or {}).get("size")
-    return [int(side) for side in size] if size else None
-
-
-def _frames(run: RunFolder) -> list[int]:
-    return [int(frame) for frame in run.columns.get("frame", ())]
 
 
 # What goes in as text.
@@ -294,15 +282,15 @@ def _filled(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dict[s
         "band_source": text(normative.SOURCE),
         "how": _how(run),
         "moved": text(_moved_sentence(pictures)),
-        "nobody": " hidden" if _frames(run) else "",
-        "somebody": "" if _frames(run) else " hidden",
+        "nobody": " hidden" if run.frames else "",
+        "somebody": "" if run.frames else " hidden",
     }
 
 
 def _status(run: RunFolder) -> tuple[str, str]:
     """What became of the run in two words, and how it is coloured."""
     status = (run.run.get("summary") or {}).get("status")
-    if not _frames(run):
+    if not run.frames:
         return str(status or "nobody tracked"), "bad"
     return str(status or "tracked"), "good" if status in (None, "tracked") else "fair"
 
@@ -314,7 +302,7 @@ def _sentences(run: RunFolder) -> list[str]:
         told = [str(message)]
     if told:
         return told
-    frames = _frames(run)
+    frames = run.frames
     if not frames:
         return ["Nobody was tracked in this video."]
     walks = len(set(run.columns["walk"].tolist()))
@@ -324,39 +312,30 @@ def _sentences(run: RunFolder) -> list[str]:
 def _warnings(run: RunFolder, notes: list[str]) -> str:
     told = []
     for walk, p_swapped in _swapped(run):
-        if p_swapped > _LIKELY_SWAPPED:
-            told.append(
-                f"Walk {walk}: left and right may be swapped (probability {p_swapped:.0%}). "
-                "Look at the pictures before you use the sides."
-            )
+        if not run.run and p_swapped > _LIKELY_SWAPPED:  # else the sentences say so
+            told.append(f"Left and right of walk {walk + 1} may be swapped (probability {p_swapped:.0%}).")
     for walk in _backward(run):
-        told.append(f"Walk {walk} goes backwards: the band of normal gait is of people who walk forward.")
-    if _frames(run) and not run.run.get("camera_given", True):
+        told.append(f"Walk {walk + 1} goes backwards: the band of normal gait is of people who walk forward.")
+    if run.frames and not run.run.get("camera_given", True):
         told.append(
             "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
             "positions do not."
         )
     if run.missing:
-        told.append(
-            f"Not in the folder: {', '.join(run.missing)}. The run was interrupted, or is an older one."
-        )
-    if run.overlay is None and _frames(run):
+        told.append(f"Not in the folder: {', '.join(run.missing)}. It may be from an older memo.")
+    if run.overlay is None and run.frames:
         told.append("There is no overlay.mp4: it was not wanted, or the run was interrupted.")
     return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
 
 
 def _swapped(run: RunFolder) -> list[tuple[int, float]]:
     """The probability that the sides are interchanged, walk by walk: it is the same in all rows of one."""
-    if not run.columns:
-        return []
     walks, p_swapped = run.columns["walk"], run.columns["p_swapped"]
     return [(int(walk), float(p_swapped[walks == walk][0])) for walk in np.unique(walks)]
 
 
 def _backward(run: RunFolder) -> list[int]:
     """The walks with a speed against the direction faced."""
-    if not run.columns:
-        return []
     walks, speeds = run.columns["walk"], run.columns["speed_mps"]
     return [int(walk) for walk in np.unique(walks) if _middle(speeds[walks == walk]) < 0]
 
@@ -383,7 +362,7 @@ def _moved_sentence(pictures: list[Picture]) -> str:
 
 
 def _walks(run: RunFolder) -> str:
-    if not run.columns or not _frames(run):
+    if not run.frames:
         return ""
     table = run.columns
     rows = []
@@ -392,7 +371,7 @@ def _walks(run: RunFolder) -> str:
         first, last = rows_of[0], rows_of[-1]
         rows.append(
             (
-                str(walk),
+                str(walk + 1),
                 f"{table['frame'][first]} to {table['frame'][last]}",
                 f"{number(table['time_s'][first])} to {number(table['time_s'][last])}",
                 f"{number(table['x_m'][first])} to {number(table['x_m'][last])}",
@@ -401,41 +380,46 @@ def _walks(run: RunFolder) -> str:
             )
         )
     header = ("walk", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
-    return rows_table("Walks in this video", header, rows)
+    return rows_table("Walks in this video (the files count them from 0)", header, rows)
 
 
 def _parameters(run: RunFolder) -> str:
-    if not run.parameters:
-        return "<p>There is no gait_parameters.csv in the folder, or no whole cycle to measure.</p>"
-    definitions = _definitions()
-    rows = []
-    for parameter in run.parameters:
-        name = parameter["parameter"]
-        digits = 1 if parameter["unit"] in ("%", "1/min") else 3
-        low, high = parameter["ci_low"], parameter["ci_high"]
-        interval = UNKNOWN
-        if low is not None and high is not None:
-            interval = f"{number(low, digits)} to {number(high, digits)}"
-        meaning = f'<small class="meaning">{text(definitions[name])}</small>' if name in definitions else ""
-        rows.append(
-            (
-                text(name.replace("_", " ")) + meaning,
-                text(parameter["walk"] or UNKNOWN),
-                text(parameter["side"] or UNKNOWN),
-                number(parameter["value"], digits),
-                text(parameter["unit"] or UNKNOWN),
-                interval,
-                number(parameter["n"], 0),
-            )
-        )
-    header = ("parameter", "walk", "side", "value", "unit", "95 % interval", "n")
-    return rows_table("Gait parameters", header, rows)
+    """A table of gait parameters for each walk, and what they mean."""
+    if not run.parameters or not len(run.parameters["walk"]):
+        return "<p>There are none: gait_parameters.csv is not there, or holds no line.</p>"
+    columns = [run.parameters[name] for name in GAIT_COLUMNS]
+    lines = [dict(zip(GAIT_COLUMNS, line, strict=True)) for line in zip(*columns, strict=True)]
+    tables = []
+    for walk in dict.fromkeys(line["walk"] for line in lines):
+        known = [line for line in lines if line["walk"] == walk and np.isfinite(line["value"])]
+        if not known:
+            tables.append(f"<p>Walk {walk + 1}: too short or too uncertain for any.</p>")
+            continue
+        rows = []
+        for name, unit in dict.fromkeys((line["parameter"], line["unit"]) for line in known):
+            cells = {line["side"]: _measured(line) for line in known if line["parameter"] == name}
+            in_words = text(name.replace("_", " ")) + (f", {text(unit)}" if unit else "")
+            rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
+        header = ("parameter", "both", "right", "left")
+        tables.append(rows_table(f"Walk {walk + 1}: value, 95 % interval, number of steps", header, rows))
+    named = dict.fromkeys(line["parameter"] for line in lines)
+    meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
+    return f"{''.join(tables)}<details open><summary>What they are</summary>{_listed(meanings)}</details>"
 
 
-def _definitions() -> dict[str, str]:
-    from memo.gait import DEFINITIONS
+def _measured(line: dict[str, Any]) -> str:
+    """A value with its interval and how many steps it rests on, as HTML."""
+    digits = 1 if line["unit"] in ("%", "1/min") else 3
+    interval = "no interval"
+    if np.isfinite(line["ci_low"]) and np.isfinite(line["ci_high"]):
+        interval = f"{number(line['ci_low'], digits)} to {number(line['ci_high'], digits)}"
+    value = number(line["value"], digits)
+    return f'{value} <small class="interval">{interval} (n = {line["n"]})</small>'
 
-    return DEFINITIONS
+
+def _listed(values: dict[str, Any]) -> str:
+    """Names and values as a list in HTML."""
+    return f"<dl>{''.join(f'<dt>{text(n)}</dt><dd>{text(v)}</dd>' for n, v in values.items())}</dl>"
 
 
 def _events(run: RunFolder) -> str:
@@ -458,12 +442,11 @@ def _how(run: RunFolder) -> str:
     if not run.run:
         return "<p>There is no run.json in the folder: with which options it was run is not known.</p>"
     told = run.run
-    frames = told.get("frames") or [0, None]
-    stop = frames[1] if len(frames) > 1 else None
+    first, stop = told["frames"]
     given = {
         "memo": told.get("memo"),
         "video": told.get("video"),
-        "frames": f"{frames[0]} to {'the end' if stop is None else stop - 1}",
+        "frames": f"{first} to {'the end' if stop is None else stop - 1}, {told['frames_read']} read",
         "frames per second": _value(told.get("rate_hz")),
         "rate given": _value(told.get("fps_given")),
         "camera": "as given" if told.get("camera_given") else "guessed",
@@ -471,15 +454,13 @@ def _how(run: RunFolder) -> str:
         **{f"camera {name}": _value(value) for name, value in (told.get("camera") or {}).items()},
         **{f"result {name}": _value(value) for name, value in (told.get("summary") or {}).items()},
     }
-    return (
-        "<dl>"
-        + "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in given.items())
-        + "</dl>"
-    )
+    return _listed(given)
 
 
-def _value(value: Any) -> str:
+def _value(value: Any, depth: int = 0) -> str:
     """A value of run.json in the fewest words."""
+    if depth > _DEEPEST:
+        return "\N{HORIZONTAL ELLIPSIS}"
     if value is None:
         return UNKNOWN
     if isinstance(value, bool):
@@ -487,9 +468,12 @@ def _value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
     if isinstance(value, list):
-        return ", ".join(f"({_value(item)})" if isinstance(item, list) else _value(item) for item in value)
+        return ", ".join(
+            f"({_value(item, depth + 1)})" if isinstance(item, list) else _value(item, depth + 1)
+            for item in value
+        )
     if isinstance(value, dict):
-        return "; ".join(f"{name} {_value(item)}" for name, item in value.items())
+        return "; ".join(f"{name} {_value(item, depth + 1)}" for name, item in value.items())
     return str(value)
 
 

@@ -109,7 +109,7 @@ function showFrame() {
   const count = frame.group_count === null ? "" : `, in ${frame.group_count} groups`;
   lines.push(`${frame.survivors} postures left${count}.`);
   for (const broken of frame.cut_all ?? []) lines.push(`Nothing is left; the least violating posture: ${broken}`);
-  lines.push(frame.linked_breaks.length ? `The posture in the motion breaks: ${frame.linked_breaks.map((name) => name.replaceAll("_", " ")).join(", ")}.` : "The posture in the motion breaks no constraint.");
+  lines.push(frame.linked_breaks?.length ? `The posture in the motion breaks: ${frame.linked_breaks.map((name) => name.replaceAll("_", " ")).join(", ")}.` : "The posture in the motion breaks no constraint.");
   lines.push(isNumber(frame.margin_nats) ? `Margin to the next best motion: ${told(frame.margin_nats, 2)} nats.` : "No other motion is in reach here.");
   $("frame-told").replaceChildren(...lines.map((line) => element("li", {}, line)));
   const rows = joints.map((name, index) => {

@@ -166,7 +166,8 @@ const PARTS = [["head", 0, 0], ["torso", 1, 1], ["right arm", 2, 4], ["left arm"
 const whyPictures = Object.fromEntries(["luma", "change", "edges"].map((name) => [name, new Pictures(why.map((item) => item[name]))]));
 let whyNow = 0;
 
-const matchColour = (share) => `hsl(${Math.round(140 * Math.min(1, Math.max(0, share ?? 0)))} 85% 52%)`;
+/** Red where nothing answers, yellow to green where something does; from a half on all is as green. */
+const matchColour = (share) => (share > 0 ? `hsl(${Math.round(60 + 80 * Math.min(1, 2 * share))} 90% 50%)` : "#e5484d");
 const partColour = (part) => (part >= 8 ? (part <= 10 ? DARK.right : DARK.left) : part >= 5 ? DARK.left : part >= 2 ? DARK.right : "#f0e442");
 const WHY = {
   "why-change": (context, item, images, place, size) => {
@@ -235,7 +236,7 @@ function showWhy() {
     marks: isNumber(item.phase) ? [{ x: (item.phase + 0.5) % 1, look: "axis", name: "half a cycle away: left and right interchanged" }] : [],
   });
   similarity.draw();
-  similarity.show(item.phase, [item.similarity[peak]], `phase ${told(item.phase, 2)} taken; dotted: half a cycle away`);
+  similarity.show(item.phase, [item.similarity[peak]], `best at ${told(item.phase, 2)}; dotted: half a cycle away`);
   const rows = PARTS.map(([name, from, to]) => {
     let [visible, found] = [0, 0];
     unpacked(item.model).forEach(([[a, b], [c, d]], k) => {
