@@ -1,8 +1,10 @@
 """Damaged motion files: every one is read or refused by a `FormatError`, in bounded time and memory.
 
-Each format is tried in a process of its own, whose memory is limited; a file that takes seconds ends it. MEMO_FULL=1 tries 100,000 files a format: `MEMO_FULL=1 pytest tests/test_formats_fuzz.py`.
+Each format is tried in a process of its own, whose memory is limited; a file that takes seconds ends it.
+MEMO_FULL=1 tries 100,000 files a format: `MEMO_FULL=1 pytest -s tests/test_formats_fuzz.py`.
 """
 
+import contextlib
 import os
 import random
 import resource
@@ -11,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +84,7 @@ def try_many(ending, count, seed, bases):
     before = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (before + MEMORY, resource.RLIM_INFINITY))
     signal.signal(signal.SIGALRM, too_long)
+    warnings.simplefilter("error")
     rng = random.Random(seed)
     done, longest = {"read": 0, "refused": 0}, 0.0
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
@@ -94,6 +98,10 @@ def try_many(ending, count, seed, bases):
                 motion = read_motion(path)
                 assert np.isfinite(motion.times_s).all() and not np.isinf(motion.points).any()
                 done["read"] += 1
+                with contextlib.suppress(FormatError):
+                    motion.at_constant_rate()
+                with contextlib.suppress(FormatError):
+                    motion.resampled(30)
             except FormatError as error:
                 message = str(error)
                 assert "\n" not in message and message.startswith(f"{path}: ")

@@ -145,7 +145,7 @@ datacolumns 5
 datarows 2
 range 0 0.1
 endheader
-time hip_flexion_r toes_tx toes_ty toes_tz
+Time hip_flexion_r toes_tx toes_ty toes_tz
 0 10 1 2 3
 0.1 20 1 2 3
 """
@@ -228,7 +228,7 @@ def test_what_is_wrong_in_a_trc_is_said_with_its_line(tmp_path, line, edit, says
         ("endheader", "", "no line endheader among the first"),
         ("datacolumns 5", "nColumns=4", "field ncolumns: 4, but there are 5 labels"),
         ("datarows 2", "nRows=9", "field nrows: 9, but there are 2 rows"),
-        ("time hip", "t hip", "line 6: wanted a row of labels that begins with time"),
+        ("Time hip", "t hip", "line 6: wanted a row of labels that begins with time"),
         ("toes_ty", "toes_tx", "line 6: column toes_tx occurs twice"),
         ("0.1 20", "0.0 20", "line 8, column time: 0.0 does not come after 0"),
         ("20 1 2 3", "20 1 2", "line 8: 4 cells, wanted 5"),
@@ -263,12 +263,12 @@ def test_what_is_wrong_in_a_table_is_said_with_its_column(tmp_path):
 def test_what_a_format_has_no_place_for_at_all_is_refused(tmp_path):
     points = Motion(("a",), [0, 1], np.zeros((2, 1, 3)))
     angles = Motion((), [0, 1], np.zeros((2, 0, 3)), angles={"knee": [1, 2]})
-    spaced = Motion(("a b",), [0, 1], np.zeros((2, 1, 3)))
+    broken = Motion(("a\tb",), [0, 1], np.zeros((2, 1, 3)))
     for name, motion, says in (
         ("x.mot", points, "holds joint angles, and there are none"),
         ("x.trc", angles, "holds points, and there are none"),
         ("x.csv", angles, "holds points, and there are none"),
-        ("x.trc", spaced, "no white space"),
+        ("x.trc", broken, "no label for a TRC file"),
         ("x.xyz", points, "no motion is written to .xyz: wanted .bvh, .c3d"),
     ):
         with pytest.raises(FormatError, match=says):

@@ -85,7 +85,7 @@ def _convert(
     fill_s: float | None,
     delivery: Delivery,
 ) -> Exit:
-    from memo.formats import WRITERS, read_motion, write_motion
+    from memo.formats import WRITERS, read_motion, usual_up, write_motion
     from memo.formats.run_folder import sources
 
     if target.suffix.lower() not in WRITERS:
@@ -104,7 +104,8 @@ def _convert(
             notes.append(f"Filled by straight lines: {filled} missing values.")
         if rate_hz is not None:
             motion = motion.resampled(rate_hz)
-        notes += write_motion(target, motion, None if up is None else up.value)
+        target_up = usual_up(target) if up is None else up.value
+        notes += write_motion(target, motion, target_up)
     summary = {
         "source": str(source),
         "target": str(target),
@@ -115,6 +116,7 @@ def _convert(
         "missing": float(np.isnan(motion.points[..., 0]).mean()) if motion.names else 0.0,
         "angles": list(motion.angles),
         "events": len(motion.events),
+        "up": target_up,
         "notes": notes,
     }
     _tell(summary, target, delivery)
@@ -133,7 +135,7 @@ def _tell(summary: dict[str, Any], target: Path, delivery: Delivery) -> None:
         print(f"Read {', '.join(held)}, {span}{missing}.")
         for note in summary["notes"]:
             print(note)
-        print(f"Written to {target}.")
+        print(f"Written to {target}, {summary['up'].upper()} up.")
 
 
 # What the user gave, checked before any work.

@@ -24,6 +24,7 @@ from memo.formats.trc import read_trc, write_trc
 
 __all__ = [
     "READERS",
+    "USUAL_UP",
     "WRITERS",
     "FormatError",
     "GaitEvent",
@@ -36,8 +37,8 @@ __all__ = [
 Reader = Callable[[Path, Given], Motion]
 """Reads a file; raises `FormatError` without the name of the file, which `read_motion` puts before it."""
 
-Writer = Callable[[Path, Motion, Up | None], list[str]]
-"""Writes a file whole, with the up axis asked for or the format's usual one; says what was left out."""
+Writer = Callable[[Path, Motion, Up], list[str]]
+"""Writes a file whole; returns what was left out, in sentences."""
 
 READERS: dict[str, Reader] = {
     ".bvh": read_bvh,
@@ -58,6 +59,9 @@ WRITERS: dict[str, Writer] = {
     ".trc": write_trc,
 }
 """What writes the files of each ending."""
+
+USUAL_UP: dict[str, Up] = {".bvh": "y", ".mot": "y", ".sto": "y", ".trc": "y"}
+"""The up axis that programs expect in the files of an ending; Z in all others."""
 
 
 def read_motion(
@@ -111,9 +115,14 @@ def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None
             f"{path}: no motion is written to {path.suffix or 'a file without ending'}: {endings(WRITERS)}"
         )
     try:
-        return writer(path, motion, up)
+        return writer(path, motion, up or usual_up(path))
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from None
+
+
+def usual_up(path: Path) -> Up:
+    """The up axis of a file when none is asked for."""
+    return USUAL_UP.get(path.suffix.lower(), "z")
 
 
 def check_up(up: str | None) -> None:

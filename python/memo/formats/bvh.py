@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.files import complete_file
-from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
+from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
 from memo.formats.reading import Given
 from memo.formats.text import number, numbers, read_lines, whole_number
@@ -78,7 +78,7 @@ def read_bvh(path: Path, given: Given) -> Motion:
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise FormatError(f"joint {twice[0]} occurs twice")
-    if len(values) * len(kept) > 30_000_000:
+    if len(values) * len(kept) > MAX_POINTS:
         raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
     up, unit_m, notes = _conventions(nodes, given)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -315,9 +315,8 @@ class _Bone:
     """(T, 3) where it comes to be."""
 
 
-def write_bvh(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_bvh(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes skeleton and rotations; returns what was left out, in sentences."""
-    up = up or "y"
     rate_hz, motion = motion.at_constant_rate()
     joints, notes = _complete_joints(motion)
     # All is done in figure axes, X to the left, Y up, Z forward, and brought to those of the file at the end.

@@ -5,17 +5,17 @@ after the other: X, Y, Z and a fourth word of every point, whose sign says wheth
 Read are integers and floats of all three processors (Intel, DEC, MIPS); written are floats in Intel's
 order, millimetres, residual 0 or -1.
 
-The reader is memo's own. Of 150 damaged files, the C++ library ezc3d 1.6 crashed the process on 15, and
+The reader is memo's own. Of 150 damaged files, the C++ library ezc3d 1.7 crashed the process on 15, and
 the Python library c3d 0.6 let struct errors and assertions through on 27; here every size in a file is
 held against the bytes that are there before anything is made of it, and every damaged file ends in one
 `FormatError`.
 
 Conventions: the time of the first frame is (its number - 1) / rate, as Vicon counts, and events (group
 EVENT, labels `Foot Strike` and `Foot Off`, contexts `Right` and `Left`) are on the same clock; of other
-events is told how many there are. Points that POINT:ANGLES names are joint angles in degrees,
+events it is told how many there are. Points that POINT:ANGLES names are joint angles in degrees,
 `RKneeAngles` with flexion in X; those that FORCES, MOMENTS, POWERS and SCALARS name, and analog channels,
-are left out. POINT:Y_SCREEN names the up axis. A POINT:RATE of 25 to 10000 Hz and more frames or points
-than 16 bits or a byte can count are written as usual (TRIAL:ACTUAL_END_FIELD, LABELS2).
+are left out. POINT:Y_SCREEN names the up axis. Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD,
+labels and events beyond 255 go on in LABELS2, TIMES2 and so forth.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ __all__ = ["read_c3d", "write_c3d"]
 _BLOCK = 512
 _MOST_BYTES = 2 << 30
 _MOST_POINTS = 10_000
+_FARTHEST = 1e12  # of a coordinate, in the file's unit; what is larger is damage
 _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _OTHER_KINDS = ("FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
@@ -218,18 +219,18 @@ def _value(data: bytes, at: int, stop: int, file: _File, where: str) -> list[str
             for k in range(rows if width else 0)
         ]
     if kind == 4:
-        return _floats(np.frombuffer(raw, np.uint8), file).astype(np.float64)
+        return _floats(np.frombuffer(raw, np.uint8), file)
     return np.frombuffer(raw, np.int8 if kind == 1 else file.order + "i2")
 
 
 def _floats(raw: np.ndarray, file: _File) -> np.ndarray:
-    """Bytes (..., 4 n) as floats (..., n); DEC's F format has 16-bit words swapped and a bias 2 larger."""
-    if file.processor != _DEC:
-        return np.ascontiguousarray(raw).view(file.order + "f4")
-    words = np.ascontiguousarray(raw).view("<u2")
-    whole = words[..., ::2].astype(np.uint32) << 16 | words[..., 1::2]
-    values: np.ndarray = whole.view(np.float32) / np.float32(4)
-    return values
+    """Bytes (..., 4 n) as float64 (..., n); DEC's F format has 16-bit words swapped and a bias 2 larger."""
+    with np.errstate(invalid="ignore"):  # damaged floats may be signalling NaN
+        if file.processor != _DEC:
+            return np.ascontiguousarray(raw).view(file.order + "f4").astype(np.float64)
+        words = np.ascontiguousarray(raw).view("<u2")
+        whole = words[..., ::2].astype(np.uint32) << 16 | words[..., 1::2]
+        return whole.view(np.float32).astype(np.float64) / 4
 
 
 def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
@@ -295,13 +296,13 @@ def _frames(data: bytes, file: _File) -> tuple[np.ndarray, np.ndarray]:
     raw = np.frombuffer(data, np.uint8, file.frames * words * size, file.start)
     raw = raw.reshape(file.frames, words * size)[:, : 4 * file.points * size]
     if size == 4:
-        values = _floats(raw, file).astype(np.float64).reshape(file.frames, file.points, 4)
+        values = _floats(raw, file).reshape(file.frames, file.points, 4)
     else:
         whole = np.ascontiguousarray(raw).view(file.order + "i2")
         values = whole.astype(np.float64).reshape(file.frames, file.points, 4)
         values[..., :3] *= file.scale
     with np.errstate(invalid="ignore"):
-        valid = (values[..., 3] >= 0) & (np.abs(values[..., :3]) < 1e12).all(axis=2)
+        valid = (values[..., 3] >= 0) & (np.abs(values[..., :3]) < _FARTHEST).all(axis=2)
     return values[..., :3], valid
 
 
@@ -380,9 +381,8 @@ def _header_events(data: bytes, file: _File) -> tuple[tuple[str, float], ...]:
 # Writing.
 
 
-def write_c3d(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_c3d(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes points in millimetres, angles in degrees and events; returns what was left out, in sentences."""
-    up = up or "z"
     rate_hz, motion = motion.at_constant_rate()
     first = max(1, round(float(motion.times_s[0]) * rate_hz) + 1)
     frames = len(motion.times_s)
@@ -393,6 +393,8 @@ def write_c3d(path: Path, motion: Motion, up: Up | None) -> list[str]:
         raise FormatError(
             f"{len(labels)} points and angles, a C3D file is written with at most {_MOST_POINTS}"
         )
+    if not (np.isnan(values) | (np.abs(values) < _FARTHEST)).all():
+        raise FormatError(f"a point or an angle is beyond {_FARTHEST:g} mm or degrees")
     parameters = _parameter_section(motion, labels, first, rate_hz, up)
     data_block = 2 + len(parameters) // _BLOCK
     header = bytearray(_BLOCK)

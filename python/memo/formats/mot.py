@@ -58,6 +58,7 @@ def read_mot(path: Path, given: Given) -> Motion:
     labels = lines[start].split() if start < len(lines) else []
     if not labels or labels[0].lower() != "time":
         raise FormatError(f"line {start + 1}: wanted a row of labels that begins with time")
+    labels[0] = "time"
     if len(set(labels)) < len(labels):
         repeated = next(name for k, name in enumerate(labels) if name in labels[:k])
         raise FormatError(f"line {start + 1}: column {repeated} occurs twice")
@@ -90,9 +91,8 @@ def read_mot(path: Path, given: Given) -> Motion:
     return Motion(tuple(names), column["time"], points, (), angles, metadata, tuple(notes))
 
 
-def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes the angles and the pelvis' position; returns what was left out, in sentences."""
-    up = up or "y"
     if not motion.angles:
         raise FormatError(
             "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
@@ -108,9 +108,10 @@ def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
         if not name.isprintable() or " " in name:
             raise FormatError(f"angle {name!r}: the labels of a MOT file have no white space")
     table = np.column_stack(list(columns.values()))
-    known = np.isfinite(table).all(axis=1)
-    if len(columns) == 1 or not known.any():
+    known = np.flatnonzero(np.isfinite(table).all(axis=1))
+    if len(columns) == 1 or not len(known):
         raise FormatError("no instant at which all angles are known")
+    gaps = len(table) - len(known)
     table = table[known]
     head = [
         path.stem.replace("\n", " "),
@@ -126,7 +127,6 @@ def write_mot(path: Path, motion: Motion, up: Up | None) -> list[str]:
         file.writelines(line + "\n" for line in head)
         for row in table.tolist():
             file.write("\t".join(f"{x:.7f}" for x in row) + "\n")
-    gaps = len(known) - len(table)
     notes = [f"{gaps} instants at which an angle or the pelvis is missing were left out."] if gaps else []
     left_out = ["events"] * bool(motion.events)
     left_out += ["points but the pelvis"] * (len(motion.names) > 1)

@@ -29,7 +29,9 @@ EVENT_KINDS = ("heel_strike", "toe_off")
 SIDES = ("right", "left")
 
 MAX_FRAMES = 10_000_000
+MAX_POINTS = 30_000_000  # frames times points
 _STAMP_ERROR_S = 1.1e-3  # containers round stamps to milliseconds; two rounded stamps make a grid
+_LATEST_S = 1e9
 _LONGEST_GAP = 20  # times as many empty frames as frames
 
 
@@ -129,8 +131,9 @@ class Motion:
         if not (math.isfinite(rate_hz) and rate_hz > 0):
             raise FormatError(f"a rate must be positive and finite, got {rate_hz:g}")
         span_s = float(self.times_s[-1] - self.times_s[0])
-        if span_s * rate_hz > MAX_FRAMES:
-            raise FormatError(f"{span_s:g} s at {rate_hz:g} Hz are more than {MAX_FRAMES} frames")
+        most = min(MAX_FRAMES, MAX_POINTS // max(1, len(self.names)))
+        if span_s * rate_hz > most:
+            raise FormatError(f"{span_s:g} s at {rate_hz:g} Hz are more than {most} frames")
         count = int(span_s * rate_hz + 1e-6) + 1
         times_s = self.times_s[0] + np.arange(count) / rate_hz
         if len(self.times_s) == 1:
@@ -177,6 +180,8 @@ class Motion:
             return np.zeros(1, np.int64), float(rate_hz)
         intervals = np.diff(self.times_s)
         period_s = float(np.median(intervals))
+        if period_s < 1e-6:
+            raise FormatError(f"frames {period_s:g} s apart: more than a million a second")
         ratios = np.round(intervals / period_s)
         if ratios.sum() >= _LONGEST_GAP * len(self.times_s) + 1000:
             raise FormatError(
@@ -185,7 +190,7 @@ class Motion:
             )
         steps = np.concatenate([[0.0], np.cumsum(ratios)])
         slope = np.polyfit(steps, self.times_s, 1)[0] if ratios.min() >= 1 else period_s
-        rate_hz = _nominal(1 / float(slope), float(steps[-1]))
+        rate_hz = _nominal(1 / float(slope), float(steps[-1]), self.metadata.get("rate_hz"))
         drift_s = self.times_s - steps / rate_hz
         off_s = float(np.abs(drift_s - (drift_s.max() + drift_s.min()) / 2).max())
         if ratios.min() < 1 or off_s > min(_STAMP_ERROR_S, 0.25 / rate_hz):
@@ -210,19 +215,21 @@ def from_z_up(points: npt.ArrayLike, up: Up) -> Array:
 
 
 def _check_clock(times_s: Array) -> None:
-    bad = np.flatnonzero(~np.isfinite(times_s))
+    bad = np.flatnonzero(~(np.abs(times_s) < _LATEST_S))
     if len(bad):
-        raise FormatError(f"frame {bad[0]}: the time is not a number")
+        raise FormatError(f"frame {bad[0]}: the time {times_s[bad[0]]:g} s is no time of a motion")
     late = np.flatnonzero(~(np.diff(times_s) > 0))
     if len(late):
         a, b = times_s[late[0]], times_s[late[0] + 1]
         raise FormatError(f"frame {late[0] + 1}: times must increase, {b:g} s follows {a:g} s")
 
 
-def _nominal(rate_hz: float, steps: float) -> float:
-    """The whole rate, or that of NTSC, if the difference shows in no stamp; else the rate itself."""
-    for nominal in (round(rate_hz), round(rate_hz * 1.001) / 1.001):
-        if nominal > 0 and abs(steps / nominal - steps / rate_hz) < _STAMP_ERROR_S / 4:
+def _nominal(rate_hz: float, steps: float, said_hz: float | None) -> float:
+    """The rate that the file says, a whole one, or one of NTSC, if the stamps cannot tell it from theirs."""
+    wholes = [rate for rate in (round(rate_hz), round(rate_hz * 1.001) / 1.001) if rate > 0]
+    near = [rate for rate in wholes if abs(rate / rate_hz - 1) < 1e-4]
+    for nominal in ([] if said_hz is None else [float(said_hz)]) + near:
+        if abs(steps / nominal - steps / rate_hz) < _STAMP_ERROR_S / 4:
             return float(nominal)
     return rate_hz
 

@@ -48,14 +48,15 @@ def read_table(path: Path, given: Given) -> Motion:
     )
 
 
-def write_table(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes points and angles with six digits after the point; returns what was left out, in sentences."""
-    up = up or "z"
     if not motion.names:
         raise FormatError(
             "a table of joints holds points, and there are none: write angles to a .mot or .sto file"
         )
-    frames = len(motion.times_s)
+    for name in (*motion.names, *motion.angles):
+        if not name.isprintable():
+            raise FormatError(f"{name!r} is no name for a column")
     columns = {f"{name}_deg": values for name, values in motion.angles.items()}
     turned = from_z_up(motion.points, up)
     for k, name in enumerate(motion.names):
@@ -66,7 +67,7 @@ def write_table(path: Path, motion: Motion, up: Up | None) -> list[str]:
             file.write("# metres, Y up\n")
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["frame", "time_s", *columns])
-        for frame in range(frames):
+        for frame in range(len(table)):
             cells = ("" if x != x else f"{x:.6f}" for x in table[frame].tolist())
             rows.writerow([frame, f"{motion.times_s[frame]:.6f}", *cells])
     return ["A table of joints has no place for events: left out."] if motion.events else []

@@ -59,15 +59,14 @@ def read_trc(path: Path, given: Given) -> Motion:
     return Motion(tuple(names), times_s, points, metadata=metadata, notes=note)
 
 
-def write_trc(path: Path, motion: Motion, up: Up | None) -> list[str]:
+def write_trc(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes the points in metres; returns what was left out, in sentences."""
-    up = up or "y"
     if not motion.names:
         raise FormatError("a TRC file holds points, and there are none")
     rate_hz, motion = motion.at_constant_rate()
     for name in motion.names:
-        if not name.isprintable() or name != name.strip() or " " in name:
-            raise FormatError(f"point {name!r}: the labels of a TRC file have no white space")
+        if not name.isprintable() or name != name.strip():
+            raise FormatError(f"point {name!r}: no label for a TRC file")
     frames, markers = motion.points.shape[:2]
     rate = f"{rate_hz:.10g}"
     values = [rate, rate, str(frames), str(markers), "m", rate, "1", str(frames)]

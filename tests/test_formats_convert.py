@@ -1,0 +1,249 @@
+"""`memo convert`, and motion files given to `memo pointlight`: what is said, written and refused."""
+
+import csv
+import json
+import os
+import sys
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+import pytest
+from memo import cli
+from memo.files import JOINTS, TRACK_COLUMNS, write_columns_csv, write_events_csv, write_track_csv
+from memo.formats import READERS, WRITERS, Motion, read_motion, write_motion
+from motions import shared_motion, stick_figure, walk
+
+FRAMES = np.r_[10:40, 50:75]
+"""Of the track: two walks with ten frames between them."""
+
+
+@pytest.fixture
+def memo_command(monkeypatch, capsys):
+    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out, " ".join(said.err.split())
+
+    return run
+
+
+def write_track(folder, times_s=None):
+    """A folder as `memo track` writes it, with two walks."""
+    folder.mkdir(exist_ok=True)
+    points, _ = stick_figure(80, 25)
+    columns = {name: np.zeros(len(FRAMES)) for name in TRACK_COLUMNS}
+    columns |= {"frame": FRAMES, "time_s": FRAMES / 25 if times_s is None else times_s}
+    columns["walk"] = (FRAMES >= 50).astype(int)
+    columns["right_knee_deg"] = FRAMES + 0.5
+    for k, joint in enumerate(JOINTS):
+        for i, axis in enumerate("xyz"):
+            columns[f"{joint}_{axis}_m"] = points[FRAMES, k, i]
+    write_track_csv(folder / "track.csv", columns)
+    event = {"frame": 15.5, "event": "heel_strike", "side": "right"}
+    write_events_csv(folder / "events.csv", [event | {"time_s": 0.62}, event | {"time_s": 2.5}])
+    return points
+
+
+def test_a_track_is_written_in_every_format(tmp_path, memo_command):
+    points = write_track(tmp_path / "run")
+    for ending in ("trc", "c3d", "csv", "mot", "sto"):
+        target = tmp_path / "out" / f"walk.{ending}"
+        code, out, err = memo_command("convert", tmp_path / "run", target)
+        assert (code, err) == (0, "")
+        assert "Read 55 frames, 12 points, 8 joint angles, 2 events, 0.40 to 2.96 s." in out
+        assert "2 walks: between them nobody was tracked." in out
+        up = "Z" if ending in ("c3d", "csv") else "Y"
+        assert out.endswith(f"Written to {target}, {up} up.\n")
+        read = read_motion(target)
+        assert read.angles["right_knee"][5] == 15.5 if ending != "trc" else not read.angles
+        if ending in ("trc", "c3d"):
+            assert len(read.times_s) == 65 and np.isnan(read.points[30:40]).all()
+            assert np.nanmax(np.abs(read.points - points[10:75])) < 1e-4
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        f"walk.{ending}" for ending in ("c3d", "csv", "mot", "sto", "trc")
+    ]
+
+
+def test_one_walk_its_events_and_the_summary_as_json(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    target = tmp_path / "run" / "walk.c3d"  # beside what was read
+    code, out, _ = memo_command("convert", tmp_path / "run", target, "--walk", 1, "--json", "--up", "y")
+    summary = json.loads(out)
+    assert (
+        code == 0
+        and summary["frames"] == 25
+        and summary["up"] == "y"
+        and summary["events"] == 1
+        and summary["notes"] == []
+    )
+    assert summary["points"] == [*JOINTS] and summary["files"] == [str(target)]
+    file = ezc3d.c3d(str(target))
+    assert file["header"]["points"]["first_frame"] == 50
+    assert file["parameters"]["EVENT"]["TIMES"]["value"].ravel().tolist() == [0, 2.5]
+    assert file["parameters"]["POINT"]["Y_SCREEN"]["value"] == ["+Y"]
+    code, _, err = memo_command("convert", tmp_path / "run", target, "--walk", 7)
+    assert code == 1 and "there is no walk 7, only 0 to 1" in err
+
+
+def test_bvh_takes_one_walk_or_says_why_not(tmp_path, memo_command):
+    points = write_track(tmp_path / "run")
+    target = tmp_path / "walk.bvh"
+    code, _, err = memo_command("convert", tmp_path / "run", target)
+    assert code == 1 and not target.exists()
+    assert "is missing in 10 frames, the first at 1.6 s" in err and "--walk" in err
+    code, out, _ = memo_command("convert", tmp_path / "run" / "track.csv", target, "--walk", 0)
+    assert code == 0 and "A BVH file has no place for events: left out." in out
+    read = read_motion(target)
+    foot = read.points[:, read.names.index("LeftFoot")]
+    assert np.abs(foot - points[10:40, JOINTS.index("left_ankle")]).max() < 3e-4
+
+
+def test_irregular_stamps_are_refused_and_interpolated_on_demand(tmp_path, memo_command):
+    times_s = 0.4 + np.cumsum(np.random.default_rng(0).uniform(0.02, 0.06, len(FRAMES)))
+    write_track(tmp_path / "run", times_s)
+    for ending in ("trc", "c3d", "bvh"):
+        target = tmp_path / f"walk.{ending}"
+        code, _, err = memo_command("convert", tmp_path / "run", target)
+        assert code == 1 and "the time stamps have no constant rate (16" in err and "give --rate" in err
+        assert not target.exists()
+        assert memo_command("convert", tmp_path / "run", target, "--rate", 50, "--quiet") == (0, "", "")
+        assert read_motion(target).at_constant_rate()[0] == pytest.approx(50)
+    assert memo_command("convert", tmp_path / "run", tmp_path / "walk.csv")[0] == 0
+    assert read_motion(tmp_path / "walk.csv").times_s == pytest.approx(times_s, abs=1e-6)
+
+
+def test_postures_are_converted_with_short_gaps_filled(tmp_path, memo_command):
+    points, times_s = stick_figure(30)
+    points[5:7, 2] = np.nan
+    columns = {"frame": np.arange(30), "time_s": times_s}
+    for k, joint in enumerate(JOINTS):
+        columns |= {f"{joint}_{axis}_m": points[:, k, i] for i, axis in enumerate("xyz")}
+        columns[f"{joint}_sd_m"] = np.zeros(30)
+    (tmp_path / "run").mkdir()
+    write_columns_csv(tmp_path / "run" / "postures.csv", columns)
+    target = tmp_path / "postures.bvh"
+    assert memo_command("convert", tmp_path / "run", target)[0] == 1
+    code, out, _ = memo_command("convert", tmp_path / "run", target, "--fill", 0.1)
+    assert code == 0 and "Filled by straight lines: 2 missing values." in out
+    assert read_motion(target).metadata["up"] == "y"
+
+
+def test_up_axis_and_unit_can_be_given(tmp_path, memo_command):
+    write_motion(tmp_path / "a.trc", walk(), "z")
+    code, _, _ = memo_command("convert", tmp_path / "a.trc", tmp_path / "b.csv", "--from-up", "y")
+    x, y, z = np.moveaxis(walk().points, -1, 0)
+    assert code == 0
+    assert np.allclose(
+        read_motion(tmp_path / "b.csv").points, np.stack([x, -z, y], -1), atol=1e-6, equal_nan=True
+    )
+    write_motion(tmp_path / "a.bvh", walk(gaps=False))
+    assert memo_command("convert", tmp_path / "a.bvh", tmp_path / "m.csv", "--unit", "mm")[0] == 0
+    small, right = read_motion(tmp_path / "m.csv"), read_motion(tmp_path / "a.bvh")
+    assert np.allclose(10 * small.points, right.points, atol=1e-5)
+
+
+def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
+    write_motion(tmp_path / "a.trc", walk())
+    a, b = tmp_path / "a.trc", tmp_path / "b.c3d"
+    (tmp_path / "empty").mkdir()
+    before = a.read_bytes()
+    for arguments, says in (
+        ((a, a), "a.trc: is what was read; write to another place"),
+        ((a, tmp_path / "b.xls"), "b.xls: the ending must be one of .bvh, .c3d, .csv, .mot, .sto"),
+        ((a, tmp_path / "empty"), "the ending must be one of"),
+        ((tmp_path / "none.trc", b), "none.trc: no such file or folder"),
+        ((tmp_path / "empty", b), "empty: holds neither track.csv of `memo track` nor postures.csv"),
+        ((a, b, "--rate", 0), "--rate 0 must be positive and finite"),
+        ((a, b, "--rate", "1e12"), "at 1e+12 Hz are more than"),
+        ((a, b, "--unit", "feet"), "--unit feet is neither m, cm, mm nor a number of metres"),
+        ((a, b, "--walk", 0), "only track.csv counts walks"),
+        ((a, tmp_path / "a.mot"), "holds joint angles, and there are none"),
+        ((a, a / "b.c3d"), "cannot be written to"),
+    ):
+        code, out, err = memo_command("convert", *arguments)
+        assert (code, out) == (1, "") and says in err and err.startswith("memo: "), err
+    assert memo_command("convert", a, b, "--up", "x")[0] == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.trc", "empty"]
+    assert a.read_bytes() == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unwritable to root")
+def test_an_unwritable_folder_is_told_before_the_source_is_read(tmp_path, memo_command):
+    (tmp_path / "sealed").mkdir(mode=0o500)
+    (tmp_path / "a.trc").write_text("broken")
+    code, _, err = memo_command("convert", tmp_path / "a.trc", tmp_path / "sealed" / "a.c3d")
+    assert code == 1 and "cannot be written to" in err
+
+
+def test_damaged_tracks_are_told_with_the_column(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    table = tmp_path / "run" / "track.csv"
+    table.write_text(table.read_text().replace("25.50", "many", 1))
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "x.trc")
+    assert code == 1 and "run: track.csv: column right_knee_deg: could not convert" in err
+    table.write_text(table.read_text().split("\n")[0] + "\n")
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "x.trc")
+    assert code == 1 and "track.csv has no frames: nobody was tracked" in err
+
+
+def test_what_fails_half_way_leaves_nothing(tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError("the disk is full")
+
+    for ending in sorted(WRITERS):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "replace", fail)
+            with pytest.raises(OSError, match="full"):
+                write_motion(tmp_path / f"a{ending}", walk(gaps=False))
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_another_format_is_one_entry_in_each_table(tmp_path, memo_command, monkeypatch):
+    def write_names(path, motion, up):
+        path.write_text(" ".join(motion.names))
+        return []
+
+    def read_names(path, given):
+        names = path.read_text().split()
+        return Motion(tuple(names), [0.0], np.zeros((1, len(names), 3)))
+
+    monkeypatch.setitem(WRITERS, ".names", write_names)
+    monkeypatch.setitem(READERS, ".names", read_names)
+    write_motion(tmp_path / "a.trc", walk())
+    assert memo_command("convert", tmp_path / "a.trc", tmp_path / "a.names")[0] == 0
+    assert memo_command("convert", tmp_path / "a.names", tmp_path / "b.csv")[0] == 0
+    assert read_motion(tmp_path / "b.csv", rate_hz=None).names == JOINTS
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["formats/cmu_12_01_walk.bvh", "formats/PiG__PiG_Motion-FlatFoot-Hole.c3d", "joints/CMU_12_01.csv"],
+)
+def test_real_motion_files_make_point_light_displays(tmp_path, memo_command, path):
+    source = shared_motion("mocap", *path.split("/"))
+    code, _, err = memo_command("pointlight", source, "--out", tmp_path, "--locomotion", "translating")
+    assert (code, err) == (0, "")
+    with open(tmp_path / "dots.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    if path.endswith(".csv"):
+        return
+    motion = read_motion(source)
+    ankle = motion.names.index({"b": "RightFoot", "P": "RTIO"}["b" if "bvh" in path else "P"])
+    v_px = np.array([float(row["RAN_v_px"]) for row in rows])
+    assert np.allclose(v_px, -200 * motion.points[:, ankle, 2], atol=1e-3)
+    assert {name for name in rows[0] if name.endswith("_u_px")} >= {"RSH_u_px", "LAN_u_px", "HEAD_u_px"}
+
+
+def test_pointlight_says_which_joints_a_file_lacks(tmp_path, memo_command):
+    write_motion(tmp_path / "markers.trc", Motion(("RSHO", "LKNE"), np.arange(9) / 10, np.zeros((9, 2, 3))))
+    code, _, err = memo_command("pointlight", tmp_path / "markers.trc", "--out", tmp_path / "out")
+    assert code == 1 and "markers.trc: no points for right_shoulder" in err and "RSHO, LKNE" in err
+    write_track(tmp_path / "run")
+    code, out, _ = memo_command("pointlight", tmp_path / "run", "--out", tmp_path / "out")
+    assert code == 0 and "12 dots" in out
+    assert (Path(tmp_path) / "out" / "display.mp4").exists()
