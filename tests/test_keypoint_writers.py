@@ -134,6 +134,15 @@ def test_an_openpose_folder_replaces_an_earlier_one_and_no_other(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["walk"]
 
 
+def test_half_a_character_in_json_is_written_as_it_was_read(tmp_path):
+    frame = {"note": "\ud800", "people": [{"pose_keypoints_2d": triples(figure(layouts()["BODY_25"]))}]}
+    (tmp_path / "json").mkdir()
+    (tmp_path / "json" / "a_1.json").write_text(json.dumps(frame))
+    found = read_keypoints(tmp_path / "json", fps=25)
+    found.replaced(found.points + 1, found.scores).write(tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "a_1.json").read_bytes())["note"] == "\ud800"
+
+
 # COCO, read and judged by pycocotools.
 
 

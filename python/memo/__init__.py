@@ -21,7 +21,7 @@ from memo._memo import (
     velocity_field,
     walker_motion,
 )
-from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
+from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints, write_keypoints
 from memo.linkage import PlanarFigure, planar
 from memo.postures import Postures, posture, read_lengths
 from memo.scene import DemoScene, demo_scene
@@ -61,4 +61,5 @@ __all__ = [
     "unswap",
     "velocity_field",
     "walker_motion",
+    "write_keypoints",
 ]

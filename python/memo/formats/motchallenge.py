@@ -13,7 +13,7 @@ What it cannot do: clip boxes to the picture (no field says its size); say how s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -105,10 +105,10 @@ def read_motchallenge(
     """
     _check_up(up)
     path = Path(path)
-    rows = [_row(line, f"{path}: line {number}") for number, line in _lines(path)]
-    if not rows:
+    rows = (_row(line, f"{path}: line {number}") for number, line in _lines(path))
+    values: Array = np.fromiter(rows, np.dtype((np.float64, 10)))  # type: ignore[assignment]
+    if not len(values):
         raise BoxesError(f"{path}: no row in it")
-    values = np.array(rows)
     columns: dict[str, npt.NDArray[Any]] = {
         "frame": values[:, 0].astype(np.int64) - 1,
         "id": values[:, 1].astype(np.int64),
@@ -125,7 +125,7 @@ def _check_up(up: str) -> None:
         raise BoxesError(f'up must be "z" or "y", got {up!r}')
 
 
-def _lines(path: Path) -> list[tuple[int, str]]:
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """The lines that are not blank, by their number."""
     try:
         size = path.stat().st_size
@@ -136,7 +136,7 @@ def _lines(path: Path) -> list[tuple[int, str]]:
         raise BoxesError(f"{path}: not text in UTF-8 (byte {error.start})") from None
     except OSError as error:
         raise BoxesError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
+    return ((number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip())
 
 
 def _row(line: str, where: str) -> list[float]:

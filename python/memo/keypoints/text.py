@@ -43,7 +43,8 @@ def parsed(path: Path, content: str) -> Any:
 def json_text(data: Any, like: str) -> str:
     """The data as JSON, with or without spaces as in the text it came from."""
     compact = re.search(r'"\s*:\s', like) is None
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":") if compact else None)
+    surrogates = re.search(r"\\u[dD][89a-fA-F]", like) is not None
+    return json.dumps(data, ensure_ascii=surrogates, separators=(",", ":") if compact else None)
 
 
 def write_text(out: Path, text: str) -> None:
@@ -51,7 +52,7 @@ def write_text(out: Path, text: str) -> None:
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with complete_file(out) as temporary:
-            temporary.write_bytes(text.encode("utf-8", "surrogatepass"))
+            temporary.write_bytes(text.encode("utf-8"))
     except OSError as error:
         raise KeypointsError(f"{out}: cannot be written: {error.strerror or error}") from None
 
