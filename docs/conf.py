@@ -56,10 +56,11 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "download_all_examples": False,
     "remove_config_comments": True,
+    "capture_repr": (),
     "show_memory": False,
     "show_signature": False,
     "min_reported_time": 1e9,
-    "plot_gallery": True,
+    "write_computation_times": False,  # their page would fetch scripts from elsewhere
 }
 
 html_theme = "furo"

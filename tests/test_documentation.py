@@ -36,10 +36,10 @@ NOT_RUN = {
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 5,
 }
-BLOCKS_RUN = 15
+BLOCKS_RUN = 16
 
 _FENCE = re.compile(
-    r"^(?P<ticks>```+)(?P<language>[a-z]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
+    r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
 )
 _MARKER = re.compile(r"<!-- not run: (.+) -->\n\Z")
 
@@ -201,7 +201,7 @@ def test_an_example_runs_and_draws(example, workplace):
 
 
 def test_there_are_examples():
-    assert len(EXAMPLES) == 8
+    assert len(EXAMPLES) == 11
 
 
 @pytest.mark.skipif(not os.environ.get("MEMO_FULL"), reason="compiles for minutes; MEMO_FULL=1 runs it")
