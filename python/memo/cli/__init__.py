@@ -1,4 +1,4 @@
-"""The command line: `memo track`, `batch`, `posture`, `planar`, `convert`, `report` and the rest.
+"""The command line: a command a file of this package.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -70,6 +70,6 @@ def _app() -> "typer.Typer":
     add_reproduce(app)
     add_pointlight(app)
     add_planar(app)
-    add_convert(app)
     add_report(app)
+    add_convert(app)
     return app

@@ -1,0 +1,221 @@
+"""What the documentation tells people to type is typed here: blocks of README.md and docs/, and all examples.
+
+A page is run from top to bottom in a folder of its own, in which the files stand that its text takes for
+given: `walk.mp4`, `camera.toml`, `walk_json/`. A block with `<!-- not run: why -->` on the line above is left
+out; how many these are is counted below, so that none is left out unseen.
+"""
+
+import contextlib
+import doctest
+import os
+import re
+import runpy
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import memo
+import numpy as np
+import pytest
+from memo.files import write_json
+from memo.video import VideoReader
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+LANGUAGES = ("sh", "console", "python", "pycon")
+
+#: Blocks that are not run, by page: set-up, what compiles for minutes, and what needs data of the reader's.
+NOT_RUN = {
+    "README.md": 4,
+    "CONTRIBUTING.md": 2,
+    "docs/start/install.md": 2,
+    "docs/start/rust.md": 2,
+    "docs/start/vision-science.md": 1,
+    "docs/reference/accuracy.md": 5,
+}
+BLOCKS_RUN = 16
+
+_FENCE = re.compile(
+    r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
+)
+_MARKER = re.compile(r"<!-- not run: (.+) -->\n\Z")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page."""
+
+    language: str
+    text: str
+    line: int
+    why_not: str | None
+
+
+def blocks(page: Path) -> list[Block]:
+    """The blocks of a page that are commands or Python."""
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for match in _FENCE.finditer(text):
+        marker = _MARKER.search(text[: match.start()])
+        line = text[: match.start()].count("\n") + 1
+        found.append(Block(match["language"], match["text"], line, marker and marker[1]))
+    return [block for block in found if block.language in LANGUAGES]
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+WITH_BLOCKS = [page for page in PAGES if any(block.why_not is None for block in blocks(page))]
+
+
+def test_no_block_is_left_out_unseen():
+    left_out = {name(page): sum(block.why_not is not None for block in blocks(page)) for page in PAGES}
+    assert {page: count for page, count in left_out.items() if count} == NOT_RUN
+    assert sum(block.why_not is None for page in PAGES for block in blocks(page)) == BLOCKS_RUN
+
+
+@pytest.fixture(scope="session")
+def given(tmp_path_factory):
+    """The files that pages take for given."""
+    folder = tmp_path_factory.mktemp("given")
+    scene = memo.demo_scene(seed=0)
+    write_walk(folder / "walk.mp4", scene)
+    (folder / "camera.toml").write_text(calibration(scene.camera), encoding="utf-8")
+    write_keypoints(folder / "walk_json", scene.camera)
+    return folder
+
+
+def write_walk(path, scene):
+    import av
+
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=round(1 / (scene.times_s[1] - scene.times_s[0])))
+        stream.height, stream.width = scene.frames.shape[1:]
+        stream.pix_fmt = "yuv420p"
+        for frame in scene.frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+        container.mux(stream.encode(None))
+
+
+def calibration(camera):
+    """The camera as TOML, found again from what it does to points."""
+    corner = np.vstack([np.zeros(3), np.eye(3)])
+    in_camera = camera.camera_from_world(corner)
+    translation, rotation = in_camera[0], (in_camera[1:] - in_camera[0]).T
+    ahead = (np.array([[0.0, 0.0, 4.0], [1.0, 1.0, 4.0]]) - translation) @ rotation
+    (cu, cv), (u, v) = camera.project(ahead)
+    matrix = [[4 * (u - cu), 0, cu], [0, 4 * (v - cv), cv], [0, 0, 1]]
+    lines = [f"size = {list(camera.size)}", f"matrix = {np.round(matrix, 6).tolist()}"]
+    lines += ["distortions = [0.0, 0.0, 0.0, 0.0]", f"rotation = {rotation.tolist()}"]
+    return "\n".join(["[cam]", 'name = "cam"', *lines, f"translation = {translation.tolist()}", ""])
+
+
+def write_keypoints(folder, camera):
+    """A walker as OpenPose writes COCO-18, one file a frame."""
+    folder.mkdir()
+    walker = memo.walker_motion(90, rate_hz=30, heading_deg=20, height_m=1.75)
+    places = dict(zip(walker["names"], walker["positions"].transpose(1, 0, 2), strict=True))
+    places["NECK"] = (places["RSH"] + places["LSH"]) / 2
+    order = ["HEAD", "NECK", *(f"{side}{joint}" for side in "RL" for joint in ("SH", "EL", "WR"))]
+    order += [f"{side}{joint}" for side in "RL" for joint in ("HP", "KN", "AN")]
+    pixels = np.stack([camera.project(places[joint]) for joint in order], axis=1)
+    for frame, points in enumerate(pixels):
+        triples = [[u, v, 0.9] if np.isfinite(u) else [0, 0, 0] for u, v in points] + [[0, 0, 0]] * 4
+        person = {"pose_keypoints_2d": np.round(np.ravel(triples), 2).tolist()}
+        write_json(folder / f"walk_{frame:012d}_keypoints.json", {"version": 1.3, "people": [person]})
+
+
+@pytest.fixture
+def workplace(given, tmp_path, monkeypatch):
+    """A folder with the given files in it, and the `memo` command on the path."""
+    for file in given.iterdir():
+        (tmp_path / file.name).symlink_to(file)
+    command = tmp_path / "bin" / "memo"
+    command.parent.mkdir()
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m memo.cli "$@"\n', encoding="utf-8")
+    command.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{command.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", str(Path(memo.__file__).parents[1]))
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("Agg")
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", WITH_BLOCKS, ids=name)
+def test_a_page_does_what_it_says(page, workplace):
+    known = {}
+    for block in blocks(page):
+        if block.why_not is None:
+            run(block, known, f"{name(page)}:{block.line}")
+
+
+def run(block, known, where):
+    """Runs a block; Python blocks of a page share their names."""
+    if block.language == "python":
+        with contextlib.redirect_stdout(sys.stderr):
+            exec(compile(block.text, where, "exec"), known)
+    elif block.language == "pycon":
+        test = doctest.DocTestParser().get_doctest(block.text, known, where, where, 0)
+        assert not doctest.DocTestRunner().run(test, clear_globs=False).failed, where
+        known.update(test.globs)
+    elif block.language == "sh":
+        shell(block.text, where)
+    else:
+        for command, output in commands(block.text):
+            said = shell(command, where).splitlines()
+            assert [line for line in output if line not in said] == [], where
+
+
+def commands(text):
+    """Commands of a `console` block, each with the lines of output shown below it."""
+    found = []
+    for line in text.splitlines():
+        if line.startswith("$ "):
+            found.append((line[2:], []))
+        elif line.strip() and line.strip() != "…":
+            found[-1][1].append(line)
+    return found
+
+
+def shell(script, where):
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", script], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, f"{where}: {script}: exit code {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_draws(example, workplace):
+    from matplotlib import pyplot as plt
+
+    try:
+        runpy.run_path(str(example))
+        assert plt.get_fignums()
+    finally:
+        plt.close("all")
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) == 11
+
+
+@pytest.mark.skipif(not os.environ.get("MEMO_FULL"), reason="compiles for minutes; MEMO_FULL=1 runs it")
+def test_the_rust_example_of_the_readme_runs(workplace):
+    from PIL import Image
+
+    frames = workplace / "FOLDER_OF_PNG_FRAMES"
+    frames.mkdir()
+    with VideoReader("walk.mp4") as video:
+        for frame in video:
+            Image.fromarray(np.ascontiguousarray(frame.luma)).save(frames / f"{frame.index:04d}.png")
+    (block,) = [block for block in blocks(ROOT / "README.md") if "--example track_frames" in block.text]
+    command = block.text.replace("FOLDER_OF_PNG_FRAMES", str(frames)).replace(
+        "camera.toml", str(workplace / "camera.toml")
+    )
+    rows = shell(f"cd {ROOT} && {command}", "README.md").splitlines()
+    assert rows[0].startswith("frame,time_s,x_m") and len(rows) > 60
