@@ -1,6 +1,7 @@
 //! Python bindings of memo-core: convert, release the interpreter lock, one call, convert back.
 
 mod array;
+mod calibrate;
 mod camera;
 mod error;
 mod image;
@@ -21,6 +22,8 @@ use pyo3::prelude::*;
 mod _memo {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
     #[pymodule_export]
     use super::camera::PyCamera;
     #[pymodule_export]
