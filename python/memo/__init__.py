@@ -7,6 +7,8 @@ Frames are numpy arrays (H, W) uint8; metres and seconds throughout; world Z up;
 from memo._memo import (
     Camera,
     __version__,
+    calibrate_points,
+    calibrate_walker,
     change_mask,
     edge_segments,
     head_points,
@@ -19,6 +21,7 @@ from memo._memo import (
     stick_joints,
     velocity_field,
     walker_motion,
+    walker_sightings,
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 from memo.linkage import PlanarFigure, planar
@@ -38,6 +41,8 @@ __all__ = [
     "Track",
     "Tracker",
     "__version__",
+    "calibrate_points",
+    "calibrate_walker",
     "change_mask",
     "demo_scene",
     "edge_segments",
@@ -58,4 +63,5 @@ __all__ = [
     "unswap",
     "velocity_field",
     "walker_motion",
+    "walker_sightings",
 ]

@@ -1,4 +1,5 @@
-"""The command line: `memo track`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`, `planar`.
+"""The command line: `memo track`, `calibrate`, `unswap`, `posture`, `demo`, `reproduce`, `pointlight`,
+`planar`.
 
 This package alone knows how results are delivered: what is checked before work starts, what is written,
 what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
@@ -10,6 +11,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
 import memo
+from memo.cli.calibrate import add_calibrate
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
@@ -60,6 +62,7 @@ def _app() -> "typer.Typer":
     ) -> None: ...
 
     add_track(app)
+    add_calibrate(app)
     add_unswap(app)
     add_posture(app)
     add_demo(app)

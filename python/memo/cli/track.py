@@ -12,7 +12,7 @@ import numpy as np
 
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, Interrupt, complain, guarded, with_progress
-from memo.cli.given import check_writable, checked_height, load_camera
+from memo.cli.given import check_writable, checked_fov, checked_height, load_camera
 from memo.files import write_events_csv, write_track_csv
 
 if TYPE_CHECKING:
@@ -32,11 +32,16 @@ _LIKELY_SWAPPED = 0.2  # from one in five on, left and right should be looked at
 def add_track(app: "typer.Typer") -> None:
     import typer
 
+    from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
+
     @app.command(epilog=EXIT_CODES)
     def track(
         video: Annotated[Path, typer.Argument(help="A video file, or a folder of images (then --fps too).")],
-        camera: Annotated[Path | None, typer.Option(help="Calibration: TOML, or Tsai XML.")] = None,
-        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        camera: Annotated[Path | None, typer.Option(help=CAMERA_HELP)] = None,
+        camera_name: CameraName = None,
+        camera_unit: CameraUnit = None,
+        camera_size: CameraSize = None,
+        camera_v_up: CameraVUp = None,
         height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
         fov_deg: Annotated[
             float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
@@ -55,7 +60,8 @@ def add_track(app: "typer.Typer") -> None:
         delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
 
         def work() -> Exit:
-            tracker_options = _tracker_options(height, camera, camera_name, fov_deg)
+            reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
+            tracker_options = _tracker_options(height, camera, reading, fov_deg)
             return _track_video(video, _frame_range(frames), fps, tracker_options, delivery)
 
         raise typer.Exit(guarded(work))
@@ -139,19 +145,18 @@ def _snapshot(track: Any, first_frame: int) -> Any:
 
 
 def _tracker_options(
-    height_m: float, camera: Path | None, camera_name: str | None, fov_deg: float | None
+    height_m: float, camera: Path | None, reading: dict[str, Any], fov_deg: float | None
 ) -> dict[str, Any]:
     options: dict[str, Any] = {"height_m": checked_height(height_m)}
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
-    if camera is None and camera_name is not None:
-        raise InputError("--camera-name needs --camera")
+    for name, value in reading.items():
+        if camera is None and value is not None:
+            raise InputError(f"--camera-{name.replace('_', '-')} needs --camera")
     if camera is not None:
-        options["camera"] = load_camera(camera, camera_name)
+        options["camera"] = load_camera(camera, **reading)
     if fov_deg is not None:
-        if not 5 <= fov_deg <= 170:
-            raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
-        options["fov_deg"] = fov_deg
+        options["fov_deg"] = checked_fov(fov_deg)
     return options
 
 
