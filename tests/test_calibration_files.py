@@ -41,6 +41,7 @@ def test_what_opencv_writes_projects_as_opencv_does(tmp_path, suffix):
     for name, changes in {
         "vectors": {},
         "matrix": {"rvec": None, "tvec": None, "R": cv2.Rodrigues(RVEC)[0], "T": TVEC.reshape(1, 3)},
+        "flat": {"rvec": RVEC, "tvec": TVEC},
         "named": {"camera_matrix": None, "cameraMatrix": MATRIX, "calibration_time": "Mon: 3", "flags": 0},
     }.items():
         camera = memo.Camera.from_file(written(tmp_path / f"{name}.{suffix}", **changes))
@@ -86,7 +87,7 @@ def test_several_cameras_in_json(tmp_path):
 
 
 def test_millimetres_are_noticed_and_taken_when_said(tmp_path):
-    path = written(tmp_path / "camera.yml", tvec=TVEC * 1000)
+    path = written(tmp_path / "camera.yml", tvec=TVEC.reshape(3, 1) * 1000)
     with pytest.raises(ValueError, match=r"tvec \(line 19\).*0.19 px high.*millimetres.*it would be 193 px"):
         memo.Camera.from_file(path)
     camera = memo.Camera.from_file(path, unit="mm")
@@ -175,5 +176,5 @@ def test_other_files_are_refused_by_name(tmp_path, name, content, reason):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=rf"{name}: .*{reason}"):
         memo.Camera.from_file(tmp_path / name)
-    with pytest.raises(OSError, match="absent.yml"):
+    with pytest.raises(OSError, match=r"absent\.yml"):
         memo.Camera.from_file(tmp_path / "absent.yml")

@@ -110,8 +110,8 @@ def read_picture(path: str | PathLike[str]) -> Luma:
 def rectangles(frames: Sequence[Luma]) -> tuple[Array, Array]:
     """Feet and heads (N, 2), pixels, of the silhouettes that stand clear of the picture's border.
 
-    The middle of the lowest rows' and of the highest rows' pixels: a rectangle's own middles would be those of
-    arms and legs.
+    The middles of the lowest and of the highest tenth of rows: a rectangle's own would be those of arms and
+    legs.
     """
     feet, heads = [], []
     for mask in memo.silhouettes(list(frames)):

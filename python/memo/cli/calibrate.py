@@ -17,7 +17,7 @@ from memo.cli.given import (
     checked_fov,
     checked_height,
     load_camera,
-    pixel_size,
+    two_sides,
 )
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def add_calibrate(app: "typer.Typer") -> None:
 
         def work() -> Exit:
             check_apart([folder, floor], _written(delivery))
-            return _checkerboard(folder, pixel_size(squares, "--squares"), square_mm, floor, delivery)
+            return _checkerboard(folder, two_sides(squares, "--squares", "9x6"), square_mm, floor, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -121,7 +121,7 @@ def _view(size: str | None, picture: Path | None, fov_deg: float | None, lens: P
         raise InputError("--lens already holds the field of view: leave --fov-deg out")
     luma = None if picture is None else read_picture(picture)
     known = None if lens is None else load_camera(lens, None, size=size, lens_only=True)
-    sides = None if size is None else pixel_size(size, "--size")
+    sides = None if size is None else two_sides(size, "--size")
     for other in (None if luma is None else luma.shape[::-1], None if known is None else known.size):
         if sides is not None and other is not None and tuple(other) != tuple(sides):
             raise InputError(
@@ -201,7 +201,8 @@ def _walker(
     kept = len(feet) - len(found["outliers"])
     lines = [
         f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
-        f" {found['rms_px'] / found['person_px']:.1%} of the person's height, over {kept} of {len(feet)} sightings.",
+        f" {found['rms_px'] / found['person_px']:.1%}"
+        f" of the person's height, over {kept} of {len(feet)} sightings.",
         f"All lengths rest on the person's height of {height_m:g} m.",
     ]
     if view["focal_px"] is not None:

@@ -23,15 +23,15 @@ def load_camera(
 ) -> Any:
     if not path.is_file():
         raise InputError(f"{path}: no such camera file")
-    sides = None if size is None else pixel_size(size, "--camera-size")
+    sides = None if size is None else two_sides(size, "--camera-size")
     return memo.Camera.from_file(path, name, unit, size=sides, v_up=v_up, lens_only=lens_only)
 
 
-def pixel_size(text: str, option: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT."""
+def two_sides(text: str, option: str, example: str = "1280x720") -> tuple[int, int]:
+    """Two whole numbers as in 1280x720."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal() and 0 < int(width) < 10**6 and 0 < int(height) < 10**6):
-        raise InputError(f"{option} {text} is not WIDTHxHEIGHT in pixels, such as 1280x720")
+        raise InputError(f"{option} {text} is not two whole numbers such as {example}")
     return int(width), int(height)
 
 

@@ -403,7 +403,13 @@ impl<'a> Problem<'a> {
             }
         }
         let mut best: Option<(f64, State)> = None;
-        for subset in &subsets {
+        for (number, subset) in subsets.iter().enumerate() {
+            // Where the pose from all points leaves none far off, none of them spoils it.
+            if number == 1
+                && best.as_ref().is_some_and(|(middle, state)| self.leaves_none_far(state, *middle))
+            {
+                break;
+            }
             for state in self.poses(subset) {
                 let mut distances: Vec<f64> = (0..all.len())
                     .map(|i| self.residual(&state, i).map_or(f64::INFINITY, DVec2::length))
@@ -417,6 +423,11 @@ impl<'a> Problem<'a> {
             }
         }
         best.map(|(_, state)| state).filter(|state| all.iter().any(|&i| self.residual(state, i).is_some()))
+    }
+
+    fn leaves_none_far(&self, state: &State, middle_px: f64) -> bool {
+        let limit_px = (4.0 * middle_px).max(1.0);
+        (0..self.places.len()).all(|i| self.residual(state, i).is_some_and(|r| r.length() < limit_px))
     }
 
     /// Poses that fit some of the points.
@@ -511,7 +522,8 @@ impl<'a> Problem<'a> {
     fn without_outliers(&self, start: State, free: &[usize], all: &[usize]) -> Option<Fitted> {
         let mut state = start;
         let mut inliers: Vec<usize> = all.to_vec();
-        let least = (free.len() / 2 + 2).max(all.len() * 2 / 3).min(all.len());
+        // At most a quarter may be mistaken, and one point more than unknowns must be left.
+        let least = (all.len() - all.len() / 4).max(free.len() / 2 + 1).min(all.len());
         // The robust pose says which points may be wrong: at first those six times as far as most.
         let mut distances: Vec<(f64, usize)> =
             all.iter().map(|&i| (self.residual(&state, i).map_or(f64::INFINITY, DVec2::length), i)).collect();
@@ -653,4 +665,56 @@ impl<'a> Problem<'a> {
 fn noise_px(found: &Fitted) -> f64 {
     let freedom = (2 * found.inliers.len()).saturating_sub(found.free.len());
     (found.fit.sum_sq() / freedom.max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn planted(focal_px: f64, turn: DVec3, depth_m: f64) -> Camera {
+        let level = Camera::level([1280, 720], 1.0, 1.5, depth_m).unwrap();
+        let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn)) * level.rotation;
+        let centre = DVec3::new(0.0, 0.0, 1.0);
+        // The middle of the points stays before the camera, at the depth that was asked for.
+        let translation = DVec3::Z * depth_m - rotation * centre;
+        Camera { focal_px: DVec2::splat(focal_px), rotation, translation, ..level }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn a_planted_camera_is_recovered(
+            focal_px in 600.0..2500.0_f64, turn in prop::array::uniform3(-0.8..0.8_f64), depth_m in 4.0..9.0_f64,
+            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 8..14),
+        ) {
+            let camera = planted(focal_px, DVec3::from(turn), depth_m);
+            let places: Vec<DVec3> =
+                points.into_iter().map(|p| DVec3::new(1.5 * p[0], 1.5 * p[1], 1.0 + p[2])).collect();
+            prop_assume!(Shape::of(&places).ratios[1] > 0.2);
+            let pixels: Vec<DVec2> = places.iter().map(|p| camera.project(*p).unwrap()).collect();
+            let options = PointOptions { size: camera.size, lens: KnownLens::Nothing };
+            let found = match camera_from_points(&places, &pixels, &options) {
+                // Some draws tell too little of the focal length, which is an answer as well.
+                Err(PointError::FocalUnknown { .. }) => return Ok(()),
+                found => found.unwrap(),
+            };
+            prop_assert!((found.camera.focal_px.x / focal_px - 1.0).abs() < 1e-5, "{}", found.camera.focal_px);
+            prop_assert!((found.camera.position() - camera.position()).length() < 1e-4);
+            prop_assert!(found.outliers.is_empty() && found.rms_px < 1e-4);
+        }
+
+        #[test]
+        fn no_input_makes_it_panic(
+            points in prop::collection::vec(prop::array::uniform3(prop::num::f64::ANY), 0..9),
+            pixels in prop::collection::vec(prop::array::uniform2(-1e7..1e7_f64), 0..9),
+        ) {
+            let places: Vec<DVec3> = points.into_iter().map(DVec3::from).collect();
+            let pixels: Vec<DVec2> = pixels.into_iter().map(DVec2::from).collect();
+            let options = PointOptions { size: [640, 480], lens: KnownLens::Nothing };
+            if let Ok(found) = camera_from_points(&places, &pixels, &options) {
+                prop_assert!(found.camera.validated().is_ok());
+            }
+        }
+    }
 }

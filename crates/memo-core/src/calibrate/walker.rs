@@ -11,8 +11,9 @@
 //! ```
 //!
 //! The world's origin is on the ground below the mean place of the person, its Y axis is where the camera looks. A
-//! camera stands level but for some degrees: roll has a prior of 2 degrees, which matters where bodies alone would
-//! have to tell it. The principal point is the picture's centre unless the lens is known.
+//! camera stands level but for some degrees: roll has a prior of 2 degrees, the focal length one of a factor of e
+//! about the picture's width, both weak beside any walk that tells them. The principal point is the picture's
+//! centre unless the lens is known.
 //!
 //! # What it cannot do
 //!
@@ -34,6 +35,8 @@ use crate::model::distortion::Distortion;
 const NEEDED: usize = 4;
 /// Of a camera's roll, radians (2 degrees).
 const ROLL_SD_RAD: f64 = 0.035;
+/// Of a focal length that nothing is known of, as the picture's longer side: a factor of e.
+const FOCAL_SD: f64 = 1.0;
 /// A walker's sway and a detector's error at least, as a share of the height.
 const LEAST_NOISE: f64 = 0.005;
 /// The focal length is told if its standard deviation is below this share of it, the pitch below this, radians.
@@ -176,18 +179,17 @@ pub fn camera_from_walker(
     options: &WalkerOptions,
 ) -> Result<WalkerCalibration, WalkerError> {
     let problem = Problem::new(sightings, options)?;
-    let all: Vec<usize> = (0..problem.sightings.len()).collect();
     // 1. The best of a grid, then weights that forget what is far off.
     let mut parameters = problem.start();
-    let unweighted = vec![1.0; all.len()];
-    let mut weights = unweighted.clone();
+    let mut weights = vec![1.0; problem.sightings.len()];
     for _ in 0..10 {
         let distances = problem.distances(&parameters);
         let mut sorted = distances.clone();
         sorted.sort_by(f64::total_cmp);
         let scale = (2.0 * sorted[sorted.len() / 2]).max(1e-6 * problem.person_px);
         for (weight, distance) in weights.iter_mut().zip(&distances) {
-            *weight = 1.0 / (1.0 + (distance / scale).powi(2));
+            let is_seen = *distance < problem.far_px();
+            *weight = f64::from(u8::from(is_seen)) / (1.0 + (distance / scale).powi(2));
         }
         parameters = problem.fit(&parameters, &weights).map_or(parameters, |fit| problem.all(&fit));
     }
@@ -275,7 +277,7 @@ impl Problem {
         let ray = rotation.transpose() * sighting.foot_px.extend(parameters[FOCAL].exp());
         let drop_m = parameters[HEIGHT].exp() - sighting.foot_share * self.options.height_m;
         let share = -drop_m / ray.z;
-        (share > 0.0 && share.is_finite()).then(|| (ray * share).with_z(0.0))
+        (drop_m > 0.0 && share > 0.0 && share.is_finite()).then(|| (ray * share).with_z(0.0))
     }
 
     /// Fitted minus seen head, pixels.
@@ -291,9 +293,13 @@ impl Problem {
         self.sightings.iter().map(|s| self.residual(parameters, &rotation, s)).collect()
     }
 
+    fn far_px(&self) -> f64 {
+        10.0 * self.width_px
+    }
+
     /// Lengths of the residuals; far where there is none.
     fn distances(&self, parameters: &[f64; 4]) -> Vec<f64> {
-        let far = 10.0 * self.width_px;
+        let far = self.far_px();
         self.residuals(parameters).into_iter().map(|r| r.map_or(far, |r| r.length().min(far))).collect()
     }
 
@@ -336,7 +342,7 @@ impl Problem {
         let free: Vec<f64> =
             start.iter().zip(self.is_free()).filter(|(_, is_free)| *is_free).map(|(p, _)| *p).collect();
         let fixed = self.known_focal_px.map_or(0.0, f64::ln);
-        let noise_px = 0.01 * self.person_px;
+        let noise_px = LEAST_NOISE * self.person_px;
         let residuals = |free: &DVector<f64>| {
             let mut given = free.iter();
             let parameters =
@@ -354,6 +360,7 @@ impl Problem {
                 }
             }
             all.push(parameters[ROLL] / ROLL_SD_RAD * noise_px);
+            all.push((parameters[FOCAL] - fixed.max(self.width_px.ln())) / FOCAL_SD * noise_px);
             Some(DVector::from_vec(all))
         };
         // What is above the horizon at the start cannot be fitted.
@@ -534,4 +541,67 @@ pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Si
     };
     let passing: Vec<Sighting> = (0..seen.len()).filter(|&i| is_passing(i)).map(|i| seen[i].1).collect();
     if passing.len() >= 2 * NEEDED { passing } else { seen.into_iter().map(|(_, s)| s).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEVEL: Camera = Camera {
+        size: [1280, 720],
+        focal_px: DVec2::splat(1000.0),
+        centre_px: DVec2::new(639.5, 359.5),
+        distortion: Distortion::None,
+        rotation: DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::new(0.0, -1.0, 0.0)),
+        translation: DVec3::ZERO,
+    };
+
+    /// A person of 1.8 m on a circle before a camera 3 m high that looks down.
+    fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<Sighting> {
+        let rotation = DMat3::from_rotation_z(roll_rad) * DMat3::from_rotation_x(pitch_rad) * LEVEL.rotation;
+        let translation = rotation * DVec3::new(0.0, 0.0, -3.0);
+        let camera = Camera { rotation, translation, ..LEVEL };
+        let place = |i: i32| {
+            let turn = f64::from(i) * 0.2;
+            DVec3::new(2.0 * turn.cos(), 9.0 + 3.0 * turn.sin(), 0.0)
+        };
+        let sighting = |p: DVec3| {
+            let [foot, head] = [p, p + DVec3::Z * 1.8].map(|p| camera.project(p).unwrap());
+            Sighting::from_rectangle(foot, head)
+        };
+        (0..30).map(place).map(sighting).collect()
+    }
+
+    #[test]
+    fn a_planted_camera_is_recovered() {
+        let options = WalkerOptions { size: LEVEL.size, height_m: 1.8, lens: KnownLens::Nothing };
+        let found = camera_from_walker(&sightings(0.25, 0.0), &options).unwrap();
+        let value = |name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().value;
+        // The prior draws it towards the picture's width of 1280 px, but little.
+        assert!((value("focal_px") - 1000.0).abs() < 0.5, "{}", value("focal_px"));
+        assert!((value("pitch_deg").to_radians() - 0.25).abs() < 2e-4);
+        assert!((value("height_m") - 3.0).abs() < 2e-3);
+        assert!((found.camera.position().z - 3.0).abs() < 2e-3);
+    }
+
+    #[test]
+    fn a_known_lens_leaves_pitch_roll_and_height() {
+        let (focal_px, centre_px) = (LEVEL.focal_px, LEVEL.centre_px);
+        let lens = KnownLens::All { focal_px, centre_px, distortion: Distortion::None };
+        let options = WalkerOptions { size: LEVEL.size, height_m: 1.8, lens };
+        let found = camera_from_walker(&sightings(0.15, 0.02), &options).unwrap();
+        assert!(found.estimates.iter().all(|e| e.name != "focal_px"));
+        let roll = found.estimates.iter().find(|e| e.name == "roll_deg").unwrap().value;
+        // The prior draws it towards zero, but little.
+        assert!((roll.to_radians() - 0.02).abs() < 2e-3, "{roll}");
+    }
+
+    #[test]
+    fn runs_of_alike_values_are_counted() {
+        let alternating: Vec<f64> = (0..100).map(|i| f64::from(i % 2)).collect();
+        assert_eq!(alike(&alternating), 1.0);
+        let runs: Vec<f64> = (0..400).map(|i| f64::from((i / 10) * 7919 % 13)).collect();
+        assert!((5.0..15.0).contains(&alike(&runs)), "{}", alike(&runs));
+        assert_eq!(alike(&[1.0, 1.0]), 1.0);
+    }
 }

@@ -89,7 +89,12 @@ impl Node {
             Value::Table(_) => {
                 let side = |key| self.entry(&[key])?.1.number();
                 let data = self.entry(&["data"])?.1.numbers()?;
-                (side("rows")? * side("cols")? == data.len() as f64).then_some(data)
+                // OpenCV 5 writes arrays of one dimension as `opencv-nd-matrix` with `sizes`.
+                let count = match self.entry(&["sizes"]) {
+                    Some((_, sizes)) => sizes.numbers()?.iter().product(),
+                    None => side("rows")? * side("cols")?,
+                };
+                (count == data.len() as f64).then_some(data)
             }
             _ => None,
         }
