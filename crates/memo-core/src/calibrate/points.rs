@@ -426,7 +426,7 @@ impl<'a> Problem<'a> {
     }
 
     fn leaves_none_far(&self, state: &State, middle_px: f64) -> bool {
-        let limit_px = (4.0 * middle_px).max(1.0);
+        let limit_px = (2.5 * middle_px).clamp(1.0, 0.003 * self.diagonal_px);
         (0..self.places.len()).all(|i| self.residual(state, i).is_some_and(|r| r.length() < limit_px))
     }
 

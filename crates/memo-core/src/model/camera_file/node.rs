@@ -91,7 +91,7 @@ impl Node {
                 let data = self.entry(&["data"])?.1.numbers()?;
                 // OpenCV 5 writes arrays of one dimension as `opencv-nd-matrix` with `sizes`.
                 let count = match self.entry(&["sizes"]) {
-                    Some((_, sizes)) => sizes.numbers()?.iter().product(),
+                    Some((_, sizes)) => sizes.number().or_else(|| Some(sizes.numbers()?.iter().product()))?,
                     None => side("rows")? * side("cols")?,
                 };
                 (count == data.len() as f64).then_some(data)
