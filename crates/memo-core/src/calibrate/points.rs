@@ -540,7 +540,8 @@ impl<'a> Problem<'a> {
             if freedom < 2 {
                 break;
             }
-            let variance = (fit.sum_sq() / freedom as f64).max(1e-16);
+            // Nobody measures pixels to better than a twentieth.
+            let variance = (fit.sum_sq() / freedom as f64).max(0.05 * 0.05);
             // F of 2 and `freedom` degrees: P(F > x) = (1 + 2 x / freedom)^(-freedom / 2).
             let chance = |distance: f64| {
                 let x = distance * distance / (2.0 * variance);
