@@ -35,9 +35,8 @@ class Camera:
         return Camera(tuple(table["size"]))
 
     @staticmethod
-    def from_tsai(*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad):
-        assert len(pixel_mm) == len(centre_px) == 2 and len(translation_mm) == len(rotation_rad) == 3
-        return Camera(size)
+    def from_file(path, name=None, unit=None, *, size=None, v_up=None, lens_only=False):
+        return Camera.from_toml(path, name)
 
     def parameters(self):
         return {"size": list(self.size)}

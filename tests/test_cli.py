@@ -20,7 +20,6 @@ from memo.files import (
     complete_file,
     read_events_csv,
     read_track_csv,
-    read_tsai_xml,
     write_events_csv,
     write_track_csv,
 )
@@ -138,33 +137,6 @@ def test_camera_is_chosen_by_name(memo_command, video, tmp_path):
     assert code == 1 and "640x480 pixels, the video has 50x36" in complaint
     code, _, complaint = memo_command(*arguments, "--camera-name", "top")
     assert code == 1 and "no camera named 'top'" in complaint
-
-
-TSAI = """<?xml version="1.0" encoding="UTF-8"?>
-<Camera name="View_001"><Geometry width="50" height="36" ncx="795" nfx="752" dpx="5.1e-03" dpy="4.65e-03"/>
-<Intrinsic focal="5.55" kappa1="5.1e-03" cx="25" cy="18" sx="1.09"/>
-<Extrinsic tx="828.7" ty="-3175.4" tz="3.5e+04" rx="2.04" ry="-0.89" rz="-0.43"/></Camera>"""
-
-
-def test_tsai_calibration_in_xml(memo_command, video, tmp_path):
-    camera = tmp_path / "View_001.xml"
-    camera.write_text(TSAI)
-    assert read_tsai_xml(camera) == {
-        "size": (50, 36),
-        "pixel_mm": (0.0051, 0.00465),
-        "focal_mm": 5.55,
-        "kappa1_per_mm2": 0.0051,
-        "centre_px": (25, 18),
-        "sx": 1.09,
-        "translation_mm": (828.7, -3175.4, 35000),
-        "rotation_rad": (2.04, -0.89, -0.43),
-    }
-    arguments = ("track", video, "--no-plots", "--no-overlay", "--out", tmp_path, "--camera", camera)
-    assert memo_command(*arguments)[0] == 0
-    for broken in (TSAI.replace("kappa1", "kappa2"), TSAI.replace("5.55", "f"), TSAI[:100]):
-        camera.write_text(broken)
-        code, _, complaint = memo_command(*arguments)
-        assert code == 1 and "not a Tsai calibration" in complaint and complaint.count("\n") == 1
 
 
 @pytest.mark.parametrize(

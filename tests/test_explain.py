@@ -266,7 +266,7 @@ def test_the_run_says_what_was_given_and_found(run):
 
 def test_parameters_of_a_tsai_camera_lose_nothing():
     clip = shared_video("pets09_s2l1")
-    camera = memo.Camera.from_tsai(**memo.files.read_tsai_xml(clip / "View_001.xml"))
+    camera = memo.Camera.from_file(clip / "View_001.xml")
     parameters = json.loads(json.dumps(camera.parameters()))
     ground = camera.ground_points([(100.0, 300.0), (600.0, 500.0)])
     again = memo.Camera.from_parameters(parameters)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import truth
 from conftest import shared_video
-from memo.files import read_tsai_xml, write_events_csv, write_track_csv
+from memo.files import write_events_csv, write_track_csv
 from memo.video import VideoReader
 
 
@@ -256,7 +256,7 @@ def isolated_people():
 
 def test_rectangles_place_isolated_people_on_the_ground():
     """Section 4.2 with the sole on the ground, from rectangles around changes, the camera 7 m above."""
-    camera = memo.Camera.from_tsai(**read_tsai_xml(shared_video("pets09_s2l1") / "View_001.xml"))
+    camera = memo.Camera.from_file(shared_video("pets09_s2l1") / "View_001.xml")
     misses = []
     for (left, top, right, bottom), position in isolated_people():
         middle = (left + right) / 2

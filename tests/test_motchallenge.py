@@ -5,7 +5,7 @@ import motmetrics
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo.files import JOINTS, read_tsai_xml
+from memo.files import JOINTS
 from memo.formats import FormatError
 from memo.formats.motchallenge import (
     boxes_from_contours,
@@ -120,7 +120,7 @@ def test_the_rows_of_pets_are_read_as_motmetrics_reads_them():
     boxes = np.column_stack([rows[name] for name in ("left_px", "top_px", "width_px", "height_px")])
     np.testing.assert_allclose(boxes, table[["X", "Y", "Width", "Height"]], atol=1e-9)
     # Its x, y are where the people stand: below the middle of their boxes.
-    camera = memo.Camera.from_tsai(**read_tsai_xml(clip / "View_001.xml"))
+    camera = memo.Camera.from_file(clip / "View_001.xml")
     feet = camera.project(np.column_stack([rows["x_m"], rows["y_m"], rows["z_m"]]))
     below = np.column_stack([boxes[:, 0] + boxes[:, 2] / 2, boxes[:, 1] + boxes[:, 3]])
     assert np.median(np.linalg.norm(feet - below, axis=1)) < 3

@@ -12,6 +12,8 @@ from memo import explain, gait
 from memo._memo import (
     Camera,
     __version__,
+    calibrate_points,
+    calibrate_walker,
     change_mask,
     edge_segments,
     head_points,
@@ -24,6 +26,7 @@ from memo._memo import (
     stick_joints,
     velocity_field,
     walker_motion,
+    walker_sightings,
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints, write_keypoints
 from memo.linkage import PlanarFigure, planar
@@ -45,6 +48,8 @@ __all__ = [
     "Track",
     "Tracker",
     "__version__",
+    "calibrate_points",
+    "calibrate_walker",
     "change_mask",
     "demo_scene",
     "edge_segments",
@@ -67,5 +72,6 @@ __all__ = [
     "unswap",
     "velocity_field",
     "walker_motion",
+    "walker_sightings",
     "write_keypoints",
 ]

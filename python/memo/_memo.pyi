@@ -16,6 +16,8 @@ __all__ = [
     "__version__",
     "_camera",
     "body_parts",
+    "calibrate_points",
+    "calibrate_walker",
     "change_mask",
     "edge_segments",
     "follow_person",
@@ -60,6 +62,7 @@ __all__ = [
     "walk_lines",
     "walk_similarity",
     "walker_motion",
+    "walker_sightings",
 ]
 
 __version__: str
@@ -70,6 +73,18 @@ class Camera:
 
     @staticmethod
     def from_toml(path: str | PathLike[str], name: str | None = None) -> Camera: ...
+    @staticmethod
+    def from_file(
+        path: str | PathLike[str],
+        name: str | None = None,
+        unit: str | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        v_up: bool | None = None,
+        lens_only: bool = False,
+    ) -> Camera: ...
+    def to_toml(self, path: str | PathLike[str], name: str = "cam") -> None: ...
+    def pixel_height(self, point: tuple[float, float, float], height_m: float) -> float: ...
     @staticmethod
     def from_tsai(
         *,
@@ -339,6 +354,30 @@ def posture_tree(
     strength: str = "measured",
     noise_rad: float = 0.0,
 ) -> npt.NDArray[np.float64]: ...
+def calibrate_points(
+    places: npt.NDArray[np.float64],
+    pixels: npt.NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    focal_px: float | None = None,
+    lens: Camera | None = None,
+) -> dict[str, Any]: ...
+def calibrate_walker(
+    feet: npt.NDArray[np.float64],
+    heads: npt.NDArray[np.float64],
+    size: tuple[int, int],
+    height_m: float,
+    *,
+    foot_share: Sequence[float] | npt.NDArray[np.float64] | None = None,
+    head_share: Sequence[float] | npt.NDArray[np.float64] | None = None,
+    focal_px: float | None = None,
+    lens: Camera | None = None,
+) -> dict[str, Any]: ...
+def walker_sightings(
+    names: Sequence[str], points: npt.NDArray[np.float64]
+) -> tuple[
+    npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]
+]: ...
 def joint_names() -> list[str]: ...
 def segment_names() -> list[str]: ...
 def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...

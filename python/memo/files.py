@@ -1,4 +1,4 @@
-"""The files of results, among them `track.csv`, `events.csv` and `flips.csv`, and calibrations in XML.
+"""The files of results, among them `track.csv`, `events.csv` and `flips.csv`.
 
 The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
 it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete.
@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +31,6 @@ __all__ = [
     "read_text_columns",
     "read_track",
     "read_track_csv",
-    "read_tsai_xml",
     "write_columns_csv",
     "write_events_csv",
     "write_flips_csv",
@@ -208,29 +206,6 @@ def read_text_columns(path: str | PathLike[str], names: tuple[str, ...]) -> dict
     """The columns of a table that has at least these, cell by cell as written."""
     rows = _read_rows(path, names)
     return {name: [row[name] or "" for row in rows] for name in names}
-
-
-def read_tsai_xml(path: str | PathLike[str]) -> dict[str, Any]:
-    """Tsai's calibration from the XML of PETS and ETISEO, as the arguments of `Camera.from_tsai`."""
-    try:
-        root = ElementTree.parse(path).getroot()
-        values = {name: float(value) for part in root for name, value in part.attrib.items()}
-
-        def of(*names: str) -> tuple[float, ...]:
-            return tuple(values[name] for name in names)
-
-        return {
-            "size": tuple(int(length) for length in of("width", "height")),
-            "pixel_mm": of("dpx", "dpy"),
-            "focal_mm": values["focal"],
-            "kappa1_per_mm2": values["kappa1"],
-            "centre_px": of("cx", "cy"),
-            "sx": values["sx"],
-            "translation_mm": of("tx", "ty", "tz"),
-            "rotation_rad": of("rx", "ry", "rz"),
-        }
-    except (ElementTree.ParseError, KeyError, ValueError) as error:
-        raise ValueError(f"{path}: not a Tsai calibration in XML: {error}") from None
 
 
 @contextmanager

@@ -49,6 +49,7 @@
 //! * Gait phase in [0, 1), 0 = right heel strike; the left side is at phase + 0.5.
 //! * Angles in radians inside, flexion positive; files say `_deg` where they hold degrees.
 
+pub mod calibrate;
 pub mod image;
 pub mod model;
 pub mod planar;

@@ -5,10 +5,11 @@ use crate::error::value_error;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
 use memo_core::model::{
-    Camera, Distortion, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters,
+    Camera, CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints,
+    PositionError, PositionOptions, TsaiParameters,
 };
 use numpy::PyArray2;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -64,6 +65,54 @@ impl PyCamera {
         let text = std::fs::read_to_string(&path).map_err(unreadable)?;
         let camera = Camera::from_toml_str(&text, name);
         camera.map(Self).map_err(|error| PyValueError::new_err(format!("{}: {error}", path.display())))
+    }
+
+    /// Reads a calibration: TOML (Pose2Sim, anipose), YAML, JSON or XML (OpenCV, ROS), XML of Tsai's parameters, or a
+    /// table of DLT coefficients. `name` chooses one of several cameras; `unit` of lengths is "m", "cm" or "mm";
+    /// `size` of the picture where the file has none; `v_up` says whether v of DLT coefficients grows upwards.
+    #[staticmethod]
+    /// With `lens_only` a file needs no rotation and translation, and those of the answer mean nothing.
+    #[pyo3(signature = (path, name=None, unit=None, *, size=None, v_up=None, lens_only=false))]
+    fn from_file(
+        path: std::path::PathBuf,
+        name: Option<&str>,
+        unit: Option<&str>,
+        size: Option<(u32, u32)>,
+        v_up: Option<bool>,
+        lens_only: bool,
+    ) -> PyResult<Self> {
+        let wrong_unit =
+            |unit| PyValueError::new_err(format!("wanted unit \"m\", \"cm\" or \"mm\"; got {unit:?}"));
+        let of_name = |unit| LengthUnit::from_name(unit).ok_or_else(|| wrong_unit(unit));
+        let options = CameraFileOptions {
+            name,
+            unit: unit.map(of_name).transpose()?,
+            size: size.map(Into::into),
+            is_lens_only: lens_only,
+            v_up,
+        };
+        Camera::from_file(&path, &options).map(Self).map_err(|error| match error {
+            CameraFileError::Read { .. } => PyOSError::new_err(error.to_string()),
+            error => PyValueError::new_err(format!("{}: {error}", path.display())),
+        })
+    }
+
+    /// Writes the camera as a section `[name]` of a TOML file, as Pose2Sim and anipose do.
+    #[pyo3(signature = (path, name="cam"))]
+    fn to_toml(&self, path: std::path::PathBuf, name: &str) -> PyResult<()> {
+        let text = self.0.to_toml_string(name).map_err(value_error)?;
+        let mut part = path.clone();
+        part.as_mut_os_string().push(format!(".{}.part", std::process::id()));
+        std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path)).map_err(|error| {
+            let _ = std::fs::remove_file(&part);
+            PyOSError::new_err(format!("{}: {error}", path.display()))
+        })
+    }
+
+    /// Distance in pixels between a point (x, y, z) and that `height_m` above it, without distortion; NaN if the
+    /// camera cannot see both.
+    fn pixel_height(&self, point: (f64, f64, f64), height_m: f64) -> f64 {
+        self.0.pixel_height_at(DVec3::from(point), height_m).unwrap_or(f64::NAN)
     }
 
     /// From Tsai's parameters, lengths in mm, angles in radians.

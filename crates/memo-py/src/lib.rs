@@ -1,6 +1,7 @@
 //! Python bindings of memo-core: convert, release the interpreter lock, one call, convert back.
 
 mod array;
+mod calibrate;
 mod camera;
 mod error;
 mod explain;
@@ -23,6 +24,9 @@ use pyo3::prelude::*;
 mod _memo {
     use pyo3::prelude::*;
 
+    use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
+    #[pymodule_export]
+    use super::camera::PyCamera;
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]

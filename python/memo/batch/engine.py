@@ -92,6 +92,7 @@ def run(
     skip_bad: bool = False,
     overlay: bool = False,
     plots: bool = False,
+    report: bool = False,
     timeout_s: float | None = None,
     memory_mb: int | None = None,
     command: Sequence[str] | None = None,
@@ -118,7 +119,7 @@ def run(
     the disk is full. When interrupted, ends the running processes, writes the tables and raises
     `KeyboardInterrupt`.
     """
-    read = prepared(manifest, skip_bad=skip_bad, overlay=overlay, plots=plots)
+    read = prepared(manifest, skip_bad=skip_bad, overlay=overlay, plots=plots, report=report)
     _check_numbers(jobs, shard, timeout_s, memory_mb)
     start = time.monotonic()
     out = default_out(manifest) if out is None else Path(out)
@@ -189,9 +190,10 @@ def prepared(
     skip_bad: bool = False,
     overlay: bool = False,
     plots: bool = False,
+    report: bool = False,
 ) -> Manifest:
     """The manifest, read and checked; raises `ManifestError` with all that is in the way of a run."""
-    read = read_manifest(manifest, {"overlay": overlay, "plots": plots})
+    read = read_manifest(manifest, {"overlay": overlay, "plots": plots, "report": report})
     problems = read.problems + [problem for row in read.rows for problem in row.problems if not skip_bad]
     if problems:
         raise ManifestError(problems)

@@ -33,17 +33,23 @@ class Option(NamedTuple):
 
     flag: str
     kind: type
+    off: str = ""
+    """What says no, where that is not `--no-` before the name."""
 
 
 OPTIONS = {
     "camera": Option("--camera", Path),
     "camera_name": Option("--camera-name", str),
+    "camera_unit": Option("--camera-unit", str),
+    "camera_size": Option("--camera-size", str),
+    "camera_v_up": Option("--camera-v-up", bool, "--camera-v-down"),
     "height_m": Option("--height", float),
     "fov_deg": Option("--fov-deg", float),
     "frames": Option("--frames", str),
     "fps": Option("--fps", float),
     "overlay": Option("--overlay", bool),
     "plots": Option("--plots", bool),
+    "report": Option("--report", bool),
 }
 """Columns that are options of `memo track`."""
 
@@ -81,9 +87,9 @@ class Row:
         """The row as arguments of `memo track`."""
         arguments = [str(self.video)]
         for name, value in self.options.items():
-            flag = OPTIONS[name].flag
+            flag, _, off = OPTIONS[name]
             if isinstance(value, bool):
-                arguments.append(flag if value else flag.replace("--", "--no-", 1))
+                arguments.append(flag if value else off or flag.replace("--", "--no-", 1))
             else:
                 arguments += [flag, str(value)]
         return arguments
@@ -370,21 +376,24 @@ def _check_options(row: Row) -> None:
     if fps is not None and not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps {fps:g} is not a frame rate")
     frame_range(options.get("frames", ":"))
-    camera, name = options.get("camera"), options.get("camera_name")
+    camera = options.get("camera")
+    reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
     height = options.get("height_m", 1.75)
     if camera is None or options.get("fov_deg") is not None:
-        checked_options(height, camera, name, options.get("fov_deg"))
+        checked_options(height, camera, reading, options.get("fov_deg"))
     else:
-        checked_options(height, None, None, None)
-        _check_camera(camera, name, camera.stat().st_mtime_ns if camera.is_file() else 0)
+        checked_options(height, None, {}, None)
+        _check_camera(camera, *reading.values(), camera.stat().st_mtime_ns if camera.is_file() else 0)
 
 
 @cache
-def _check_camera(camera: Path, name: str | None, modified_ns: int) -> None:
+def _check_camera(
+    camera: Path, name: str | None, unit: str | None, size: str | None, v_up: bool | None, modified_ns: int
+) -> None:
     """Reads a camera once for all the rows that share it."""
     from memo.cli.given import load_camera
 
-    load_camera(camera, name)
+    load_camera(camera, name, unit, size, v_up)
 
 
 def _files(video: Path) -> list[Path]:

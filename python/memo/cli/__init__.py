@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import memo
 from memo.cli.batch import add_batch
+from memo.cli.calibrate import add_calibrate
 from memo.cli.convert import add_convert
 from memo.cli.delivery import Exit, complain
 from memo.cli.demo import add_demo
@@ -64,6 +65,7 @@ def _app() -> "typer.Typer":
 
     add_track(app)
     add_batch(app)
+    add_calibrate(app)
     add_unswap(app)
     add_posture(app)
     add_demo(app)

@@ -45,7 +45,7 @@ def add_batch(app: "typer.Typer") -> None:
             Path,
             typer.Argument(
                 help="CSV or TOML, a row a video: video, name, camera, camera_name, height_m, fov_deg, "
-                "frames, fps, overlay, plots."
+                "frames, fps, overlay, plots, report."
             ),
         ],
         out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/MANIFEST.")] = None,
@@ -71,6 +71,7 @@ def add_batch(app: "typer.Typer") -> None:
         max_memory: Annotated[int | None, typer.Option(help="Most memory for a video, MB (Linux).")] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4; a row may say otherwise.")] = False,
         plots: Annotated[bool, typer.Option(help="Write plots; a row may say otherwise.")] = False,
+        report: Annotated[bool, typer.Option(help="Write report.html; a row may say otherwise.")] = False,
         backend: Annotated[Backend, typer.Option(help="Who runs the processes.")] = Backend.LOCAL,
         ray_address: Annotated[
             str | None, typer.Option(help="Of the Ray cluster; without, the one at hand or a local one.")
@@ -105,6 +106,7 @@ def add_batch(app: "typer.Typer") -> None:
                 "resume": resume,
                 "retry_failed": retry_failed,
                 "skip_bad": skip_bad,
+                "report": report,
                 "timeout_s": timeout,
                 "memory_mb": max_memory,
             }

@@ -11,15 +11,35 @@ from typing import Any
 
 import memo
 from memo.cli.delivery import InputError
-from memo.files import read_tsai_xml
 
 
-def load_camera(path: Path, name: str | None) -> Any:
+def load_camera(
+    path: Path,
+    name: str | None,
+    unit: str | None = None,
+    size: str | None = None,
+    v_up: bool | None = None,
+    *,
+    lens_only: bool = False,
+) -> Any:
     if not path.is_file():
         raise InputError(f"{path}: no such camera file")
-    if path.suffix.lower() == ".xml":
-        return memo.Camera.from_tsai(**read_tsai_xml(path))
-    return memo.Camera.from_toml(str(path), name=name)
+    sides = None if size is None else two_sides(size, "--camera-size")
+    return memo.Camera.from_file(path, name, unit, size=sides, v_up=v_up, lens_only=lens_only)
+
+
+def two_sides(text: str, option: str, example: str = "1280x720") -> tuple[int, int]:
+    """Two whole numbers as in 1280x720."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal() and 0 < int(width) < 10**6 and 0 < int(height) < 10**6):
+        raise InputError(f"{option} {text} is not two whole numbers such as {example}")
+    return int(width), int(height)
+
+
+def checked_fov(fov_deg: float) -> float:
+    if not 5 <= fov_deg <= 170:
+        raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
+    return fov_deg
 
 
 def checked_height(height_m: float) -> float:

@@ -73,13 +73,17 @@ class Anchor(StrEnum):
 def add_posture(app: "typer.Typer") -> None:
     import typer
 
+    from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
     from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
 
     @app.command(epilog=POSTURE_EXIT_CODES)
     def posture(
         keypoints: KeypointsPath,
-        camera: Annotated[Path, typer.Option(help="Calibration: TOML, or Tsai XML.")],
-        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        camera: Annotated[Path, typer.Option(help=CAMERA_HELP)],
+        camera_name: CameraName = None,
+        camera_unit: CameraUnit = None,
+        camera_size: CameraSize = None,
+        camera_v_up: CameraVUp = None,
         lengths: Annotated[
             Path | None, typer.Option(help="The 17 segment lengths, metres: CSV, JSON or a postures.json.")
         ] = None,
@@ -129,7 +133,7 @@ def add_posture(app: "typer.Typer") -> None:
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
             check_apart([keypoints, camera, lengths], [delivery.out / name for name in (*WRITTEN, _DRAWN)])
-            calibrated = load_camera(camera, camera_name)
+            calibrated = load_camera(camera, camera_name, camera_unit, camera_size, camera_v_up)
             return _posture(keypoints, reading, calibrated, scale | options, frame, delivery)
 
         raise typer.Exit(guarded(work))

@@ -12,7 +12,7 @@ import numpy as np
 
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, Interrupt, complain, guarded, with_progress
-from memo.cli.given import check_writable, checked_height, frame_range, load_camera
+from memo.cli.given import check_writable, checked_fov, checked_height, frame_range, load_camera
 from memo.cli.report import write_page
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
@@ -33,11 +33,16 @@ _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.pn
 def add_track(app: "typer.Typer") -> None:
     import typer
 
+    from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
+
     @app.command(epilog=EXIT_CODES)
     def track(
         video: Annotated[Path, typer.Argument(help="A video file, or a folder of images (then --fps too).")],
-        camera: Annotated[Path | None, typer.Option(help="Calibration: TOML, or Tsai XML.")] = None,
-        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        camera: Annotated[Path | None, typer.Option(help=CAMERA_HELP)] = None,
+        camera_name: CameraName = None,
+        camera_unit: CameraUnit = None,
+        camera_size: CameraSize = None,
+        camera_v_up: CameraVUp = None,
         height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
         fov_deg: Annotated[
             float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
@@ -49,7 +54,9 @@ def add_track(app: "typer.Typer") -> None:
         ] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
         plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
-        page: Annotated[bool, typer.Option("--report", help="Write report.html (memo report).")] = False,
+        page: Annotated[
+            bool, typer.Option("--report/--no-report", help="Write report.html (memo report).")
+        ] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
@@ -57,7 +64,8 @@ def add_track(app: "typer.Typer") -> None:
         delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
 
         def work() -> Exit:
-            tracker_options = checked_options(height, camera, camera_name, fov_deg)
+            reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
+            tracker_options = checked_options(height, camera, reading, fov_deg)
             return _track_video(video, frame_range(frames), fps, tracker_options, page, delivery)
 
         raise typer.Exit(guarded(work))
@@ -154,19 +162,18 @@ def _snapshot(tracker: Any, source: Source, frames_read: int) -> Any:
 
 
 def checked_options(
-    height_m: float, camera: Path | None, camera_name: str | None, fov_deg: float | None
+    height_m: float, camera: Path | None, reading: dict[str, Any], fov_deg: float | None
 ) -> dict[str, Any]:
     options: dict[str, Any] = {"height_m": checked_height(height_m)}
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
-    if camera is None and camera_name is not None:
-        raise InputError("--camera-name needs --camera")
+    for name, value in reading.items():
+        if camera is None and value is not None:
+            raise InputError(f"--camera-{name.replace('_', '-')} needs --camera")
     if camera is not None:
-        options["camera"] = load_camera(camera, camera_name)
+        options["camera"] = load_camera(camera, **reading)
     if fov_deg is not None:
-        if not 5 <= fov_deg <= 170:
-            raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
-        options["fov_deg"] = fov_deg
+        options["fov_deg"] = checked_fov(fov_deg)
     return options
 
 

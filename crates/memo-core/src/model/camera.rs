@@ -65,11 +65,25 @@ pub enum CameraError {
     },
     /// The camera is improbably far from the world's origin.
     #[error(
-        "camera is {distance_m:.0} m from the world's origin: the translation looks like millimetres, metres are expected (at most {MAX_DISTANCE_M:.0} m)"
+        "camera is {distance_m:.0} m from the world's origin, a 1.7 m person there {person_px:.2} px high: the translation looks like millimetres, in which it would be {:.0} px; say so by the unit mm",
+        person_px * 1000.0
     )]
     LooksLikeMillimetres {
         /// Distance of camera and origin, if the translation is in metres.
         distance_m: f64,
+        /// How high a person of 1.7 m is at the origin, pixels.
+        person_px: f64,
+    },
+    /// The camera is improbably near to the world's origin.
+    #[error(
+        "camera is {:.1} mm from the world's origin, a 1.7 m person there {person_px:.0} px high: the unit is rather metres, in which it would be {:.0} px",
+        distance_m * 1000.0, person_px / 1000.0
+    )]
+    LooksLikeMetres {
+        /// Distance of camera and origin.
+        distance_m: f64,
+        /// How high a person of 1.7 m is at the origin, pixels.
+        person_px: f64,
     },
     /// A quantity that must be positive is not.
     #[error("{parameter} must be positive and finite, got {value}")]
@@ -239,7 +253,8 @@ impl Camera {
         check_rotation(&self.rotation, 1e-6)?;
         let distance_m = self.translation.length();
         if distance_m > MAX_DISTANCE_M {
-            return Err(CameraError::LooksLikeMillimetres { distance_m });
+            let person_px = self.focal_px.y * 1.7 / distance_m;
+            return Err(CameraError::LooksLikeMillimetres { distance_m, person_px });
         }
         Ok(self)
     }

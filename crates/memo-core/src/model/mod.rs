@@ -14,7 +14,7 @@ pub mod visibility;
 
 pub use body::{Body, PosedBody, Proportions, SideJoints, Walker};
 pub use camera::{Camera, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, TsaiParameters};
-pub use camera_file::CameraFileError;
+pub use camera_file::{CameraFileError, CameraFileOptions, FileFormat, LengthUnit};
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;
 pub use gait::{Gait, GaitStyle, Posture, SideAngles};

@@ -1,0 +1,607 @@
+//! A camera from a person of known height who walks through its picture.
+//!
+//! Where the feet are seen fixes where the person stands, for a camera of focal length f, pitch, roll and height
+//! above the ground; where the head then must be seen is compared with where it is (the geometry of Lv, Zhao and
+//! Nevatia 2006: the line through two positions' feet and that through their heads meet on the horizon, the bodies
+//! themselves point to the vertical vanishing point). All sightings are fitted at once by least squares, weighted
+//! against those far off.
+//!
+//! ```text
+//! x_cam = R_z(roll) R_x(pitch) R_level (x_world - (0, 0, height)),   R_level: looking along world Y
+//! ```
+//!
+//! The world's origin is on the ground below the mean place of the person, its Y axis is where the camera looks. A
+//! camera stands level but for some degrees: roll has a prior of 2 degrees, the focal length one of a factor of e
+//! about the picture's width, both weak beside any walk that tells them. The principal point is the picture's
+//! centre unless the lens is known.
+//!
+//! # What it cannot do
+//!
+//! Horizon and vertical vanishing point give f by their distance, f² = -(v_y - c_y) (h_y - c_y): a level camera has
+//! the latter at infinity, a person who always stays equally far away shows neither. Then the focal length is
+//! refused, and with a known field of view the rest may be told. All lengths scale with the person's height. A
+//! walker bends and sways by a hundredth of the height, more than a detector errs; that is averaged, not modelled.
+
+use glam::{DMat3, DVec2, DVec3};
+use nalgebra::DVector;
+use thiserror::Error;
+
+use super::least_squares::{Fit, minimise};
+use super::{Estimate, KnownLens};
+use crate::model::camera::{Camera, CameraError};
+use crate::model::distortion::Distortion;
+
+/// Sightings that are needed.
+const NEEDED: usize = 4;
+/// Of a camera's roll, radians (2 degrees).
+const ROLL_SD_RAD: f64 = 0.035;
+/// Of a focal length that nothing is known of, as the picture's longer side: a factor of e.
+const FOCAL_SD: f64 = 1.0;
+/// A walker's sway and a detector's error at least, as a share of the height.
+const LEAST_NOISE: f64 = 0.005;
+/// The focal length is told if its standard deviation is below this share of it, the pitch below this, radians.
+const MAX_FOCAL_SD: f64 = 0.25;
+const MAX_PITCH_SD_RAD: f64 = 0.09;
+/// A sighting is left out if chance would put the farthest of all so far off less often than this.
+const CHANCE: f64 = 0.01;
+const FOCAL: usize = 0;
+const PITCH: usize = 1;
+const ROLL: usize = 2;
+const HEIGHT: usize = 3;
+
+/// Why no camera was found.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum WalkerError {
+    /// The person's height makes no sense.
+    #[error("the person's height must be 0.5 to 2.5 metres, got {height_m}")]
+    PersonHeight {
+        /// The height given, metres.
+        height_m: f64,
+    },
+    /// A pixel is NaN or infinite.
+    #[error("sighting {index} has a pixel that is not finite")]
+    NotFinite {
+        /// Number of the sighting, from 0.
+        index: usize,
+    },
+    /// Not enough sightings.
+    #[error("{count} sightings of the whole person from head to feet: {NEEDED} are needed")]
+    TooFew {
+        /// Sightings given.
+        count: usize,
+    },
+    /// The person is upside down.
+    #[error("in {count} of {total} sightings the head is not above the feet: v counts downwards")]
+    UpsideDown {
+        /// Sightings in which the head is below the feet.
+        count: usize,
+        /// All sightings.
+        total: usize,
+    },
+    /// The focal length cannot be told.
+    #[error(
+        "the walk does not tell the focal length (it would be known to ±{:.0} %): the person should come nearer and go farther under a camera that looks down; or give the field of view",
+        relative_sd * 100.0
+    )]
+    FocalUnknown {
+        /// Standard deviation of the focal length over itself.
+        relative_sd: f64,
+    },
+    /// The pitch cannot be told, even with the focal length known.
+    #[error(
+        "the walk does not tell how far the camera looks down (it would be known to ±{:.0} degrees): the person should come nearer and go farther",
+        sd_rad.to_degrees()
+    )]
+    PitchUnknown {
+        /// Standard deviation of the pitch, radians.
+        sd_rad: f64,
+    },
+    /// No camera shows the person so.
+    #[error(
+        "no camera over flat ground shows a person of {height_m} m so: nearest is {rms_px:.0} px off at {person_px:.0} px of height"
+    )]
+    NoCamera {
+        /// The person's height, metres.
+        height_m: f64,
+        /// Root mean square distance of the best camera, pixels.
+        rms_px: f64,
+        /// Median height of the person in the picture, pixels.
+        person_px: f64,
+    },
+    /// The camera is not valid.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+}
+
+/// A person seen once, from head to feet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// The lower point, pixels.
+    pub foot_px: DVec2,
+    /// The upper point, pixels.
+    pub head_px: DVec2,
+    /// The lower point's height above the ground, as a share of the person's.
+    pub foot_share: f64,
+    /// The upper point's.
+    pub head_share: f64,
+}
+
+impl Sighting {
+    /// From the middles of a rectangle's lower and upper side.
+    pub fn from_rectangle(foot_px: DVec2, head_px: DVec2) -> Self {
+        Self { foot_px, head_px, foot_share: 0.0, head_share: 1.0 }
+    }
+}
+
+/// What is known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WalkerOptions {
+    /// Width and height of the picture, pixels.
+    pub size: [u32; 2],
+    /// Height of the person, crown to sole, metres.
+    pub height_m: f64,
+    /// What is known of the lens.
+    pub lens: KnownLens,
+}
+
+/// A camera and how well the walk tells it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WalkerCalibration {
+    /// The camera; the origin is on the ground below the mean place of the person, Y where it looks.
+    pub camera: Camera,
+    /// `focal_px` unless it was given, `pitch_deg` (down), `roll_deg`, `height_m` of the camera. Their deviations
+    /// take sightings of one stride as the alike ones they are.
+    pub estimates: Vec<Estimate>,
+    /// Fitted minus seen head, pixels, of every sighting; NaN where the feet are above the horizon.
+    pub residuals_px: Vec<DVec2>,
+    /// Numbers of the sightings that were left out, from 0.
+    pub outliers: Vec<usize>,
+    /// Root mean square of the residuals of the others, pixels.
+    pub rms_px: f64,
+    /// Median distance of head and feet, pixels.
+    pub person_px: f64,
+    /// How many sightings in a row err alike.
+    pub alike: f64,
+    /// Where the person stood, metres; NaN where the feet are above the horizon.
+    pub places: Vec<DVec3>,
+}
+
+/// The camera that sees a walker so.
+///
+/// `sightings` in the order of time.
+///
+/// # Errors
+///
+/// Sightings that are too few, not finite or upside down, walks that do not tell the camera, and such that no
+/// camera shows.
+pub fn camera_from_walker(
+    sightings: &[Sighting],
+    options: &WalkerOptions,
+) -> Result<WalkerCalibration, WalkerError> {
+    let problem = Problem::new(sightings, options)?;
+    // 1. The best of a grid, then weights that forget what is far off.
+    let mut parameters = problem.start();
+    let mut weights = vec![1.0; problem.sightings.len()];
+    for _ in 0..10 {
+        let distances = problem.distances(&parameters);
+        let mut sorted = distances.clone();
+        sorted.sort_by(f64::total_cmp);
+        let scale = (2.0 * sorted[sorted.len() / 2]).max(1e-6 * problem.person_px);
+        for (weight, distance) in weights.iter_mut().zip(&distances) {
+            let is_seen = *distance < problem.far_px();
+            *weight = f64::from(u8::from(is_seen)) / (1.0 + (distance / scale).powi(2));
+        }
+        parameters = problem.fit(&parameters, &weights).map_or(parameters, |fit| problem.all(&fit));
+    }
+    // 2. Least squares of what is left.
+    let (fit, inliers) = problem.without_outliers(&parameters)?;
+    // 3. What it tells.
+    problem.calibration(&fit, &inliers)
+}
+
+struct Problem {
+    /// In ideal pixels, the principal point at zero, square pixels.
+    sightings: Vec<Sighting>,
+    options: WalkerOptions,
+    centre_px: DVec2,
+    known_focal_px: Option<f64>,
+    person_px: f64,
+    width_px: f64,
+}
+
+impl Problem {
+    fn new(sightings: &[Sighting], options: &WalkerOptions) -> Result<Self, WalkerError> {
+        let height_m = options.height_m;
+        if !(0.5..=2.5).contains(&height_m) {
+            return Err(WalkerError::PersonHeight { height_m });
+        }
+        if options.size.contains(&0) {
+            return Err(CameraError::Size { size: options.size }.into());
+        }
+        if let Some(index) = sightings.iter().position(|s| !(s.foot_px.is_finite() && s.head_px.is_finite()))
+        {
+            return Err(WalkerError::NotFinite { index });
+        }
+        let total = sightings.len();
+        if total < NEEDED {
+            return Err(WalkerError::TooFew { count: total });
+        }
+        let count = sightings.iter().filter(|s| s.head_px.y >= s.foot_px.y).count();
+        if 2 * count > total {
+            return Err(WalkerError::UpsideDown { count, total });
+        }
+        let sides = DVec2::new(f64::from(options.size[0]), f64::from(options.size[1]));
+        let mut problem = Self {
+            sightings: sightings.to_vec(),
+            options: *options,
+            centre_px: sides / 2.0 - 0.5,
+            known_focal_px: None,
+            person_px: 0.0,
+            width_px: sides.x.max(sides.y),
+        };
+        let camera = problem.lens()?;
+        for sighting in &mut problem.sightings {
+            for pixel in [&mut sighting.foot_px, &mut sighting.head_px] {
+                *pixel = (camera.undistort(*pixel)? - camera.centre_px)
+                    * DVec2::new(1.0, camera.focal_px.x / camera.focal_px.y);
+            }
+        }
+        problem.centre_px = camera.centre_px;
+        let mut heights: Vec<f64> = problem.sightings.iter().map(|s| s.head_px.distance(s.foot_px)).collect();
+        heights.sort_by(f64::total_cmp);
+        problem.person_px = heights[heights.len() / 2].max(1e-3);
+        Ok(problem)
+    }
+
+    /// The camera at the origin with the lens that is known; sets the known focal length.
+    fn lens(&mut self) -> Result<Camera, WalkerError> {
+        let (focal_px, centre_px, distortion) = match self.options.lens {
+            KnownLens::Nothing => (DVec2::splat(self.width_px), self.centre_px, Distortion::None),
+            KnownLens::Focal(focal) => (DVec2::splat(focal), self.centre_px, Distortion::None),
+            KnownLens::All { focal_px, centre_px, distortion } => (focal_px, centre_px, distortion),
+        };
+        if self.options.lens != KnownLens::Nothing {
+            self.known_focal_px = Some(focal_px.x);
+        }
+        let (size, rotation, translation) = (self.options.size, DMat3::IDENTITY, DVec3::ZERO);
+        Ok(Camera { size, focal_px, centre_px, distortion, rotation, translation }.validated()?)
+    }
+
+    fn rotation(parameters: &[f64; 4]) -> DMat3 {
+        let level = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
+        DMat3::from_rotation_z(parameters[ROLL]) * DMat3::from_rotation_x(parameters[PITCH]) * level
+    }
+
+    /// Where the person stands, if the feet are below the horizon.
+    fn place(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &Sighting) -> Option<DVec3> {
+        let ray = rotation.transpose() * sighting.foot_px.extend(parameters[FOCAL].exp());
+        let drop_m = parameters[HEIGHT].exp() - sighting.foot_share * self.options.height_m;
+        let share = -drop_m / ray.z;
+        (drop_m > 0.0 && share > 0.0 && share.is_finite()).then(|| (ray * share).with_z(0.0))
+    }
+
+    /// Fitted minus seen head, pixels.
+    fn residual(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &Sighting) -> Option<DVec2> {
+        let place = self.place(parameters, rotation, sighting)?;
+        let rise_m = sighting.head_share * self.options.height_m - parameters[HEIGHT].exp();
+        let p = *rotation * place.with_z(rise_m);
+        (p.z > 1e-6).then(|| p.truncate() / p.z * parameters[FOCAL].exp() - sighting.head_px)
+    }
+
+    fn residuals(&self, parameters: &[f64; 4]) -> Vec<Option<DVec2>> {
+        let rotation = Self::rotation(parameters);
+        self.sightings.iter().map(|s| self.residual(parameters, &rotation, s)).collect()
+    }
+
+    fn far_px(&self) -> f64 {
+        10.0 * self.width_px
+    }
+
+    /// Lengths of the residuals; far where there is none.
+    fn distances(&self, parameters: &[f64; 4]) -> Vec<f64> {
+        let far = self.far_px();
+        self.residuals(parameters).into_iter().map(|r| r.map_or(far, |r| r.length().min(far))).collect()
+    }
+
+    /// The best of some hundred cameras, by the median distance.
+    fn start(&self) -> [f64; 4] {
+        let focals: Vec<f64> = match self.known_focal_px {
+            Some(focal) => vec![focal],
+            None => [0.6, 0.9, 1.3, 2.0, 3.5].map(|share| share * self.width_px).to_vec(),
+        };
+        let mut best = (f64::INFINITY, [self.width_px.ln(), 0.0, 0.0, 0.0]);
+        for focal in focals {
+            for pitch_deg in [-15.0, -5.0, 0.0, 3.0, 8.0, 15.0, 25.0, 35.0, 50.0, 70.0_f64] {
+                for step in 0..24 {
+                    let height_m = 0.25 * 1.25_f64.powi(step);
+                    let parameters = [focal.ln(), pitch_deg.to_radians(), 0.0, height_m.ln()];
+                    let mut distances = self.distances(&parameters);
+                    let middle = distances.len() / 2;
+                    let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
+                    if *median < best.0 {
+                        best = (*median, parameters);
+                    }
+                }
+            }
+        }
+        best.1
+    }
+
+    fn is_free(&self) -> [bool; 4] {
+        [self.known_focal_px.is_none(), true, true, true]
+    }
+
+    /// All four parameters of a fit.
+    fn all(&self, fit: &Fit) -> [f64; 4] {
+        let mut free = fit.parameters.iter();
+        let fixed = self.known_focal_px.map_or(0.0, f64::ln);
+        self.is_free().map(|is_free| if is_free { free.next().copied().unwrap_or_default() } else { fixed })
+    }
+
+    fn fit(&self, start: &[f64; 4], weights: &[f64]) -> Option<Fit> {
+        let free: Vec<f64> =
+            start.iter().zip(self.is_free()).filter(|(_, is_free)| *is_free).map(|(p, _)| *p).collect();
+        let fixed = self.known_focal_px.map_or(0.0, f64::ln);
+        let noise_px = LEAST_NOISE * self.person_px;
+        let residuals = |free: &DVector<f64>| {
+            let mut given = free.iter();
+            let parameters =
+                self.is_free().map(|is| if is { given.next().copied().unwrap_or_default() } else { fixed });
+            let (focal, pitch) = (parameters[FOCAL], parameters[PITCH]);
+            if pitch.abs() > 1.55 || !(0.0..20.0).contains(&focal) || parameters[HEIGHT].abs() > 8.0 {
+                return None;
+            }
+            let mut all = Vec::with_capacity(2 * weights.len() + 1);
+            for (residual, weight) in self.residuals(&parameters).into_iter().zip(weights) {
+                if *weight > 0.0 {
+                    // Head and foot are both seen with noise, which moves the fitted head as much.
+                    let r = residual? * (weight / 2.0).sqrt();
+                    all.extend([r.x, r.y]);
+                }
+            }
+            all.push(parameters[ROLL] / ROLL_SD_RAD * noise_px);
+            all.push((parameters[FOCAL] - fixed.max(self.width_px.ln())) / FOCAL_SD * noise_px);
+            Some(DVector::from_vec(all))
+        };
+        // What is above the horizon at the start cannot be fitted.
+        minimise(DVector::from_vec(free.clone()), &vec![1e-6; free.len()], residuals)
+    }
+
+    fn without_outliers(&self, start: &[f64; 4]) -> Result<(Fit, Vec<usize>), WalkerError> {
+        let mut parameters = *start;
+        let count = self.sightings.len();
+        let mut inliers: Vec<usize> = Vec::new();
+        let mut last = None;
+        for _ in 0..10 {
+            let distances = self.distances(&parameters);
+            let mut sorted = distances.clone();
+            sorted.sort_by(f64::total_cmp);
+            // Of normal noise in two directions the median is 1.18 standard deviations.
+            let variance = (sorted[count / 2] / 1.18).powi(2).max(1e-12);
+            let limit = (2.0 * variance * (count as f64 / CHANCE).ln()).sqrt();
+            let next: Vec<usize> = (0..count).filter(|&i| distances[i] <= limit).collect();
+            if next == inliers {
+                break;
+            }
+            inliers = next;
+            let weights: Vec<f64> = (0..count).map(|i| f64::from(u8::from(inliers.contains(&i)))).collect();
+            let Some(fit) = self.fit(&parameters, &weights) else { break };
+            parameters = self.all(&fit);
+            last = Some(fit);
+        }
+        let no_camera = || WalkerError::NoCamera {
+            height_m: self.options.height_m,
+            rms_px: f64::INFINITY,
+            person_px: self.person_px,
+        };
+        match last {
+            Some(fit) if inliers.len() >= NEEDED => Ok((fit, inliers)),
+            _ => Err(no_camera()),
+        }
+    }
+
+    fn calibration(&self, fit: &Fit, inliers: &[usize]) -> Result<WalkerCalibration, WalkerError> {
+        let parameters = self.all(fit);
+        let residuals = self.residuals(&parameters);
+        let rms_px = {
+            let of_inliers = inliers.iter().filter_map(|&i| residuals[i]).map(|r| r.length_squared());
+            (of_inliers.sum::<f64>() / inliers.len() as f64).sqrt()
+        };
+        if rms_px > 0.15 * self.person_px || 2 * inliers.len() < self.sightings.len() {
+            let (height_m, person_px) = (self.options.height_m, self.person_px);
+            return Err(WalkerError::NoCamera { height_m, rms_px, person_px });
+        }
+        let alike = alike(&inliers.iter().filter_map(|&i| residuals[i]).map(|r| r.y).collect::<Vec<_>>());
+        let covariance = fit.unit_covariance();
+        let free: Vec<usize> = (0..4).filter(|&i| self.is_free()[i]).collect();
+        let equations = (2 * inliers.len()).saturating_sub(free.len()).max(1);
+        let fitted_px = (inliers.len() as f64 * rms_px.powi(2) / 2.0 / equations as f64).sqrt();
+        let sd = |parameter: usize, noise_px: f64| {
+            let row = free.iter().position(|&p| p == parameter);
+            let (Some(covariance), Some(row)) = (&covariance, row) else { return f64::INFINITY };
+            (covariance[(row, row)] * alike).sqrt() * noise_px
+        };
+        let assumed_px = fitted_px.max(LEAST_NOISE * self.person_px);
+        if self.known_focal_px.is_none() {
+            let relative_sd = sd(FOCAL, assumed_px);
+            if relative_sd > MAX_FOCAL_SD {
+                return Err(WalkerError::FocalUnknown { relative_sd: relative_sd.min(9.99) });
+            }
+        }
+        let sd_rad = sd(PITCH, assumed_px);
+        if sd_rad > MAX_PITCH_SD_RAD {
+            return Err(WalkerError::PitchUnknown { sd_rad: sd_rad.min(1.57) });
+        }
+        let (focal_px, height_m) = (parameters[FOCAL].exp(), parameters[HEIGHT].exp());
+        let mut estimates = Vec::new();
+        if self.known_focal_px.is_none() {
+            estimates.push(Estimate {
+                name: "focal_px",
+                value: focal_px,
+                sd: focal_px * sd(FOCAL, fitted_px),
+            });
+        }
+        for (name, parameter) in [("pitch_deg", PITCH), ("roll_deg", ROLL)] {
+            let (value, sd) = (parameters[parameter].to_degrees(), sd(parameter, fitted_px).to_degrees());
+            estimates.push(Estimate { name, value, sd });
+        }
+        estimates.push(Estimate { name: "height_m", value: height_m, sd: height_m * sd(HEIGHT, fitted_px) });
+        self.described(&parameters, residuals, inliers, rms_px, alike, estimates)
+    }
+
+    fn described(
+        &self,
+        parameters: &[f64; 4],
+        residuals: Vec<Option<DVec2>>,
+        inliers: &[usize],
+        rms_px: f64,
+        alike: f64,
+        estimates: Vec<Estimate>,
+    ) -> Result<WalkerCalibration, WalkerError> {
+        let rotation = Self::rotation(parameters);
+        let place = |s: &Sighting| self.place(parameters, &rotation, s);
+        let mean =
+            inliers.iter().filter_map(|&i| place(&self.sightings[i])).sum::<DVec3>() / inliers.len() as f64;
+        let (focal_px, centre_px, distortion) = match self.options.lens {
+            KnownLens::All { focal_px, centre_px, distortion } => (focal_px, centre_px, distortion),
+            _ => (DVec2::splat(parameters[FOCAL].exp()), self.centre_px, Distortion::None),
+        };
+        let translation = rotation * (mean - DVec3::Z * parameters[HEIGHT].exp());
+        let camera =
+            Camera { size: self.options.size, focal_px, centre_px, distortion, rotation, translation };
+        Ok(WalkerCalibration {
+            camera: camera.validated()?,
+            estimates,
+            residuals_px: residuals.into_iter().map(|r| r.unwrap_or(DVec2::NAN)).collect(),
+            outliers: (0..self.sightings.len()).filter(|i| !inliers.contains(i)).collect(),
+            rms_px,
+            person_px: self.person_px,
+            alike,
+            places: self.sightings.iter().map(|s| place(s).map_or(DVec3::NAN, |p| p - mean)).collect(),
+        })
+    }
+}
+
+/// 1 + 2 Σ ρ_k of the autocorrelations ρ_k up to the first that is not positive: how many in a row are alike.
+fn alike(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count.max(1.0);
+    let product = |lag: usize| -> f64 {
+        values.iter().zip(values.iter().skip(lag)).map(|(a, b)| (a - mean) * (b - mean)).sum()
+    };
+    let variance = product(0);
+    if variance <= 0.0 {
+        return 1.0;
+    }
+    let lags = (1..values.len()).map(|lag| product(lag) / variance).take_while(|rho| *rho > 0.05);
+    1.0 + 2.0 * lags.sum::<f64>()
+}
+
+/// Heights of detected points as shares of the body's: crown, eyes, tragions and nose, mid-shoulders (after Drillis
+/// and Contini 1966 and the survey of Gordon et al. 1989); the first that is seen is taken, ears before the nose
+/// because they are above the ankles.
+const HEADS: [(&[&str], f64); 5] = [
+    (&["head_top"], 1.0),
+    (&["right_ear", "left_ear"], 0.926),
+    (&["right_eye", "left_eye"], 0.936),
+    (&["nose"], 0.91),
+    (&["neck"], 0.83),
+];
+/// Of the ankle's joint centre.
+const ANKLE_SHARE: f64 = 0.042;
+/// Ankles this far apart, as a share of the height, are not passing each other.
+const MAX_APART: f64 = 0.15;
+
+/// Sightings from joints over time: where the ankles pass each other, which is when the person stands highest and
+/// upright over one foot; all frames if that is hardly ever seen.
+///
+/// `names` of the joints in this project's spelling; `points_px` one row of them a frame, NaN where missing.
+pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Sighting> {
+    let column = |name: &str| names.iter().position(|n| *n == name);
+    let point =
+        |row: &[DVec2], name: &str| column(name).and_then(|c| row.get(c)).copied().filter(|p| p.is_finite());
+    let mut seen: Vec<(f64, Sighting)> = Vec::new();
+    for row in points_px {
+        let (Some(right), Some(left)) = (point(row, "right_ankle"), point(row, "left_ankle")) else {
+            continue;
+        };
+        let head = HEADS.iter().find_map(|(names, share)| {
+            let found: Vec<DVec2> = names.iter().filter_map(|name| point(row, name)).collect();
+            (!found.is_empty()).then(|| (found.iter().sum::<DVec2>() / found.len() as f64, *share))
+        });
+        let Some((head_px, head_share)) = head else { continue };
+        // The foot on the ground is the lower one; from side to side the body is between both.
+        let foot_px = DVec2::new((right.x + left.x) / 2.0, right.y.max(left.y));
+        let apart = right.distance(left) / head_px.distance(foot_px).max(1e-9);
+        seen.push((apart, Sighting { foot_px, head_px, foot_share: ANKLE_SHARE, head_share }));
+    }
+    let is_passing = |i: usize| {
+        let near = seen[i.saturating_sub(3)..(i + 4).min(seen.len())].iter();
+        seen[i].0 < MAX_APART && near.into_iter().all(|(apart, _)| *apart >= seen[i].0)
+    };
+    let passing: Vec<Sighting> = (0..seen.len()).filter(|&i| is_passing(i)).map(|i| seen[i].1).collect();
+    if passing.len() >= 2 * NEEDED { passing } else { seen.into_iter().map(|(_, s)| s).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEVEL: Camera = Camera {
+        size: [1280, 720],
+        focal_px: DVec2::splat(1000.0),
+        centre_px: DVec2::new(639.5, 359.5),
+        distortion: Distortion::None,
+        rotation: DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::new(0.0, -1.0, 0.0)),
+        translation: DVec3::ZERO,
+    };
+
+    /// A person of 1.8 m on a circle before a camera 3 m high that looks down.
+    fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<Sighting> {
+        let rotation = DMat3::from_rotation_z(roll_rad) * DMat3::from_rotation_x(pitch_rad) * LEVEL.rotation;
+        let translation = rotation * DVec3::new(0.0, 0.0, -3.0);
+        let camera = Camera { rotation, translation, ..LEVEL };
+        let place = |i: i32| {
+            let turn = f64::from(i) * 0.2;
+            DVec3::new(2.0 * turn.cos(), 9.0 + 3.0 * turn.sin(), 0.0)
+        };
+        let sighting = |p: DVec3| {
+            let [foot, head] = [p, p + DVec3::Z * 1.8].map(|p| camera.project(p).unwrap());
+            Sighting::from_rectangle(foot, head)
+        };
+        (0..30).map(place).map(sighting).collect()
+    }
+
+    #[test]
+    fn a_planted_camera_is_recovered() {
+        let options = WalkerOptions { size: LEVEL.size, height_m: 1.8, lens: KnownLens::Nothing };
+        let found = camera_from_walker(&sightings(0.25, 0.0), &options).unwrap();
+        let value = |name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().value;
+        // The prior draws it towards the picture's width of 1280 px, but little.
+        assert!((value("focal_px") - 1000.0).abs() < 0.5, "{}", value("focal_px"));
+        assert!((value("pitch_deg").to_radians() - 0.25).abs() < 2e-4);
+        assert!((value("height_m") - 3.0).abs() < 2e-3);
+        assert!((found.camera.position().z - 3.0).abs() < 2e-3);
+    }
+
+    #[test]
+    fn a_known_lens_leaves_pitch_roll_and_height() {
+        let (focal_px, centre_px) = (LEVEL.focal_px, LEVEL.centre_px);
+        let lens = KnownLens::All { focal_px, centre_px, distortion: Distortion::None };
+        let options = WalkerOptions { size: LEVEL.size, height_m: 1.8, lens };
+        let found = camera_from_walker(&sightings(0.15, 0.02), &options).unwrap();
+        assert!(found.estimates.iter().all(|e| e.name != "focal_px"));
+        let roll = found.estimates.iter().find(|e| e.name == "roll_deg").unwrap().value;
+        // The prior draws it towards zero, but little.
+        assert!((roll.to_radians() - 0.02).abs() < 2e-3, "{roll}");
+    }
+
+    #[test]
+    fn runs_of_alike_values_are_counted() {
+        let alternating: Vec<f64> = (0..100).map(|i| f64::from(i % 2)).collect();
+        assert_eq!(alike(&alternating), 1.0);
+        let runs: Vec<f64> = (0..400).map(|i| f64::from((i / 10) * 7919 % 13)).collect();
+        assert!((5.0..15.0).contains(&alike(&runs)), "{}", alike(&runs));
+        assert_eq!(alike(&[1.0, 1.0]), 1.0);
+    }
+}

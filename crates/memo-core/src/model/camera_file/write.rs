@@ -1,0 +1,94 @@
+//! A camera as TOML, one section, that Pose2Sim and anipose read.
+
+use glam::DQuat;
+use nalgebra::{Matrix3, Vector3};
+
+use super::CameraFileError;
+use crate::model::camera::Camera;
+use crate::model::distortion::Distortion;
+
+/// Largest difference between a lens and the k1, k2, k3 it is written as, pixels.
+const MAX_LENS_ERROR_PX: f64 = 0.1;
+const LENS_SAMPLES: usize = 200;
+
+impl Camera {
+    /// The camera as a section `[name]` of TOML.
+    ///
+    /// Tsai's lens is written as the k1, k2, k3 nearest to it over the picture.
+    ///
+    /// # Errors
+    ///
+    /// A lens that these would miss by more than 0.1 px.
+    pub fn to_toml_string(&self, name: &str) -> Result<String, CameraFileError> {
+        let [k1, k2, p1, p2, k3] = self.opencv_distortion()?;
+        let (f, c, t) = (self.focal_px, self.centre_px, self.translation);
+        let r = DQuat::from_mat3(&self.rotation).to_scaled_axis();
+        let title = quoted(name);
+        let k3 = if k3 == 0.0 { String::new() } else { format!(", {k3:?}") };
+        Ok(format!(
+            "[{title}]\nname = {title}\nsize = [{}, {}]\n\
+             matrix = [[{:?}, 0.0, {:?}], [0.0, {:?}, {:?}], [0.0, 0.0, 1.0]]\n\
+             distortions = [{k1:?}, {k2:?}, {p1:?}, {p2:?}{k3}]\n\
+             rotation = [{:?}, {:?}, {:?}]\ntranslation = [{:?}, {:?}, {:?}]\nfisheye = false\n",
+            self.size[0], self.size[1], f.x, c.x, f.y, c.y, r.x, r.y, r.z, t.x, t.y, t.z
+        ))
+    }
+
+    /// OpenCV's k1, k2, p1, p2, k3 of the lens.
+    ///
+    /// # Errors
+    ///
+    /// A Tsai lens that these would miss by more than 0.1 px somewhere in the picture.
+    pub fn opencv_distortion(&self) -> Result<[f64; 5], CameraFileError> {
+        match self.distortion {
+            Distortion::None => Ok([0.0; 5]),
+            Distortion::Brown { k1, k2, p1, p2, k3 } => Ok([k1, k2, p1, p2, k3]),
+            Distortion::Tsai { .. } => self.nearest_radial(),
+        }
+    }
+
+    /// Least squares of r_d = r (1 + k1 r² + k2 r⁴ + k3 r⁶) over the radii of the picture.
+    fn nearest_radial(&self) -> Result<[f64; 5], CameraFileError> {
+        let (width, height) = (f64::from(self.size[0]), f64::from(self.size[1]));
+        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+        let reach = corners
+            .map(|(u, v)| ((glam::DVec2::new(u, v) - self.centre_px) / self.focal_px).length())
+            .into_iter()
+            .fold(0.0, f64::max);
+        // Distorted radii up to the corner, with the ideal radii they belong to.
+        let sampled = (1..=LENS_SAMPLES).filter_map(|i| {
+            let distorted = reach * i as f64 / LENS_SAMPLES as f64;
+            self.distortion.undistort(glam::DVec2::new(distorted, 0.0)).map(|ideal| (ideal.x, distorted))
+        });
+        let pairs: Vec<(f64, f64)> = sampled.collect();
+        let most = pairs.last().map_or(1.0, |(ideal, _)| *ideal);
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (r, r_d) in &pairs {
+            let s = r / most;
+            let row = Vector3::new(s.powi(3), s.powi(5), s.powi(7));
+            normal += row * row.transpose();
+            right += row * ((r_d - r) / most);
+        }
+        let fitted = normal.cholesky().map_or_else(Vector3::zeros, |c| c.solve(&right));
+        let [k1, k2, k3] = [fitted[0] / most.powi(2), fitted[1] / most.powi(4), fitted[2] / most.powi(6)];
+        let lens = Distortion::from_opencv([k1, k2, 0.0, 0.0, k3]);
+        let miss = |(r, r_d): &(f64, f64)| {
+            lens.distort(glam::DVec2::new(*r, 0.0)).map_or(f64::INFINITY, |d| (d.x - r_d).abs())
+        };
+        let error_px = pairs.iter().map(miss).fold(0.0, f64::max) * self.focal_px.max_element();
+        if pairs.len() == LENS_SAMPLES && error_px <= MAX_LENS_ERROR_PX {
+            return Ok([k1, k2, 0.0, 0.0, k3]);
+        }
+        Err(CameraFileError::Lens { error_px })
+    }
+}
+
+/// A TOML string; control characters by their numbers.
+fn quoted(name: &str) -> String {
+    let escaped = name.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04X}", u32::from(c)),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}

@@ -1,0 +1,359 @@
+"""`memo calibrate`: a camera from measured points, a walker or a checkerboard.
+
+(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+"""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+import memo
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed, with_progress
+from memo.cli.given import (
+    check_apart,
+    check_writable,
+    checked_fov,
+    checked_height,
+    load_camera,
+    two_sides,
+)
+
+if TYPE_CHECKING:
+    import typer
+
+CALIBRATE_EXIT_CODES = """Exit codes: 0 the calibration was written; 1 the input cannot be used;
+2 wrong usage; 4 the app extra is not installed; 130 interrupted (nothing is written)."""
+
+_KEYPOINT_SUFFIXES = (".json", ".csv")
+_MOST_FRAMES = 150  # a background needs no more, and memory holds them all
+
+
+def add_calibrate(app: "typer.Typer") -> None:
+    import typer
+
+    from memo.cli.camera_options import FovDeg, Lens, Picture, Size
+
+    ways = typer.Typer(no_args_is_help=True, help="Finds where the camera stands and how it images.")
+    app.add_typer(ways, name="calibrate")
+    out_option = typer.Option(help="Folder for the results; memo-out/NAME.")
+    json_option = typer.Option("--json", help="Print the summary as JSON.")
+    quiet_option = typer.Option("--quiet", help="Print nothing but errors.")
+
+    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    def points(
+        table: Annotated[Path, typer.Argument(metavar="POINTS", help="CSV: x_m,y_m,z_m,u_px,v_px.")],
+        size: Size = None,
+        picture: Picture = None,
+        fov_deg: FovDeg = None,
+        lens: Lens = None,
+        out: Annotated[Path | None, out_option] = None,
+        as_json: Annotated[bool, json_option] = False,
+        quiet: Annotated[bool, quiet_option] = False,
+    ) -> None:
+        """From six measured points, or four on the floor: where they are and where the picture shows them."""
+        delivery = Delivery(out or Path("memo-out") / table.stem, as_json=as_json, quiet=quiet)
+
+        def work() -> Exit:
+            check_apart([table, picture, lens], _written(delivery))
+            return _points(table, _view(size, picture, fov_deg, lens), delivery)
+
+        raise typer.Exit(guarded(work))
+
+    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    def walker(
+        source: Annotated[
+            Path,
+            typer.Argument(help="A video, or keypoints (folder, JSON, CSV), of one person walking about."),
+        ],
+        height: Annotated[float, typer.Option(help="Height of the person, metres.")],
+        size: Size = None,
+        picture: Picture = None,
+        fov_deg: FovDeg = None,
+        lens: Lens = None,
+        fps: Annotated[float | None, typer.Option(help="Frame rate, where the source does not say.")] = None,
+        out: Annotated[Path | None, out_option] = None,
+        as_json: Annotated[bool, json_option] = False,
+        quiet: Annotated[bool, quiet_option] = False,
+    ) -> None:
+        """From a person of known height who walks towards the camera and away from it."""
+        delivery = Delivery(out or Path("memo-out") / source.resolve().stem, as_json=as_json, quiet=quiet)
+
+        def work() -> Exit:
+            checked_height(height)
+            check_apart([source, picture, lens], _written(delivery))
+            return _walker(source, height, fps, (size, picture, fov_deg, lens), delivery)
+
+        raise typer.Exit(guarded(work))
+
+    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    def checkerboard(
+        folder: Annotated[Path, typer.Argument(help="Folder of pictures of the board, tilted differently.")],
+        squares: Annotated[str, typer.Option(help="Squares along both sides.", metavar="9x6")],
+        square_mm: Annotated[float, typer.Option(help="Side of a square, millimetres.")],
+        floor: Annotated[
+            Path | None, typer.Option(help="A picture with the board lying on the ground: where z is 0.")
+        ] = None,
+        out: Annotated[Path | None, out_option] = None,
+        as_json: Annotated[bool, json_option] = False,
+        quiet: Annotated[bool, quiet_option] = False,
+    ) -> None:
+        """From pictures of a checkerboard; with --floor also where the camera stands."""
+        delivery = Delivery(out or Path("memo-out") / folder.resolve().name, as_json=as_json, quiet=quiet)
+
+        def work() -> Exit:
+            check_apart([folder, floor], _written(delivery))
+            return _checkerboard(folder, two_sides(squares, "--squares", "9x6"), square_mm, floor, delivery)
+
+        raise typer.Exit(guarded(work))
+
+
+def _written(delivery: Delivery) -> list[Path]:
+    return [delivery.out / name for name in ("camera.toml", "lens.toml", "ground.png")]
+
+
+def _view(size: str | None, picture: Path | None, fov_deg: float | None, lens: Path | None) -> dict[str, Any]:
+    """Size, luma and what is known of the lens, from the options that say so."""
+    from memo.calibration import read_picture
+
+    if fov_deg is not None and lens is not None:
+        raise InputError("--lens already holds the field of view: leave --fov-deg out")
+    luma = None if picture is None else read_picture(picture)
+    known = None if lens is None else load_camera(lens, None, size=size, lens_only=True)
+    sides = None if size is None else two_sides(size, "--size")
+    for other in (None if luma is None else luma.shape[::-1], None if known is None else known.size):
+        if sides is not None and other is not None and tuple(other) != tuple(sides):
+            raise InputError(
+                f"pictures of different sizes: {sides[0]}x{sides[1]} and {other[0]}x{other[1]} pixels"
+            )
+        sides = sides or (None if other is None else (int(other[0]), int(other[1])))
+    if sides is None:
+        raise InputError("the size of the picture is needed: give --size WxH or --picture")
+    view: dict[str, Any] = {"size": sides, "luma": luma, "lens": known, "focal_px": None}
+    if fov_deg is not None:
+        view["focal_px"] = sides[0] / 2 / math.tan(math.radians(checked_fov(fov_deg)) / 2)
+    return view
+
+
+def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
+    from memo.calibration import read_points_csv
+
+    check_writable(delivery.out)
+    table = read_points_csv(path)
+    with with_elapsed("fitting", delivery):
+        try:
+            found = memo.calibrate_points(
+                table.places, table.pixels, view["size"], focal_px=view["focal_px"], lens=view["lens"]
+            )
+        except ValueError as error:
+            raise InputError(f"{path}: {error} (points are counted from 0)") from None
+    off = np.hypot(*found["residuals_px"].T)
+    kept = len(off) - len(found["outliers"])
+    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {kept} points."]
+    if found["outliers"]:
+        left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found["outliers"])
+        lines.append(f"Left out, as chance would not put them there: {left_out}.")
+    if found["is_planar"] and view["lens"] is None:
+        lines.append("All points lie in a plane: square pixels were taken for granted.")
+    if "centre_u_px" not in found["estimates"] and view["lens"] is None:
+        lines.append("The points ask for no principal point but the picture's centre.")
+    marks = np.stack([table.pixels, table.pixels + found["residuals_px"]], axis=1)
+    summary = {"points": len(off), "left_out_lines": [table.lines[i] for i in found["outliers"]]}
+    return _deliver(found, view, lines, summary, marks, delivery)
+
+
+def _walker(
+    source: Path,
+    height_m: float,
+    fps: float | None,
+    options: tuple[str | None, Path | None, float | None, Path | None],
+    delivery: Delivery,
+) -> Exit:
+    check_writable(delivery.out)
+    size, picture, fov_deg, lens = options
+    is_keypoints = source.suffix.lower() in _KEYPOINT_SUFFIXES or (
+        source.is_dir() and any(source.glob("*.json"))
+    )
+    shares: dict[str, Any] = {}
+    if is_keypoints:
+        keypoints = memo.read_keypoints(source, fps=fps or 25.0)
+        if size is None and picture is None and keypoints.image_size is not None:
+            size = f"{keypoints.image_size[0]}x{keypoints.image_size[1]}"
+        view = _view(size, picture, fov_deg, lens)
+        points = np.where(keypoints.scores[..., None] > 0, keypoints.points, np.nan)
+        feet, heads, shares["foot_share"], shares["head_share"] = memo.walker_sightings(
+            keypoints.names, points
+        )
+        if not len(feet):
+            raise InputError(f"{source}: no frame has both ankles and the head (or ears, eyes, nose, neck)")
+    else:
+        feet, heads, luma = _video_sightings(source, fps, delivery)
+        view = _view(size or f"{luma.shape[1]}x{luma.shape[0]}", picture, fov_deg, lens)
+        view["luma"] = luma if view["luma"] is None else view["luma"]
+    with with_elapsed("fitting", delivery):
+        try:
+            found = memo.calibrate_walker(
+                feet, heads, view["size"], height_m, focal_px=view["focal_px"], lens=view["lens"], **shares
+            )
+        except ValueError as error:
+            raise InputError(f"{source}: {error}") from None
+    kept = len(feet) - len(found["outliers"])
+    lines = [
+        f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
+        f" {found['rms_px'] / found['person_px']:.1%}"
+        f" of the person's height, over {kept} of {len(feet)} sightings.",
+        f"All lengths rest on the person's height of {height_m:g} m.",
+    ]
+    if view["focal_px"] is not None:
+        lines.append("The focal length was given by --fov-deg.")
+    marks = np.stack([heads, heads + found["residuals_px"]], axis=1)
+    summary = {"sightings": len(feet), "left_out": len(found["outliers"]), "person_px": found["person_px"]}
+    return _deliver(found, view, lines, summary, marks, delivery)
+
+
+def _video_sightings(source: Path, fps: float | None, delivery: Delivery) -> tuple[Any, Any, Any]:
+    from memo.calibration import rectangles
+    from memo.video import VideoReader
+
+    with VideoReader(source, rate_hz=fps) as reader:
+        count = reader.frame_count
+        step = max(1, math.ceil((count or 500) / _MOST_FRAMES))
+        frames: list[Any] = []
+        for frame in with_progress(reader, "reading", count, delivery):
+            if frame.index % step == 0 and len(frames) < 2 * _MOST_FRAMES:
+                frames.append(np.ascontiguousarray(frame.luma))
+    with with_elapsed("looking for the walker", delivery):
+        feet, heads = rectangles(frames)
+    if not len(feet):
+        raise InputError(f"{source}: nobody is seen from head to feet, clear of the border")
+    return feet, heads, frames[len(frames) // 2]
+
+
+def _checkerboard(
+    folder: Path, squares: tuple[int, int], square_mm: float, floor: Path | None, delivery: Delivery
+) -> Exit:
+    from memo.calibration import board_places, find_boards, lens_from_boards, read_picture
+
+    check_writable(delivery.out)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder of pictures")
+    if not (math.isfinite(square_mm) and 1 <= square_mm <= 1000):
+        raise InputError(f"--square-mm {square_mm:g} is not the side of a square in millimetres (1 to 1000)")
+    suffixes = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
+    if not paths:
+        raise InputError(f"{folder}: holds no pictures ({', '.join(suffixes)})")
+
+    def progress(paths: Any) -> Any:
+        return with_progress(paths, "looking for boards", len(paths), delivery)
+
+    boards = find_boards(paths, squares, progress)
+    lens = lens_from_boards(boards, square_mm / 1000)
+    columns, rows = boards.corners
+    lines = [
+        f"Board of {columns + 1}x{rows + 1} squares ({columns}x{rows} inner corners)"
+        f" in {len(boards.found)} of {len(paths)} pictures; reprojection error {lens.rms_px:.2f} px RMS."
+    ]
+    if not boards.are_squares:
+        lines.append(f"--squares {squares[0]}x{squares[1]} are inner corners, not squares, of this board.")
+    lines += [f"Not used: {path.name}: {why}." for path, why in boards.without.items()]
+    lines.append(f"Focal length {lens.focal_px[0]:.1f} ± {lens.focal_sd_px[0]:.1f} px.")
+    summary = {
+        "pictures": len(paths),
+        "used": {path.name: error for path, error in lens.error_px.items()},
+        "not_used": {path.name: why for path, why in boards.without.items()},
+        "rms_px": lens.rms_px,
+        "focal_px": lens.focal_px,
+        "focal_sd_px": lens.focal_sd_px,
+    }
+    lens_file = delivery.out / "lens.toml"
+    with _complete(lens_file) as temporary:
+        temporary.write_text(lens.text, encoding="utf-8")
+    known = memo.Camera.from_file(lens_file, lens_only=True)
+    if floor is None:
+        lines.append("Without --floor it is not known where the camera stands: give lens.toml as --lens.")
+        delivery.tell(summary, lines, [lens_file])
+        return Exit.DONE
+    board = find_boards([floor], (columns + 1, rows + 1)).found.get(floor)
+    if board is None:
+        raise InputError(f"{floor}: no board of {columns + 1}x{rows + 1} squares was found")
+    places = board_places(boards.corners, square_mm / 1000)
+    try:
+        found = memo.calibrate_points(places, board, boards.size, lens=known)
+    except ValueError:  # from below: the corners are counted the other way round
+        places = places * np.array([1.0, -1.0, 1.0])
+        found = memo.calibrate_points(places, board, boards.size, lens=known)
+    lines.append(f"On the floor: reprojection error {found['rms_px']:.2f} px RMS.")
+    view = {"size": boards.size, "luma": read_picture(floor), "lens": known, "focal_px": None}
+    marks = np.stack([board, board + found["residuals_px"]], axis=1)
+    return _deliver(
+        found, view, lines, {**summary, "floor_rms_px": found["rms_px"]}, marks, delivery, [lens_file]
+    )
+
+
+# What is written and said.
+
+
+def _deliver(
+    found: dict[str, Any],
+    view: dict[str, Any],
+    lines: list[str],
+    summary: dict[str, Any],
+    marks: Any,
+    delivery: Delivery,
+    written: list[Path] | None = None,
+) -> Exit:
+    from memo.calibration import PERSON_M, draw_ground, standing_place, write_picture
+
+    camera = found["camera"]
+    toml, picture = delivery.out / "camera.toml", delivery.out / "ground.png"
+    camera.to_toml(toml)
+    luma = view["luma"]
+    if luma is None:
+        luma = np.full(view["size"][::-1], 90, np.uint8)
+    write_picture(picture, draw_ground(luma, camera, marks))
+    place = standing_place(camera)
+    person_px = None if place is None else camera.pixel_height(place[0], PERSON_M)
+    estimates = {name: {"value": value, "sd": sd} for name, (value, sd) in found["estimates"].items()}
+    pitch_deg = _pitch_deg(camera)
+    x, y, z = camera.position
+    where = (
+        f"The camera is {z:.2f} m above the ground at ({x:.2f}, {y:.2f}) m and looks {abs(pitch_deg):.1f}°"
+    )
+    fitted = ", ".join(f"{name} {_rounded(entry['value'], entry['sd'])}" for name, entry in estimates.items())
+    size = (
+        f"A {PERSON_M} m person is {person_px:.0f} px high at {place[1]}."
+        if place and person_px
+        else ("The picture shows no ground on which a person could stand: are the axes right?")
+    )
+    said = [f"{where} {'down' if pitch_deg >= 0 else 'up'}.", f"Fitted: {fitted}.", size]
+    summary = {
+        **summary,
+        "estimates": estimates,
+        "rms_px": found["rms_px"],
+        "person_px_at": None if place is None else {"place_m": place[0], "height_px": person_px},
+        "position_m": camera.position,
+        "pitch_deg": pitch_deg,
+    }
+    delivery.tell(summary, [*lines, *said], [*(written or []), toml, picture])
+    return Exit.DONE
+
+
+def _pitch_deg(camera: Any) -> float:
+    """How far the camera looks down, degrees."""
+    up = camera.camera_from_world(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    return math.degrees(math.asin(max(-1.0, min(1.0, -(up[1] - up[0])[2]))))
+
+
+def _rounded(value: float, sd: float) -> str:
+    if not math.isfinite(sd) or sd <= 0:
+        return f"{value:.6g} (no deviation known)"
+    digits = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{min(digits, 9)}f} ± {sd:.{min(digits, 9)}f}"
+
+
+def _complete(path: Path) -> Any:
+    from memo.files import complete_file
+
+    return complete_file(path)

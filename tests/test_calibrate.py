@@ -1,0 +1,396 @@
+"""`memo calibrate` and what it calls, against planted cameras, OpenCV and recorded scenes."""
+
+import json
+import sys
+import tomllib
+
+import memo
+import numpy as np
+import pytest
+from conftest import shared_video
+from memo import cli
+from memo.calibration import board_places, draw_ground, read_picture, write_picture
+
+cv2 = pytest.importorskip("cv2")
+
+SIZE = (1280, 720)
+
+
+def look_at(position, target, roll_deg=0.0):
+    """Rotation and translation of a camera, OpenCV axes."""
+    forward = np.subtract(target, position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0, 0, 1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    a = np.radians(roll_deg)
+    rotation = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ rotation
+    return rotation, -rotation @ position
+
+
+def project(points, focal, pose, k=(0, 0), centre=(639.5, 359.5)):
+    matrix = np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
+    pixels, _ = cv2.projectPoints(
+        np.asarray(points, float), cv2.Rodrigues(pose[0])[0], pose[1], matrix, np.array([*k, 0, 0], float)
+    )
+    return pixels.reshape(-1, 2)
+
+
+def spread(count, seed=0):
+    return np.random.default_rng(seed).uniform([-2, -1.5, 0], [2, 2, 2], (count, 3))
+
+
+POSE = look_at(np.array([1.5, -6.0, 1.6]), np.array([0.0, 0.0, 0.9]), 1.0)
+
+
+@pytest.fixture
+def memo_command(monkeypatch, capsys):
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out, said.err
+
+    return run
+
+
+# Points.
+
+
+@pytest.mark.parametrize("count", [6, 8, 30])
+def test_a_planted_camera_is_recovered(count):
+    places = spread(count)
+    found = memo.calibrate_points(places, project(places, 1100, POSE), SIZE)
+    assert found["estimates"]["focal_px"][0] == pytest.approx(1100, abs=1e-3)
+    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-5)
+    assert found["outliers"] == [] and set(found["estimates"]) == {"focal_px", "x_m", "y_m", "z_m"}
+
+
+def test_what_the_points_ask_for_is_fitted():
+    places = spread(40)
+    pixels = project(places, 1100, POSE, k=(-0.25, 0.0), centre=(610.0, 380.0))
+    pixels += np.random.default_rng(1).normal(0, 0.3, pixels.shape)
+    estimates = memo.calibrate_points(places, pixels, SIZE)["estimates"]
+    for name, planted in {"focal_px": 1100, "centre_u_px": 610, "centre_v_px": 380, "k1": -0.25}.items():
+        value, sd = estimates[name]
+        assert abs(value - planted) < 4 * sd, name
+
+
+def test_a_plane_and_a_known_focal_length():
+    floor = np.array([[x, y, 0.0] for x in (-1.5, 0, 1.5) for y in (-1.0, 1.0, 3.0)])
+    found = memo.calibrate_points(floor, project(floor, 1100, POSE), SIZE)
+    assert found["is_planar"]
+    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-4)
+    corners = floor[[0, 2, 6, 8]]
+    found = memo.calibrate_points(corners, project(corners, 1100, POSE), SIZE, focal_px=1100.0)
+    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-4)
+
+
+def test_poses_are_those_of_opencv(tmp_path):
+    """Least squares with a known lens: the same minimum as solvePnP refined by Levenberg and Marquardt."""
+    places = spread(20, seed=5)
+    matrix, lens = np.array([[1100, 0, 630], [0, 1090, 350], [0, 0, 1.0]]), np.array([-0.2, 0.03, 0.001, 0.0])
+    rvec = cv2.Rodrigues(POSE[0])[0]
+    pixels = cv2.projectPoints(places, rvec, POSE[1], matrix, lens)[0].reshape(-1, 2)
+    pixels += np.random.default_rng(2).normal(0, 0.5, pixels.shape)
+    _, rvec, tvec = cv2.solvePnP(places, pixels, matrix, lens, flags=cv2.SOLVEPNP_ITERATIVE)
+    rvec, tvec = cv2.solvePnPRefineLM(places, pixels, matrix, lens, rvec, tvec)
+    theirs = (-cv2.Rodrigues(rvec)[0].T @ tvec).ravel()
+    path = tmp_path / "lens.json"
+    path.write_text(json.dumps({"size": SIZE, "K": matrix.tolist(), "D": lens.tolist()}))
+    known = memo.Camera.from_file(path, lens_only=True)
+    ours = memo.calibrate_points(places, pixels, SIZE, lens=known)
+    sd = [ours["estimates"][name][1] for name in ("x_m", "y_m", "z_m")]
+    # Ours are residuals before the lens, theirs behind it: a tenth of the deviation apart at most.
+    assert (np.abs(np.array(ours["camera"].position) - theirs) < 0.2 * np.array(sd)).all()
+
+
+def test_deviations_are_those_of_repetition():
+    places = spread(15, seed=4)
+    exact = project(places, 1100, POSE)
+    random = np.random.default_rng(0)
+    values, deviations = [], []
+    for _ in range(60):
+        found = memo.calibrate_points(places, exact + random.normal(0, 1.0, exact.shape), SIZE)
+        if "centre_u_px" in found["estimates"] or "k1" in found["estimates"] or found["outliers"]:
+            continue
+        values.append([found["estimates"][name][0] for name in ("focal_px", "x_m", "y_m", "z_m")])
+        deviations.append([found["estimates"][name][1] for name in ("focal_px", "x_m", "y_m", "z_m")])
+    assert len(values) > 45
+    ratio = np.std(values, axis=0) / np.sqrt(np.mean(np.square(deviations), axis=0))
+    assert ((ratio > 0.7) & (ratio < 1.3)).all(), ratio
+
+
+def test_a_mistaken_point_is_left_out():
+    places = spread(12)
+    pixels = project(places, 1100, POSE) + np.random.default_rng(0).normal(0, 0.5, (12, 2))
+    pixels[4] += [60, -25]
+    found = memo.calibrate_points(places, pixels, SIZE)
+    assert found["outliers"] == [4]
+    assert np.hypot(*found["residuals_px"][4]) == pytest.approx(65, abs=6)
+
+
+def test_faults_say_what_is_missing():
+    places, pixels = spread(8), project(spread(8), 1100, POSE)
+
+    def refused(places, pixels, reason, **options):
+        with pytest.raises(ValueError, match=reason):
+            memo.calibrate_points(np.ascontiguousarray(places), np.ascontiguousarray(pixels), SIZE, **options)
+
+    refused(places[:5], pixels[:5], "5 points: 6 are needed, or 4 if all lie in one plane")
+    refused(places[:3], pixels[:3], "3 points: 6 are needed")
+    line = np.linspace(0, 1, 8)[:, None] * [1.0, 0.5, 0.2]
+    refused(line, project(line, 1100, POSE), "on one line")
+    refused(places, np.full((8, 2), [5.0, 6.0]), "pixels lie on one line")
+    refused(places * [-1, 1, 1], pixels, "mirrored picture")
+    floor = np.array([[x, y, 0.0] for x in (-1.5, 0, 1.5) for y in (-1.0, 1.0, 3.0)])
+    refused(floor * [1, -1, 1], project(floor, 1100, POSE), "mirrored picture")
+    refused(places[::-1], pixels, "no camera shows the points|mirrored picture")
+    broken = pixels.copy()
+    broken[3, 1] = np.nan
+    refused(places, broken, "point 3: v_px must be finite")
+    refused(np.vstack([places[:7], places[:1]]), pixels, "points 0 and 7 have the same place")
+    wall = np.array([[x, 0.0, z] for x in (-1, 0, 1) for z in (0.2, 1, 1.8)])
+    head_on = look_at(np.array([0, -6.0, 1.0]), np.array([0, 0, 1.0]))
+    refused(wall, project(wall, 1100, head_on), "do not tell focal length from distance")
+    found = memo.calibrate_points(wall, project(wall, 1100, head_on), SIZE, focal_px=1100.0)
+    np.testing.assert_allclose(found["camera"].position, [0, -6, 1], atol=1e-4)
+    refused(places, pixels, "focal length must be positive", focal_px=-1.0)
+
+
+def test_points_from_the_command_line(memo_command, tmp_path):
+    places = spread(10)
+    pixels = project(places, 1100, POSE) + np.random.default_rng(0).normal(0, 0.4, (10, 2))
+    pixels[7] += 80
+    table = tmp_path / "points.csv"
+    rows = np.column_stack([places, pixels])
+    np.savetxt(table, rows, delimiter=",", header="x_m,y_m,z_m,u_px,v_px", comments="")
+    out = tmp_path / "out"
+    code, said, _ = memo_command("calibrate", "points", table, "--size", "1280x720", "--out", out)
+    assert code == 0 and "Left out" in said and "line 9 (1" in said and "A 1.7 m person is" in said
+    assert read_picture(out / "ground.png").shape == (720, 1280)
+    section = tomllib.loads((out / "camera.toml").read_text())["cam"]
+    theirs, _ = cv2.projectPoints(
+        places,
+        np.array(section["rotation"]),
+        np.array(section["translation"]),
+        np.array(section["matrix"]),
+        np.array(section["distortions"]),
+    )
+    ours = memo.Camera.from_file(out / "camera.toml").project(places)
+    np.testing.assert_allclose(ours, theirs.reshape(-1, 2), atol=1e-9, rtol=0)
+    code, said, _ = memo_command(
+        "calibrate", "points", table, "--size", "1280x720", "--out", out, "--json", "--fov-deg", "60.4"
+    )
+    assert code == 0 and json.loads(said)["left_out_lines"] == [9]
+    for content, reason in {
+        "x_m,y_m,z_m,u_px\n1,2,3,4\n": "line 1: missing columns v_px",
+        "x_m,y_m,z_m,u_px,v_px\n1,2,3,4,nan\n": "line 2: v_px must be a finite number, got 'nan'",
+        "x_m,y_m,z_m,u_px,v_px\n1,2,3,4\n": "line 2: v_px must be a finite number, got None",
+        "": "line 1: missing columns",
+    }.items():
+        table.write_text(content)
+        code, _, complaint = memo_command("calibrate", "points", table, "--size", "1280x720", "--out", out)
+        assert code == 1 and f"points.csv: {reason}" in complaint and complaint.count("\n") == 1
+    code, _, complaint = memo_command("calibrate", "points", table, "--out", out)
+    assert code == 1 and "give --size WxH or --picture" in complaint
+
+
+# A walker.
+
+HIGH = look_at(np.array([0.0, -8.0, 4.0]), np.array([0.0, 0.0, 0.5]))
+
+
+def walked(places, focal, pose, height_m=1.75, noise_px=0.0, seed=0):
+    random = np.random.default_rng(seed)
+    feet = project(np.column_stack([places, np.zeros(len(places))]), focal, pose)
+    heads = project(np.column_stack([places, np.full(len(places), height_m)]), focal, pose)
+    return feet + random.normal(0, noise_px, feet.shape), heads + random.normal(0, noise_px, heads.shape)
+
+
+def round_walk(count=60):
+    turn = np.linspace(0, 2 * np.pi, count)
+    return np.column_stack([2.5 * np.cos(turn), 3.0 * np.sin(turn)])
+
+
+def test_a_walk_near_and_far_tells_the_camera():
+    found = memo.calibrate_walker(*walked(round_walk(), 1100, HIGH), SIZE, 1.75)
+    estimates = found["estimates"]
+    assert estimates["focal_px"][0] == pytest.approx(1100, rel=1e-3)
+    assert estimates["height_m"][0] == pytest.approx(4.0, rel=1e-3)
+    assert estimates["pitch_deg"][0] == pytest.approx(np.degrees(np.arctan2(3.5, 8)), abs=0.02)
+    # Distances between places are those walked, whatever the axes.
+    places = found["places"][:, :2]
+    apart = np.linalg.norm(places[:30] - places[30:], axis=1)
+    np.testing.assert_allclose(
+        apart, np.linalg.norm(round_walk()[:30] - round_walk()[30:], axis=1), rtol=1e-4
+    )
+
+
+def test_walker_deviations_are_those_of_repetition():
+    values, deviations = [], []
+    for seed in range(60):
+        found = memo.calibrate_walker(
+            *walked(round_walk(40), 1100, HIGH, noise_px=1.5, seed=seed), SIZE, 1.75
+        )
+        values.append([found["estimates"][name][0] for name in ("focal_px", "pitch_deg", "height_m")])
+        deviations.append([found["estimates"][name][1] for name in ("focal_px", "pitch_deg", "height_m")])
+    ratio = np.std(values, axis=0) / np.sqrt(np.mean(np.square(deviations), axis=0))
+    assert ((ratio > 0.7) & (ratio < 1.3)).all(), ratio
+    assert abs(np.mean(values, axis=0)[0] - 1100) < 25
+
+
+def test_what_a_walk_does_not_tell_is_said():
+    across = np.column_stack([np.linspace(-2, 2, 40), np.zeros(40)])
+    level = look_at(np.array([0.0, -7.0, 1.2]), np.array([0.0, 0.0, 1.2]))
+    feet, heads = walked(across, 1100, level, noise_px=0.5)
+    with pytest.raises(ValueError, match=r"does not tell the focal length.*give the field of view"):
+        memo.calibrate_walker(feet, heads, SIZE, 1.75)
+    found = memo.calibrate_walker(feet, heads, SIZE, 1.75, focal_px=1100.0)
+    assert found["estimates"]["height_m"][0] == pytest.approx(1.2, abs=0.1)
+    assert abs(found["estimates"]["pitch_deg"][0]) < 1.0
+    for arguments, reason in {
+        (1.0, 0, 3): "3 sightings of the whole person.*4 are needed",
+        (75.0, 0, 40): "height must be 0.5 to 2.5",
+        (1.75, 1, 40): "the head is not above the feet",
+    }.items():
+        height, swapped, count = arguments
+        ends = (heads, feet) if swapped else (feet, heads)
+        with pytest.raises(ValueError, match=reason):
+            memo.calibrate_walker(ends[0][:count], ends[1][:count], SIZE, height)
+    broken = heads.copy()
+    broken[5] = np.inf
+    with pytest.raises(ValueError, match="sighting 5"):
+        memo.calibrate_walker(feet, broken, SIZE, 1.75)
+
+
+def test_wrong_detections_are_left_out():
+    feet, heads = walked(round_walk(), 1100, HIGH, noise_px=1.0)
+    heads[[7, 20, 41]] += [[30, -60], [-45, 80], [100, 0]]
+    found = memo.calibrate_walker(feet, heads, SIZE, 1.75)
+    assert {7, 20, 41} <= set(found["outliers"]) and len(found["outliers"]) < 6
+    assert found["estimates"]["focal_px"][0] == pytest.approx(1100, rel=0.1)
+
+
+def pets_boxes(person):
+    """Boxes of one person in the middle of the picture, and the published camera."""
+    folder = shared_video("pets09_s2l1")
+    rows = np.loadtxt(folder / "gt.txt", delimiter=",")
+    u, v, w, h = rows[rows[:, 1] == person][:, 2:6].T
+    inside = (u > 5) & (u + w < 763) & (v > 5) & (v + h < 571)
+    feet, heads = np.column_stack([u + w / 2, v + h])[inside] - 1, np.column_stack([u + w / 2, v])[inside] - 1
+    return np.ascontiguousarray(feet), np.ascontiguousarray(heads), folder
+
+
+def test_pets_from_annotated_boxes():
+    """Boxes of several people of unknown heights, 53 to 153 px, from 7 m above: hard for all else."""
+    ends = zip(*(pets_boxes(person)[:2] for person in (1, 9, 15, 19)), strict=True)
+    feet, heads = (np.concatenate(points) for points in ends)
+    true = memo.Camera.from_file(pets_boxes(15)[2] / "View_001.xml")
+    with pytest.raises(ValueError, match="does not tell the focal length"):
+        memo.calibrate_walker(*pets_boxes(15)[:2], (768, 576), 1.75)
+    found = memo.calibrate_walker(feet, heads, (768, 576), 1.75, focal_px=1190.0)
+    assert found["camera"].position[2] == pytest.approx(true.position[2], rel=0.12)
+    pixels = [(u, v) for u, v in feet.tolist()]
+    ours, published = found["camera"].ground_points(pixels), true.ground_points(pixels)
+    apart = [np.linalg.norm(places[:-40] - places[40:], axis=1) for places in (ours, published)]
+    print(found["estimates"], np.median(apart[0] / apart[1]), np.std(apart[0] / apart[1]))
+    assert np.median(apart[0] / apart[1]) == pytest.approx(1, abs=0.15)
+
+
+@pytest.mark.parametrize(("name", "height_m"), [("mocap_a", 1.86), ("mocap_b", 1.66)])
+def test_recorded_walks_across_the_picture_tell_little(memo_command, tmp_path, name, height_m):
+    """At one distance only leaning bodies tell the pitch: refused, or the deviation holds the error."""
+    folder = shared_video(name)
+    true = memo.Camera.from_file(folder / "camera.toml")
+    section = tomllib.loads((folder / "camera.toml").read_text())["cam"]
+    fov_deg = 2 * np.degrees(np.arctan(section["size"][0] / 2 / section["matrix"][0][0]))
+    arguments = ("calibrate", "walker", folder / "video.mp4", "--height", height_m, "--out", tmp_path)
+    code, _, complaint = memo_command(*arguments)
+    assert code == 1 and "does not tell" in complaint
+    code, said, complaint = memo_command(*arguments, "--fov-deg", fov_deg, "--json")
+    if code == 0:
+        height = json.loads(said)["estimates"]["height_m"]
+        assert abs(height["value"] - true.position[2]) < 2 * height["sd"]
+    else:
+        assert "does not tell how far the camera looks down" in complaint
+
+
+def test_keypoints_are_taken_where_the_ankles_pass(tmp_path):
+    names = ["nose", "right_ear", "left_ear", "right_ankle", "left_ankle"]
+    points = np.zeros((60, 5, 2))
+    swing = np.cos((np.arange(60) + 0.5) / 60 * 12 * np.pi)
+    points[:, 0], points[:, 1], points[:, 2] = [105, 55], [100, 50], [102, 50]
+    points[:, 3] = np.column_stack([100 + 60 * swing, np.full(60, 290)])
+    points[:, 4] = np.column_stack([100 - 60 * swing, np.full(60, 294)])
+    feet, heads, foot_share, head_share = memo.walker_sightings(names, points)
+    assert len(feet) == 12
+    np.testing.assert_allclose(feet, [[100, 294]] * 12)
+    np.testing.assert_allclose(heads, [[101, 50]] * 12)
+    assert set(foot_share) == {0.042} and set(head_share) == {0.926}
+    points[:, 1:3] = np.nan
+    assert set(memo.walker_sightings(names, points)[3]) == {0.91}
+
+
+# Checkerboards.
+
+
+def rendered_board(pose, focal=550.0, size=(640, 360), squares=(10, 7), square_m=0.03, k=(-0.15, 0.02)):
+    """A board in its plane z = 0, seen through a lens; anti-aliased by 3x3 rays a pixel."""
+    u, v = np.meshgrid((np.arange(size[0] * 3) - 1) / 3, (np.arange(size[1] * 3) - 1) / 3)
+    matrix = np.array([[focal, 0, 319.5], [0, focal, 179.5], [0, 0, 1]])
+    rays = cv2.undistortPoints(np.stack([u.ravel(), v.ravel()], 1)[:, None], matrix, np.array([*k, 0, 0]))
+    rays = np.column_stack([rays.reshape(-1, 2), np.ones(u.size)]) @ pose[0]
+    place = -pose[0].T @ pose[1]
+    hit = place + rays * (-place[2] / rays[:, 2:])
+    cell = np.floor(hit[:, :2] / square_m).astype(int) + 1
+    inside = ((cell >= 0) & (cell < squares)).all(axis=1)
+    luma = np.where(inside, np.where(cell.sum(axis=1) % 2, 230, 25), 200).reshape(u.shape)
+    return luma.reshape(size[1], 3, size[0], 3).mean(axis=(1, 3)).astype(np.uint8)
+
+
+def test_rendered_boards(memo_command, tmp_path):
+    folder = tmp_path / "boards"
+    folder.mkdir()
+    eyes = [(0.42, 0.07, 0.3), (-0.18, 0.08, 0.3), (0.13, 0.36, 0.28), (0.11, -0.21, 0.28)]
+    eyes += [(0.14, 0.0, 0.5), (0.34, 0.3, 0.25), (-0.1, -0.15, 0.25)]
+    for i, eye in enumerate(eyes):
+        luma = rendered_board(look_at(np.array(eye), np.array([0.12, 0.075, 0])))
+        cv2.imwrite(str(folder / f"board{i}.png"), luma)
+    cv2.imwrite(str(folder / "empty.png"), np.full((360, 640), 90, np.uint8))
+    cv2.imwrite(str(folder / "small.png"), np.full((72, 128), 90, np.uint8))
+    (folder / "torn.png").write_bytes(b"no picture")
+    floor = tmp_path / "floor.png"
+    eye = np.array([0.1, -0.55, 0.35])
+    cv2.imwrite(str(floor), rendered_board(look_at(eye, np.array([0.12, 0.075, 0]))))
+    out = tmp_path / "out"
+    arguments = ("calibrate", "checkerboard", folder, "--square-mm", 30, "--out", out)
+    code, said, complaint = memo_command(*arguments, "--squares", "10x7", "--floor", floor, "--json")
+    assert code == 0, complaint
+    summary = json.loads(said)
+    assert set(summary["not_used"]) == {"empty.png", "small.png", "torn.png"}
+    print(summary)
+    for focal_px, sd in zip(summary["focal_px"], summary["focal_sd_px"], strict=True):
+        assert abs(focal_px - 550) < max(4 * sd, 3)
+    assert summary["rms_px"] < 0.2 and summary["floor_rms_px"] < 0.3
+    camera = memo.Camera.from_file(out / "camera.toml")
+    assert camera.position[2] == pytest.approx(0.35, abs=5e-3)
+    code, said, complaint = memo_command(*arguments, "--squares", "9x6")
+    assert code == 0 and "9x6 are inner corners, not squares" in said and "give lens.toml as --lens" in said
+    code, _, complaint = memo_command(*arguments, "--squares", "5x4")
+    assert code == 1 and complaint.count("\n") == 1  # too few boards, or corners too near to one another
+
+
+def test_the_ground_is_drawn(tmp_path):
+    camera = memo.Camera.level((320, 240), 60.0, 1.4, 5.0)
+    rgb = draw_ground(np.full((240, 320), 90, np.uint8), camera)
+    u, v = camera.project(np.array([[0.5, 0.0, 0.0]]))[0]
+    red, green, blue = rgb[round(v), round(u)].astype(int)
+    assert red > green + 60 and red > blue + 60
+    assert (rgb[:100] == rgb[50, 5]).all() or rgb[:60].std() < 60
+    assert read_picture(write_picture(tmp_path / "ground.png", rgb)).shape == (240, 320)
+    assert board_places((3, 2), 0.5).tolist() == [
+        *([0, 0, 0], [0.5, 0, 0], [1, 0, 0]),
+        *([0, 0.5, 0], [0.5, 0.5, 0], [1, 0.5, 0]),
+    ]
