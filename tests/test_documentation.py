@@ -1,7 +1,7 @@
 """What the documentation tells people to type is typed here: blocks of README.md and docs/, and all examples.
 
 A page is run from top to bottom in a folder of its own, in which the files stand that its text takes for
-given: `walk.mp4`, `points.csv`, `walk_json/` and such. A block with `<!-- not run: why -->` on the line above is
+given: `walk.mp4`, `points.csv`, `walk_json/` and such. A block with `<!-- not run: why -->` above it is
 left out; how many these are is counted below, so that none is left out unseen.
 """
 
