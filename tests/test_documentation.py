@@ -1,8 +1,8 @@
 """What the documentation tells people to type is typed here: blocks of README.md and docs/, and all examples.
 
 A page is run from top to bottom in a folder of its own, in which the files stand that its text takes for
-given: `walk.mp4`, `camera.toml`, `walk_json/`. A block with `<!-- not run: why -->` on the line above is left
-out; how many these are is counted below, so that none is left out unseen.
+given: `walk.mp4`, `points.csv`, `walk_json/` and such. A block with `<!-- not run: why -->` above it is
+left out; how many these are is counted below, so that none is left out unseen.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ NOT_RUN = {
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 5,
 }
-BLOCKS_RUN = 16
+BLOCKS_RUN = 17
 
 _FENCE = re.compile(
     r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
@@ -86,6 +86,7 @@ def given(tmp_path_factory):
     write_walk(folder / "walk.mp4", scene)
     (folder / "camera.toml").write_text(calibration(scene.camera), encoding="utf-8")
     write_keypoints(folder / "walk_json", scene.camera)
+    write_points(folder / "points.csv", scene.camera)
     return folder
 
 
@@ -112,6 +113,13 @@ def calibration(camera):
     lines = [f"size = {list(camera.size)}", f"matrix = {np.round(matrix, 6).tolist()}"]
     lines += ["distortions = [0.0, 0.0, 0.0, 0.0]", f"rotation = {rotation.tolist()}"]
     return "\n".join(["[cam]", 'name = "cam"', *lines, f"translation = {translation.tolist()}", ""])
+
+
+def write_points(path, camera):
+    """Eight places, on the floor and 1.6 m above it, with their pixels."""
+    places = np.array([[x, y, z] for z in (0, 1.6) for x in (-1.5, 1.5) for y in (-0.5, 1.5)])
+    table = np.hstack([places, camera.project(places)])
+    np.savetxt(path, table, delimiter=",", header="x_m,y_m,z_m,u_px,v_px", comments="", fmt="%.2f")
 
 
 def write_keypoints(folder, camera):
@@ -201,7 +209,7 @@ def test_an_example_runs_and_draws(example, workplace):
 
 
 def test_there_are_examples():
-    assert len(EXAMPLES) == 11
+    assert len(EXAMPLES) == 12
 
 
 @pytest.mark.skipif(not os.environ.get("MEMO_FULL"), reason="compiles for minutes; MEMO_FULL=1 runs it")
