@@ -24,9 +24,8 @@ use pyo3::prelude::*;
 mod _memo {
     use pyo3::prelude::*;
 
-    use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
     #[pymodule_export]
-    use super::camera::PyCamera;
+    use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
