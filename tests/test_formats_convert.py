@@ -80,9 +80,9 @@ def test_parquet_tells_its_up_axis(tmp_path, memo_command):
     np.testing.assert_allclose(again.points, points[FRAMES], atol=1e-4)
 
 
-def test_boxes_and_keypoints_of_a_track(tmp_path, memo_command):
+def test_keypoints_of_a_track(tmp_path, memo_command):
     write_track(tmp_path / "run")
-    for target, said in [("a.txt", "MOTChallenge rows"), ("a.json", "COCO results"), ("a_json", "OpenPose")]:
+    for target, said in [("a.json", "COCO results"), ("a_json", "OpenPose")]:
         code, out, err = memo_command("convert", tmp_path / "run", tmp_path / target)
         assert (code, err) == (0, "")
         assert said in out
@@ -93,6 +93,11 @@ def test_boxes_and_keypoints_of_a_track(tmp_path, memo_command):
     assert (code, err) == (1, "memo: --up: means nothing for COCO results")
     code, _, err = memo_command("convert", tmp_path / "nobody", tmp_path / "b.txt")
     assert code == 1 and "no such file or folder" in err
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.txt")
+    assert (code, err) == (
+        1,
+        f"memo: {tmp_path / 'run'}: holds no run.json, so it is not the folder of a memo track",
+    )
 
 
 def test_one_walk_its_events_and_the_summary_as_json(tmp_path, memo_command):

@@ -5,14 +5,10 @@ import motmetrics
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo.files import JOINTS
+from memo.files import write_track_csv
 from memo.formats import FormatError
-from memo.formats.motchallenge import (
-    boxes_from_contours,
-    boxes_from_joints,
-    read_motchallenge,
-    write_motchallenge,
-)
+from memo.formats.motchallenge import boxes_from_contours, read_motchallenge, write_motchallenge
+from memo.run import RunError, Source, write_run
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +33,7 @@ def overlap(one, other):
 def test_rows_are_read_by_motmetrics(tmp_path, track):
     write_motchallenge(tmp_path / "walk.txt", track)
     table = motmetrics.io.loadtxt(str(tmp_path / "walk.txt"), fmt="mot15-2D").reset_index()
-    boxes = boxes_from_contours(track)
+    boxes = boxes_from_contours(map(track.contours, range(len(track))))
     np.testing.assert_array_equal(table["FrameId"], track.columns["frame"] + 1)
     assert set(table["Id"]) == {1}
     # motmetrics takes the 1 of MATLAB's pixels off; its names of the last columns are those of 2016.
@@ -61,42 +57,42 @@ def test_boxes_hold_the_walker_that_was_drawn(tmp_path, scene, track):
         v, u = np.nonzero(change[frame])
         low = [np.percentile(u, 0.5), np.percentile(v, 0.5)]
         seen.append([*low, np.percentile(u, 99.5), np.percentile(v, 99.5)])
-    boxes = np.column_stack(
-        [
-            rows["left_px"],
-            rows["top_px"],
-            rows["left_px"] + rows["width_px"],
-            rows["top_px"] + rows["height_px"],
-        ]
-    )
-    assert np.median(overlap(boxes, np.array(seen))) > 0.85
+    assert np.median(overlap(boxes_of(rows), np.array(seen))) > 0.85
 
 
-def test_boxes_from_joints_are_those_of_the_contours(track):
-    """A saved track has joints alone; head, hands and feet are added to them."""
-    from_joints, from_contours = boxes_from_joints(track.columns), boxes_from_contours(track)
-    assert overlap(from_joints, from_contours).mean() > 0.95
-    heights = from_contours[:, 3] - from_contours[:, 1]
-    off = np.abs(from_joints - from_contours).mean(axis=0) / heights.mean()
-    assert (off < 0.012).all(), off
-    joints = np.stack(
-        [np.column_stack([track.columns[f"{joint}_{axis}_px"] for axis in "uv"]) for joint in JOINTS], axis=1
-    )
-    bare = np.concatenate([joints.min(axis=1), joints.max(axis=1)], axis=1)
-    assert overlap(bare, from_contours).mean() < 0.7
+def saved(folder, scene, track, columns=None):
+    """The folder that `memo track` makes of a track, or of the columns of its table."""
+    folder.mkdir()
+    write_track_csv(folder / "track.csv", track.columns if columns is None else columns)
+    write_run(folder, track, {"height_m": scene.height_m}, Source(None, (0, None), 25.0), len(scene.frames))
+    return folder
 
 
-def test_a_saved_track_is_written_from_its_columns(tmp_path, track):
+def boxes_of(rows):
+    low = np.column_stack([rows["left_px"], rows["top_px"]])
+    return np.column_stack([low, low + np.column_stack([rows["width_px"], rows["height_px"]])])
+
+
+def test_a_saved_track_has_the_boxes_of_its_contours(tmp_path, scene, track):
+    folder = saved(tmp_path / "run", scene, track)
+    for name in (folder, folder / "track.csv"):
+        assert write_motchallenge(tmp_path / "walk.txt", name) == len(track)
+        boxes = boxes_of(read_motchallenge(tmp_path / "walk.txt"))
+        # The table has tenths of millimetres.
+        np.testing.assert_allclose(
+            boxes, boxes_from_contours(map(track.contours, range(len(track)))), atol=0.06
+        )
+
+
+def test_rows_without_a_place_have_no_box(tmp_path, scene, track):
     columns = {name: values.copy() for name, values in track.columns.items()}
-    columns["walk"][20:] = 1
-    columns["x_m"][3] = columns["left_knee_u_px"][5] = columns["similarity"][7] = np.nan
-    write_motchallenge(tmp_path / "walk.txt", columns)
+    columns["x_m"][3] = columns["phase"][5] = columns["similarity"][7] = np.nan
+    write_motchallenge(tmp_path / "walk.txt", saved(tmp_path / "run", scene, track, columns))
     rows = read_motchallenge(tmp_path / "walk.txt")
-    kept = np.delete(np.arange(len(columns["frame"])), 5)  # a row without a box has none
+    kept = np.delete(np.arange(len(track)), [3, 5])
     np.testing.assert_array_equal(rows["frame"], columns["frame"][kept])
-    np.testing.assert_array_equal(rows["id"], columns["walk"][kept] + 1)
-    assert np.isnan([rows[axis][3] for axis in ("x_m", "y_m", "z_m")]).all() and rows["conf"][6] == -1
-    np.testing.assert_allclose(np.delete(rows["x_m"], 3), np.delete(columns["x_m"], [3, 5]), atol=1e-4)
+    assert rows["conf"][5] == -1
+    np.testing.assert_allclose(rows["x_m"], columns["x_m"][kept], atol=1e-4)
 
 
 def test_y_up_is_turned_about_x(tmp_path, track):
@@ -164,9 +160,13 @@ def test_broken_rows_are_refused(tmp_path, text, message):
     assert str(path) in str(error.value) and "\n" not in str(error.value)
 
 
-def test_what_is_no_track_is_refused(tmp_path):
-    with pytest.raises(FormatError, match="not the columns of a track: no left_ankle_x_m"):
-        write_motchallenge(tmp_path / "a.txt", {"frame": [0]})
+def test_what_is_no_run_is_refused(tmp_path, scene, track):
     with pytest.raises(FormatError, match="cannot be read"):
         read_motchallenge(tmp_path / "nowhere.txt")
-    assert list(tmp_path.iterdir()) == []
+    folder = saved(tmp_path / "run", scene, track, {**track.columns, "walk": np.full(len(track), 1)})
+    with pytest.raises(RunError, match=r"run\.json: has 1 walks, the table a walk 1"):
+        write_motchallenge(tmp_path / "a.txt", folder)
+    (folder / "run.json").unlink()
+    with pytest.raises(RunError, match=r"holds no run\.json, so it is not the folder of a memo track"):
+        write_motchallenge(tmp_path / "a.txt", folder)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]

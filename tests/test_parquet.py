@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 from memo.files import TRACK_COLUMNS, read_columns_csv, read_track, write_columns_csv, write_track_csv
 from memo.formats import FormatError
-from memo.formats.parquet import read_parquet, unit_of, write_parquet
+from memo.formats.parquet import read_parquet, write_parquet
+from memo.table import column_unit
 
 
 def track_columns(count=20):
@@ -179,7 +180,13 @@ except FormatError as error:
 
 
 def test_units_of_names():
-    assert unit_of("cadence_per_min") == "1/min" and unit_of("reason") is None and unit_of("rate_hz") == "Hz"
     assert (
-        unit_of("margin_nats") == "nat" and unit_of("anchor_sd_m") == "m" and unit_of("stance_percent") == "%"
+        column_unit("cadence_per_min") == "1/min"
+        and column_unit("reason") is None
+        and column_unit("rate_hz") == "Hz"
+    )
+    assert (
+        column_unit("margin_nats") == "nat"
+        and column_unit("anchor_sd_m") == "m"
+        and column_unit("stance_percent") == "%"
     )

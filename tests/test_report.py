@@ -551,7 +551,7 @@ def test_limbs_from_dots_have_a_page(limb_folder):
         (
             "points3d.csv",
             "frame,time_s,source,A_u_px,A_v_px,A_z_px\n0,0,x,1,far,\n",
-            "line 2: A_v_px 'far' is not",
+            "row 2: A_v_px 'far' is not",
         ),
         ("points3d.csv", "frame,time_s,source,A_u_px,A_v_px,A_z_px\n0,0,x,1,inf,\n", "'inf' is not finite"),
         ("windows.csv", None, "windows.csv"),

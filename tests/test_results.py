@@ -82,7 +82,7 @@ def test_a_result_is_a_data_frame(results, name):
     assert isinstance(frame, pandas.DataFrame)
     if name == "track":
         assert list(frame.columns) == list(results[name].columns)
-        assert frame.attrs["units"]["x_m"] == "m"
+        assert frame.attrs["units"]["x_m"] == "m" and frame.attrs["units"]["sd_phase"] == "cycle"
         np.testing.assert_array_equal(frame["phase"], results[name].columns["phase"])
     if name == "postures":
         assert len(frame) == len(results[name])

@@ -48,6 +48,7 @@ __all__ = [
     "pointlight",
     "posture",
     "posture_tree",
+    "recorded_contours",
     "rohr_deviations",
     "rohr_numbers",
     "search_windows",
@@ -189,6 +190,13 @@ class Explainer:
     def __new__(cls, tracker: Tracker, records: Sequence[dict[str, Any]], wanted: set[int]) -> Self: ...
     def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> dict[str, Any] | None: ...
     def finish(self) -> dict[str, Any] | None: ...
+
+def recorded_contours(
+    tracker: Tracker,
+    record: dict[str, Any],
+    torso_m: npt.NDArray[np.float64],
+    phases: npt.NDArray[np.float64],
+) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]]: ...
 
 @final
 class Walk:

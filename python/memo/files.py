@@ -31,6 +31,7 @@ __all__ = [
     "read_text_columns",
     "read_track",
     "read_track_csv",
+    "read_typed_columns",
     "write_columns_csv",
     "write_events_csv",
     "write_flips_csv",
@@ -103,18 +104,7 @@ def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.Array
 
 def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
     """Reads any table written here: a column is int64, float64 with NaN for empty cells, or texts."""
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not a table: {error}") from None
-    if not header or len(set(header)) < len(header):
-        raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
-    for line, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
-    cells = zip(*rows, strict=True) if rows else ((),) * len(header)
-    return {name: _column(own) for name, own in zip(header, cells, strict=True)}
+    return {name: _column(cells) for name, cells in read_text_columns(path).items()}
 
 
 def _column(cells: Sequence[str]) -> Column:
@@ -146,15 +136,7 @@ def plain(value: Any) -> Any:
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
     """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN."""
-    rows = _read_rows(path, TRACK_COLUMNS)
-    columns: dict[str, Column] = {}
-    for name in TRACK_COLUMNS:
-        kind = np.int64 if name in ("frame", "walk") else np.float64
-        try:
-            columns[name] = np.array([row[name] or "nan" for row in rows], dtype=object).astype(kind)
-        except (ValueError, OverflowError) as error:
-            raise ValueError(f"{path}: column {name}: {error}") from None
-    return columns
+    return read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
@@ -196,16 +178,50 @@ def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]
 
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
     """Reads what `write_events_csv` wrote."""
-    return [
-        {**row, "time_s": float(row["time_s"]), "frame": float(row["frame"])}
-        for row in _read_rows(path, EVENT_COLUMNS)
-    ]
+    columns = read_typed_columns(path, EVENT_COLUMNS, texts=("event", "side"))
+    if np.isnan([columns["time_s"], columns["frame"]]).any():
+        raise ValueError(f"{path}: an event without its time or frame")
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
-def read_text_columns(path: str | PathLike[str], names: tuple[str, ...]) -> dict[str, list[str]]:
-    """The columns of a table that has at least these, cell by cell as written."""
-    rows = _read_rows(path, names)
-    return {name: [row[name] or "" for row in rows] for name in names}
+def read_typed_columns(
+    path: str | PathLike[str], names: Sequence[str], *, whole: Sequence[str] = (), texts: Sequence[str] = ()
+) -> dict[str, Column]:
+    """These columns of a table: int64 for `whole`, objects for `texts`, else float64 with NaN where empty."""
+    columns: dict[str, Column] = {}
+    for name, cells in read_text_columns(path, names).items():
+        kind = np.int64 if name in whole else np.float64
+        try:
+            filled = cells if name in texts else [cell or "nan" for cell in cells]
+            columns[name] = np.array(filled, dtype=object)
+            if name not in texts:
+                columns[name] = columns[name].astype(kind)
+        except (ValueError, OverflowError) as error:
+            raise ValueError(f"{path}: column {name}: {error}") from None
+    return columns
+
+
+def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> dict[str, list[str]]:
+    """The columns of a table that has at least these (all of it by default), cell by cell as written.
+
+    Every table written here is read by this; ValueError names the file and the row.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a table: {error}") from None
+    absent = set(names) - set(header)
+    if absent:
+        raise ValueError(f"{path}: columns missing: {sorted(absent)}")
+    if not header or len(set(header)) < len(header):
+        raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
+    for line, row in enumerate(rows, start=2):
+        if row and len(row) != len(header):
+            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
+    place = {name: index for index, name in enumerate(header)}
+    return {name: [row[place[name]] for row in rows if row] for name in names or header}
 
 
 @contextmanager
@@ -233,12 +249,3 @@ def _write_rows(path: str | PathLike[str], header: Iterable[str], rows: Iterable
         table = csv.writer(file, lineterminator="\n")
         table.writerow(header)
         table.writerows(rows)
-
-
-def _read_rows(path: str | PathLike[str], header: tuple[str, ...]) -> list[dict[str, str]]:
-    with open(path, newline="", encoding="utf-8") as file:
-        table = csv.DictReader(file)
-        absent = set(header) - set(table.fieldnames or ())
-        if absent:
-            raise ValueError(f"{path}: columns missing: {sorted(absent)}")
-        return list(table)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import read_text_columns, write_columns_csv
+from memo.files import read_typed_columns, write_columns_csv
 
 __all__ = [
     "DEFINITIONS",
@@ -116,13 +116,4 @@ def write_gait_parameters_csv(path: str | PathLike[str], table: Mapping[str, npt
 
 def read_gait_parameters_csv(path: str | PathLike[str]) -> Table:
     """Reads what `write_gait_parameters_csv` wrote; NaN for empty numbers, whole numbers as int64."""
-    kinds = {"walk": np.int64, "n": np.int64, "value": float, "ci_low": float, "ci_high": float}
-    table: Table = {}
-    for name, texts in read_text_columns(path, GAIT_COLUMNS).items():
-        kind = kinds.get(name)
-        try:
-            filled = [text or "nan" for text in texts] if kind else texts
-            table[name] = np.array(filled, dtype=object).astype(kind or object)
-        except ValueError as error:
-            raise ValueError(f"{path}: column {name}: {error}") from None
-    return table
+    return read_typed_columns(path, GAIT_COLUMNS, whole=("walk", "n"), texts=("parameter", "side", "unit"))

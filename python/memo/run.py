@@ -16,10 +16,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from memo import _memo
 from memo._memo import __version__
 from memo.files import write_json
 
-__all__ = ["RunError", "Source", "read_run", "write_run"]
+__all__ = ["RunError", "Source", "contours_of_run", "read_run", "write_run"]
 
 NAME = "run.json"
 
@@ -115,3 +119,30 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     if not all(isinstance(walk, dict) for walk in run["walks"]):
         raise RunError(f"{path}: walks must be objects")
     return run
+
+
+def contours_of_run(
+    path: str | PathLike[str], columns: Mapping[str, npt.NDArray[Any]]
+) -> list[npt.NDArray[np.float64]]:
+    """Visible contours of the model, (n, 2, 2) pixels, as `Track.contours` has them, for each row of a track.
+
+    `path` is the folder of a run or a table in it, `columns` are those of the table. A row whose place or
+    phase is not known has none.
+    """
+    folder = Path(path) if Path(path).is_dir() else Path(path).parent
+    run = read_run(folder)
+    contours: list[npt.NDArray[np.float64]] = [np.empty((0, 2, 2))] * len(columns["walk"])
+    torso_m = np.column_stack([np.asarray(columns[name], np.float64) for name in ("x_m", "y_m", "z_m")])
+    phase = np.asarray(columns["phase"], np.float64)
+    for walk in np.unique(columns["walk"]).tolist():
+        if not 0 <= walk < len(run["walks"]):
+            raise RunError(f"{folder / NAME}: has {len(run['walks'])} walks, the table a walk {walk}")
+        rows = np.flatnonzero(columns["walk"] == walk)
+        try:
+            tracker = _memo.Tracker(**run["options"])
+            found = _memo.recorded_contours(tracker, run["walks"][walk], torso_m[rows], phase[rows])
+        except (TypeError, ValueError, OverflowError) as error:
+            raise RunError(f"{folder / NAME}: {error}") from None
+        for row, (segments, _) in zip(rows.tolist(), found, strict=True):
+            contours[row] = segments
+    return contours

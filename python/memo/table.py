@@ -1,4 +1,4 @@
-"""Results as pandas tables, where pandas is installed; memo itself does not need it."""
+"""Units of the columns of tables; results as pandas tables, where pandas is installed."""
 
 from __future__ import annotations
 
@@ -10,19 +10,30 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["data_frame"]
+__all__ = ["column_unit", "data_frame"]
 
-#: Unit of a column by the end of its name.
 _UNITS = {
-    "_m": "m",
     "_mps": "m/s",
-    "_px": "px",
+    "_per_min": "1/min",
+    "_percent": "%",
     "_deg": "deg",
     "_rad": "rad",
+    "_nats": "nat",
+    "_px": "px",
+    "_hz": "Hz",
+    "_m": "m",
     "_s": "s",
-    "_nats": "nats",
-    "phase": "cycles",
+    "phase": "cycle",
+    "p_swapped": "1",
+    "p_mirrored": "1",
+    "probability": "1",
+    "similarity": "1",
 }
+
+
+def column_unit(name: str) -> str | None:
+    """The unit that the end of a column's name says, None for counts, names and numbers of frames."""
+    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), None)
 
 
 def data_frame(columns: Mapping[str, Any]) -> pandas.DataFrame:
@@ -35,7 +46,6 @@ def data_frame(columns: Mapping[str, Any]) -> pandas.DataFrame:
     except ImportError:
         raise ImportError("to_pandas() needs pandas: pip install pandas") from None
     frame = pandas.DataFrame({name: np.asarray(values) for name, values in columns.items()})
-    frame.attrs["units"] = {
-        name: unit for name in columns for end, unit in _UNITS.items() if str(name).endswith(end)
-    }
+    units = {name: column_unit(str(name)) for name in columns}
+    frame.attrs["units"] = {name: unit for name, unit in units.items() if unit is not None}
     return frame

@@ -1,12 +1,13 @@
-//! `Explainer`: frames looked at again as the tracker did.
+//! A finished walk from its record: frames looked at again as the tracker did (`Explainer`), contours drawn again.
 
 use crate::array::{
     frame_from_numpy, numpy_from_column, numpy_from_image, numpy_from_rows, numpy_from_segments,
+    points_from_numpy,
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::tracker::PyTracker;
-use glam::{DVec2, Vec2};
+use crate::tracker::{DRAWN, PyTracker, SegmentsWithParts, segments_with_parts};
+use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::{Camera, Walker};
 use memo_core::track::evidence::{Evidence, EvidenceStream};
@@ -72,6 +73,38 @@ impl Recorded {
             looks: looks(record)?,
         })
     }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene { walker: &self.walker, camera: &self.camera, path: &self.path }
+    }
+}
+
+/// Visible contours of a recorded walk, as `Walk.contours` gives them, where rows of a table have the centre of the
+/// torso, (N, 3) metres, and the gait phase, (N,); a row that has them not has no contours. `tracker` has the
+/// options of the run.
+#[pyfunction]
+pub fn recorded_contours<'py>(
+    py: Python<'py>,
+    tracker: &Bound<'py, PyTracker>,
+    record: &Bound<'py, PyDict>,
+    torso_m: &Bound<'py, PyAny>,
+    phases: Vec<f64>,
+) -> PyResult<Vec<SegmentsWithParts<'py>>> {
+    let walk = Recorded::read(record, tracker.borrow().locked().options())?;
+    let torso_m = points_from_numpy(torso_m)?;
+    if torso_m.len() != phases.len() {
+        let message = format!("{} torso centres for {} phases", torso_m.len(), phases.len());
+        return Err(PyValueError::new_err(message));
+    }
+    let scene = walk.scene();
+    let contours = |(centre, phase): (DVec3, f64)| {
+        if !(centre.is_finite() && phase.is_finite()) {
+            return segments_with_parts(py, &[], scene.camera);
+        }
+        let at = scene.hypothesis_at(centre, phase.rem_euclid(1.0));
+        segments_with_parts(py, &scene.visible(&at, &DRAWN), scene.camera)
+    };
+    torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
 }
 
 fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
@@ -208,12 +241,11 @@ impl PyExplainer {
             let message = format!("{:?} lies outside frames of {width}x{height} pixels", look.window);
             return Err(refused("window_px", message));
         }
-        let Recorded { walker, camera, path, .. } = &self.walks[index];
-        let scene = Scene { walker, camera, path };
+        let scene = self.walks[index].scene();
         let why = py
             .detach(|| explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))
             .map_err(value_error)?;
-        dict_of(py, evidence, index, &look, &why, camera).map(Some)
+        dict_of(py, evidence, index, &look, &why, scene.camera).map(Some)
     }
 }
 

@@ -29,7 +29,7 @@ mod _memo {
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
-    use super::explain::PyExplainer;
+    use super::explain::{PyExplainer, recorded_contours};
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
     #[pymodule_export]

@@ -5,10 +5,10 @@ use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::explain::record_of;
 use crate::wait::interruptible;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
-use memo_core::model::{SideJoints, VisibilityOptions, visible_contours};
+use memo_core::model::{Camera, SideJoints, VisibilityOptions, VisibleSegment};
 use memo_core::track::gait_parameters::GaitParameter;
 use memo_core::track::person::PersonOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
@@ -177,7 +177,21 @@ impl PyWalk {
 }
 
 /// Segments (n, 2, 2) and the body part of each (n,).
-type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
+pub type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
+
+/// Contours as they are drawn: side lines and end ellipses.
+pub const DRAWN: VisibilityOptions = VisibilityOptions { rims: true, rim_chords: 24 };
+
+/// Visible pieces in image pixels; those the camera does not see are left out.
+pub fn segments_with_parts<'py>(
+    py: Python<'py>,
+    visible: &[VisibleSegment],
+    camera: &Camera,
+) -> PyResult<SegmentsWithParts<'py>> {
+    let seen = |v: &VisibleSegment| Some((v.ends_px(camera)?.map(|p| p.to_array()), v.part as u8));
+    let (segments, parts) = visible.iter().filter_map(seen).unzip();
+    Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
+}
 
 #[pymethods]
 impl PyWalk {
@@ -272,20 +286,7 @@ impl PyWalk {
             let message = format!("row {row} of a walk with {} rows", self.rows.len());
             return Err(PyIndexError::new_err(message));
         };
-        let camera = &self.walk.camera;
-        let posed = self.walk.scene().pose(&row.hypothesis);
-        let options = VisibilityOptions { rims: true, ..VisibilityOptions::default() };
-        let mut visible = Vec::new();
-        visible_contours(&posed.cylinders, camera.position(), &options, &mut visible);
-        let pixel = |p: DVec3| camera.project(p).map(|q| q.to_array());
-        let (mut segments, mut parts) = (Vec::new(), Vec::new());
-        for piece in &visible {
-            if let (Some(start), Some(end)) = (pixel(piece.start), pixel(piece.end)) {
-                segments.push([start, end]);
-                parts.push(piece.part as u8);
-            }
-        }
-        Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
+        segments_with_parts(py, &self.walk.scene().visible(&row.hypothesis, &DRAWN), &self.walk.camera)
     }
 
     /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules

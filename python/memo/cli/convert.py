@@ -149,12 +149,10 @@ def _convert_picture(
     check_writable(target.parent)
     check_apart([source], [target])
     if target.suffix.lower() == ".txt":
-        from memo.files import read_track
         from memo.formats.motchallenge import write_motchallenge
 
-        columns = read_track(source)
-        write_motchallenge(target, columns, up="z" if up is None else up.value)
-        summary: dict[str, Any] = {"rows": len(columns["frame"]), "notes": []}
+        rows = write_motchallenge(target, source, up="z" if up is None else up.value)
+        summary: dict[str, Any] = {"rows": rows, "notes": []}
         told = f"{summary['rows']} rows of the track"
     else:
         from memo.keypoints import read_keypoints

@@ -4,8 +4,8 @@
 numbers of people and pixels count from 1; x, y, z is where the feet stand, in metres, -1 where unknown.)
 
 What is written of a track: a row a frame and walk, `id` 1 for the first walk; the box of the model's visible
-contours; the point of the ground below the torso; the track's similarity as `conf`. Of a saved track only
-joints are known, and the box is that of the body they belong to, see `boxes_from_joints`.
+contours; the point of the ground below the torso; the track's similarity as `conf`. Of a folder of
+`memo track` the contours are drawn again, with the person and camera in `run.json`.
 
 What it cannot do: clip boxes to the picture (no field says its size); say how sure x and y are.
 """
@@ -13,7 +13,7 @@ What it cannot do: clip boxes to the picture (no field says its size); say how s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,18 +21,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import JOINTS, complete_file
+from memo.files import complete_file, read_track
 from memo.formats.motion import FormatError
+from memo.run import contours_of_run
 
 if TYPE_CHECKING:
     from memo.tracking import Track
 
-__all__ = [
-    "boxes_from_contours",
-    "boxes_from_joints",
-    "read_motchallenge",
-    "write_motchallenge",
-]
+__all__ = ["boxes_from_contours", "read_motchallenge", "write_motchallenge"]
 
 Array = npt.NDArray[np.float64]
 
@@ -41,32 +37,22 @@ _MAX_NUMBER = 1e9
 _BOX = ("left_px", "top_px", "width_px", "height_px")
 _WORLD = ("x_m", "y_m", "z_m")
 
-# Of the model, in body heights (crates/memo-core/src/model/body.rs): what reaches beyond the joints.
-_UPPER_ARM = 0.186
-_CROWN_ABOVE_SHOULDERS = 0.182
-_HEAD_HALF_WIDTHS = (0.054, 0.044)  # along and across the way the person faces
-_HAND = 0.070
-_TOE, _HEEL = 0.117, 0.035  # before and behind the ankle
-_SOLE_BELOW_ANKLE = 0.039
-_LIMB_HALF_WIDTH = 0.030
-
 
 def write_motchallenge(
-    path: str | PathLike[str], track: Track | Mapping[str, npt.ArrayLike], *, up: str = "z"
-) -> None:
-    """Writes a track, or the columns of `track.csv`; frames without a box in the picture have no row.
+    path: str | PathLike[str], track: Track | str | PathLike[str], *, up: str = "z"
+) -> int:
+    """Writes a track, or that of a folder of `memo track`; returns the number of rows.
 
-    `up="y"`: the ground is the plane of x and z, `x, y, z` of the world are `x, z, -y` of the file.
+    Frames without a box in the picture have no row. `up="y"`: the ground is the plane of x and z, `x, y, z`
+    of the world are `x, z, -y` of the file.
     """
-    columns: Mapping[str, npt.ArrayLike]
-    if isinstance(track, Mapping):
-        columns, boxes = track, boxes_from_joints(track)
-    else:
-        columns, boxes = track.columns, boxes_from_contours(track)
     _check_up(up)
-    of = {
-        name: np.asarray(columns[name], np.float64) for name in ("frame", "walk", "similarity", "x_m", "y_m")
-    }
+    if isinstance(track, str | PathLike):
+        of = read_track(track)
+        boxes = boxes_from_contours(contours_of_run(track, of))
+    else:
+        of = track.columns
+        boxes = boxes_from_contours(map(track.contours, range(len(track))))
     lines = []
     for row in np.lexsort([of["walk"], of["frame"]]).tolist():
         box = boxes[row]
@@ -88,6 +74,7 @@ def write_motchallenge(
         lines.append(",".join(cells) + "\n")
     with complete_file(path) as temporary:
         temporary.write_text("".join(lines), encoding="ascii")
+    return len(lines)
 
 
 def read_motchallenge(path: str | PathLike[str], *, up: str = "z") -> dict[str, npt.NDArray[Any]]:
@@ -158,79 +145,8 @@ def _row(line: str, where: str) -> list[float]:
 # Boxes.
 
 
-def boxes_from_contours(track: Track) -> Array:
-    """(N, 4) left, top, right, bottom in pixels of the model's visible contours; NaN where none are."""
-    boxes = np.full((sum(map(len, track.walks)), 4), np.nan)
-    for row, box in enumerate(boxes):
-        points = track.contours(row).reshape(-1, 2)
-        if len(points):
-            box[:] = *points.min(axis=0), *points.max(axis=0)
-    return boxes
-
-
-def boxes_from_joints(columns: Mapping[str, npt.ArrayLike]) -> Array:
-    """(N, 4) left, top, right, bottom in pixels of the body around the joints of `track.csv`; NaN if unknown.
-
-    Head, hands and feet are where the model has them, given its joints, and come into the picture by the
-    affine map that takes the twelve joints of the row to their pixels: the camera, near the body. On tracked
-    walks the sides are on average within 1 % of the body height of `boxes_from_contours`, the top within 3 %,
-    as the height of a fitted person's shoulders is not in the table.
-    """
-    in_world = _joints(columns, ("x_m", "y_m", "z_m"))
-    in_picture = _joints(columns, ("u_px", "v_px"))
-    heading_rad = np.asarray(columns["heading_rad"], np.float64)
-    boxes = np.full((len(in_world), 4), np.nan)
-    known = np.isfinite(in_world).all(axis=(1, 2)) & np.isfinite(in_picture).all(axis=(1, 2))
-    for row in np.flatnonzero(known & np.isfinite(heading_rad)):
-        points, half_width_m = _ends(in_world[row], heading_rad[row])
-        affine, *_ = np.linalg.lstsq(_homogeneous(in_world[row]), in_picture[row], rcond=None)
-        ends = _homogeneous(points) @ affine
-        half_width_px = half_width_m * np.linalg.norm(affine[:3], 2)
-        low = np.minimum(in_picture[row].min(axis=0) - half_width_px, ends.min(axis=0))
-        high = np.maximum(in_picture[row].max(axis=0) + half_width_px, ends.max(axis=0))
-        boxes[row] = *low, high[0], ends[:, 1].max()
-    return boxes
-
-
-def _joints(columns: Mapping[str, npt.ArrayLike], axes: tuple[str, ...]) -> Array:
-    """(N, 12, axes)"""
-    absent = sorted({f"{joint}_{axis}" for joint in JOINTS for axis in axes} - set(columns))
-    if absent:
-        raise FormatError(f"not the columns of a track: no {absent[0]}")
-    return np.stack(
-        [
-            np.stack([np.asarray(columns[f"{joint}_{axis}"], np.float64) for axis in axes], axis=-1)
-            for joint in JOINTS
-        ],
-        axis=1,
-    )
-
-
-def _ends(joints: Array, heading_rad: float) -> tuple[Array, float]:
-    """Ends of head, hands and feet (M, 3) and half the width of a limb, metres, from the joints (12, 3)."""
-    at = dict(zip(JOINTS, joints, strict=True))
-    height_m = float(np.linalg.norm(at["right_shoulder"] - at["right_elbow"])) / _UPPER_ARM
-    forward = np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-    up = np.array([0.0, 0.0, 1.0])
-    left = np.cross(up, forward)
-    crown = (at["right_shoulder"] + at["left_shoulder"]) / 2 + height_m * _CROWN_ABOVE_SHOULDERS * up
-    along, across = height_m * _HEAD_HALF_WIDTHS[0] * forward, height_m * _HEAD_HALF_WIDTHS[1] * left
-    ends = [crown + along, crown - along, crown + across, crown - across]
-    for side in ("right", "left"):
-        ends.append(at[f"{side}_wrist"] + height_m * _HAND * _unit(at[f"{side}_wrist"] - at[f"{side}_elbow"]))
-        ankle = at[f"{side}_ankle"]
-        down = _unit(ankle - at[f"{side}_knee"])
-        toes = _unit(np.cross(down, left))
-        toes = toes if toes @ forward > 0 else -toes
-        sole = ankle + height_m * _SOLE_BELOW_ANKLE * down
-        ends += [sole + height_m * _TOE * toes, sole - height_m * _HEEL * toes]
-    return np.array(ends), height_m * _LIMB_HALF_WIDTH
-
-
-def _unit(vector: Array) -> Array:
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 0 else vector
-
-
-def _homogeneous(points: Array) -> Array:
-    return np.column_stack([points, np.ones(len(points))])
+def boxes_from_contours(contours: Iterable[Array]) -> Array:
+    """(N, 4) left, top, right, bottom in pixels of contours (n, 2, 2) a row; NaN where a row has none."""
+    points = [row.reshape(-1, 2) for row in contours]
+    boxes = [[*row.min(axis=0), *row.max(axis=0)] if len(row) else 4 * [math.nan] for row in points]
+    return np.array(boxes, np.float64).reshape(-1, 4)

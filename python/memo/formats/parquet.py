@@ -25,32 +25,11 @@ from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
 from memo.linkage import NumberTable
+from memo.table import column_unit
 
-__all__ = ["read_parquet", "read_parquet_motion", "unit_of", "write_parquet", "write_parquet_motion"]
+__all__ = ["read_parquet", "read_parquet_motion", "write_parquet", "write_parquet_motion"]
 
 _MAX_CELLS = 100_000_000
-_UNITS = {
-    "_mps": "m/s",
-    "_per_min": "1/min",
-    "_percent": "%",
-    "_deg": "deg",
-    "_rad": "rad",
-    "_nats": "nat",
-    "_px": "px",
-    "_hz": "Hz",
-    "_m": "m",
-    "_s": "s",
-    "phase": "cycle",
-    "p_swapped": "1",
-    "p_mirrored": "1",
-    "probability": "1",
-    "similarity": "1",
-}
-
-
-def unit_of(name: str) -> str | None:
-    """The unit that the end of a column's name says, None for counts, names and numbers of frames."""
-    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), None)
 
 
 def write_parquet(
@@ -69,7 +48,7 @@ def write_parquet(
     lengths = {name: len(array) for name, array in arrays.items()}
     if not lengths or len(set(lengths.values())) > 1:
         raise FormatError(f"{path}: columns of one length are needed, got {lengths}")
-    known = {name: (units or {}).get(name) or unit_of(name) for name in arrays}
+    known = {name: (units or {}).get(name) or column_unit(name) for name in arrays}
     fields = [
         pa.field(name, array.type, metadata=None if known[name] is None else {"unit": known[name]})
         for name, array in arrays.items()

@@ -6,7 +6,6 @@ Where a format wants a frame at every instant, those frames are empty.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -77,5 +76,5 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
 def _read(reader: Callable[[Path], Any], path: Path) -> Any:
     try:
         return reader(path)
-    except (ValueError, TypeError, csv.Error) as error:
+    except ValueError as error:
         raise FormatError(f"{path.name}: {str(error).removeprefix(f'{path}: ')}") from None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import memo
+from memo.files import read_text_columns
 from memo.report.choice import Choice
 from memo.report.page import Page, number, rows_table, text
 from memo.report.pictures import Thinned
@@ -59,64 +60,58 @@ def planar_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
 
 
 def _table(path: Path, columns: tuple[str, ...]) -> list[Row]:
-    """Rows of a table; numbers as float, None where empty. ValueError names the file and the line."""
-    with open(path, newline="", encoding="utf-8") as file:
-        try:
-            table = csv.DictReader(file)
-            absent = set(columns) - set(table.fieldnames or ())
-            if absent:
-                raise ValueError(f"columns missing: {sorted(absent)}")
-            return [_table_row(table.line_num, row, columns) for row in table]
-        except (ValueError, csv.Error) as error:
-            raise ValueError(f"{path}: {error}") from None
-
-
-def _table_row(line: int, row: dict[str, str], columns: tuple[str, ...]) -> Row:
-    return {name: _cell(line, name, row[name], name in _NUMBERS) for name in columns}
+    """Rows of a table; numbers as float, None where empty. ValueError names the file and the row."""
+    cells = read_text_columns(path, columns)
+    return [
+        {name: _cell(path, line, name, row[name], name in _NUMBERS) for name in columns}
+        for line, row in _rows(cells)
+    ]
 
 
 def _points(path: Path) -> tuple[list[str], list[Row]]:
     """Names of the points, and by frame u, v and depth of each, pixels; None where not known."""
-    with open(path, newline="", encoding="utf-8") as file:
-        try:
-            table = csv.DictReader(file)
-            header = list(table.fieldnames or ())
-            names = [name.removesuffix("_z_px") for name in header if name.endswith("_z_px")]
-            wanted = [f"{name}_{axis}_px" for name in names for axis in "uvz"]
-            absent = {"frame", "time_s", "source", *wanted} - set(header)
-            if absent or not names:
-                raise ValueError(f"columns missing: {sorted(absent) or ['NAME_u_px, NAME_v_px, NAME_z_px']}")
-            return names, [_point_row(table.line_num, row, names) for row in table]
-        except (ValueError, csv.Error) as error:
-            raise ValueError(f"{path}: {error}") from None
+    cells = read_text_columns(path)
+    names = [name.removesuffix("_z_px") for name in cells if name.endswith("_z_px")]
+    wanted = [f"{name}_{axis}_px" for name in names for axis in "uvz"]
+    absent = {"frame", "time_s", "source", *wanted} - set(cells)
+    if absent or not names:
+        missing = sorted(absent) or ["NAME_u_px, NAME_v_px, NAME_z_px"]
+        raise ValueError(f"{path}: columns missing: {missing}")
+    return names, [_point_row(path, line, row, names) for line, row in _rows(cells)]
 
 
-def _point_row(line: int, row: dict[str, str], names: list[str]) -> Row:
+def _rows(cells: dict[str, list[str]]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Number of each row, the header being the first, and its cells by column."""
+    for line, row in enumerate(zip(*cells.values(), strict=True), start=2):
+        yield line, dict(zip(cells, row, strict=True))
+
+
+def _point_row(path: Path, line: int, row: dict[str, str], names: list[str]) -> Row:
     def cell(name: str) -> Any:
-        return _cell(line, name, row[name], True)
+        return _cell(path, line, name, row[name], True)
 
     frame = cell("frame")
     if frame is None:
-        raise ValueError(f"line {line}: frame is empty")
+        raise ValueError(f"{path}: row {line}: frame is empty")
     return {
         "frame": int(frame),
         "time_s": cell("time_s"),
-        "source": row["source"] or "",
+        "source": row["source"],
         "points": [[cell(f"{name}_{axis}_px") for axis in "uvz"] for name in names],
     }
 
 
-def _cell(line: int, name: str, written: str | None, is_number: bool) -> Any:
+def _cell(path: Path, line: int, name: str, written: str, is_number: bool) -> Any:
     if not is_number:
-        return written or ""
+        return written
     if not written:
         return None
     try:
         value = float(written)
     except ValueError:
-        raise ValueError(f"line {line}: {name} {written[:40]!r} is not a number") from None
+        raise ValueError(f"{path}: row {line}: {name} {written[:40]!r} is not a number") from None
     if not math.isfinite(value):
-        raise ValueError(f"line {line}: {name} {written[:40]!r} is not finite")
+        raise ValueError(f"{path}: row {line}: {name} {written[:40]!r} is not finite")
     return value
 
 

@@ -6,7 +6,6 @@ The tables must be right where they are there: an error names the file. What oth
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +79,7 @@ def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
             return instead
         try:
             return reader(path)
-        except (ValueError, OverflowError, csv.Error) as error:
+        except (ValueError, OverflowError) as error:
             raise ValueError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
     columns = read("track.csv", read_track_csv, {})

@@ -39,8 +39,8 @@
 //!   dropped.
 
 use super::silhouette::{ContourKind, RimAspect, RimChord, camera_in_unit_frame, rims, side_lines};
-use super::{Contour, EllipticCylinder};
-use glam::DVec3;
+use super::{Camera, Contour, EllipticCylinder};
+use glam::{DVec2, DVec3};
 
 /// The relative size of what is taken for rounding: occluders shrink by it, shorter visible pieces are
 /// dropped.
@@ -61,6 +61,13 @@ pub struct VisibleSegment {
     pub start: DVec3,
     /// Second end point, metres.
     pub end: DVec3,
+}
+
+impl VisibleSegment {
+    /// Its ends in image pixels; `None` unless the camera sees both.
+    pub fn ends_px(&self, camera: &Camera) -> Option<[DVec2; 2]> {
+        Some([camera.project(self.start)?, camera.project(self.end)?])
+    }
 }
 
 /// What [`visible_contours`] returns.

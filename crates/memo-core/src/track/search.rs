@@ -67,10 +67,25 @@ impl Scene<'_> {
         self.walker.pose(centre, self.path.heading_rad, hypothesis.phase)
     }
 
+    /// The hypothesis whose torso centre and gait phase these are; across the path the centre counts for nothing.
+    pub fn hypothesis_at(&self, torso_centre: DVec3, phase: f64) -> Hypothesis {
+        Hypothesis {
+            along_m: self.path.along(torso_centre.truncate()),
+            height_m: torso_centre.z - self.walker.gait.vertical_m(phase),
+            phase,
+        }
+    }
+
+    /// What of a hypothesis's contours is visible, in the world.
+    pub fn visible(&self, hypothesis: &Hypothesis, options: &VisibilityOptions) -> Vec<VisibleSegment> {
+        let mut visible = Vec::new();
+        visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), options, &mut visible);
+        visible
+    }
+
     /// The visible side lines of a hypothesis in ideal pixels, cut to the image.
     pub fn lines(&self, hypothesis: &Hypothesis) -> Vec<ModelLine> {
-        let mut visible = Vec::new();
-        visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), &LINES_ONLY, &mut visible);
+        let visible = self.visible(hypothesis, &LINES_ONLY);
         visible.iter().filter_map(|segment| project(segment, self.camera)).collect()
     }
 
@@ -85,10 +100,8 @@ impl Scene<'_> {
         if hidden_lines == HiddenLines::PerHypothesis {
             return self.lines(hypothesis);
         }
-        let middle = self.pose(&Hypothesis { height_m: middle_height_m, ..*hypothesis });
+        let visible = self.visible(&Hypothesis { height_m: middle_height_m, ..*hypothesis }, &LINES_ONLY);
         let raised = DVec3::Z * (hypothesis.height_m - middle_height_m);
-        let mut visible = Vec::new();
-        visible_contours(&middle.cylinders, self.camera.position(), &LINES_ONLY, &mut visible);
         let moved =
             |s: &VisibleSegment| VisibleSegment { start: s.start + raised, end: s.end + raised, ..*s };
         visible.iter().filter_map(|segment| project(&moved(segment), self.camera)).collect()

@@ -6,12 +6,12 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::tracker::PyWalk;
+use crate::tracker::{DRAWN, PyWalk, SegmentsWithParts, segments_with_parts};
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeOptions, outlines, pair_changes};
 use memo_core::model::body::Part;
 use memo_core::model::{
-    Body, Camera, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours,
+    Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours,
 };
 use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
 use memo_core::track::experiment;
@@ -99,30 +99,24 @@ pub fn model_contours<'py>(
         let centre = DVec3::new(x, y, walker.level_torso_height_m());
         cylinders.extend(walker.pose(centre, heading_rad, phase).cylinders);
     }
-    let options = VisibilityOptions { rims: true, ..VisibilityOptions::default() };
     let mut visible = Vec::new();
     if hidden {
         for (part, cylinder) in cylinders.iter().enumerate() {
             let mut alone = Vec::new();
-            visible_contours(std::slice::from_ref(cylinder), camera.position(), &options, &mut alone);
+            visible_contours(std::slice::from_ref(cylinder), camera.position(), &DRAWN, &mut alone);
             visible.extend(alone.into_iter().map(|piece| VisibleSegment { part, ..piece }));
         }
     } else {
-        visible_contours(&cylinders, camera.position(), &options, &mut visible);
+        visible_contours(&cylinders, camera.position(), &DRAWN, &mut visible);
     }
     let (mut segments, mut parts, mut owners) = (Vec::new(), Vec::new(), Vec::new());
-    for (segment, part) in in_pixels(&visible, &camera) {
-        segments.push(segment);
-        parts.push((part % Part::ALL.len()) as u8);
-        owners.push((part / Part::ALL.len()) as i64);
+    for piece in &visible {
+        let Some(ends_px) = piece.ends_px(&camera) else { continue };
+        segments.push(ends_px.map(|p| p.to_array()));
+        parts.push((piece.part % Part::ALL.len()) as u8);
+        owners.push((piece.part / Part::ALL.len()) as i64);
     }
     Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts), numpy_from_column(py, owners)))
-}
-
-/// The pieces in image pixels with their parts; those behind the camera are left out.
-fn in_pixels(visible: &[VisibleSegment], camera: &Camera) -> Vec<([[f64; 2]; 2], usize)> {
-    let pixel = |p: DVec3| camera.project(p).map(|q| q.to_array());
-    visible.iter().filter_map(|v| Some(([pixel(v.start)?, pixel(v.end)?], v.part))).collect()
 }
 
 /// What the image stages make of a frame between its neighbours: `changed`, eq. (1) against either; `cleaned`
@@ -213,22 +207,16 @@ pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult
 /// the part of each.
 #[pyfunction]
 #[pyo3(signature = (walk, row, phase=None))]
-#[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
 pub fn walk_lines<'py>(
     py: Python<'py>,
     walk: PyRef<'py, PyWalk>,
     row: usize,
     phase: Option<f64>,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>)> {
+) -> PyResult<SegmentsWithParts<'py>> {
     let at = hypothesis(&walk, row)?;
     let at = Hypothesis { phase: phase.unwrap_or(at.phase), ..at };
-    let camera = &walk.walk.camera;
-    let posed = walk.walk.scene().pose(&at);
-    let mut visible = Vec::new();
-    visible_contours(&posed.cylinders, camera.position(), &VisibilityOptions::default(), &mut visible);
-    let (segments, parts): (Vec<_>, Vec<_>) =
-        in_pixels(&visible, camera).into_iter().map(|(segment, part)| (segment, part as u8)).unzip();
-    Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts)))
+    let visible = walk.walk.scene().visible(&at, &VisibilityOptions::default());
+    segments_with_parts(py, &visible, &walk.walk.camera)
 }
 
 /// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels to a walk's model about a row's place, over
