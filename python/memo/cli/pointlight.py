@@ -19,6 +19,14 @@ from memo.files import complete_file
 if TYPE_CHECKING:
     import typer
 
+EPILOG = """Examples:
+  memo pointlight --azimuth-deg 60
+  memo pointlight --azimuth-deg 60 --scramble-position --seed 3 --out control
+  memo pointlight walk.c3d --out mine
+
+Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage; \
+4 the app extra is not installed."""
+
 FEWEST_FRAMES = 8
 """Fewer are not linked by `memo planar`."""
 
@@ -26,39 +34,46 @@ FEWEST_FRAMES = 8
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
 
-    @app.command()
+    @app.command(epilog=EPILOG)
     def pointlight(
         motion: Annotated[
             Path | None,
             typer.Argument(
+                metavar="MOTION",
                 help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
-                " (.c3d, .bvh, .trc); a walker."
+                " (.c3d, .bvh, .trc); without, an average walker.",
             ),
         ] = None,
-        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
-        azimuth_deg: Annotated[float, typer.Option(help="Viewer about the vertical; 90 = from +x.")] = 0.0,
-        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal.")] = 0.0,
-        px_per_m: Annotated[float, typer.Option(help="Scale.")] = 200.0,
+        azimuth_deg: Annotated[
+            float, typer.Option(help="Viewer about the vertical, degrees; 90 looks from +x.")
+        ] = 0.0,
+        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal, degrees.")] = 0.0,
+        px_per_m: Annotated[float, typer.Option(help="Scale, pixels a metre.")] = 200.0,
         locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
-        inverted: Annotated[bool, typer.Option(help="Upside down.")] = False,
-        mirrored: Annotated[bool, typer.Option(help="Facing the other way.")] = False,
+        inverted: Annotated[bool, typer.Option("--inverted", help="Upside down.")] = False,
+        mirrored: Annotated[bool, typer.Option("--mirrored", help="Facing the other way.")] = False,
         reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
         scramble_position: Annotated[
-            bool, typer.Option(help="Every dot's motion at a random place.")
+            bool, typer.Option("--scramble-position", help="Every dot's motion at a random place.")
         ] = False,
-        scramble_phase: Annotated[bool, typer.Option(help="Every dot's motion shifted in time.")] = False,
+        scramble_phase: Annotated[
+            bool, typer.Option("--scramble-phase", help="Every dot's motion shifted in time.")
+        ] = False,
         period: Annotated[
-            float | None, typer.Option(help="Period of the motion, seconds; all of it.")
+            float | None, typer.Option(help="Period of the motion, seconds; else its whole length.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
         dots: Annotated[int, typer.Option(help="With --lifetime: dots shown.")] = 8,
         on: Annotated[str, typer.Option(help="With --lifetime: limbs or joints.")] = "limbs",
         noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
         noise_kind: Annotated[str, typer.Option(help="scrambled, linear or flicker.")] = "scrambled",
-        noise_px: Annotated[float, typer.Option(help="Standard deviation of pixel noise.")] = 0.0,
-        seconds: Annotated[float, typer.Option(help="Without MOTION: duration.")] = 2.4,
+        noise_px: Annotated[
+            float, typer.Option(help="Standard deviation of the noise of dots, pixels.")
+        ] = 0.0,
+        seconds: Annotated[float, typer.Option(help="Without MOTION: duration, seconds.")] = 2.4,
         fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
-        seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Of all that is random.", min=0)] = 0,
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
     ) -> None:
         """Makes a point-light display: dots.csv, labels.csv and display.mp4."""
         options = {
