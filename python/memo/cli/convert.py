@@ -55,7 +55,8 @@ def add_convert(app: "typer.Typer") -> None:
             ),
         ],
         up: Annotated[
-            Axis | None, typer.Option(help="Up axis of TARGET; its usual one: y, but z for .c3d and .csv.")
+            Axis | None,
+            typer.Option(help="Up axis of TARGET; its usual one: y of .trc, .mot, .sto and .bvh, else z."),
         ] = None,
         from_up: Annotated[Axis | None, typer.Option(help="Up axis of SOURCE, whatever it says.")] = None,
         rate: Annotated[
