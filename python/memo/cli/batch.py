@@ -83,7 +83,7 @@ def add_batch(app: "typer.Typer") -> None:
         ray_address: Annotated[
             str | None, typer.Option(help="Of the Ray cluster; without, the one at hand or a local one.")
         ] = None,
-        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Tracks the videos of MANIFEST. Any may fail or crash, and the run be killed: none is lost."""

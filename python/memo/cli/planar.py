@@ -51,11 +51,14 @@ def add_planar(app: "typer.Typer") -> None:
         ] = 50.0,
         out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
         video: Annotated[bool, typer.Option(help="Write turned.mp4, the limbs from a new side.")] = True,
-        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Links unnamed points into limbs that swing in planes, with lengths and depths."""
         options = {"window_s": window, "carry": carry, "focal_px": focal_px}
-        delivery = Delivery(out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json)
+        delivery = Delivery(
+            out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json, quiet=quiet
+        )
         raise typer.Exit(guarded(lambda: _planar(tracks, noise_px, fps, names, turn_deg, options, delivery)))
 
 

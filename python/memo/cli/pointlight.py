@@ -6,13 +6,14 @@
 import csv
 import math
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 import memo
-from memo.cli.delivery import Exit, InputError, guarded
+from memo.cli.delivery import Delivery, Exit, InputError, guarded
 from memo.cli.given import check_writable
 from memo.files import complete_file
 
@@ -74,6 +75,8 @@ def add_pointlight(app: "typer.Typer") -> None:
         fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
         seed: Annotated[int, typer.Option(help="Of all that is random.", min=0)] = 0,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Makes a point-light display: dots.csv, labels.csv and display.mp4."""
         options = {
@@ -95,20 +98,23 @@ def add_pointlight(app: "typer.Typer") -> None:
             "noise_sd_px": noise_px,
             "seed": seed,
         }
-        raise typer.Exit(guarded(lambda: _pointlight(motion, out, seconds, fps, options)))
+        delivery = Delivery(out, as_json=as_json, quiet=quiet)
+        raise typer.Exit(guarded(lambda: _pointlight(motion, seconds, fps, options, delivery)))
 
 
 def _pointlight(
-    motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
+    motion: Path | None, seconds: float, fps: float | None, options: dict[str, Any], delivery: Delivery
 ) -> Exit:
     from memo.linkage import Points, write_points_csv
     from memo.linkage_plot import write_display_video
 
+    notes: Sequence[str] = ()
     _check_period(options["period_s"], options["scramble_phase"] is not None)
     if motion is None:
         points = _walker_points(seconds, 60.0 if fps is None else fps)
     else:
-        points = _read_points(motion, fps)
+        points, notes = _read_points(motion, fps)
+    out = delivery.out
     check_writable(out)
     display = _new_display(points, options)
     shown, labels = display["positions_px"], display["labels"]
@@ -117,33 +123,32 @@ def _pointlight(
     write_points_csv(out / "dots.csv", Points(named, display["times_s"], shown))
     _write_labels(out / "labels.csv", points.names, named, display)
     write_display_video(out / "display.mp4", display["times_s"], shown)
-    print(f"{shown.shape[1]} dots in {shown.shape[0]} frames.")
-    print(f"Written to {out}: dots.csv, labels.csv, display.mp4.")
+    written = [out / "dots.csv", out / "labels.csv", out / "display.mp4"]
+    summary = {"dots": shown.shape[1], "frames": shown.shape[0], "notes": list(notes)}
+    delivery.tell(summary, [*notes, f"{shown.shape[1]} dots in {shown.shape[0]} frames."], written)
     scrambled = options["scramble_position"] or options["scramble_phase"]
-    if stays and not scrambled and len(shown) >= FEWEST_FRAMES:
+    if delivery.talks and stays and not scrambled and len(shown) >= FEWEST_FRAMES:
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
         print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
 
 
-def _read_points(path: Path, fps: float | None) -> Any:
+def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
     """All points of a table; of a motion file or the folder of a track the joints alone."""
     from memo.formats import READERS, FormatError, read_motion
     from memo.formats.names import joint_points
     from memo.linkage import Points, read_points_csv
 
     if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
-        return read_points_csv(path, 3, fps)
+        return read_points_csv(path, 3, fps), ()
     motion = read_motion(path)
     if fps is not None:
         raise InputError(f"{path}: has times of its own: leave --fps out")
-    for note in motion.notes:
-        print(note)
     try:
         joints = joint_points(motion)
     except FormatError as error:
         raise InputError(f"{path}: {error}") from None
-    return Points(list(joints.names), joints.times_s, joints.points)
+    return Points(list(joints.names), joints.times_s, joints.points), motion.notes
 
 
 def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
