@@ -28,10 +28,13 @@ nitpicky = True
 # Types of Python, numpy and the extras: their documentation is elsewhere, and this site needs no network.
 nitpick_ignore_regex = [
     (r"py:.*", r"(Any|Path|PathLike|Callable|Iterable|Iterator|Mapping|Sequence|ContextManager)"),
-    (r"py:.*", r"memo\.(.*\._\w+|batch\.manifest\.Manifest|keypoints\.points\.Source)"),  # of the inside
+    (  # of the inside
+        r"py:.*",
+        r"memo\.(.*\._\w+|batch\.manifest\.Manifest|tracking\.StoredWalk|keypoints\.points\.Source)",
+    ),
     (
         r"py:.*",
-        r"(av|collections|concurrent|datetime|matplotlib|np|npt|numpy|os|pathlib|typing|Axes|Figure)(\..*)?",
+        r"(av|collections|concurrent|datetime|matplotlib|np|npt|numpy|os|pandas|pathlib|typing|Axes|Figure)(\..*)?",
     ),
     (r"py:.*", r"(Array|Whole|Column|Columns|Luma|NDArray|float64|uint8|bool_|int64|optional|TypeAlias)"),
 ]

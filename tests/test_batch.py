@@ -61,9 +61,14 @@ for name in ("track.csv", "gait_parameters.csv"):
         if todo[0] != "nobody":
             file.write("0,stride_time,right," + height + ",s,1.0,1.2,3\\n")
             file.write("0,cadence,," + height + ",1/min,,,6\\n")
+        if todo[0] == "twice":
+            file.write("1,cadence,," + height + ",1/min,,,4\\n")
 with open(os.path.join(out, "run.json"), "w") as file:
     options = '"options": {"height_m": ' + height + '}, "camera_given": false'
-    file.write('{"summary": {"direction": "left to right", "p_swapped": 0.01}, ' + options + "}")
+    ways = (("left to right", "forward", 0.01), ("right to left", "backward", 0.2))
+    walk = '{"direction": "%s", "gait": "%s", "p_swapped": %s}'
+    walks = ", ".join(walk % way for way in ways) if todo[0] != "nobody" else ""
+    file.write('{"walks": [' + walks + "], " + options + "}")
 print('{"message": "said of ' + os.path.basename(video) + '"}')
 if todo[0] == "no-table":
     os.remove(os.path.join(out, "track.csv"))
@@ -387,6 +392,19 @@ def test_one_table_of_all_walks(lab):
     assert first["stride_time_right_s_n"] == "3" and first["cadence_per_min"] == "1.6"
     assert (second["state"], second["walk"], second["cadence_per_min"]) == ("nobody", "", "")
     assert (third["state"], third["walk"]) == ("failed", "")
+
+
+def test_each_walk_of_a_video_has_its_own_direction(lab):
+    lab.videos("twice")
+    lab.run()
+    seen = [
+        [row[name] for name in ("walk", "direction", "gait", "p_swapped")]
+        for row in table(lab.out, "gait_parameters.csv")
+    ]
+    assert seen == [
+        ["0", "left to right", "forward", "0.010000"],
+        ["1", "right to left", "backward", "0.200000"],
+    ]
 
 
 def test_a_second_run_goes_on_only_when_told(lab):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import av
 import memo
 import numpy as np
 import pytest
+import typer
 from conftest import shared_video
 from memo import cli
 from memo.cli.demo import against_truth
@@ -75,6 +77,35 @@ def test_version_and_help(memo_command):
     code, said, _ = memo_command("track", "--help")
     assert code == 0 and "Exit codes" in said and "--no-overlay" in said
     assert memo_command("track")[0] == 2
+
+
+def every_command(group=None, context=None):
+    """Each command of the command line by its words, such as `memo calibrate points`, with its context."""
+    group = group or typer.main.get_command(cli._app())
+    context = context or group.make_context("memo", [], resilient_parsing=True)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        inner = type(context)(command, info_name=name, parent=context)
+        if hasattr(command, "list_commands"):
+            yield from every_command(command, inner)
+        else:
+            yield inner.command_path, command
+
+
+@pytest.mark.parametrize(("words", "command"), list(every_command()))
+def test_each_command_shows_examples_that_parse(words, command):
+    """A paragraph of examples, options as they are, then the exit codes; arguments in capitals."""
+    examples, codes = command.epilog.split("\n\n")
+    head, *lines = examples.splitlines()
+    assert head == "Examples:" and codes.startswith("Exit codes: 0 ")
+    assert len(lines) >= 2 and "\n" not in codes
+    for line in lines:
+        assert line.startswith(f"  {words}")
+        command.make_context(words, shlex.split(line.removeprefix(f"  {words}")))
+    names = [parameter.name for parameter in command.params]
+    assert names[-2:] == ["as_json", "quiet"] and "out" in names or words in ("memo demo", "memo convert")
+    arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
+    assert all((argument.metavar or "").isupper() for argument in arguments)
 
 
 def test_tracking_leaves_everything(memo_command, video, tmp_path):

@@ -78,6 +78,22 @@ def test_no_block_is_left_out_unseen():
     assert sum(block.why_not is None for page in PAGES for block in blocks(page)) == BLOCKS_RUN
 
 
+def test_the_architecture_names_every_module_and_no_other():
+    tree = (ROOT / "docs/ARCHITECTURE.md").read_text(encoding="utf-8").split("```")[1]
+    core, python = tree.split("crates/memo-py/src/")
+    named: dict[str, set[str]] = {}
+    wing = ""
+    for line in core.splitlines()[2:]:
+        wing = line[2:13].strip(" /") or wing  # a line without one goes on with the last
+        named.setdefault(wing, set()).update(line[38:].split())
+    del named["progress"]  # a file, said in a sentence
+    folders = [folder for folder in (ROOT / "crates/memo-core/src").iterdir() if folder.is_dir()]
+    assert named == {folder.name: {file.stem for file in folder.iterdir()} - {"mod"} for folder in folders}
+    modules = {path.stem for path in (ROOT / "python/memo").glob("[!_]*") if path.suffix in ("", ".py")}
+    found = re.findall(r"^  (\w+)/? |  (\w+)/?  ", python, re.MULTILINE)
+    assert {name for pair in found for name in pair if name} == modules
+
+
 @pytest.fixture(scope="session")
 def given(tmp_path_factory):
     """The files that pages take for given."""

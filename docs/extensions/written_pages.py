@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,15 @@ def _command(command: Any, context: Any) -> list[str]:
     if rows:
         lines += [*rows, ""]
     if command.epilog:
-        lines += [_plain(command.epilog), ""]
+        *examples, codes = command.epilog.split("\n\n")
+        lines += [
+            "```text",
+            *inspect.cleandoc("\n".join(examples)).splitlines()[1:],
+            "```",
+            "",
+            _plain(codes),
+            "",
+        ]
     return lines
 
 

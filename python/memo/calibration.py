@@ -21,6 +21,7 @@ import memo
 from memo.files import complete_file
 
 __all__ = [
+    "BoardLens",
     "Boards",
     "PointTable",
     "draw_ground",

@@ -251,8 +251,16 @@ class Track:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What `memo.explain` needs of every walk beside the video, plain numbers."""
-        return [walk.record() for walk in self.walks]
+        """Every walk: which way, how sure, and what `memo.explain` needs beside the video, plain numbers."""
+        return [
+            {
+                "direction": self._way(walk),
+                "gait": walk.direction,
+                "p_swapped": walk.p_swapped,
+                **walk.record(),
+            }
+            for walk in self.walks
+        ]
 
     @property
     def camera(self) -> _memo.Camera | None:

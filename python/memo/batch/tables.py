@@ -53,29 +53,34 @@ def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
     if record is None or not record.finished:
         return [{"name": row.name, "state": state}]
     results = folder.results(row.name)
-    common = {"name": row.name, "state": state, **_summary(results / "run.json")}
+    given, seen = _run(results / "run.json")
+    common = {"name": row.name, "state": state, **given}
     walks: dict[str, dict[str, Any]] = {}
     lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS)
     for walk, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
         column = f"{parameter}{'_' if side else ''}{side}{_UNITS.get(unit, '')}"
         cells = {column: value, f"{column}_ci_low": low, f"{column}_ci_high": high, f"{column}_n": n}
-        walks.setdefault(walk, {**common, "walk": walk}).update(cells)
+        walks.setdefault(walk, {**common, "walk": walk, **seen.get(walk, {})}).update(cells)
     return list(walks.values()) or [common]
 
 
-def _summary(path: Path) -> dict[str, Any]:
-    """What holds for all walks of a video."""
+def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """What holds for all walks of a video; and which way each goes, by its number."""
     try:
         run = json.loads(path.read_text(encoding="utf-8"))
-        height_m, summary = run["options"]["height_m"], run["summary"]
-        p_swapped = summary.get("p_swapped")
-        return {
-            "height_m": height_m,
+        given = {
+            "height_m": run["options"]["height_m"],
             "camera_given": "yes" if run["camera_given"] else "no",
-            "direction": summary.get("direction", ""),
-            "gait": summary.get("gait", ""),
-            "p_swapped": "" if p_swapped is None else f"{p_swapped:.6f}",
         }
+        seen = {
+            str(number): {
+                "direction": walk["direction"],
+                "gait": walk["gait"],
+                "p_swapped": f"{walk['p_swapped']:.6f}",
+            }
+            for number, walk in enumerate(run["walks"])
+        }
+        return given, seen
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise BatchError(f"{path}: not as memo track writes it: {error!r}") from None
 

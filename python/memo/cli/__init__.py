@@ -20,11 +20,18 @@ from memo.cli.pointlight import add_pointlight
 from memo.cli.posture import add_posture
 from memo.cli.report import add_report
 from memo.cli.reproduce import add_reproduce
-from memo.cli.track import EXIT_CODES, add_track
+from memo.cli.track import add_track
 from memo.cli.unswap import add_unswap
 
 if TYPE_CHECKING:
     import typer
+
+EPILOG = """Examples:
+  memo demo
+  memo track walk.mp4 --height 1.68
+  memo report memo-out/walk
+
+Exit codes of every command: its own --help."""
 
 EXTRA = ("av", "matplotlib", "rich", "typer")
 
@@ -47,7 +54,7 @@ def _app() -> "typer.Typer":
     app = typer.Typer(
         name="memo",
         help="3D motion of a walker from one fixed camera.",
-        epilog=EXIT_CODES,
+        epilog=EPILOG,
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -64,14 +71,14 @@ def _app() -> "typer.Typer":
     ) -> None: ...
 
     add_track(app)
-    add_batch(app)
-    add_calibrate(app)
-    add_unswap(app)
-    add_posture(app)
-    add_demo(app)
-    add_reproduce(app)
-    add_pointlight(app)
-    add_planar(app)
     add_report(app)
     add_convert(app)
+    add_batch(app)
+    add_calibrate(app)
+    add_posture(app)
+    add_unswap(app)
+    add_pointlight(app)
+    add_planar(app)
+    add_reproduce(app)
+    add_demo(app)
     return app

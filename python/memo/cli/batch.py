@@ -22,8 +22,14 @@ from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, ter
 if TYPE_CHECKING:
     import typer
 
-EXIT_CODES = """Exit codes: 0 every video was tracked or has nobody in it; 1 the manifest or the folder cannot
-be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are left, see status.csv;
+EPILOG = """Examples:
+  memo batch trials.csv --check
+  memo batch trials.csv --out trials
+  memo batch trials.csv --out trials --resume
+  memo batch trials.csv --out trials --shard 2/4
+
+Exit codes: 0 every video was tracked or has nobody in it; 1 the manifest or the folder cannot \
+be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are left, see status.csv; \
 130 interrupted."""
 
 _FEW = 5  # videos that are named where there are many
@@ -39,16 +45,16 @@ class Backend(StrEnum):
 def add_batch(app: "typer.Typer") -> None:
     import typer
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def batch(
         manifest: Annotated[
             Path,
             typer.Argument(
+                metavar="MANIFEST",
                 help="CSV or TOML, a row a video: video, name, camera, camera_name, height_m, fov_deg, "
-                "frames, fps, overlay, plots, report."
+                "frames, fps, overlay, plots, report.",
             ),
         ],
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/MANIFEST.")] = None,
         jobs: Annotated[
             int | None, typer.Option(help="Videos at a time; as many as processors.", min=1)
         ] = None,
@@ -69,6 +75,7 @@ def add_batch(app: "typer.Typer") -> None:
         ] = "1/1",
         timeout: Annotated[float | None, typer.Option(help="Longest time for a video, seconds.")] = None,
         max_memory: Annotated[int | None, typer.Option(help="Most memory for a video, MB (Linux).")] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/MANIFEST.")] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4; a row may say otherwise.")] = False,
         plots: Annotated[bool, typer.Option(help="Write plots; a row may say otherwise.")] = False,
         report: Annotated[bool, typer.Option(help="Write report.html; a row may say otherwise.")] = False,
@@ -76,7 +83,7 @@ def add_batch(app: "typer.Typer") -> None:
         ray_address: Annotated[
             str | None, typer.Option(help="Of the Ray cluster; without, the one at hand or a local one.")
         ] = None,
-        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Tracks the videos of MANIFEST. Any may fail or crash, and the run be killed: none is lost."""

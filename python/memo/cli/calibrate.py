@@ -23,8 +23,23 @@ from memo.cli.given import (
 if TYPE_CHECKING:
     import typer
 
-CALIBRATE_EXIT_CODES = """Exit codes: 0 the calibration was written; 1 the input cannot be used;
+EXIT_CODES = """Exit codes: 0 the calibration was written; 1 the input cannot be used; \
 2 wrong usage; 4 the app extra is not installed; 130 interrupted (nothing is written)."""
+POINTS_EPILOG = f"""Examples:
+  memo calibrate points points.csv --size 1280x720
+  memo calibrate points points.csv --picture floor.png --out camera
+
+{EXIT_CODES}"""
+WALKER_EPILOG = f"""Examples:
+  memo calibrate walker to_and_fro.mp4 --height 1.68
+  memo calibrate walker walk_json --height 1.68 --fps 30 --size 1280x720
+
+{EXIT_CODES}"""
+CHECKERBOARD_EPILOG = f"""Examples:
+  memo calibrate checkerboard boards --squares 9x6 --square-mm 30
+  memo calibrate checkerboard boards --squares 9x6 --square-mm 30 --floor floor.png
+
+{EXIT_CODES}"""
 
 _KEYPOINT_SUFFIXES = (".json", ".csv")
 _MOST_FRAMES = 150  # a background needs no more, and memory holds them all
@@ -41,7 +56,7 @@ def add_calibrate(app: "typer.Typer") -> None:
     json_option = typer.Option("--json", help="Print the summary as JSON.")
     quiet_option = typer.Option("--quiet", help="Print nothing but errors.")
 
-    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    @ways.command(epilog=POINTS_EPILOG)
     def points(
         table: Annotated[Path, typer.Argument(metavar="POINTS", help="CSV: x_m,y_m,z_m,u_px,v_px.")],
         size: Size = None,
@@ -61,11 +76,14 @@ def add_calibrate(app: "typer.Typer") -> None:
 
         raise typer.Exit(guarded(work))
 
-    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    @ways.command(epilog=WALKER_EPILOG)
     def walker(
         source: Annotated[
             Path,
-            typer.Argument(help="A video, or keypoints (folder, JSON, CSV), of one person walking about."),
+            typer.Argument(
+                metavar="SOURCE",
+                help="A video, or keypoints (folder, JSON, CSV), of one person walking about.",
+            ),
         ],
         height: Annotated[float, typer.Option(help="Height of the person, metres.")],
         size: Size = None,
@@ -87,9 +105,12 @@ def add_calibrate(app: "typer.Typer") -> None:
 
         raise typer.Exit(guarded(work))
 
-    @ways.command(epilog=CALIBRATE_EXIT_CODES)
+    @ways.command(epilog=CHECKERBOARD_EPILOG)
     def checkerboard(
-        folder: Annotated[Path, typer.Argument(help="Folder of pictures of the board, tilted differently.")],
+        folder: Annotated[
+            Path,
+            typer.Argument(metavar="FOLDER", help="Folder of pictures of the board, tilted differently."),
+        ],
         squares: Annotated[str, typer.Option(help="Squares along both sides.", metavar="9x6")],
         square_mm: Annotated[float, typer.Option(help="Side of a square, millimetres.")],
         floor: Annotated[

@@ -18,7 +18,12 @@ from memo.files import plain
 if TYPE_CHECKING:
     import typer
 
-EXIT_CODES = """Exit codes: 0 TARGET was written; 1 the input cannot be used; 2 wrong usage;
+EPILOG = """Examples:
+  memo convert memo-out/walk walk.trc
+  memo convert memo-out/walk walk.bvh --walk 0
+  memo convert walk.c3d walk.csv --rate 50
+
+Exit codes: 0 TARGET was written; 1 the input cannot be used; 2 wrong usage; \
 4 the app extra is not installed."""
 
 
@@ -30,25 +35,28 @@ class Axis(StrEnum):
 def add_convert(app: "typer.Typer") -> None:
     import typer
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def convert(
         source: Annotated[
             Path,
             typer.Argument(
+                metavar="SOURCE",
                 help="A folder of `memo track` or `memo posture`, or a motion file:"
-                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints those of a detector as well."
+                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints those of a detector as well.",
             ),
         ],
         target: Annotated[
             Path,
             typer.Argument(
+                metavar="TARGET",
                 help=".trc, .csv, .parquet: joints; .mot, .sto: joint angles;"
                 " .c3d: joints, angles and events; .bvh: a skeleton; .json: keypoints as COCO results;"
-                " no ending: a folder of OpenPose's keypoints; .txt: a track as MOTChallenge rows."
+                " no ending: a folder of OpenPose's keypoints; .txt: a track as MOTChallenge rows.",
             ),
         ],
         up: Annotated[
-            Axis | None, typer.Option(help="Up axis of TARGET; its usual one: y, but z for .c3d and .csv.")
+            Axis | None,
+            typer.Option(help="Up axis of TARGET; its usual one: y of .trc, .mot, .sto and .bvh, else z."),
         ] = None,
         from_up: Annotated[Axis | None, typer.Option(help="Up axis of SOURCE, whatever it says.")] = None,
         rate: Annotated[

@@ -13,7 +13,7 @@ import numpy as np
 import memo
 from memo.cli.delivery import Delivery, Exit, guarded
 from memo.cli.given import check_writable
-from memo.cli.track import EXIT_CODES, deliver_interrupted, exit_code, follow, new_tracker, report, write_all
+from memo.cli.track import deliver_interrupted, exit_code, follow, new_tracker, report, write_all
 from memo.files import JOINTS
 from memo.run import Source
 
@@ -22,14 +22,22 @@ if TYPE_CHECKING:
 
     from memo.video import Frame
 
+EPILOG = """Examples:
+  memo demo
+  memo demo --seed 3 --out another
+
+Exit codes: 0 the walker was tracked; 1 the results cannot be written; 2 wrong usage; \
+3 no walker was tracked; 4 the app extra is not installed; 130 interrupted \
+(what was tracked until then is written)."""
+
 
 def add_demo(app: "typer.Typer") -> None:
     import typer
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def demo(
-        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
         seed: Annotated[int, typer.Option(help="Which scene is drawn.", min=0)] = 0,
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
     ) -> None:
         """Draws a walker whose motion is known, tracks it and compares."""
         raise typer.Exit(guarded(lambda: _demo(out, seed)))

@@ -8,13 +8,14 @@ import typer
 KeypointsPath = Annotated[
     Path,
     typer.Argument(
+        metavar="KEYPOINTS",
         help="OpenPose folder, COCO or AlphaPose JSON, Sports2D's TRC in pixels, a table (CSV or "
-        "Parquet), or a folder with track.csv."
+        "Parquet), or a folder with track.csv.",
     ),
 ]
 Fps = Annotated[
     float | None,
-    typer.Option(help="Frame rate; needed where no times are given, and taken instead of `time_s`."),
+    typer.Option(help="Frame rate; needed where no times are given, and taken instead of time_s."),
 ]
 LayoutName = Annotated[
     str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")

@@ -15,37 +15,50 @@ from memo.cli.given import check_writable
 if TYPE_CHECKING:
     import typer
 
-EXIT_CODES = """Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage;
+EPILOG = """Examples:
+  memo planar dots.csv
+  memo planar joints.csv --fps 60 --noise-px 1 --names
+
+Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 3 no window shows planar motion; 4 the app extra is not installed."""
 
 
 def add_planar(app: "typer.Typer") -> None:
     import typer
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def planar(
-        tracks: Annotated[Path, typer.Argument(help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps).")],
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
-        noise_px: Annotated[float, typer.Option(help="Standard deviation of the tracks' coordinates.")] = 0.5,
+        tracks: Annotated[
+            Path, typer.Argument(metavar="TRACKS", help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps).")
+        ],
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of a coordinate, pixels.")] = 0.5,
         window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
         fps: Annotated[float | None, typer.Option(help="Frame rate where the file has no time_s.")] = None,
         carry: Annotated[
-            bool, typer.Option(help="Carry lengths through windows in which it is lost.")
+            bool, typer.Option("--carry", help="Carry lengths through windows in which no plane fits.")
         ] = False,
         names: Annotated[
             bool,
-            typer.Option(help="The columns name joints (RKN or right_knee): limbs bend as joints can."),
+            typer.Option(
+                "--names", help="The columns name joints (RKN or right_knee): limbs bend as joints can."
+            ),
         ] = False,
         focal_px: Annotated[
-            float | None, typer.Option(help="Focal length: says what perspective costs.")
+            float | None, typer.Option(help="Focal length, pixels: says what perspective costs.")
         ] = None,
-        turn_deg: Annotated[float, typer.Option(help="Viewpoint of turned.mp4 and turned.png.")] = 50.0,
+        turn_deg: Annotated[
+            float, typer.Option(help="Viewpoint of turned.mp4 and turned.png, degrees.")
+        ] = 50.0,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
         video: Annotated[bool, typer.Option(help="Write turned.mp4, the limbs from a new side.")] = True,
-        as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Links unnamed points into limbs that swing in planes, with lengths and depths."""
         options = {"window_s": window, "carry": carry, "focal_px": focal_px}
-        delivery = Delivery(out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json)
+        delivery = Delivery(
+            out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json, quiet=quiet
+        )
         raise typer.Exit(guarded(lambda: _planar(tracks, noise_px, fps, names, turn_deg, options, delivery)))
 
 

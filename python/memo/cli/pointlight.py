@@ -6,18 +6,27 @@
 import csv
 import math
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 import memo
-from memo.cli.delivery import Exit, InputError, guarded
+from memo.cli.delivery import Delivery, Exit, InputError, guarded
 from memo.cli.given import check_writable
 from memo.files import complete_file
 
 if TYPE_CHECKING:
     import typer
+
+EPILOG = """Examples:
+  memo pointlight --azimuth-deg 60
+  memo pointlight --azimuth-deg 60 --scramble-position --seed 3 --out control
+  memo pointlight walk.c3d --out mine
+
+Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage; \
+4 the app extra is not installed."""
 
 FEWEST_FRAMES = 8
 """Fewer are not linked by `memo planar`."""
@@ -26,39 +35,48 @@ FEWEST_FRAMES = 8
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
 
-    @app.command()
+    @app.command(epilog=EPILOG)
     def pointlight(
         motion: Annotated[
             Path | None,
             typer.Argument(
+                metavar="MOTION",
                 help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
-                " (.c3d, .bvh, .trc); a walker."
+                " (.c3d, .bvh, .trc); without, an average walker.",
             ),
         ] = None,
-        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
-        azimuth_deg: Annotated[float, typer.Option(help="Viewer about the vertical; 90 = from +x.")] = 0.0,
-        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal.")] = 0.0,
-        px_per_m: Annotated[float, typer.Option(help="Scale.")] = 200.0,
+        azimuth_deg: Annotated[
+            float, typer.Option(help="Viewer about the vertical, degrees; 90 looks from +x.")
+        ] = 0.0,
+        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal, degrees.")] = 0.0,
+        px_per_m: Annotated[float, typer.Option(help="Scale, pixels a metre.")] = 200.0,
         locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
-        inverted: Annotated[bool, typer.Option(help="Upside down.")] = False,
-        mirrored: Annotated[bool, typer.Option(help="Facing the other way.")] = False,
+        inverted: Annotated[bool, typer.Option("--inverted", help="Upside down.")] = False,
+        mirrored: Annotated[bool, typer.Option("--mirrored", help="Facing the other way.")] = False,
         reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
         scramble_position: Annotated[
-            bool, typer.Option(help="Every dot's motion at a random place.")
+            bool, typer.Option("--scramble-position", help="Every dot's motion at a random place.")
         ] = False,
-        scramble_phase: Annotated[bool, typer.Option(help="Every dot's motion shifted in time.")] = False,
+        scramble_phase: Annotated[
+            bool, typer.Option("--scramble-phase", help="Every dot's motion shifted in time.")
+        ] = False,
         period: Annotated[
-            float | None, typer.Option(help="Period of the motion, seconds; all of it.")
+            float | None, typer.Option(help="Period of the motion, seconds; else its whole length.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
         dots: Annotated[int, typer.Option(help="With --lifetime: dots shown.")] = 8,
         on: Annotated[str, typer.Option(help="With --lifetime: limbs or joints.")] = "limbs",
         noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
         noise_kind: Annotated[str, typer.Option(help="scrambled, linear or flicker.")] = "scrambled",
-        noise_px: Annotated[float, typer.Option(help="Standard deviation of pixel noise.")] = 0.0,
-        seconds: Annotated[float, typer.Option(help="Without MOTION: duration.")] = 2.4,
+        noise_px: Annotated[
+            float, typer.Option(help="Standard deviation of the noise of dots, pixels.")
+        ] = 0.0,
+        seconds: Annotated[float, typer.Option(help="Without MOTION: duration, seconds.")] = 2.4,
         fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
-        seed: Annotated[int, typer.Option(help="Of everything random.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Of all that is random.", min=0)] = 0,
+        out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Makes a point-light display: dots.csv, labels.csv and display.mp4."""
         options = {
@@ -80,20 +98,23 @@ def add_pointlight(app: "typer.Typer") -> None:
             "noise_sd_px": noise_px,
             "seed": seed,
         }
-        raise typer.Exit(guarded(lambda: _pointlight(motion, out, seconds, fps, options)))
+        delivery = Delivery(out, as_json=as_json, quiet=quiet)
+        raise typer.Exit(guarded(lambda: _pointlight(motion, seconds, fps, options, delivery)))
 
 
 def _pointlight(
-    motion: Path | None, out: Path, seconds: float, fps: float | None, options: dict[str, Any]
+    motion: Path | None, seconds: float, fps: float | None, options: dict[str, Any], delivery: Delivery
 ) -> Exit:
     from memo.linkage import Points, write_points_csv
     from memo.linkage_plot import write_display_video
 
+    notes: Sequence[str] = ()
     _check_period(options["period_s"], options["scramble_phase"] is not None)
     if motion is None:
         points = _walker_points(seconds, 60.0 if fps is None else fps)
     else:
-        points = _read_points(motion, fps)
+        points, notes = _read_points(motion, fps)
+    out = delivery.out
     check_writable(out)
     display = _new_display(points, options)
     shown, labels = display["positions_px"], display["labels"]
@@ -102,33 +123,32 @@ def _pointlight(
     write_points_csv(out / "dots.csv", Points(named, display["times_s"], shown))
     _write_labels(out / "labels.csv", points.names, named, display)
     write_display_video(out / "display.mp4", display["times_s"], shown)
-    print(f"{shown.shape[1]} dots in {shown.shape[0]} frames.")
-    print(f"Written to {out}: dots.csv, labels.csv, display.mp4.")
+    written = [out / "dots.csv", out / "labels.csv", out / "display.mp4"]
+    summary = {"dots": shown.shape[1], "frames": shown.shape[0], "notes": list(notes)}
+    delivery.tell(summary, [*notes, f"{shown.shape[1]} dots in {shown.shape[0]} frames."], written)
     scrambled = options["scramble_position"] or options["scramble_phase"]
-    if stays and not scrambled and len(shown) >= FEWEST_FRAMES:
+    if delivery.talks and stays and not scrambled and len(shown) >= FEWEST_FRAMES:
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
         print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
 
 
-def _read_points(path: Path, fps: float | None) -> Any:
+def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
     """All points of a table; of a motion file or the folder of a track the joints alone."""
     from memo.formats import READERS, FormatError, read_motion
     from memo.formats.names import joint_points
     from memo.linkage import Points, read_points_csv
 
     if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
-        return read_points_csv(path, 3, fps)
+        return read_points_csv(path, 3, fps), ()
     motion = read_motion(path)
     if fps is not None:
         raise InputError(f"{path}: has times of its own: leave --fps out")
-    for note in motion.notes:
-        print(note)
     try:
         joints = joint_points(motion)
     except FormatError as error:
         raise InputError(f"{path}: {error}") from None
-    return Points(list(joints.names), joints.times_s, joints.points)
+    return Points(list(joints.names), joints.times_s, joints.points), motion.notes
 
 
 def _check_period(period_s: float | None, scrambles_phase: bool) -> None:

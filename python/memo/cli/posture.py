@@ -18,8 +18,12 @@ from memo.postures import WRITTEN, write_postures
 if TYPE_CHECKING:
     import typer
 
-POSTURE_EXIT_CODES = """Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage;
-3 no posture is left in any frame (the tables say why); 4 the app extra is not installed;
+EPILOG = """Examples:
+  memo posture walk_json --camera camera.toml --fps 30 --height 1.75
+  memo posture joints.csv --camera camera.toml --lengths lengths.csv --rules physical
+
+Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage; \
+3 no posture is left in any frame (the tables say why); 4 the app extra is not installed; \
 130 interrupted (no file is left half written)."""
 
 _DRAWN = "postures.png"
@@ -76,7 +80,7 @@ def add_posture(app: "typer.Typer") -> None:
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
     from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
 
-    @app.command(epilog=POSTURE_EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def posture(
         keypoints: KeypointsPath,
         camera: Annotated[Path, typer.Option(help=CAMERA_HELP)],

@@ -16,23 +16,29 @@ if TYPE_CHECKING:
 
     from memo.report import Report
 
-EXIT_CODES = """Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage;
+EPILOG = """Examples:
+  memo report memo-out/walk --open
+  memo report memo-out/walk --frames 45:146 --every 2
+
+Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage; \
 4 the app extra is not installed; 130 interrupted (an older page stays as it was)."""
 
 
 def add_report(app: "typer.Typer") -> None:
     import typer
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def report(
-        folder: Annotated[Path, typer.Argument(help="What memo track or memo posture left.", metavar="DIR")],
-        out: Annotated[Path | None, typer.Option(help="The file to write; DIR/report.html.")] = None,
+        folder: Annotated[
+            Path, typer.Argument(metavar="DIR", help="What memo track, memo posture or memo planar left.")
+        ],
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         every: Annotated[
             int | None, typer.Option(help="Every N-th frame; else as many as fit in about 25 MB.", min=1)
         ] = None,
         why: Annotated[bool, typer.Option(help="Show what each frame was matched to.")] = True,
         video: Annotated[Path | None, typer.Option(help="Where the video is now, if it was moved.")] = None,
+        out: Annotated[Path | None, typer.Option(help="The file to write; DIR/report.html.")] = None,
         open_: Annotated[bool, typer.Option("--open", help="Show it in the browser.")] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,

@@ -27,15 +27,23 @@ class Paper(StrEnum):
     HOFFMAN_FLINCHBAUGH = "hoffman-flinchbaugh"
 
 
+EPILOG = """Examples:
+  memo reproduce
+  memo reproduce lee-chen --out tables
+  memo reproduce rohr --video walk.mp4 --height 1.68
+
+Exit codes: 0 done, differences included; 1 the input cannot be used; 2 wrong usage; \
+3 nobody was tracked in --video; 4 the app extra is not installed; 130 interrupted."""
+
 HELP = "rohr: tracking (1994); lee-chen: postures (1985); hoffman-flinchbaugh: biological motion (1982)."
 
 
 def add_reproduce(app: "typer.Typer") -> None:
     import typer
 
-    @app.command()
+    @app.command(epilog=EPILOG)
     def reproduce(
-        paper: Annotated[Paper, typer.Argument(help=HELP)] = Paper.ALL,
+        paper: Annotated[Paper, typer.Argument(metavar="PAPER", help=HELP)] = Paper.ALL,
         out: Annotated[
             Path | None, typer.Option(help="Folder for rows and figures; memo-out/reproduce, or in it PAPER.")
         ] = None,
@@ -44,9 +52,9 @@ def add_reproduce(app: "typer.Typer") -> None:
         ] = None,
         height: Annotated[float | None, typer.Option(help="Height of the walker in --video, metres.")] = None,
         camera: Annotated[
-            Path | None, typer.Option(help="Calibration of --video: TOML, or Tsai XML.")
+            Path | None, typer.Option(help="Calibration of --video, as for memo track.")
         ] = None,
-        camera_name: Annotated[str | None, typer.Option(help="Which camera of a TOML with several.")] = None,
+        camera_name: Annotated[str | None, typer.Option(help="Which camera of a file with several.")] = None,
         fps: Annotated[float | None, typer.Option(help="True frame rate of --video (slow motion).")] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,

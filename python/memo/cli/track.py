@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 
     from memo.video import Frame
 
-EXIT_CODES = """Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage;
-3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted
+EPILOG = """Examples:
+  memo track walk.mp4 --height 1.68
+  memo track walk.mp4 --height 1.68 --camera camera.toml --report
+  memo track slow.mp4 --height 1.68 --fps 240 --frames 100:900
+
+Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
+3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted \
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
@@ -35,9 +40,12 @@ def add_track(app: "typer.Typer") -> None:
 
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
 
-    @app.command(epilog=EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def track(
-        video: Annotated[Path, typer.Argument(help="A video file, or a folder of images (then --fps too).")],
+        video: Annotated[
+            Path,
+            typer.Argument(metavar="VIDEO", help="A video file, or a folder of images (then --fps too)."),
+        ],
         camera: Annotated[Path | None, typer.Option(help=CAMERA_HELP)] = None,
         camera_name: CameraName = None,
         camera_unit: CameraUnit = None,
@@ -47,11 +55,11 @@ def add_track(app: "typer.Typer") -> None:
         fov_deg: Annotated[
             float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
         ] = None,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         fps: Annotated[
             float | None, typer.Option(help="True frame rate, in place of the time stamps (slow motion).")
         ] = None,
+        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
         plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
         page: Annotated[

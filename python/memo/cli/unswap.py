@@ -16,7 +16,11 @@ from memo.keypoints import write_keypoints
 if TYPE_CHECKING:
     import typer
 
-UNSWAP_EXIT_CODES = """Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong usage;
+EPILOG = """Examples:
+  memo unswap walk_json --fps 30
+  memo unswap walk.json --fps 30 --format csv --out sides
+
+Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong usage; \
 4 the app extra is not installed; 130 interrupted (nothing is written)."""
 
 
@@ -37,7 +41,7 @@ def add_unswap(app: "typer.Typer") -> None:
 
     from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
 
-    @app.command(epilog=UNSWAP_EXIT_CODES)
+    @app.command(epilog=EPILOG)
     def unswap(
         keypoints: KeypointsPath,
         fps: Fps = None,
