@@ -37,7 +37,7 @@ print("camera at", np.round(camera.position, 2), "m; truly at", np.round(true.po
 grid = np.array([[x, y, 0.0] for x in np.linspace(-2, 2, 9) for y in np.linspace(-1, 4, 11)])
 seen = true.project(grid)
 inside = np.isfinite(seen).all(axis=1)
-error_m = camera.ground_points([tuple(pixel) for pixel in seen[inside]]) - grid[inside]
+error_m = camera.ground_points(seen[inside]) - grid[inside]
 fig, ax = plt.subplots(figsize=(7, 4.2), layout="constrained")
 ax.quiver(*grid[inside, :2].T, *(20 * error_m[:, :2]).T, angles="xy", scale_units="xy", scale=1, width=0.003)
 ax.plot(*places[:, :2].T, "s", color="tab:orange", label="measured points, from above")

@@ -10,6 +10,7 @@ import pytest
 from conftest import shared_video
 from memo import cli
 from memo.calibration import board_places, draw_ground, read_picture, write_picture
+from memo.keypoints.points import layouts
 
 cv2 = pytest.importorskip("cv2")
 
@@ -331,6 +332,91 @@ def test_keypoints_are_taken_where_the_ankles_pass(tmp_path):
     assert set(foot_share) == {0.042} and set(head_share) == {0.926}
     points[:, 1:3] = np.nan
     assert set(memo.walker_sightings(names, points)[3]) == {0.91}
+
+
+def seen_walker(layout, pose, height_m=1.75, frames=300, noise_px=2.0):
+    """Keypoints of somebody who walks an oval before a camera of 1100 px.
+
+    Ears at 0.926 and standing ankles at 0.042 of the height, as calibration takes them; the ankles swing.
+    """
+    turn = np.arange(frames) * 0.02
+    middle = np.column_stack([2.0 * np.cos(turn), 2.5 * np.sin(turn), 0 * turn])
+    forward = np.column_stack([-2.0 * np.sin(turn), 2.5 * np.cos(turn), 0 * turn])
+    forward /= np.linalg.norm(forward, axis=1)[:, None]
+    left, up = np.cross([0.0, 0.0, 1.0], forward), np.array([0.0, 0.0, 1.0])
+    stride = np.arange(frames) / 25 * 2 * np.pi * 0.9
+    sway = 0.02 * (np.cos(2 * stride) - 1)[:, None] * up
+    body = {"nose": (0.91, 0.0, 0.11), "neck": (0.82, 0.0, 0.0), "mid_hip": (0.53, 0.0, 0.0)}
+    sides = {"ear": (0.926, 0.07, 0), "eye": (0.936, 0.03, 0.1), "shoulder": (0.82, 0.19, 0)}
+    sides |= {"elbow": (0.63, 0.22, 0), "wrist": (0.48, 0.22, 0.1), "hip": (0.53, 0.09, 0)}
+    for side, sign in (("right", -1), ("left", 1)):
+        body |= {f"{side}_{name}": (at, sign * out, on) for name, (at, out, on) in sides.items()}
+    seen = {
+        name: middle + at * height_m * up + sway + out * left + on * forward
+        for name, (at, out, on) in body.items()
+    }
+    for side, sign in (("right", -1), ("left", 1)):
+        swing = sign * np.sin(stride), np.maximum(0, -sign * np.cos(stride))
+        ankle = middle + 0.042 * height_m * up + sign * 0.05 * left
+        ankle = ankle + 0.33 * swing[0][:, None] * forward + 0.1 * swing[1][:, None] * up
+        seen[f"{side}_ankle"] = ankle
+        seen[f"{side}_knee"] = (ankle + seen[f"{side}_hip"]) / 2 + 0.05 * forward
+    names = layouts()[layout]
+    missing = np.full((frames, 2), np.nan)
+    points = [project(seen[name], 1100, pose) if name in seen else missing for name in names]
+    noise = np.random.default_rng(0).normal(0, noise_px, (frames, len(names), 2))
+    return memo.Keypoints.from_arrays(np.stack(points, axis=1) + noise, names=layout, fps=25.0)
+
+
+@pytest.mark.parametrize(
+    ("layout", "written", "name"),
+    [("BODY_25", "openpose", "walk_json"), ("COCO_17", "coco", "walk.json"), ("BODY_25", "csv", "walk.csv")],
+)
+def test_a_tilted_camera_from_keypoints_of_a_detector(memo_command, tmp_path, layout, written, name):
+    pose = look_at(np.array([0.0, -7.0, 3.0]), np.array([0.0, 0.0, 0.8]), 1.0)
+    truth = {"focal_px": 1100, "pitch_deg": np.degrees(np.arctan2(2.2, 7)), "roll_deg": 1.0, "height_m": 3.0}
+    memo.write_keypoints(tmp_path / name, seen_walker(layout, pose), written)
+    arguments = ("calibrate", "walker", tmp_path / name, "--height", 1.75, "--out", tmp_path / "out")
+    code, said, _ = memo_command(*arguments, "--size", "1280x720", "--json")
+    assert code == 0
+    summary = json.loads(said)
+    assert 15 < summary["sightings"] < 40  # where the ankles pass each other
+    for estimate, value in truth.items():
+        found = summary["estimates"][estimate]
+        assert abs(found["value"] - value) < 2.5 * found["sd"], (estimate, found)
+        assert found["sd"] < {"focal_px": 40, "pitch_deg": 0.5, "roll_deg": 0.3, "height_m": 0.05}[estimate]
+    camera = memo.Camera.from_file(tmp_path / "out" / "camera.toml")
+    assert abs(camera.position[2] - 3.0) < 0.1
+    code, _, complaint = memo_command(*arguments, "--size", "720x1280")
+    assert code == 1 and "outside a picture of 720x1280 pixels" in complaint and complaint.count("\n") == 1
+
+
+def test_a_video_has_its_own_size(memo_command, tmp_path):
+    video = shared_video("mocap_a") / "video.mp4"
+    arguments = ("calibrate", "walker", video, "--height", 1.86, "--out", tmp_path)
+    code, _, complaint = memo_command(*arguments, "--size", "1280x960")
+    assert code == 1 and "1280x960 and 640x480 pixels" in complaint
+    code, _, complaint = memo_command(*arguments, "--layout", "BODY_25")
+    assert code == 1 and "--layout: means nothing for a video" in complaint
+
+
+def test_points_are_taken_as_numpy_takes_them():
+    camera = memo.Camera.level(SIZE, 60, 1.2, 5.0)
+    pixels = np.array([[600, 500], [100, 650]])
+    ground = camera.ground_points(pixels)
+    assert ground.shape == (2, 3)
+    for same in (pixels.astype(np.float32), pixels.tolist(), [tuple(pixel) for pixel in pixels], pixels[::1]):
+        np.testing.assert_array_equal(camera.ground_points(same), ground)
+    np.testing.assert_array_equal(camera.ground_points(np.fliplr(pixels)[:, ::-1]), ground)
+    np.testing.assert_allclose(camera.project(ground.tolist()), pixels, atol=1e-9)
+    assert camera.ground_points(np.empty((0, 2))).shape == (0, 3)
+    assert np.isnan(camera.ground_points([[np.nan, 500.0]])).all()
+    for wrong in (pixels[0], np.zeros((2, 3)), np.zeros((2, 2, 2))):
+        with pytest.raises(ValueError, match=r"wanted pixels: numpy array of shape \(N, 2\); got shape"):
+            camera.ground_points(wrong)
+    for wrong in ([[1.0, 2.0], [3.0]], [["a", "b"]], "ab", None, np.zeros((2, 2), bool)):
+        with pytest.raises(TypeError, match=r"wanted pixels: numpy array of shape \(N, 2\) of numbers; got"):
+            camera.ground_points(wrong)
 
 
 # Checkerboards.

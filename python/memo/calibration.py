@@ -183,7 +183,7 @@ def _grid(camera: memo.Camera) -> list[Array]:
     """Lines on the ground a metre apart, over what the picture shows of it."""
     width, height = camera.size
     u, v = np.meshgrid(np.linspace(0, width - 1, 15), np.linspace(0, height - 1, 25))
-    ground = camera.ground_points(list(zip(u.ravel().tolist(), v.ravel().tolist(), strict=True)))[:, :2]
+    ground = camera.ground_points(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
     ground = ground[np.isfinite(ground).all(axis=1)]
     if not len(ground):
         return []

@@ -128,18 +128,36 @@ pub fn numpy_from_column<T: numpy::Element>(py: Python<'_>, column: Vec<T>) -> B
     column.into_pyarray(py)
 }
 
-/// Points of shape (N, 3).
+/// Points (N, 3): an array of any number type, or a sequence of triples.
 pub fn points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
-    let wanted = "wanted points: numpy array of shape (N, 3), dtype float64";
-    let Ok(array) = points.cast::<PyArray2<f64>>() else {
-        return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
+    numbers_from_numpy(points, "points")
+}
+
+/// Pixels (N, 2): an array of any number type, or a sequence of pairs.
+pub fn pixels_from_numpy(pixels: &Bound<'_, PyAny>) -> PyResult<Vec<DVec2>> {
+    Ok(numbers_from_numpy(pixels, "pixels")?.into_iter().map(DVec2::from_array).collect())
+}
+
+/// What numpy makes of the object, as rows of N numbers.
+fn numbers_from_numpy<const N: usize>(object: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<[f64; N]>> {
+    let wanted = format!("wanted {what}: numpy array of shape (N, {N})");
+    let array = object.py().import("numpy")?.call_method1("asarray", (object,)).ok();
+    let described = || describe(array.as_ref().unwrap_or(object));
+    let kind =
+        array.as_ref().and_then(|a| a.getattr("dtype").ok()?.getattr("kind").ok()?.extract::<char>().ok());
+    let (Some(array), Some('f' | 'i' | 'u')) = (&array, kind) else {
+        return Err(PyTypeError::new_err(format!("{wanted} of numbers; got {}", described()?)));
     };
-    let array = array.readonly();
-    let view = array.as_array();
-    if view.ncols() != 3 {
-        return Err(PyValueError::new_err(format!("{wanted}; got shape {:?}", view.shape())));
+    let numbers = array.call_method1("astype", ("float64",))?;
+    if numbers.len()? == 0 {
+        return Ok(Vec::new());
     }
-    Ok(view.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+    let rows = numbers.cast::<PyArray2<f64>>().ok().filter(|rows| rows.shape()[1] == N);
+    let Some(rows) = rows else {
+        return Err(PyValueError::new_err(format!("{wanted}; got {}", described()?)));
+    };
+    let rows = rows.readonly();
+    Ok(rows.as_array().rows().into_iter().map(|row| std::array::from_fn(|i| row[i])).collect())
 }
 
 /// Line segments of shape (N, 2, 2).

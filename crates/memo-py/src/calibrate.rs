@@ -1,6 +1,8 @@
 //! Cameras from measured points and from a walker.
 
-use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_rows, points_from_numpy};
+use crate::array::{
+    motion_from_numpy, numpy_from_column, numpy_from_rows, pixels_from_numpy, points_from_numpy,
+};
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use glam::{DVec2, DVec3};
@@ -8,8 +10,8 @@ use memo_core::calibrate::{
     Estimate, KnownLens, PointOptions, Sighting, WalkerOptions, camera_from_points, camera_from_walker,
     sightings_from_joints,
 };
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -144,16 +146,4 @@ fn estimates<'py>(py: Python<'py>, estimates: &[Estimate]) -> PyResult<Bound<'py
 
 fn residuals(residuals_px: &[DVec2]) -> Vec<[f64; 2]> {
     residuals_px.iter().map(|r| r.to_array()).collect()
-}
-
-fn pixels_from_numpy(pixels: &Bound<'_, PyAny>) -> PyResult<Vec<DVec2>> {
-    let wanted = "wanted pixels: numpy array of shape (N, 2), dtype float64";
-    let Ok(array) = pixels.cast::<PyArray2<f64>>() else {
-        return Err(PyTypeError::new_err(format!("{wanted}; got {}", pixels.get_type().name()?)));
-    };
-    let array = array.readonly();
-    if array.shape()[1] != 2 {
-        return Err(PyValueError::new_err(format!("{wanted}; got shape {:?}", array.shape())));
-    }
-    Ok(array.as_array().rows().into_iter().map(|row| DVec2::new(row[0], row[1])).collect())
 }

@@ -1,6 +1,6 @@
 //! `Camera`.
 
-use crate::array::{numpy_from_rows, points_from_numpy};
+use crate::array::{numpy_from_rows, pixels_from_numpy, points_from_numpy};
 use crate::error::value_error;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
@@ -231,14 +231,14 @@ impl PyCamera {
     fn ground_points<'py>(
         &self,
         py: Python<'py>,
-        pixels: Vec<(f64, f64)>,
+        pixels: &Bound<'py, PyAny>,
         z_m: f64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let point = |pixel: (f64, f64)| {
-            let ideal = self.0.undistort(DVec2::from(pixel)).ok();
+        let point = |pixel: DVec2| {
+            let ideal = self.0.undistort(pixel).ok();
             ideal.and_then(|p| self.0.point_at_height(p, z_m)).unwrap_or(DVec3::NAN).to_array()
         };
-        numpy_from_rows(py, pixels.into_iter().map(point).collect())
+        numpy_from_rows(py, pixels_from_numpy(pixels)?.into_iter().map(point).collect())
     }
 
     /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6).

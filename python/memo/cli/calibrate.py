@@ -41,7 +41,7 @@ CHECKERBOARD_EPILOG = f"""Examples:
 
 {EXIT_CODES}"""
 
-_KEYPOINT_SUFFIXES = (".json", ".csv")
+_KEYPOINT_SUFFIXES = (".json", ".csv", ".trc", ".parquet")
 _MOST_FRAMES = 150  # a background needs no more, and memory holds them all
 
 
@@ -49,6 +49,7 @@ def add_calibrate(app: "typer.Typer") -> None:
     import typer
 
     from memo.cli.camera_options import FovDeg, Lens, Picture, Size
+    from memo.cli.keypoint_options import LayoutName, Person
 
     ways = typer.Typer(no_args_is_help=True, help="Finds where the camera stands and how it images.")
     app.add_typer(ways, name="calibrate")
@@ -82,7 +83,7 @@ def add_calibrate(app: "typer.Typer") -> None:
             Path,
             typer.Argument(
                 metavar="SOURCE",
-                help="A video, or keypoints (folder, JSON, CSV), of one person walking about.",
+                help="A video, or keypoints (folder, JSON, CSV, TRC, Parquet), of a person walking about.",
             ),
         ],
         height: Annotated[float, typer.Option(help="Height of the person, metres.")],
@@ -91,6 +92,8 @@ def add_calibrate(app: "typer.Typer") -> None:
         fov_deg: FovDeg = None,
         lens: Lens = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate, where the source does not say.")] = None,
+        layout: LayoutName = None,
+        person: Person = None,
         out: Annotated[Path | None, out_option] = None,
         as_json: Annotated[bool, json_option] = False,
         quiet: Annotated[bool, quiet_option] = False,
@@ -101,7 +104,8 @@ def add_calibrate(app: "typer.Typer") -> None:
         def work() -> Exit:
             checked_height(height)
             check_apart([source, picture, lens], _written(delivery))
-            return _walker(source, height, fps, (size, picture, fov_deg, lens), delivery)
+            reading = {"fps": fps, "layout": layout, "person": person}
+            return _walker(source, height, reading, (size, picture, fov_deg, lens), delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -134,16 +138,26 @@ def _written(delivery: Delivery) -> list[Path]:
     return [delivery.out / name for name in ("camera.toml", "lens.toml", "ground.png")]
 
 
-def _view(size: str | None, picture: Path | None, fov_deg: float | None, lens: Path | None) -> dict[str, Any]:
-    """Size, luma and what is known of the lens, from the options that say so."""
+def _view(
+    size: str | None,
+    picture: Path | None,
+    fov_deg: float | None,
+    lens: Path | None,
+    source_size: tuple[int, int] | None = None,
+) -> dict[str, Any]:
+    """Size, luma and what is known of the lens, from the options and what the source says of its size."""
     from memo.calibration import read_picture
 
     if fov_deg is not None and lens is not None:
         raise InputError("--lens already holds the field of view: leave --fov-deg out")
+    sides = None if size is None else two_sides(size, "--size")
     luma = None if picture is None else read_picture(picture)
     known = None if lens is None else load_camera(lens, None, size=size, lens_only=True)
-    sides = None if size is None else two_sides(size, "--size")
-    for other in (None if luma is None else luma.shape[::-1], None if known is None else known.size):
+    for other in (
+        source_size,
+        None if luma is None else luma.shape[::-1],
+        None if known is None else known.size,
+    ):
         if sides is not None and other is not None and tuple(other) != tuple(sides):
             raise InputError(
                 f"pictures of different sizes: {sides[0]}x{sides[1]} and {other[0]}x{other[1]} pixels"
@@ -155,6 +169,17 @@ def _view(size: str | None, picture: Path | None, fov_deg: float | None, lens: P
     if fov_deg is not None:
         view["focal_px"] = sides[0] / 2 / math.tan(math.radians(checked_fov(fov_deg)) / 2)
     return view
+
+
+def _check_inside(source: Path, pixels: Any, size: tuple[int, int]) -> None:
+    """Refuses a size that more than a tenth of the points lie outside of."""
+    outside = ((pixels < 0) | (pixels >= size)).any(axis=1)
+    if outside.mean() > 0.1:
+        u, v = pixels[outside][0]
+        raise InputError(
+            f"{source}: {outside.sum()} of {len(pixels)} points are outside a picture of"
+            f" {size[0]}x{size[1]} pixels, the first at ({u:.0f}, {v:.0f}): is that its size?"
+        )
 
 
 def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
@@ -187,30 +212,34 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
 def _walker(
     source: Path,
     height_m: float,
-    fps: float | None,
+    reading: dict[str, Any],
     options: tuple[str | None, Path | None, float | None, Path | None],
     delivery: Delivery,
 ) -> Exit:
     check_writable(delivery.out)
-    size, picture, fov_deg, lens = options
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder")
     is_keypoints = source.suffix.lower() in _KEYPOINT_SUFFIXES or (
         source.is_dir() and any(source.glob("*.json"))
     )
     shares: dict[str, Any] = {}
     if is_keypoints:
-        keypoints = memo.read_keypoints(source, fps=fps or 25.0)
-        if size is None and picture is None and keypoints.image_size is not None:
-            size = f"{keypoints.image_size[0]}x{keypoints.image_size[1]}"
-        view = _view(size, picture, fov_deg, lens)
+        # The fit asks for no times; a rate is only needed to read what has none.
+        keypoints = memo.read_keypoints(source, **{**reading, "fps": reading["fps"] or 25.0})
+        view = _view(*options, keypoints.image_size)
         points = np.where(keypoints.scores[..., None] > 0, keypoints.points, np.nan)
         feet, heads, shares["foot_share"], shares["head_share"] = memo.walker_sightings(
             keypoints.names, points
         )
         if not len(feet):
             raise InputError(f"{source}: no frame has both ankles and the head (or ears, eyes, nose, neck)")
+        _check_inside(source, np.concatenate([feet, heads]), view["size"])
     else:
-        feet, heads, luma = _video_sightings(source, fps, delivery)
-        view = _view(size or f"{luma.shape[1]}x{luma.shape[0]}", picture, fov_deg, lens)
+        unused = [f"--{name}" for name in ("layout", "person") if reading[name] is not None]
+        if unused:
+            raise InputError(f"{', '.join(unused)}: means nothing for a video")
+        feet, heads, luma = _video_sightings(source, reading["fps"], delivery)
+        view = _view(*options, (luma.shape[1], luma.shape[0]))
         view["luma"] = luma if view["luma"] is None else view["luma"]
     with with_elapsed("fitting", delivery):
         try:
@@ -329,11 +358,12 @@ def _deliver(
 
     camera = found["camera"]
     toml, picture = delivery.out / "camera.toml", delivery.out / "ground.png"
-    camera.to_toml(toml)
     luma = view["luma"]
     if luma is None:
         luma = np.full(view["size"][::-1], 90, np.uint8)
-    write_picture(picture, draw_ground(luma, camera, marks))
+    drawn = draw_ground(luma, camera, marks)
+    camera.to_toml(toml)
+    write_picture(picture, drawn)
     place = standing_place(camera)
     person_px = None if place is None else camera.pixel_height(place[0], PERSON_M)
     estimates = {name: {"value": value, "sd": sd} for name, (value, sd) in found["estimates"].items()}

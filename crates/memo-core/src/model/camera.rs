@@ -65,7 +65,7 @@ pub enum CameraError {
     },
     /// The camera is improbably far from the world's origin.
     #[error(
-        "camera is {distance_m:.0} m from the world's origin, a 1.7 m person there {person_px:.2} px high: the translation looks like millimetres, in which it would be {:.0} px; say so by the unit mm",
+        "camera is {distance_m:.0} m from the world's origin, a 1.7 m person there {person_px:.2} px high: the translation looks like millimetres, in which it would be {:.0} px; say so by the unit mm (--camera-unit mm)",
         person_px * 1000.0
     )]
     LooksLikeMillimetres {

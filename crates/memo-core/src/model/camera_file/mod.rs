@@ -522,7 +522,7 @@ fisheye = false
         starts(
             "[0.1, 1.18, 4.4]",
             "[100, 1180, 4400]",
-            "[cam] translation (line 8): camera is 4557 m from the world's origin, a 1.7 m person there 0.37 px high: the translation looks like millimetres, in which it would be 373 px; say so by the unit mm",
+            "[cam] translation (line 8): camera is 4557 m from the world's origin, a 1.7 m person there 0.37 px high: the translation looks like millimetres, in which it would be 373 px; say so by the unit mm (--camera-unit mm)",
         );
         starts(
             "fisheye = false",
