@@ -25,6 +25,7 @@ from memo.files import (
     write_events_csv,
     write_track_csv,
 )
+from memo.run import read_run
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -253,6 +254,7 @@ def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path):
     code, complaint = interrupted(process, started.exists)
     assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
     assert 1 <= len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 400
+    assert read_run(tmp_path / "out")["interrupted"] is True
 
 
 @pytest.mark.parametrize("absent", ["typer", "av", "matplotlib", "rich"])

@@ -13,6 +13,7 @@ from memo import _memo, cli
 from memo.gait import (
     DEFINITIONS,
     GAIT_COLUMNS,
+    cadence_sentences,
     gait_table,
     lookup,
     read_gait_parameters_csv,
@@ -129,6 +130,16 @@ def test_only_what_excludes_zero_is_said():
     ]
     unknown = [(*line[:2], np.nan, line[3], np.nan, np.nan, 0) for line in LINES]
     assert symmetry_sentences(gait_table([LINES, unknown]), 1) == []
+
+
+def test_steps_hardly_seen_are_said_to_be():
+    def said(low, high, value=100.0):
+        return cadence_sentences(gait_table([[("cadence", "", value, "1/min", low, high, 4)]]), 0)
+
+    assert said(90.0, 110.0) == [] == said(np.nan, np.nan, np.nan)
+    assert said(-2.0, 202.0) == [
+        "Its steps were hardly seen (95 % interval 0 to 202 a minute): use no gait parameter of it."
+    ]
 
 
 def test_the_table_is_read_as_it_was_written(tmp_path):

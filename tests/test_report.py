@@ -273,6 +273,17 @@ def test_a_video_of_another_size_is_not_taken(run_folder, write_video, luma_fram
     assert "32x24 pixels, the run 64x48" in page_of(folder)[0]
 
 
+def test_a_video_named_by_hand_must_be_the_one(run_folder, write_video, luma_frames, monkeypatch, capsys):
+    folder, other = run_folder(), write_video("other.mp4", luma_frames(size=(32, 24)))
+    page_of(folder)
+    older = (folder / "report.html").read_bytes()
+    code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--video", other)
+    assert code == 1 and complaint == f"memo: {other}: it has 32x24 pixels, the run 64x48\n"
+    code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--frames", "500:600")
+    assert code == 1 and complaint.endswith("among those asked for; it read 0 to 19\n")
+    assert (folder / "report.html").read_bytes() == older
+
+
 def test_frames_that_cannot_be_explained(run_folder, monkeypatch):
     def broken(folder, frames=None, **_):
         yield next(fake_explain.explain(folder, frames))
@@ -294,8 +305,29 @@ def test_several_walks_and_backwards(run_folder):
         "Walk 2 goes backwards" in written
         and "Walk 1 goes" not in written
         and "10 to 19" in written
+        and '<tr><th scope="row">1</th><td>heel strike</td>' in written
         and data["track"]["walk"][-1] == 1
     )
+
+
+def test_an_interrupted_run_says_so(run_folder):
+    written, _, _ = page_of(run_folder(interrupted=True, frames_read=12))
+    assert '<span class="status fair">tracked, interrupted</span>' in written
+    assert "The run was interrupted after 12 frames: what came later was not looked at." in written
+    assert "interrupted after" not in page_of(run_folder())[0]
+
+
+def test_what_is_assumed_or_hardly_seen_is_no_measurement(run_folder):
+    folder = run_folder()
+    track = read_track_csv(folder / "track.csv")
+    write_track_csv(folder / "track.csv", track | {"p_swapped": 0 * track["p_swapped"]})
+    table = folder / "gait_parameters.csv"
+    table.write_text(table.read_text() + "0,stance,,61.0,%,,,0\n")
+    written, _, _ = page_of(folder)
+    assert '61.0 <small class="interval">assumed, not measured</small>' in written
+    assert '<span class="status good">tracked</span>' in written
+    table.write_text("walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,40.1,1/min,-2,82.2,2\n")
+    assert '<span class="status fair">tracked</span>' in page_of(folder)[0]
 
 
 def test_unknown_numbers_are_dashes(run_folder):

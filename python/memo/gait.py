@@ -18,6 +18,7 @@ from memo.files import read_typed_columns, write_columns_csv
 __all__ = [
     "DEFINITIONS",
     "GAIT_COLUMNS",
+    "cadence_sentences",
     "gait_table",
     "read_gait_parameters_csv",
     "symmetry_sentences",
@@ -85,6 +86,21 @@ def lookup(
     """One line of the table as a dict of its columns."""
     here = (table["walk"] == walk) & (table["parameter"] == parameter) & (table["side"] == side)
     return {name: table[name][here][0] for name in GAIT_COLUMNS}
+
+
+_STEADY = 0.2
+
+
+def cadence_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:
+    """What is said of a walk whose steps were hardly seen: cadence known to no better than a fifth."""
+    cadence = lookup(table, walk, "cadence")
+    value, low, high = (float(cadence[name]) for name in ("value", "ci_low", "ci_high"))
+    if not high - low > 2 * _STEADY * value:  # also where it is not known at all
+        return []
+    return [
+        f"Its steps were hardly seen (95 % interval {max(low, 0):.0f} to {high:.0f} a minute): use no gait "
+        "parameter of it."
+    ]
 
 
 def symmetry_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:

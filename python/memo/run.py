@@ -1,7 +1,8 @@
 """`run.json`: what `memo track` was given and found, so that its folder can be read, reported and explained.
 
 Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
-stop], stop null for the end), `frames_read`, `rate_hz`, `fps_given`, `camera_given`, `camera` (the camera
+stop], stop null for the end), `frames_read`, `interrupted` (whether frames that were asked for were left
+unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `camera_given`, `camera` (the camera
 given, or the one guessed for the longest walk; the keys of a Pose2Sim TOML; null where nobody was tracked
 without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk what
 `memo.explain` needs; frames there are counted from the first one read).
@@ -49,7 +50,12 @@ class Source:
 
 
 def write_run(
-    folder: str | PathLike[str], track: Any, options: Mapping[str, Any], source: Source, frames_read: int
+    folder: str | PathLike[str],
+    track: Any,
+    options: Mapping[str, Any],
+    source: Source,
+    frames_read: int,
+    interrupted: bool = False,
 ) -> Path:
     """Writes `run.json` of a `Track` into a folder; returns its path."""
     path = Path(folder) / NAME
@@ -62,6 +68,7 @@ def write_run(
             "video": None if source.video is None else str(source.video.absolute()),
             "frames": source.frames,
             "frames_read": frames_read,
+            "interrupted": interrupted,
             "rate_hz": source.rate_hz,
             "fps_given": source.fps_given,
             "camera_given": source.camera_given,
@@ -81,6 +88,7 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "video": (str, type(None)),
     "frames": (list,),
     "frames_read": (int,),
+    "interrupted": (bool,),
     "rate_hz": (int, float),
     "fps_given": (int, float, type(None)),
     "camera_given": (bool,),
@@ -93,7 +101,10 @@ _KINDS: dict[str, tuple[type, ...]] = {
 
 
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
-    """Reads `run.json` of a folder; its keys are all there and of their kind."""
+    """Reads `run.json` of a folder; its keys are all there and of their kind.
+
+    `interrupted` may be missing, as in older folders, and is then `False`.
+    """
     path = Path(folder) / NAME
     try:
         run = json.loads(path.read_text(encoding="utf-8"))
@@ -105,6 +116,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         raise RunError(f"{path}: not JSON: {error}") from None
     if not isinstance(run, dict):
         raise RunError(f"{path}: an object was wanted, got {type(run).__name__}")
+    run.setdefault("interrupted", False)
     for key, kinds in _KINDS.items():
         if key not in run:
             raise RunError(f"{path}: {key} is missing")

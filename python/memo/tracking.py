@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import TRACK_COLUMNS
-from memo.gait import gait_table, lookup, symmetry_sentences
+from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
 from memo.table import data_frame
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ class Track:
             return [self.summary["message"]]
         said = []
         for index, walk in enumerate(self.walks):
-            told = [self._message(walk)]
+            told = [self._message(walk), *cadence_sentences(self.gait_parameters, index)]
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): look before you use them.")

@@ -110,7 +110,7 @@ def _track_video(
     if page:
         written.append(write_page(delivery.out, delivery.out / "report.html", delivery).path)
     report(track, written, delivery)
-    if "camera" not in tracker_options and delivery.talks:
+    if "camera" not in tracker_options and delivery.talks and len(track.columns["frame"]):
         print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
     return exit_code(track)
 
@@ -135,15 +135,15 @@ def follow(
                 if interrupt.requested:
                     break
     except ValueError as error:
-        track = _snapshot(tracker, source, frames_read)
+        track = _snapshot(tracker, source, frames_read, interrupted=True)
         if not len(track.columns["frame"]):
             raise
         _write_tables(track, delivery)
         raise InputError(f"{error}; the tables hold what was tracked until then") from error
-    return _snapshot(tracker, source, frames_read), interrupt.requested
+    return _snapshot(tracker, source, frames_read, interrupt.requested), interrupt.requested
 
 
-def _snapshot(tracker: Any, source: Source, frames_read: int) -> Any:
+def _snapshot(tracker: Any, source: Source, frames_read: int, interrupted: bool) -> Any:
     """The track's tables, read once, with frames numbered as in the video (the tracker counts from 0)."""
     track = tracker.finish()
     first_frame = source.frames[0]
@@ -162,7 +162,7 @@ def _snapshot(tracker: Any, source: Source, frames_read: int) -> Any:
         gait_parameters=dict(track.gait_parameters),
         camera=track.camera,
         records=track.records,
-        run=(tracker.options, source, frames_read),
+        run=(tracker.options, source, frames_read, interrupted),
     )
 
 

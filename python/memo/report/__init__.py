@@ -73,6 +73,8 @@ def write_report(
 
 
 def _kind(folder: Path) -> str:
+    if folder.is_file():
+        raise ValueError(f"{folder}: is a file; give the folder it is in")
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder")
     found = [command for name, command in KINDS.items() if (folder / name).is_file()]

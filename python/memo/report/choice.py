@@ -18,6 +18,11 @@ class Choice:
     why: bool = True
     """Whether frames of a walk are explained."""
 
+    @property
+    def chosen(self) -> bool:
+        """Whether some frames were asked for, not all."""
+        return bool(self.first) or self.stop is not None
+
     def takes(self, frame: int) -> bool:
         """Whether a frame is among those asked for."""
         return frame >= self.first and (self.stop is None or frame < self.stop)
@@ -28,7 +33,7 @@ class Choice:
         if every > 1:
             reason = "as asked" if self.every else "to keep it small"
             sentences.append(f"Every {ordinal(every)} frame is in this page, {reason}.")
-        if self.first or self.stop is not None:
+        if self.chosen:
             stop = "the end" if self.stop is None else str(self.stop - 1)
             sentences.append(f"Of the frames, {self.first} to {stop} were asked for.")
         return sentences

@@ -63,7 +63,7 @@ def track_page(
     """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
     run = read_run_folder(folder, video)
     notes: list[str] = []
-    pictures, drawn, size, every = _pictures(run, choice, watch, notes)
+    pictures, drawn, size, every = _pictures(run, choice, watch, notes, must_be_there=video is not None)
     explained, why_every = _explained(run, pictures, choice, watch, notes)
     counts = {
         "pictures": len(pictures),
@@ -99,16 +99,25 @@ def track_page(
     return page, counts | {"notes": notes}
 
 
+class _NoFrames(ValueError):
+    """None of the frames asked for is there."""
+
+
 def _pictures(
-    run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str]
+    run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str], must_be_there: bool
 ) -> tuple[list[Picture], bool, Sequence[int] | None, int]:
     """The frames as JPEG, whether the model is drawn on them already, the size in pixels that positions
-    refer to, and every how many-th frame they are."""
+    refer to, and every how many-th frame they are. A video that must be there is one the user named."""
     if run.video is not None:
         try:
             kept, every, size = _video_pictures(run, run.video, choice, watch, notes)
             return kept, False, size, every
+        except _NoFrames:
+            raise
         except (ValueError, OSError) as error:
+            if must_be_there:
+                about = "" if str(run.video) in str(error) else f"{run.video}: "
+                raise ValueError(f"{about}{_one_line(error)}") from None
             notes.append(f"The video cannot be read any more ({_one_line(error)}).")
     if run.overlay is not None:
         try:
@@ -137,9 +146,17 @@ def _video_pictures(
                 picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, LONGEST_PX), *moved)
                 thinned.keep(picture, picture.size_bytes)
             before = frame.luma.copy() if nobody else None
+        if not thinned.items and choice.chosen:
+            raise _NoFrames(f"{video}: no frame of the run is among those asked for; {_read(run)}")
         if reader.damage:
             notes.append(f"The video: {reader.damage}.")
     return thinned.items, thinned.every, reader.size
+
+
+def _read(run: RunFolder) -> str:
+    """Which frames the run read."""
+    count = run.run.get("frames_read")
+    return f"it read {run.first_frame} to {run.first_frame + count - 1}" if count else "it read none"
 
 
 def _overlay_pictures(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import memo
-from memo.gait import DEFINITIONS, GAIT_COLUMNS
+from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences
 from memo.report import normative
 from memo.report.page import UNKNOWN, number, rows_table, text
 from memo.report.pictures import Picture
@@ -44,9 +44,22 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
 def _status(run: RunFolder) -> tuple[str, str]:
     """What became of the run in two words, and how it is coloured."""
     status = (run.run.get("summary") or {}).get("status")
+    told = str(status or ("tracked" if run.frames else "nobody tracked"))
+    if run.run.get("interrupted"):
+        told = f"{told}, interrupted"
     if not run.frames:
-        return str(status or "nobody tracked"), "bad"
-    return str(status or "tracked"), "good" if status in (None, "tracked") else "fair"
+        return told, "bad"
+    doubtful = any(p_swapped > _LIKELY_SWAPPED for _, p_swapped in _swapped(run)) or _unsteady(run)
+    return told, "fair" if doubtful or told != "tracked" else "good"
+
+
+def _unsteady(run: RunFolder) -> bool:
+    """Whether the steps of a walk were hardly seen."""
+    table = run.parameters
+    if not table:
+        return False
+    cadences = (table["parameter"] == "cadence") & (table["side"] == "")
+    return any(cadence_sentences(table, walk) for walk in dict.fromkeys(table["walk"][cadences].tolist()))
 
 
 def _sentences(run: RunFolder) -> list[str]:
@@ -65,6 +78,9 @@ def _sentences(run: RunFolder) -> list[str]:
 
 def _warnings(run: RunFolder, notes: list[str]) -> str:
     told = []
+    if run.run.get("interrupted"):
+        count = _counted(run.run["frames_read"], "frame")
+        told.append(f"The run was interrupted after {count}: what came later was not looked at.")
     for walk, p_swapped in _swapped(run):
         if not run.run and p_swapped > _LIKELY_SWAPPED:  # else the sentences say so
             told.append(f"Left and right of walk {walk + 1} may be swapped (probability {p_swapped:.0%}).")
@@ -78,7 +94,9 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
     if run.missing:
         told.append(f"Not in the folder: {', '.join(run.missing)}. It may be from an older memo.")
     if run.overlay is None and run.frames:
-        told.append("There is no overlay.mp4: it was not wanted, or the run was interrupted.")
+        told.append(
+            "There is no overlay.mp4: it was not wanted, was removed, or its drawing was interrupted."
+        )
     return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
 
 
@@ -164,10 +182,12 @@ def _parameters(run: RunFolder) -> str:
 def _measured(line: dict[str, Any]) -> str:
     """A value with its interval and how many steps it rests on, as HTML."""
     digits = 1 if line["unit"] in ("%", "1/min") else 3
+    value = number(line["value"], digits)
+    if line["n"] == 0:
+        return f'{value} <small class="interval">assumed, not measured</small>'
     interval = "no interval"
     if np.isfinite(line["ci_low"]) and np.isfinite(line["ci_high"]):
         interval = f"{number(line['ci_low'], digits)} to {number(line['ci_high'], digits)}"
-    value = number(line["value"], digits)
     return f'{value} <small class="interval">{interval} (n = {line["n"]})</small>'
 
 
@@ -179,8 +199,10 @@ def _listed(values: dict[str, Any]) -> str:
 def _events(run: RunFolder) -> str:
     if not run.events:
         return ""
+    several = len(_swapped(run)) > 1
     rows = [
         (
+            *((_walk_at(run, event["frame"]),) if several else ()),
             text(str(event["event"]).replace("_", " ")),
             text(event["side"]),
             number(event["time_s"], 3),
@@ -188,7 +210,13 @@ def _events(run: RunFolder) -> str:
         )
         for event in run.events
     ]
-    return rows_table("Heel strikes and toe-offs", ("event", "side", "time, s", "frame"), rows)
+    header = (*(("walk",) if several else ()), "event", "side", "time, s", "frame")
+    return rows_table("Heel strikes and toe-offs", header, rows)
+
+
+def _walk_at(run: RunFolder, frame: float) -> str:
+    """Number of the walk, from 1, a moment belongs to: that of the tracked frame next to it."""
+    return str(int(run.columns["walk"][np.argmin(np.abs(run.columns["frame"] - frame))]) + 1)
 
 
 def _how(run: RunFolder) -> str:

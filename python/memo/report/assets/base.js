@@ -164,7 +164,7 @@ class Player {
 
 // Charts: curves over one axis, with spreads, a band, marks and where we are.
 
-const MARGIN = { left: 44, right: 10, top: 8, bottom: 30 };
+const MARGIN = { left: 44, right: 10, top: 8, bottom: 32 };
 
 function niceStep(span, count) {
   const rough = span / count;
@@ -254,10 +254,10 @@ function chart(host, spec) {
     const [xTicks, xDigits] = ticks(xLow, xHigh, width < 400 ? 4 : 6);
     for (const tick of xTicks) {
       svg.append(shape("line", { class: "axis", x1: x(tick), x2: x(tick), y1: height - MARGIN.bottom, y2: height - MARGIN.bottom + 4 }));
-      if (x(tick) < width - MARGIN.right - 60 || xTicks.length < 3) svg.append(shape("text", { x: x(tick), y: height - MARGIN.bottom + 15, "text-anchor": "middle" }, told(tick, xDigits)));
+      svg.append(shape("text", { x: x(tick), y: height - MARGIN.bottom + 15, "text-anchor": "middle" }, told(tick, xDigits)));
     }
     svg.append(shape("line", { class: "axis", x1: MARGIN.left, x2: width - MARGIN.right, y1: height - MARGIN.bottom, y2: height - MARGIN.bottom }));
-    svg.append(shape("text", { x: width - MARGIN.right, y: height - MARGIN.bottom + 15, "text-anchor": "end" }, spec.xLabel));
+    svg.append(shape("text", { x: width - MARGIN.right, y: height - MARGIN.bottom + 28, "text-anchor": "end" }, spec.xLabel));
     const spread = ({ xs, ys, sds, gaps }, look) => {
       for (const indices of stretches(xs, ys, gaps)) {
         const known = indices.filter((index) => isNumber(sds[index]));
