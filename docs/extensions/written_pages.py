@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 from typing import Any
 
@@ -100,4 +101,4 @@ def _plain(text: str | None) -> str:
     joined = " ".join((text or "").split())
     for mark in "\\[]*<>_":
         joined = joined.replace(mark, f"\\{mark}")
-    return joined
+    return re.sub(r"--[a-z][a-z-]*", r"`\g<0>`", joined)  # typography would make a dash of the hyphens
