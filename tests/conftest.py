@@ -1,6 +1,7 @@
 """Fixtures: the stand-in core, small videos written for one test, and where the development footage lies."""
 
 import os
+import signal
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,6 +15,9 @@ import pytest
 SHARED_DATA = Path(
     os.environ.get("MEMO_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"
 )
+
+# Started in the background by a script, Python is told to ignore Ctrl-C, and so would be what tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def shared_video(name):

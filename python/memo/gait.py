@@ -1,7 +1,8 @@
 """Gait parameters of walks: the table, what its lines mean, and what they say in plain words.
 
 The numbers come from the core (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
-the height that was given: lengths scale with it.
+the height that was given: lengths scale with it. They are wide rather than narrow: of 120 drawn walks, of
+people unlike the model, they held the truth in every one (`tests/gait_parameters.rs` of the core).
 """
 
 from __future__ import annotations
