@@ -152,7 +152,10 @@ def _convert_picture(
         from memo.files import read_track
         from memo.formats.motchallenge import write_motchallenge
 
-        columns = read_track(source)
+        try:
+            columns = read_track(source)
+        except UnicodeDecodeError:
+            raise InputError(f"{source}: not a track of `memo track` (no text in UTF-8)") from None
         write_motchallenge(target, columns, up="z" if up is None else up.value)
         summary: dict[str, Any] = {"rows": len(columns["frame"]), "notes": []}
         told = f"{summary['rows']} rows of the track"
