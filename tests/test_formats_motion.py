@@ -80,11 +80,21 @@ def test_resampling_bridges_no_gap_and_turns_the_short_way():
 def test_short_gaps_are_filled_on_demand():
     motion = walk()
     filled, count = motion.filled(0.081)
-    assert count == 3 and np.isfinite(filled.points[3:6, 2]).all()
+    assert count == 4 and np.isfinite(filled.points[3:6, 2]).all()  # and one of an angle
     part = (filled.points[4, 2] - filled.points[2, 2]) / (filled.points[6, 2] - filled.points[2, 2])
     assert part == pytest.approx([0.5, 0.5, 0.5])
     assert np.isnan(filled.points[0, 7]).all()  # nothing before it
-    assert motion.filled(0.079)[1] == 0
+    assert motion.filled(0.079)[1] == 1  # the angle's gap is of 0.04 s
+
+
+def test_gaps_of_angles_are_filled_the_short_way_round():
+    values = np.array([np.nan, 170.0, np.nan, np.nan, -160.0, np.nan])
+    motion = Motion((), np.arange(6) / 50, np.empty((6, 0, 3)), angles={"right_knee": values})
+    filled, count = motion.filled(0.061)
+    assert count == 2
+    np.testing.assert_allclose(filled.angles["right_knee"], [np.nan, 170, 180, 190, -160, np.nan])
+    assert np.isnan(values[2])  # the motion itself stays as it was
+    assert motion.filled(0.059)[1] == 0
 
 
 def test_up_axes_are_turned_not_mirrored():

@@ -62,21 +62,24 @@ def read_points_csv(path: str | PathLike[str]) -> PointTable:
     """Reads `x_m,y_m,z_m,u_px,v_px`; every fault names file, line and column."""
     rows: list[list[float]] = []
     lines: list[int] = []
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        try:
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
             table = csv.DictReader(file, skipinitialspace=True)
             header = [name.strip() for name in table.fieldnames or ()]
             absent = [name for name in POINT_COLUMNS if name not in header]
             if absent:
-                raise ValueError(f"{path}: line 1: missing columns {', '.join(absent)}")
+                hint = "" if len(header) > 1 else "; commas are wanted between columns"
+                raise ValueError(f"{path}: line 1: missing columns {', '.join(absent)}{hint}")
             table.fieldnames = header
             for row in table:
                 if not any((value or "") if isinstance(value, str) else value for value in row.values()):
                     continue
                 rows.append([_number(path, table.line_num, name, row[name]) for name in POINT_COLUMNS])
                 lines.append(table.line_num)
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise ValueError(f"{path}: not a table of points: {error}") from None
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a table of points: {error}") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
     numbers = np.array(rows, np.float64).reshape(-1, 5)
     return PointTable(
         np.ascontiguousarray(numbers[:, :3]), np.ascontiguousarray(numbers[:, 3:]), tuple(lines)

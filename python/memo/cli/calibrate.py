@@ -4,6 +4,7 @@
 """
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,6 +43,7 @@ CHECKERBOARD_EPILOG = f"""Examples:
 {EXIT_CODES}"""
 
 _KEYPOINT_SUFFIXES = (".json", ".csv", ".trc", ".parquet")
+_WIDEST_M = 500.0  # no points farther apart than this are measured for one camera
 _MOST_FRAMES = 150  # a background needs no more, and memory holds them all
 
 
@@ -187,13 +189,22 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
 
     check_writable(delivery.out)
     table = read_points_csv(path)
+    if len(table.lines):
+        _check_inside(path, table.pixels, view["size"])
+        spread_m = float(np.ptp(table.places, axis=0).max())
+        if spread_m > _WIDEST_M:
+            raise InputError(
+                f"{path}: x_m, y_m and z_m are spread over {spread_m:g} m: are they millimetres?"
+                " divide them by 1000"
+            )
     with with_elapsed("fitting", delivery):
         try:
             found = memo.calibrate_points(
                 table.places, table.pixels, view["size"], focal_px=view["focal_px"], lens=view["lens"]
             )
         except ValueError as error:
-            raise InputError(f"{path}: {error} (points are counted from 0)") from None
+            counted = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
+            raise InputError(f"{path}: {error}{counted}") from None
     off = np.hypot(*found["residuals_px"].T)
     kept = len(off) - len(found["outliers"])
     lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {kept} points."]

@@ -159,7 +159,10 @@ def _convert_picture(
     if target.suffix.lower() == ".txt":
         from memo.formats.motchallenge import write_motchallenge
 
-        rows = write_motchallenge(target, source, up="z" if up is None else up.value)
+        try:
+            rows = write_motchallenge(target, source, up="z" if up is None else up.value)
+        except UnicodeDecodeError:
+            raise InputError(f"{source}: not a track of `memo track` (no text in UTF-8)") from None
         summary: dict[str, Any] = {"rows": rows, "notes": []}
         told = f"{summary['rows']} rows of the track"
     else:

@@ -166,18 +166,29 @@ class Motion:
         """The motion with gaps up to `longest_s` bridged by straight lines, and the number of values filled.
 
         A gap is as long as the time between the frames at its two ends. What is missing at the beginning or
-        at the end of a point's track stays missing.
+        at the end of a point's or an angle's track stays missing, and frames that are absent stay absent.
         """
         points, filled = self.points.copy(), 0
         for k in range(len(self.names)):
-            known = np.flatnonzero(np.isfinite(points[:, k, 0]))
-            wide = np.diff(known) > 1
-            for a, b in zip(known[:-1][wide], known[1:][wide], strict=True):
-                if self.times_s[b] - self.times_s[a] <= longest_s * (1 + 1e-9):
-                    part = (self.times_s[a + 1 : b] - self.times_s[a]) / (self.times_s[b] - self.times_s[a])
-                    points[a + 1 : b, k] = points[a, k] + part[:, None] * (points[b, k] - points[a, k])
-                    filled += int(b - a - 1)
-        return replace(self, points=points), filled
+            filled += self._bridge(points[:, k], longest_s)
+        angles = {name: values.copy() for name, values in self.angles.items()}
+        for values in angles.values():
+            filled += self._bridge(values[:, None], longest_s, are_angles=True)
+        return replace(self, points=points, angles=angles), filled
+
+    def _bridge(self, track: Array, longest_s: float, *, are_angles: bool = False) -> int:
+        """Fills the gaps of a track (T, D) in place; returns how many frames it filled."""
+        filled = 0
+        known = np.flatnonzero(np.isfinite(track[:, 0]))
+        wide = np.diff(known) > 1
+        for a, b in zip(known[:-1][wide], known[1:][wide], strict=True):
+            if self.times_s[b] - self.times_s[a] <= longest_s * (1 + 1e-9):
+                part = (self.times_s[a + 1 : b] - self.times_s[a]) / (self.times_s[b] - self.times_s[a])
+                change = track[b] - track[a]
+                change = _turn_deg(change) if are_angles else change
+                track[a + 1 : b] = track[a] + part[:, None] * change
+                filled += int(b - a - 1)
+        return filled
 
     def _steps(self) -> tuple[npt.NDArray[np.int64], float]:
         """(T,) numbers of the frames on the grid, from 0, and the rate of the grid."""
