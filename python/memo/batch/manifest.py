@@ -63,7 +63,7 @@ class ManifestError(ValueError):
     """What is wrong with a manifest: every problem in a line of its own, in `problems` too."""
 
     def __init__(self, problems: Iterable[str]) -> None:
-        self.problems = list(problems)
+        self.problems: list[str] = list(problems)
         super().__init__("\n".join(self.problems))
 
 

@@ -54,7 +54,7 @@ class Thinned(Generic[Kept]):
     """
 
     def __init__(self, budget_bytes: int, every: int | None = None) -> None:
-        self.every = every or 1
+        self.every: int = every or 1
         self._fixed = every is not None
         self._budget_bytes = budget_bytes
         self._offered = 0
