@@ -276,9 +276,12 @@ def _cv2() -> Any:
 def find_boards(
     paths: Sequence[Path],
     squares: tuple[int, int],
-    progress: Callable[[Iterable[Path]], Iterable[Path]] = lambda paths: paths,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Boards:
-    """Looks for a board of so many squares, then for one of so many inner corners, in pictures."""
+    """Looks for a board of so many squares, then for one of so many inner corners, in pictures.
+
+    `progress` is called with the pictures looked at and in all, anew for the inner corners.
+    """
     without: dict[Path, str] = {}
     pictures: dict[Path, Luma] = {}
     for path in paths:
@@ -298,10 +301,12 @@ def find_boards(
         if min(corners) < 2:
             continue
         found = {}
-        for path in progress(list(pictures)):
-            board = _corners(pictures[path], corners)
+        for done, (path, picture) in enumerate(pictures.items(), 1):
+            board = _corners(picture, corners)
             if board is not None:
                 found[path] = board
+            if progress is not None:
+                progress(done, len(pictures))
         if found:
             break
     without |= {path: "no board was found" for path in pictures if path not in found}

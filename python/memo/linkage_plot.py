@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from os import PathLike
 from typing import Any
 
@@ -81,12 +81,12 @@ def write_turned_video(
     figure: PlanarFigure,
     *,
     turn_deg: float = 50.0,
-    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+    progress: Callable[[int, int], object] | None = None,
 ) -> None:
     """The display left, and right the limbs found in it seen from `turn_deg` to the side.
 
     Each chain's first point is drawn at depth 0: depths of chains against each other are not known, and
-    each open chain may be reflected.
+    each open chain may be reflected. `progress` is called with the frames drawn and in all.
     """
     flat, turned = _turned(points, figure, turn_deg)
     links_at = _links_by_frame(figure, len(flat))
@@ -105,7 +105,7 @@ def write_turned_video(
     left.set_title("as seen", color="white")
     (dots,) = left.plot([], [], "o", color="white", markersize=5)
     with complete_file(path) as temporary, _h264(str(temporary), _rate(points.times_s)) as write:
-        for frame in progress(range(len(flat))):
+        for frame in range(len(flat)):
             dots.set_data(flat[frame, :, 0], flat[frame, :, 1])
             for line in list(right.lines):
                 line.remove()
@@ -115,6 +115,8 @@ def write_turned_video(
             right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
             canvas.draw()
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
+            if progress is not None:
+                progress(frame + 1, len(flat))
 
 
 def _centre(tracks: Any) -> Any:

@@ -2,7 +2,7 @@
 
 use crate::array::{numpy_from_rows, pixels_from_numpy, points_from_numpy};
 use crate::error::value_error;
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
 use memo_core::model::{
     Camera, CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints,
@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 #[derive(Clone, PartialEq)]
 pub struct PyCamera(pub Camera);
 
-/// All that a camera is, for pickling: size, (fx, fy), (cx, cy), lens with its coefficients, the rotation
+/// All that a camera is, to the last bit, for pickling: size, (fx, fy), (cx, cy), lens with its coefficients, the rotation
 /// column by column, translation.
 type Parameters = ((u32, u32), (f64, f64), (f64, f64), (String, Vec<f64>), Vec<f64>, (f64, f64, f64));
 
@@ -164,28 +164,22 @@ impl PyCamera {
             centre_px: DVec2::new(matrix[0][2], matrix[1][2]),
             distortion: kappa
                 .map_or_else(|| Distortion::from_opencv(coefficients), |kappa| Distortion::Tsai { kappa }),
-            rotation: DMat3::from_quat(DQuat::from_scaled_axis(turn)),
+            rotation: Camera::rotation_of_vector(turn),
             translation: DVec3::from_array(parameter(parameters, "translation")?),
         };
         camera.validated().map(Self).map_err(value_error)
     }
 
     /// As a section of a Pose2Sim TOML file holds them: `size`, `matrix`, `distortions` (k1, k2, p1, p2, k3),
-    /// `rotation` (axis times angle), `translation` (metres). Of Tsai's lens the distortions are the series, and
-    /// `tsai_kappa` is the number itself.
+    /// `rotation` (axis times angle), `translation` (metres). Of Tsai's lens the distortions are those nearest over
+    /// the picture, zeros where none are, and `tsai_kappa` is the number itself.
     pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let Camera { size, focal_px: f, centre_px: c, distortion, rotation, translation } = &self.0;
-        let coefficients = match *distortion {
-            Distortion::None => [0.0; 5],
-            Distortion::Brown { k1, k2, p1, p2, k3 } => [k1, k2, p1, p2, k3],
-            // x = x_d (1 + kappa r_d²) solved for x_d.
-            Distortion::Tsai { kappa } => [-kappa, 3.0 * kappa.powi(2), 0.0, 0.0, -12.0 * kappa.powi(3)],
-        };
+        let Camera { size, focal_px: f, centre_px: c, distortion, translation, .. } = &self.0;
         let dict = PyDict::new(py);
         dict.set_item("size", size)?;
         dict.set_item("matrix", [[f.x, 0.0, c.x], [0.0, f.y, c.y], [0.0, 0.0, 1.0]])?;
-        dict.set_item("distortions", coefficients)?;
-        dict.set_item("rotation", DQuat::from_mat3(rotation).to_scaled_axis().to_array())?;
+        dict.set_item("distortions", self.0.nearest_opencv_lens().coefficients)?;
+        dict.set_item("rotation", self.0.rotation_vector().to_array())?;
         dict.set_item("translation", translation.to_array())?;
         if let Distortion::Tsai { kappa } = *distortion {
             dict.set_item("tsai_kappa", kappa)?;

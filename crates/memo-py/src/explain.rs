@@ -6,10 +6,10 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::tracker::{DRAWN, PyTracker, SegmentsWithParts, segments_with_parts};
+use crate::tracker::{PyTracker, SegmentsWithParts, segments_with_parts};
 use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
-use memo_core::model::{Camera, Walker};
+use memo_core::model::{Camera, VisibilityOptions, Walker};
 use memo_core::track::evidence::{Evidence, EvidenceStream};
 use memo_core::track::explain::{Explanation, explain};
 use memo_core::track::person::Deviation;
@@ -102,7 +102,7 @@ pub fn recorded_contours<'py>(
             return segments_with_parts(py, &[], scene.camera);
         }
         let at = scene.hypothesis_at(centre, phase.rem_euclid(1.0));
-        segments_with_parts(py, &scene.visible(&at, &DRAWN), scene.camera)
+        segments_with_parts(py, &scene.visible(&at, &VisibilityOptions::DRAWN), scene.camera)
     };
     torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
 }

@@ -179,9 +179,6 @@ impl PyWalk {
 /// Segments (n, 2, 2) and the body part of each (n,).
 pub type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
 
-/// Contours as they are drawn: side lines and end ellipses.
-pub const DRAWN: VisibilityOptions = VisibilityOptions { rims: true, rim_chords: 24 };
-
 /// Visible pieces in image pixels; those the camera does not see are left out.
 pub fn segments_with_parts<'py>(
     py: Python<'py>,
@@ -286,7 +283,11 @@ impl PyWalk {
             let message = format!("row {row} of a walk with {} rows", self.rows.len());
             return Err(PyIndexError::new_err(message));
         };
-        segments_with_parts(py, &self.walk.scene().visible(&row.hypothesis, &DRAWN), &self.walk.camera)
+        segments_with_parts(
+            py,
+            &self.walk.scene().visible(&row.hypothesis, &VisibilityOptions::DRAWN),
+            &self.walk.camera,
+        )
     }
 
     /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules

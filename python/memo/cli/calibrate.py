@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count, with_elapsed, with_progress
 from memo.cli.given import (
     check_apart,
     check_writable,
@@ -306,10 +306,8 @@ def _checkerboard(
     if not paths:
         raise InputError(f"{folder}: holds no pictures ({', '.join(suffixes)})")
 
-    def progress(paths: Any) -> Any:
-        return with_progress(paths, "looking for boards", len(paths), delivery)
-
-    boards = find_boards(paths, squares, progress)
+    with with_count("looking for boards", delivery) as progress:
+        boards = find_boards(paths, squares, progress)
     lens = lens_from_boards(boards, square_mm / 1000)
     columns, rows = boards.corners
     lines = [

@@ -122,6 +122,25 @@ def with_count(what: str, delivery: Delivery) -> Iterator[Callable[[int, int | N
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
+@contextlib.contextmanager
+def with_steps(delivery: Delivery) -> Iterator[Callable[..., None]]:
+    """Gives a callback for the `progress` of a call of several steps: the name of the step and, where known,
+    how much of it is done and of how much; on a terminal, these and the time since the start."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = terminal(delivery)
+    columns = (BarColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=console is None) as progress:
+        task = progress.add_task("", total=None)
+
+        def show(step: str, done: int = 0, total: int | None = None) -> None:
+            # Through the task: `update` keeps a total once known.
+            progress.tasks[0].total = total
+            progress.update(task, description=step, completed=done)
+
+        yield show
+
+
 def terminal(delivery: Delivery) -> Console | None:
     """The terminal progress is shown on, if there is one and it is wanted."""
     from rich.console import Console

@@ -4,12 +4,11 @@
 """
 
 import math
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
 from memo.cli.given import check_writable
 
 if TYPE_CHECKING:
@@ -93,11 +92,8 @@ def _planar(
         write_turned_png(out / "turned.png", points, figure, turn_deg=turn_deg)
         written.append(out / "turned.png")
     if figure.interpreted and delivery.overlay:
-
-        def drawn(frames: Iterable[int]) -> Iterable[int]:
-            return with_progress(cast(Any, frames), "drawing", len(points.times_s), delivery)  # type: ignore[return-value]
-
-        write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=drawn)
+        with with_count("drawing", delivery) as progress:
+            write_turned_video(out / "turned.mp4", points, figure, turn_deg=turn_deg, progress=progress)
         written.append(out / "turned.mp4")
     verdicts = figure.verdicts()
     links = [

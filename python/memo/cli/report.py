@@ -4,11 +4,10 @@
 """
 
 import webbrowser
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_progress
+from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_steps
 from memo.cli.given import frame_range
 
 if TYPE_CHECKING:
@@ -65,10 +64,8 @@ def write_page(folder: Path, path: Path, delivery: Delivery, **options: Any) -> 
     """Writes the page of a folder, with progress."""
     from memo.report import write_report
 
-    def watch(items: Iterable[Any], what: str, count: int | None) -> Iterable[Any]:
-        return with_progress(items, what, count, delivery)
-
-    return write_report(folder, path, watch=watch, **options)
+    with with_steps(delivery) as progress:
+        return write_report(folder, path, progress=progress, **options)
 
 
 def _lines(report: "Report") -> list[str]:

@@ -3,13 +3,11 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
-import contextlib
-from collections.abc import Callable, Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded
+from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, with_steps
 from memo.cli.given import check_apart, check_writable, checked_height, load_camera
 
 if TYPE_CHECKING:
@@ -113,7 +111,7 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
     made: list[Reproduction] = []
     written: list[Path] = []
     try:
-        with _steps(delivery) as progress:
+        with with_steps(delivery) as progress:
             for name in names:
                 options: dict[str, Any] = {"clip": clip} if name == "rohr" else {}
                 made.append(EXPERIMENTS[name](progress=progress, **options))
@@ -133,22 +131,6 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
         figures = sum(path.suffix == ".png" for path in written)
         print(f"Written to {delivery.out}: reproduction.md and .csv, {figures} figures and the tables.")
     return Exit.DONE
-
-
-@contextlib.contextmanager
-def _steps(delivery: Delivery) -> Iterator[Callable[[str], object]]:
-    """What is being done and for how long already, on a terminal; gives the function that says it."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if delivery.quiet or not console.is_terminal:
-        yield lambda _: None
-        return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("reproducing", total=None)
-        yield lambda what: progress.update(task, description=what)
 
 
 def _print(reproduction: "Reproduction") -> None:

@@ -6,7 +6,7 @@ model was matched to, frame by frame. It needs the `app` extra.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -47,14 +47,15 @@ def write_report(
     every: int | None = None,
     why: bool = True,
     video: str | PathLike[str] | None = None,
-    watch: Callable[[Iterable[Any], str, int | None], Iterable[Any]] = lambda items, what, count: items,
+    progress: Callable[[str, int, int | None], object] | None = None,
 ) -> Report:
     """Writes `out`, by default `report.html` in the folder, from what a command left there (`KINDS`).
 
     `frames` are those from the first up to, not including, the second; `every` n-th of them is shown, by
     default as many as keep the file under about 25 MB. `why=False` leaves out what explains the frames of a
     walk, for which the video is read again. `video` is where that is now, if it was moved.
-    `watch(items, what, count)` gives the items back and may show progress.
+    `progress` is called with the step under way, the frames of it that are done and all of them, None if
+    unknown.
 
     Raises ValueError where the folder holds nothing of this kind or a table in it cannot be used.
     """
@@ -62,7 +63,7 @@ def write_report(
     kind = _kind(folder)
     choice = Choice(*frames, every, why)
     if kind == "memo track":
-        page, contents = track_page(folder, choice, watch, None if video is None else Path(video))
+        page, contents = track_page(folder, choice, progress, None if video is None else Path(video))
     else:
         page, contents = (posture_page if kind == "memo posture" else planar_page)(folder, choice)
     path = folder / "report.html" if out is None else Path(out)

@@ -6,7 +6,7 @@ Bookkeeping alone: what is drawn was computed by the core, in the run or when a 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -54,17 +54,17 @@ _SHOWN = {
 }
 
 Item = TypeVar("Item")
-Watch = Callable[[Iterable[Item], str, "int | None"], Iterable[Item]]
+Progress = Callable[[str, int, "int | None"], object]
 
 
 def track_page(
-    folder: Path, choice: Choice, watch: Watch[Any], video: Path | None = None
+    folder: Path, choice: Choice, progress: Progress | None, video: Path | None = None
 ) -> tuple[Page, dict[str, Any]]:
     """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
     run = read_run_folder(folder, video)
     notes: list[str] = []
-    pictures, drawn, size, every = _pictures(run, choice, watch, notes, must_be_there=video is not None)
-    explained, why_every = _explained(run, pictures, choice, watch, notes)
+    pictures, drawn, size, every = _pictures(run, choice, progress, notes, must_be_there=video is not None)
+    explained, why_every = _explained(run, pictures, choice, progress, notes)
     counts = {
         "pictures": len(pictures),
         "every": every if pictures else None,
@@ -103,14 +103,24 @@ class _NoFrames(ValueError):
     """None of the frames asked for is there."""
 
 
+def _counted(
+    progress: Progress | None, step: str, items: Iterable[Item], total: int | None
+) -> Iterator[Item]:
+    """The items; each is told when it is done with."""
+    for done, item in enumerate(items, 1):
+        yield item
+        if progress is not None:
+            progress(step, done, total)
+
+
 def _pictures(
-    run: RunFolder, choice: Choice, watch: Watch[Any], notes: list[str], must_be_there: bool
+    run: RunFolder, choice: Choice, progress: Progress | None, notes: list[str], must_be_there: bool
 ) -> tuple[list[Picture], bool, Sequence[int] | None, int]:
     """The frames as JPEG, whether the model is drawn on them already, the size in pixels that positions
     refer to, and every how many-th frame they are. A video that must be there is one the user named."""
     if run.video is not None:
         try:
-            kept, every, size = _video_pictures(run, run.video, choice, watch, notes)
+            kept, every, size = _video_pictures(run, run.video, choice, progress, notes)
             return kept, False, size, every
         except _NoFrames:
             raise
@@ -121,7 +131,7 @@ def _pictures(
             notes.append(f"The video cannot be read any more ({_one_line(error)}).")
     if run.overlay is not None:
         try:
-            kept, every = _overlay_pictures(run, run.overlay, choice, watch)
+            kept, every = _overlay_pictures(run, run.overlay, choice, progress)
             return kept, True, None, every
         except (ValueError, OSError) as error:
             notes.append(f"The overlay cannot be read ({_one_line(error)}).")
@@ -130,7 +140,7 @@ def _pictures(
 
 
 def _video_pictures(
-    run: RunFolder, video: Path, choice: Choice, watch: Watch[Any], notes: list[str]
+    run: RunFolder, video: Path, choice: Choice, progress: Progress | None, notes: list[str]
 ) -> tuple[list[Picture], int, tuple[int, int]]:
     stop = run.first_frame + run.run["frames_read"] if run.run else None
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
@@ -140,7 +150,7 @@ def _video_pictures(
         if size is not None and tuple(size) != reader.size:
             raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")
         before = None
-        for frame in watch(reader, "reading the video", reader.frame_count):
+        for frame in _counted(progress, "reading the video", reader, reader.frame_count):
             if choice.takes(frame.index) and thinned.wants_next():
                 moved = _moved(before, frame.luma) if nobody else (None, ())
                 picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, LONGEST_PX), *moved)
@@ -160,11 +170,11 @@ def _read(run: RunFolder) -> str:
 
 
 def _overlay_pictures(
-    run: RunFolder, overlay: Path, choice: Choice, watch: Watch[Any]
+    run: RunFolder, overlay: Path, choice: Choice, progress: Progress | None
 ) -> tuple[list[Picture], int]:
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
     times = dict(zip(run.frames, run.columns["time_s"], strict=True))
-    for index, time_s, rgb in watch(colour_frames(overlay), "reading the overlay", None):
+    for index, time_s, rgb in _counted(progress, "reading the overlay", colour_frames(overlay), None):
         frame = index + run.first_frame
         if choice.takes(frame) and thinned.wants_next():
             picture = Picture(frame, float(times.get(frame, time_s)), jpeg_uri(rgb, LONGEST_PX))
@@ -182,7 +192,7 @@ def _moved(before: Any, now: Any) -> tuple[str | None, tuple[tuple[int, ...], ..
 
 
 def _explained(
-    run: RunFolder, pictures: list[Picture], choice: Choice, watch: Watch[Any], notes: list[str]
+    run: RunFolder, pictures: list[Picture], choice: Choice, progress: Progress | None, notes: list[str]
 ) -> tuple[list[dict[str, Any]], int]:
     """Frames with what was seen in them, and every how many-th of the tracked ones in the page they are."""
     shown = {picture.frame for picture in pictures}
@@ -193,7 +203,9 @@ def _explained(
     chosen = frames[::every]
     thinned: Thinned[dict[str, Any]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
     try:
-        for why in watch(explain(run.path, chosen, video=run.video), "explaining frames", len(chosen)):
+        for why in _counted(
+            progress, "explaining frames", explain(run.path, chosen, video=run.video), len(chosen)
+        ):
             if thinned.wants_next():
                 item = evidence(why)
                 thinned.keep(item, len(json.dumps(item)))

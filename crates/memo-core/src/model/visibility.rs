@@ -79,9 +79,14 @@ pub struct VisibilityOptions {
     pub rim_chords: usize,
 }
 
+impl VisibilityOptions {
+    /// Contours as they are drawn: side lines and end ellipses.
+    pub const DRAWN: Self = Self { rims: true, rim_chords: 24 };
+}
+
 impl Default for VisibilityOptions {
     fn default() -> Self {
-        Self { rims: false, rim_chords: 24 }
+        Self { rims: false, rim_chords: Self::DRAWN.rim_chords }
     }
 }
 

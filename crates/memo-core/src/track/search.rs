@@ -173,10 +173,15 @@ impl Grid {
 
     /// The paper's starting grid: the whole cycle.
     pub fn whole_cycle(along_m: f64, height_m: f64) -> Self {
-        let around = Hypothesis { along_m, height_m, phase: 0.0 };
+        Self::whole_cycle_within(along_m, height_m, [0.2, 0.1])
+    }
+
+    /// The whole cycle at places within these half widths along the path and in height, metres; 0 is one place.
+    pub fn whole_cycle_within(along_m: f64, height_m: f64, half_widths_m: [f64; 2]) -> Self {
         Self {
+            along: Axis::around(along_m, half_widths_m[0], POSITION_STEP_M),
+            height: Axis::around(height_m, half_widths_m[1], POSITION_STEP_M),
             phase: Axis { centre: 0.5 - 0.5 * PHASE_STEP, step: PHASE_STEP, count: 50 },
-            ..Self::printed(&around)
         }
     }
 

@@ -6,18 +6,16 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::tracker::{DRAWN, PyWalk, SegmentsWithParts, segments_with_parts};
+use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeOptions, outlines, pair_changes};
 use memo_core::model::body::Part;
-use memo_core::model::{
-    Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours,
-};
+use memo_core::model::{Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours};
 use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
 use memo_core::track::experiment;
 use memo_core::track::score::EdgeLine;
 use memo_core::track::search::Hypothesis;
-use memo_core::track::search::{Axis, Grid, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
+use memo_core::track::search::{Axis, Grid, search};
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -103,11 +101,16 @@ pub fn model_contours<'py>(
     if hidden {
         for (part, cylinder) in cylinders.iter().enumerate() {
             let mut alone = Vec::new();
-            visible_contours(std::slice::from_ref(cylinder), camera.position(), &DRAWN, &mut alone);
+            visible_contours(
+                std::slice::from_ref(cylinder),
+                camera.position(),
+                &VisibilityOptions::DRAWN,
+                &mut alone,
+            );
             visible.extend(alone.into_iter().map(|piece| VisibleSegment { part, ..piece }));
         }
     } else {
-        visible_contours(&cylinders, camera.position(), &DRAWN, &mut visible);
+        visible_contours(&cylinders, camera.position(), &VisibilityOptions::DRAWN, &mut visible);
     }
     let (mut segments, mut parts, mut owners) = (Vec::new(), Vec::new(), Vec::new());
     for piece in &visible {
@@ -253,20 +256,10 @@ pub fn walk_similarity<'py>(
             _ => Err(PyValueError::new_err(format!("an edge has four numbers, got {}", row.len()))),
         })
         .collect::<PyResult<_>>()?;
-    let grid = Grid {
-        along: Axis::around(at.along_m, along_m, POSITION_STEP_M),
-        height: Axis::around(at.height_m, height_m, POSITION_STEP_M),
-        phase: Axis {
-            centre: 0.5 - 0.5 * PHASE_STEP,
-            step: PHASE_STEP,
-            count: (1.0 / PHASE_STEP).round() as usize,
-        },
-    };
+    let grid = Grid::whole_cycle_within(at.along_m, at.height_m, [along_m, height_m]);
     let found = py.detach(|| {
-        let path: Path = tracked.walk.path;
-        let scene = Scene { walker: &tracked.walk.walker, camera, path: &path };
         let options = &tracked.options;
-        search(&edges, &scene, &grid, &options.similarity, options.hidden_lines)
+        search(&edges, &tracked.scene(), &grid, &options.similarity, options.hidden_lines)
     });
     let values = |axis: &Axis, from: f64| (0..axis.count).map(|i| axis.at(i) - from).collect::<Vec<f64>>();
     let shape = vec![grid.phase.count, grid.along.count, grid.height.count];

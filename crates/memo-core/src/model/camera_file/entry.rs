@@ -231,7 +231,7 @@ impl Section<'_> {
     fn rotation(&self) -> Result<DMat3, CameraFileError> {
         let (key, node) = self.value(ROTATION)?;
         if let Some(vector) = three(node) {
-            return Ok(DMat3::from_quat(DQuat::from_scaled_axis(vector)));
+            return Ok(Camera::rotation_of_vector(vector));
         }
         let expected = "a rotation vector of 3 or a matrix of 3x3 finite numbers";
         let nine = nine(node).ok_or_else(|| self.unexpected(key, expected, node))?;

@@ -36,6 +36,8 @@ mod write;
 mod xml;
 mod yaml;
 
+pub use write::NearestLens;
+
 use std::fmt;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! A camera as TOML, one section, that Pose2Sim and anipose read.
 
-use glam::DQuat;
+use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::CameraFileError;
@@ -10,6 +10,15 @@ use crate::model::distortion::Distortion;
 /// Largest difference between a lens and the k1, k2, k3 it is written as, pixels.
 const MAX_LENS_ERROR_PX: f64 = 0.1;
 const LENS_SAMPLES: usize = 200;
+
+/// A lens in OpenCV's coefficients.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestLens {
+    /// k1, k2, p1, p2, k3; zeros where none come near.
+    pub coefficients: [f64; 5],
+    /// By how much they miss the lens somewhere in the picture, pixels.
+    pub error_px: f64,
+}
 
 impl Camera {
     /// The camera as a section `[name]` of TOML.
@@ -21,8 +30,7 @@ impl Camera {
     /// A lens that these would miss by more than 0.1 px.
     pub fn to_toml_string(&self, name: &str) -> Result<String, CameraFileError> {
         let [k1, k2, p1, p2, k3] = self.opencv_distortion()?;
-        let (f, c, t) = (self.focal_px, self.centre_px, self.translation);
-        let r = DQuat::from_mat3(&self.rotation).to_scaled_axis();
+        let (f, c, r, t) = (self.focal_px, self.centre_px, self.rotation_vector(), self.translation);
         let title = quoted(name);
         let k3 = if k3 == 0.0 { String::new() } else { format!(", {k3:?}") };
         Ok(format!(
@@ -34,21 +42,39 @@ impl Camera {
         ))
     }
 
+    /// Axis times angle, radians, of the rotation: what OpenCV calls its vector.
+    pub fn rotation_vector(&self) -> DVec3 {
+        DQuat::from_mat3(&self.rotation).to_scaled_axis()
+    }
+
+    /// The rotation matrix of a vector as [`Camera::rotation_vector`] gives it.
+    pub fn rotation_of_vector(vector: DVec3) -> DMat3 {
+        DMat3::from_quat(DQuat::from_scaled_axis(vector))
+    }
+
     /// OpenCV's k1, k2, p1, p2, k3 of the lens.
     ///
     /// # Errors
     ///
     /// A Tsai lens that these would miss by more than 0.1 px somewhere in the picture.
     pub fn opencv_distortion(&self) -> Result<[f64; 5], CameraFileError> {
+        let NearestLens { coefficients, error_px } = self.nearest_opencv_lens();
+        if error_px <= MAX_LENS_ERROR_PX { Ok(coefficients) } else { Err(CameraFileError::Lens { error_px }) }
+    }
+
+    /// The lens in OpenCV's coefficients, or those nearest to it over the picture.
+    pub fn nearest_opencv_lens(&self) -> NearestLens {
         match self.distortion {
-            Distortion::None => Ok([0.0; 5]),
-            Distortion::Brown { k1, k2, p1, p2, k3 } => Ok([k1, k2, p1, p2, k3]),
+            Distortion::None => NearestLens { coefficients: [0.0; 5], error_px: 0.0 },
+            Distortion::Brown { k1, k2, p1, p2, k3 } => {
+                NearestLens { coefficients: [k1, k2, p1, p2, k3], error_px: 0.0 }
+            }
             Distortion::Tsai { .. } => self.nearest_radial(),
         }
     }
 
     /// Least squares of r_d = r (1 + k1 r² + k2 r⁴ + k3 r⁶) over the radii of the picture.
-    fn nearest_radial(&self) -> Result<[f64; 5], CameraFileError> {
+    fn nearest_radial(&self) -> NearestLens {
         let (width, height) = (f64::from(self.size[0]), f64::from(self.size[1]));
         let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
         let reach = corners
@@ -76,10 +102,11 @@ impl Camera {
             lens.distort(glam::DVec2::new(*r, 0.0)).map_or(f64::INFINITY, |d| (d.x - r_d).abs())
         };
         let error_px = pairs.iter().map(miss).fold(0.0, f64::max) * self.focal_px.max_element();
-        if pairs.len() == LENS_SAMPLES && error_px <= MAX_LENS_ERROR_PX {
-            return Ok([k1, k2, 0.0, 0.0, k3]);
+        let coefficients = [k1, k2, 0.0, 0.0, k3];
+        if pairs.len() < LENS_SAMPLES || !coefficients.iter().all(|k| k.is_finite()) {
+            return NearestLens { coefficients: [0.0; 5], error_px: f64::INFINITY };
         }
-        Err(CameraFileError::Lens { error_px })
+        NearestLens { coefficients, error_px }
     }
 }
 
