@@ -650,7 +650,6 @@ def test_an_interrupted_pool_is_not_left_with_children(lab):
     assert not lab.processes() and not lab.strays()
 
 
-@pytest.mark.skipif(not FULL, reason="a Ray cluster takes long to start")
 def test_a_ray_worker_that_is_killed_loses_its_video_alone(lab, monkeypatch):
     ray = pytest.importorskip("ray")
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
