@@ -554,7 +554,7 @@ mod tests {
         );
         assert!(
             text(Camera { translation: DVec3::new(0.0, 984.0, 6060.0), ..camera() })
-                .contains("6139 m from the world's origin: the translation looks like millimetres")
+                .contains("6139 m from the world's origin, a 1.7 m person there 0.14 px high: the translation looks like millimetres")
         );
         assert_eq!(
             text(Camera { translation: DVec3::new(0.0, f64::NAN, 0.0), ..camera() }),

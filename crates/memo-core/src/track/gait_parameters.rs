@@ -404,13 +404,16 @@ impl BySide {
     }
 }
 
-/// 97.5 % quantile of Student's t, by its expansion about the normal one; 0.5 % off at 3 degrees of freedom.
+/// 97.5 % quantile of Student's t, by its expansion about the normal one (Abramowitz and Stegun 26.7.5); 0.1 % off
+/// at 3 degrees of freedom.
 fn student_quantile(freedom: f64) -> f64 {
     let z = Z;
     let terms = [
         (z.powi(3) + z) / 4.0,
         (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
         (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
+        (79.0 * z.powi(9) + 776.0 * z.powi(7) + 1482.0 * z.powi(5) - 1920.0 * z.powi(3) - 945.0 * z)
+            / 92160.0,
     ];
     z + terms.iter().zip(1..).map(|(term, power)| term / freedom.powi(power)).sum::<f64>()
 }
@@ -421,10 +424,16 @@ mod tests {
 
     #[test]
     fn the_quantile_of_student_s_t_is_that_of_the_tables() {
-        for (freedom, table) in
-            [(4.0, 2.776), (5.0, 2.571), (8.0, 2.306), (12.0, 2.179), (30.0, 2.042), (1e9, 1.960)]
-        {
-            assert!((student_quantile(freedom) - table).abs() < 0.006, "{freedom}");
+        for (freedom, table) in [
+            (3.0, 3.182),
+            (4.0, 2.776),
+            (5.0, 2.571),
+            (8.0, 2.306),
+            (12.0, 2.179),
+            (30.0, 2.042),
+            (1e9, 1.960),
+        ] {
+            assert!((student_quantile(freedom) - table).abs() < 0.004, "{freedom}");
         }
     }
 
