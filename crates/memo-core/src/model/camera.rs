@@ -552,10 +552,9 @@ mod tests {
         assert!(
             text(Camera { rotation: camera().rotation * 1.1, ..camera() }).contains("determinant 1.331000")
         );
-        assert!(
-            text(Camera { translation: DVec3::new(0.0, 984.0, 6060.0), ..camera() })
-                .contains("6139 m from the world's origin, a 1.7 m person there 0.14 px high: the translation looks like millimetres")
-        );
+        let far = text(Camera { translation: DVec3::new(0.0, 984.0, 6060.0), ..camera() });
+        assert!(far.contains("camera is 6139 m from the world's origin, a 1.7 m person there 0."), "{far}");
+        assert!(far.contains("the translation looks like millimetres"), "{far}");
         assert_eq!(
             text(Camera { translation: DVec3::new(0.0, f64::NAN, 0.0), ..camera() }),
             "translation must be finite"
