@@ -1,6 +1,7 @@
 """The annotations as a user's type checker sees them, in pyright's strict mode."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,9 @@ def pyright(*arguments):
         "--outputjson",
         *arguments,
     ]
-    done = subprocess.run(command, capture_output=True, text=True)
+    own_first = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    # --verifytypes looks for the package where the first `python` of the path is, whatever --pythonpath says.
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PATH": own_first})
     return json.loads(done.stdout)
 
 
