@@ -14,8 +14,8 @@
 //! more than a tenth of the depth, the true distribution is skewed towards the far side.
 //!
 //! What it cannot do: four points of which two nearly coincide are three, with up to four poses; of those it
-//! may miss one (seen once in some ten thousand draws: two points a thirtieth of the figure apart, and the
-//! nearest pose found 0.1 rad off).
+//! may miss one (seen once in random draws: two points a thirtieth of the figure apart, and the nearest pose
+//! found 0.1 rad off). How often is not measured.
 
 use super::linear::LINEAR_POINTS;
 use super::pose::{Matrix7, Vector7, point_jacobian};
