@@ -10,11 +10,16 @@ import fake_core
 import memo
 import numpy as np
 import pytest
+from hypothesis import settings
 
 #: Third-party footage with ground truth; not part of this repository.
 SHARED_DATA = Path(
     os.environ.get("MEMO_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"
 )
+
+# The same cases every time, as for the property tests in Rust; `pytest --hypothesis-profile=default` draws others.
+settings.register_profile("repeatable", derandomize=True, database=None)
+settings.load_profile("repeatable")
 
 # Started in the background by a script, Python is told to ignore Ctrl-C, and so would be what tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
