@@ -3,7 +3,7 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,6 +33,7 @@ Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
+_OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 
 def add_track(app: "typer.Typer") -> None:
@@ -232,8 +233,17 @@ def deliver_interrupted(track: Any, delivery: Delivery) -> Exit:
     return Exit.INTERRUPTED
 
 
-def report(track: Any, written: list[Path], delivery: Delivery) -> None:
-    summary = {**track.summary, "rows": len(track.columns["frame"]), "sentences": track.sentences}
+def report(
+    track: Any, written: list[Path], delivery: Delivery, more: Mapping[str, Any] | None = None
+) -> None:
+    """Says what was found; the JSON has the figures of the longest walk, `each_walk`, and `more`."""
+    summary = {
+        **track.summary,
+        "rows": len(track.columns["frame"]),
+        "each_walk": [{name: walk[name] for name in _OF_A_WALK} for walk in track.records],
+        "sentences": track.sentences,
+        **(more or {}),
+    }
     delivery.tell(summary, track.sentences, written)
 
 
