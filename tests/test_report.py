@@ -522,6 +522,7 @@ def posture_folder(tmp_path):
         "first_frame": 11,
         "last_frame": 12,
         "p": 0.4,
+        "margin_nats": 0.42,
         "postures_m": points[1:3].tolist(),
     }
     document = {
@@ -556,7 +557,8 @@ def test_postures_have_a_page(posture_folder):
     assert report.kind == "memo posture" and report.contents["frames"] == len(data["frames"]) == 4
     assert sorted(data["second"]["at"]) == ["11", "12"] and len(data["frames"][0]["groups_m"]) == 12
     assert written.count("<script") == 2 and html.escape(HOSTILE) in written
-    assert "breaks a constraint in 4" in " ".join(written.split())
+    words = " ".join(written.split())
+    assert "breaks a constraint in 4" in words and "its margin over the whole sequence 0.42 nats" in words
 
 
 @pytest.mark.parametrize(
