@@ -191,7 +191,11 @@ def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
     if camera is None or tuple(camera.size) == reader.size:
         return
     (width, height), (video_width, video_height) = camera.size, reader.size
-    raise InputError(f"the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}")
+    turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
+    raise InputError(
+        f"{reader.path}: the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}"
+        f"{turned}"
+    )
 
 
 # What is written and said.
