@@ -193,8 +193,8 @@ def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
     (width, height), (video_width, video_height) = camera.size, reader.size
     turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
     raise InputError(
-        f"{reader.path}: the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}"
-        f"{turned}"
+        f"{reader.path}: the camera is for {width}x{height} pixels, the video has "
+        f"{video_width}x{video_height}{turned}"
     )
 
 
