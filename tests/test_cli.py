@@ -216,6 +216,12 @@ def test_a_damaged_video_is_tracked_and_told(memo_command, write_video, luma_fra
     assert 10 < len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 60
 
 
+def test_a_picture_larger_than_any_tested_is_told(memo_command, write_video, luma_frames, tmp_path):
+    path = write_video("large.mp4", luma_frames(count=3, size=(1924, 32)))
+    _, _, complaint = memo_command("track", path, "--no-plots", "--no-overlay", "--out", tmp_path / "out")
+    assert complaint.count("\n") == 1 and "1924x32 pixels are more than memo was tested on" in complaint
+
+
 def test_demo_compares_with_the_truth(memo_command, tmp_path):
     code, said, _ = memo_command("demo", "--out", tmp_path, "--seed", "3")
     assert code == 0 and "torso x 0.0 cm" in said and "memo track VIDEO" in said

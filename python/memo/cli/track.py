@@ -33,6 +33,7 @@ Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
+_LARGEST_PX = 1920  # of a side; the same walk enlarged to 2560 and more lost the way it faces
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 
@@ -97,6 +98,12 @@ def _track_video(
 
     with opened() as reader:
         _check_camera_fits(tracker_options, reader)
+        if max(reader.size) > _LARGEST_PX:
+            width, height = reader.size
+            complain(
+                f"{video}: {width}x{height} pixels are more than memo was tested on: which way the person "
+                "faces and which leg is which may be wrong; try a smaller copy"
+            )
         if "camera" not in tracker_options and reader.pixel_aspect != 1:
             complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
         tracker = new_tracker(tracker_options)
