@@ -20,8 +20,9 @@ from pathlib import Path
 
 import pytest
 from memo import batch
-from memo.batch.engine import Progress
+from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
+from memo.cli.batch import _line
 
 FULL = bool(os.environ.get("MEMO_FULL"))
 KILLS = 60 if FULL else 4
@@ -66,11 +67,20 @@ for name in ("track.csv", "gait_parameters.csv"):
             file.write("1,cadence,," + height + ",1/min,,,4\\n")
 with open(os.path.join(out, "run.json"), "w") as file:
     options = '"options": {"height_m": ' + height + '}, "camera_given": false'
-    ways = (("left to right", "forward", 0.01), ("right to left", "backward", 0.2))
-    walk = '{"direction": "%s", "gait": "%s", "p_swapped": %s}'
+    ways = (
+        ("left to right", "forward", 0.01, ', "start_s": 0.5, "end_s": 2.25'),
+        ("right to left", "backward", 0.2, ""),
+    )
+    walk = '{"direction": "%s", "gait": "%s", "p_swapped": %s%s}'
     walks = ", ".join(walk % way for way in ways) if todo[0] != "nobody" else ""
     file.write('{"walks": [' + walks + "], " + options + "}")
-print('{"message": "said of ' + os.path.basename(video) + '"}')
+said = '{"message": "said of ' + os.path.basename(video) + '"'
+if todo[0] == "twice":
+    print(said + ', "walks": 2, "each_walk": [{"message": "Goes."}, {"message": "Comes."}], '
+        '"sentences": ["Walk 1 of 2: Goes.", "Walk 1 of 2: Look.", "Walk 2 of 2: Comes."]}')
+    sys.stderr.write("memo: " + video + ": cut off\\n")
+else:
+    print(said + ', "walks": ' + str(int(todo[0] != "nobody")) + ', "each_walk": [], "sentences": []}')
 if todo[0] == "no-table":
     os.remove(os.path.join(out, "track.csv"))
 sys.exit(3 if todo[0] == "nobody" else 0)
@@ -409,6 +419,38 @@ def test_each_walk_of_a_video_has_its_own_direction(lab):
         ["0", "left to right", "forward", "0.010000"],
         ["1", "right to left", "backward", "0.200000"],
     ]
+
+
+def test_every_walk_is_counted_and_told(lab):
+    lab.videos("twice", "ok", "nobody", "fails")
+    told = []
+    result = lab.run(progress=told.append)
+    first, *others = lab.status()
+    assert (first["walks"], first["message"]) == ("2", "1: Goes. 2: Comes.")
+    assert first["remarks"] == f"{lab.folder / 'v00.mp4'}: cut off; Walk 1 of 2: Look."
+    assert [row["walks"] for row in others] == ["1", "0", ""] and not any(row["remarks"] for row in others)
+    assert result.walks == 3
+    sentences = list(described(result))
+    assert "3 walks; several in 1 video (v00): gait_parameters.csv has a row for each, whoever walks." in (
+        sentences
+    )
+    assert "Remarks on 1 video (v00): see status.csv." in sentences
+    line = next(_line(now.record) for now in told if now.record is not None and now.record.name == "v00")
+    assert ": done, 2 walks, " in line and line.endswith("1: Goes. 2: Comes. (remarks: status.csv)")
+    rows = [(row["start_s"], row["end_s"]) for row in table(lab.out, "gait_parameters.csv")[:2]]
+    assert rows == [("0.500", "2.250"), ("", "")]  # the second as an older memo left it
+
+
+def test_records_of_an_older_memo_know_no_number_of_walks(lab):
+    lab.videos("twice")
+    lab.run()
+    record = lab.out / ".batch" / "records" / "v00.json"
+    older = {
+        key: value for key, value in json.loads(record.read_text()).items() if key not in ("walks", "remarks")
+    }
+    record.write_text(json.dumps(older))
+    assert lab.run(resume=True).done_now == 0
+    assert (lab.status()[0]["walks"], lab.status()[0]["state"]) == ("", "done")
 
 
 def test_a_second_run_goes_on_only_when_told(lab):

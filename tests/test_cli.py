@@ -16,7 +16,7 @@ import pytest
 import typer
 from conftest import shared_video
 from memo import cli
-from memo.cli.demo import against_truth
+from memo.cli.demo import from_truth
 from memo.files import (
     TRACK_COLUMNS,
     complete_file,
@@ -104,7 +104,7 @@ def test_each_command_shows_examples_that_parse(words, command):
         assert line.startswith(f"  {words}")
         command.make_context(words, shlex.split(line.removeprefix(f"  {words}")))
     names = [parameter.name for parameter in command.params]
-    assert names[-2:] == ["as_json", "quiet"] or words in ("memo demo", "memo convert")
+    assert names[-2:] == ["as_json", "quiet"] or words == "memo convert"
     arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
     assert all((argument.metavar or "").isupper() for argument in arguments)
 
@@ -216,10 +216,19 @@ def test_a_damaged_video_is_tracked_and_told(memo_command, write_video, luma_fra
     assert 10 < len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 60
 
 
+def test_a_picture_larger_than_any_tested_is_told(memo_command, write_video, luma_frames, tmp_path):
+    path = write_video("large.mp4", luma_frames(count=3, size=(1924, 32)))
+    _, _, complaint = memo_command("track", path, "--no-plots", "--no-overlay", "--out", tmp_path / "out")
+    assert complaint.count("\n") == 1 and "1924x32 pixels are more than memo was tested on" in complaint
+
+
 def test_demo_compares_with_the_truth(memo_command, tmp_path):
     code, said, _ = memo_command("demo", "--out", tmp_path, "--seed", "3")
     assert code == 0 and "torso x 0.0 cm" in said and "memo track VIDEO" in said
     assert (tmp_path / "overlay.mp4").exists() and (tmp_path / "track.csv").exists()
+    code, said, _ = memo_command("demo", "--out", tmp_path, "--seed", "3", "--json")
+    assert code == 0 and json.loads(said)["rms_from_truth"]["x_m"] == pytest.approx(0, abs=5e-4)
+    assert memo_command("demo", "--out", tmp_path, "--quiet") == (0, "", "")
 
 
 def test_truth_is_compared_by_frame_number(core):
@@ -228,8 +237,9 @@ def test_truth_is_compared_by_frame_number(core):
     columns = {name: values[10:].copy() for name, values in truth.items()}
     columns["x_m"] += 0.03
     columns["phase"] = (columns["phase"] + 0.99) % 1
-    lines = " ".join(against_truth(columns, truth))
-    assert "over 20 frames" in lines and "torso x 3.0 cm, y 0.0 cm" in lines and "phase 0.010" in lines
+    differences = from_truth(columns, truth)
+    assert differences["frames"] == 20 and differences["phase"] == pytest.approx(0.01)
+    assert differences["x_m"] == pytest.approx(0.03) and differences["y_m"] == 0
 
 
 def interrupted(process, started, after_s=0.3):

@@ -253,7 +253,7 @@ def test_what_is_missing_is_said(run_folder, tmp_path):
     written, data, _ = page_of(folder)
     assert "Not in the folder: run.json, events.csv, gait_parameters.csv." in written
     assert "neither the video nor overlay.mp4" in written and data["pictures"]["uri"] == []
-    assert len(data["track"]["frame"]) == 20 and "walk 1 may be swapped (probability 40%)" in written
+    assert len(data["track"]["frame"]) == 20 and "swapped in walk 1 (probability 40%)." in written
     folder = run_folder(video=str(tmp_path / "gone.mp4"))
     assert "gone.mp4: no such file" in page_of(folder)[0]
 
@@ -308,6 +308,22 @@ def test_several_walks_and_backwards(run_folder):
         and '<tr><th scope="row">1</th><td>heel strike</td>' in written
         and data["track"]["walk"][-1] == 1
     )
+
+
+def test_many_walks_leave_the_picture_in_sight(run_folder):
+    sentences = [f"Walk {k} of 20: Somebody walks." for k in range(1, 21)]
+    folder = run_folder(sentences=sentences)
+    table = read_track_csv(folder / "track.csv")
+    table["walk"] = np.arange(20)
+    table["speed_mps"][[3, 7, 11]] *= -1
+    table["p_swapped"] = np.where(np.isin(table["walk"], [5, 6]), 0.45, 0.01)
+    write_track_csv(folder / "track.csv", table)
+    written, _, _ = page_of(folder)
+    head = written[: written.index("<main>")]
+    shown, folded = head.split("<details><summary>12 more sentences</summary>")
+    assert "Walk 8 of 20" in shown and "Walk 9 of 20" in folded and "Walk 20 of 20" in folded
+    assert "Walks 4, 8 and 12 go backwards" in head
+    assert "swapped in walks 6 and 7 (probability up to 45%)." in head
 
 
 def test_an_interrupted_run_says_so(run_folder):
@@ -506,6 +522,7 @@ def posture_folder(tmp_path):
         "first_frame": 11,
         "last_frame": 12,
         "p": 0.4,
+        "margin_nats": 0.42,
         "postures_m": points[1:3].tolist(),
     }
     document = {
@@ -540,7 +557,8 @@ def test_postures_have_a_page(posture_folder):
     assert report.kind == "memo posture" and report.contents["frames"] == len(data["frames"]) == 4
     assert sorted(data["second"]["at"]) == ["11", "12"] and len(data["frames"][0]["groups_m"]) == 12
     assert written.count("<script") == 2 and html.escape(HOSTILE) in written
-    assert "breaks a constraint in 4" in " ".join(written.split())
+    words = " ".join(written.split())
+    assert "breaks a constraint in 4" in words and "its margin over the whole sequence 0.42 nats" in words
 
 
 @pytest.mark.parametrize(

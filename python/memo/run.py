@@ -5,8 +5,9 @@ stop], stop null for the end), `frames_read`, `interrupted` (whether frames that
 unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `camera_given`, `camera` (the camera
 given, or the one guessed for the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa`
 beside the distortions nearest to it; null where nobody was tracked without a camera), `options` (of
-`Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk what `memo.explain` and
-`contours_of_run` need; frames there are counted from the first one read).
+`Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk `message`, `start_s`,
+`end_s`, `direction`, `gait`, `p_swapped`, and what `memo.explain` and `contours_of_run` need; frames there
+are counted from the first one read).
 """
 
 from __future__ import annotations

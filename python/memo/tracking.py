@@ -251,9 +251,12 @@ class Track:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Every walk: which way, how sure, and what `memo.explain` needs beside the video, plain numbers."""
+        """Every walk: when, which way, how sure, and what `memo.explain` needs beside the video."""
         return [
             {
+                "message": self._message(walk),
+                "start_s": float(walk.columns()["time_s"][0]),
+                "end_s": float(walk.columns()["time_s"][-1]),
                 "direction": self._way(walk),
                 "gait": walk.direction,
                 "p_swapped": walk.p_swapped,

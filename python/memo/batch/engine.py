@@ -27,6 +27,7 @@ _ATTEMPTS_OF_WORKERS = 3  # a worker may be lost for no fault of the video, so o
 _BYTES_A_VIDEO = 1 << 20  # of results without an overlay
 _RESERVE_BYTES = 50 << 20  # with less on the disk, errors are not the videos'
 _TELL_S = 0.5
+_FEW = 3  # names that stand for many
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,11 @@ class BatchResult:
         """How many videos are in each of `STATES`."""
         counted = Counter(record.state for record in self.records)
         return {state: counted[state] for state in STATES}
+
+    @property
+    def walks(self) -> int:
+        """How many walks were tracked in all videos."""
+        return sum(record.walks or 0 for record in self.records)
 
     @property
     def unfinished(self) -> int:
@@ -434,7 +440,28 @@ def described(result: BatchResult) -> Iterator[str]:
         parts.append(f"{len(result.left)} left")
     total = len(result.records) + len(result.left)
     yield f"{_videos(total)}: {', '.join(parts) or 'nothing done'}."
+    yield from _of_walks(result.records)
     if result.done_now:
         each = result.seconds / result.done_now
         yield f"{result.done_now} in this run, {result.seconds:.0f} s, {each:.2f} s a video."
     yield from result.notes
+
+
+def _of_walks(records: Sequence[Record]) -> Iterator[str]:
+    """How many walks there are, where there are several, and where more is said."""
+    several = [record for record in records if (record.walks or 0) > 1]
+    if several:
+        walks = sum(record.walks or 0 for record in records)
+        yield (
+            f"{walks} walks; several in {_videos(len(several))} ({_named(several)}): "
+            "gait_parameters.csv has a row for each, whoever walks."
+        )
+    remarked = [record for record in records if record.remarks]
+    if remarked:
+        yield f"Remarks on {_videos(len(remarked))} ({_named(remarked)}): see status.csv."
+
+
+def _named(records: Sequence[Record]) -> str:
+    """The first names of many."""
+    names = ", ".join(record.name for record in records[:_FEW])
+    return names + ", ..." * (len(records) > _FEW)

@@ -54,6 +54,10 @@ class Record:
     """Version of memo."""
     fingerprint: dict[str, Any]
     """What the result depends on, see `Row.fingerprint`."""
+    walks: int | None = None
+    """How many walks were tracked; `None` where that is not known."""
+    remarks: tuple[str, ...] | list[str] = ()
+    """What else is said of the results: doubts, damage of the video, differences of the sides."""
 
     @property
     def finished(self) -> bool:

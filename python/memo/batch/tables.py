@@ -15,11 +15,14 @@ from memo.gait import GAIT_COLUMNS
 
 __all__ = ["STATUS_COLUMNS", "write_status", "write_table"]
 
-STATUS_COLUMNS = ("name", "state", "attempt", "seconds", "message", "video")
+STATUS_COLUMNS = ("name", "state", "walks", "attempt", "seconds", "message", "remarks", "video")
 """Columns of `status.csv`, in order; a state is one of `STATES`, or `waiting`."""
 
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
-_LEADING = ("name", "state", "walk", "height_m", "camera_given", "direction", "gait", "p_swapped")
+_LEADING = (
+    *("name", "state", "walk", "height_m", "camera_given"),
+    *("start_s", "end_s", "direction", "gait", "p_swapped"),
+)
 
 
 def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
@@ -28,10 +31,11 @@ def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
     for row in rows:
         record = folder.record(row.name)
         if record is None:
-            cells.append([row.name, "waiting", "", "", "", str(row.video)])
+            cells.append([row.name, "waiting", "", "", "", "", "", str(row.video)])
         else:
-            seconds = f"{record.seconds:.1f}"
-            cells.append([row.name, record.state, record.attempt, seconds, record.message, str(row.video)])
+            walks = "" if record.walks is None else record.walks
+            told = (f"{record.seconds:.1f}", record.message, "; ".join(record.remarks))
+            cells.append([row.name, record.state, walks, record.attempt, *told, str(row.video)])
     _write(path, STATUS_COLUMNS, cells)
 
 
@@ -65,7 +69,7 @@ def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
 
 
 def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """What holds for all walks of a video; and which way each goes, by its number."""
+    """What holds for all walks of a video; and when and which way each goes, by its number."""
     try:
         run = json.loads(path.read_text(encoding="utf-8"))
         given = {
@@ -74,6 +78,7 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         }
         seen = {
             str(number): {
+                **{name: _seconds(walk.get(name)) for name in ("start_s", "end_s")},
                 "direction": walk["direction"],
                 "gait": walk["gait"],
                 "p_swapped": f"{walk['p_swapped']:.6f}",
@@ -83,6 +88,10 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         return given, seen
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise BatchError(f"{path}: not as memo track writes it: {error!r}") from None
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
 
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:

@@ -86,9 +86,14 @@ def _tracked(task: Task, results: Path) -> Record | None:
             code = _watch(task, command, said, complaints, start)
         except _Stopped:
             return None
-        state, message = _verdict(task, code, _read(said), _read(complaints))
+        said_text, complaint_text = _read(said), _read(complaints)
+    state, message = _verdict(task, code, complaint_text)
+    walks: int | None = None
+    remarks: list[str] = []
     if state in ("done", "nobody") and not (results / "track.csv").is_file():
         state, message = "crashed", "it ended without an error and without track.csv"
+    elif state in ("done", "nobody"):
+        walks, message, remarks = _told(said_text, complaint_text)
     if not task.folder.is_current(task.run):
         return None
     if state in ("done", "nobody"):
@@ -101,6 +106,8 @@ def _tracked(task: Task, results: Path) -> Record | None:
         attempt=task.attempt,
         memo=__version__,
         fingerprint=task.fingerprint,
+        walks=walks,
+        remarks=remarks,
     )
     task.folder.write_record(record)
     if not task.folder.log(task.name).stat().st_size:
@@ -162,7 +169,7 @@ def _started(
         child.stdin.close()
 
 
-def _verdict(task: Task, code: int | str, said: str, complaints: str) -> tuple[str, str]:
+def _verdict(task: Task, code: int | str, complaints: str) -> tuple[str, str]:
     """The state of a video and a line that says why, from how its process ended."""
     lines = [line.strip() for line in complaints.splitlines()]
     lines = [line for line in lines if line and not line.startswith(("note:", "stack backtrace:"))]  # Rust's
@@ -173,7 +180,7 @@ def _verdict(task: Task, code: int | str, said: str, complaints: str) -> tuple[s
         return "crashed", f"ended for more than {task.memory_mb} MB of memory"
     assert isinstance(code, int)
     if code in (0, 3):
-        return ("done" if code == 0 else "nobody"), _sentence(said)
+        return ("done" if code == 0 else "nobody"), ""  # `_told` knows more
     if code == OUT_OF_MEMORY:
         return "crashed", "out of memory"
     if code < 0:
@@ -185,12 +192,23 @@ def _verdict(task: Task, code: int | str, said: str, complaints: str) -> tuple[s
     return "failed", last or f"exit code {code}"
 
 
-def _sentence(said: str) -> str:
-    """The message of the summary that the child printed as JSON."""
+def _told(said: str, complaints: str) -> tuple[int | None, str, list[str]]:
+    """How many walks there are, what is said of each, and what else is said.
+
+    `said` is the JSON of the child; its `sentences` hold the message of each walk and what else there is.
+    """
+    complained = [
+        line.removeprefix("memo: ") for line in complaints.splitlines() if line.startswith("memo: ")
+    ]
     try:
-        return str(json.loads(said)["message"])
+        summary = json.loads(said)
+        messages = [walk["message"] for walk in summary["each_walk"]] or [summary["message"]]
+        others = [line for line in summary["sentences"] if not line.endswith(tuple(messages))]
+        several = len(messages) > 1
+        told = [f"{k}: {message}" if several else message for k, message in enumerate(messages, 1)]
+        return int(summary["walks"]), " ".join(told), complained + others
     except (ValueError, TypeError, KeyError):
-        return ""
+        return None, "", complained
 
 
 def _read(file: IO[bytes]) -> str:

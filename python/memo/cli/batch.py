@@ -33,6 +33,7 @@ be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed o
 130 interrupted."""
 
 _FEW = 5  # videos that are named where there are many
+_LONGEST_LINE = 300  # characters of a message; status.csv has all of it
 
 
 class Backend(StrEnum):
@@ -193,6 +194,7 @@ def _tell(result: BatchResult, delivery: Delivery) -> None:
     summary = {
         "videos": len(result.records) + len(result.left),
         **result.counts,
+        "walks": result.walks,
         "left": len(result.left),
         "seconds": round(result.seconds, 3),
         "out": str(delivery.out),
@@ -213,7 +215,12 @@ def _failures(result: BatchResult) -> Iterator[str]:
 
 
 def _line(record: Record) -> str:
-    return f"{record.name}: {record.state}, {record.seconds:.1f} s. {record.message}"
+    walks = f"{record.walks} walks, " if (record.walks or 0) > 1 else ""
+    remarks = " (remarks: status.csv)" if record.remarks else ""
+    message = record.message
+    if len(message) > _LONGEST_LINE:
+        message = message[:_LONGEST_LINE].rpartition(" ")[0] + " ..."
+    return f"{record.name}: {record.state}, {walks}{record.seconds:.1f} s. {message}{remarks}"
 
 
 # While it runs.

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 EPILOG = """Examples:
   memo demo
   memo demo --seed 3 --out another
+  memo demo --json
 
 Exit codes: 0 the walker was tracked; 1 the results cannot be written; 2 wrong usage; \
 3 no walker was tracked; 4 the app extra is not installed; 130 interrupted \
@@ -38,14 +39,16 @@ def add_demo(app: "typer.Typer") -> None:
     def demo(
         seed: Annotated[int, typer.Option(help="Which scene is drawn.", min=0)] = 0,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
+        as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+        quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Draws a walker whose motion is known, tracks it and compares."""
-        raise typer.Exit(guarded(lambda: _demo(out, seed)))
+        delivery = Delivery(out, as_json=as_json, quiet=quiet)
+        raise typer.Exit(guarded(lambda: _demo(delivery, seed)))
 
 
-def _demo(out: Path, seed: int) -> Exit:
-    delivery = Delivery(out)
-    check_writable(out)
+def _demo(delivery: Delivery, seed: int) -> Exit:
+    check_writable(delivery.out)
     scene, frames = _draw_scene(seed)
     tracker = new_tracker({"height_m": scene.height_m, "camera": scene.camera})
     rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
@@ -54,11 +57,13 @@ def _demo(out: Path, seed: int) -> Exit:
     if interrupted:
         return deliver_interrupted(track, delivery)
     written = write_all(track, frames, len(frames), rate_hz, delivery)
-    report(track, written, delivery)
-    for line in against_truth(track.columns, scene.truth):
-        print(line)
-    print("Next, your own video of one person walking across the picture, camera on a tripod:")
-    print("  memo track VIDEO --height 1.75")
+    differences = from_truth(track.columns, scene.truth)
+    report(track, written, delivery, {"rms_from_truth": differences})
+    if delivery.talks:
+        for line in _described(differences):
+            print(line)
+        print("Next, your own video of one person walking across the picture, camera on a tripod:")
+        print("  memo track VIDEO --height 1.75")
     return exit_code(track)
 
 
@@ -70,21 +75,36 @@ def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
     return scene, [Frame(index, float(time_s), luma) for index, (time_s, luma) in enumerate(timed)]
 
 
-def against_truth(columns: dict[str, Any], truth: dict[str, Any]) -> list[str]:
-    """Root mean square differences from the scene's truth, in sentences; none without a tracked frame."""
+def from_truth(columns: dict[str, Any], truth: dict[str, Any]) -> dict[str, float]:
+    """Root mean square differences from the scene's truth over all tracked frames; empty without one."""
     rows = np.searchsorted(truth["frame"], columns["frame"])
     if not len(rows):
-        return []
+        return {}
 
     def rms(names: Iterable[str]) -> float:
         return math.sqrt(np.nanmean([(columns[name] - np.asarray(truth[name])[rows]) ** 2 for name in names]))
 
     phase = (columns["phase"] - np.asarray(truth["phase"])[rows] + 0.5) % 1 - 0.5
-    joints = math.sqrt(3) * rms(f"{joint}_{axis}_m" for joint in JOINTS for axis in "xyz")
-    angles = rms(f"{side}_{joint}_deg" for side in ("right", "left") for joint in ("hip", "knee"))
+    return {
+        "frames": len(rows),
+        **{name: rms([name]) for name in ("x_m", "y_m", "z_m")},
+        "phase": math.sqrt(np.mean(phase**2)),
+        "hips_and_knees_deg": rms(
+            f"{side}_{joint}_deg" for side in ("right", "left") for joint in ("hip", "knee")
+        ),
+        "joints_m": math.sqrt(3) * rms(f"{joint}_{axis}_m" for joint in JOINTS for axis in "xyz"),
+    }
+
+
+def _described(differences: dict[str, float]) -> list[str]:
+    """The differences in sentences."""
+    if not differences:
+        return []
+    torso = ", ".join(f"{axis} {100 * differences[f'{axis}_m']:.1f} cm" for axis in "xyz")
+    phase, angles = differences["phase"], differences["hips_and_knees_deg"]
     return [
-        f"Against the drawn truth, root mean square over {len(rows)} frames:",
-        "  torso " + ", ".join(f"{axis} {100 * rms([f'{axis}_m']):.1f} cm" for axis in "xyz"),
-        f"  phase {math.sqrt(np.mean(phase**2)):.3f} of a cycle, hips and knees {angles:.1f} degrees",
-        f"  joints {100 * joints:.1f} cm in space",
+        f"Against the drawn truth, root mean square over {differences['frames']} frames:",
+        f"  torso {torso}",
+        f"  phase {phase:.3f} of a cycle, hips and knees {angles:.1f} degrees",
+        f"  joints {100 * differences['joints_m']:.1f} cm in space",
     ]

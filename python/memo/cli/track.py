@@ -3,7 +3,7 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,6 +33,8 @@ Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
+_LARGEST_PX = 1920  # of a side; the same walk enlarged to 2560 and more lost the way it faces
+_OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 
 def add_track(app: "typer.Typer") -> None:
@@ -96,6 +98,12 @@ def _track_video(
 
     with opened() as reader:
         _check_camera_fits(tracker_options, reader)
+        if max(reader.size) > _LARGEST_PX:
+            width, height = reader.size
+            complain(
+                f"{video}: {width}x{height} pixels are more than memo was tested on: which way the person "
+                "faces and which leg is which may be wrong; try a smaller copy"
+            )
         if "camera" not in tracker_options and reader.pixel_aspect != 1:
             complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
         tracker = new_tracker(tracker_options)
@@ -190,7 +198,11 @@ def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
     if camera is None or tuple(camera.size) == reader.size:
         return
     (width, height), (video_width, video_height) = camera.size, reader.size
-    raise InputError(f"the camera is for {width}x{height} pixels, the video has {video_width}x{video_height}")
+    turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
+    raise InputError(
+        f"{reader.path}: the camera is for {width}x{height} pixels, the video has "
+        f"{video_width}x{video_height}{turned}"
+    )
 
 
 # What is written and said.
@@ -232,8 +244,17 @@ def deliver_interrupted(track: Any, delivery: Delivery) -> Exit:
     return Exit.INTERRUPTED
 
 
-def report(track: Any, written: list[Path], delivery: Delivery) -> None:
-    summary = {**track.summary, "rows": len(track.columns["frame"]), "sentences": track.sentences}
+def report(
+    track: Any, written: list[Path], delivery: Delivery, more: Mapping[str, Any] | None = None
+) -> None:
+    """Says what was found; the JSON has the figures of the longest walk, `each_walk`, and `more`."""
+    summary = {
+        **track.summary,
+        "rows": len(track.columns["frame"]),
+        "each_walk": [{name: walk[name] for name in _OF_A_WALK} for walk in track.records],
+        "sentences": track.sentences,
+        **(more or {}),
+    }
     delivery.tell(summary, track.sentences, written)
 
 

@@ -32,7 +32,8 @@ class Choice:
         sentences = []
         if every > 1:
             reason = "as asked" if self.every else "to keep it small"
-            sentences.append(f"Every {ordinal(every)} frame is in this page, {reason}.")
+            more = "" if self.every else "; --frames A:B shows more of a part"
+            sentences.append(f"Every {ordinal(every)} frame is in this page, {reason}{more}.")
         if self.chosen:
             stop = "the end" if self.stop is None else str(self.stop - 1)
             sentences.append(f"Of the frames, {self.first} to {stop} were asked for.")

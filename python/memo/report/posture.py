@@ -83,8 +83,9 @@ def _sentences(document: dict[str, Any]) -> list[str]:
         joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
         told.append(
             f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
-            f"{second['last_frame']}; its probability is {number(second.get('p'))}. Some joint is undecided "
-            f"in {document.get('undecided_frames', UNKNOWN)} of {count} frames."
+            f"{second['last_frame']}; its probability is {number(second.get('p'))}, its margin over the "
+            f"whole sequence {number(second.get('margin_nats'))} nats. Some joint is undecided in "
+            f"{document.get('undecided_frames', UNKNOWN)} of {count} frames."
         )
     return told
 

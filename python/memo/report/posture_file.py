@@ -90,8 +90,9 @@ def _wrong_in_second(second: Any, joints: int) -> Iterator[str]:
     yield from (
         f"{name} of second" for name in ("first_frame", "last_frame") if not _is_whole(second.get(name))
     )
-    if not _has_shape(second.get("p"), (), joints):
-        yield "p of second"
+    yield from (
+        f"{name} of second" for name in ("p", "margin_nats") if not _has_shape(second.get(name), (), 0)
+    )
     if not _has_shape(second.get("postures_m"), (None, "joints", 3), joints):
         yield "postures_m of second"
 

@@ -17,6 +17,8 @@ __all__ = ["track_text"]
 
 _DEEPEST = 4
 _LIKELY_SWAPPED = 0.2
+_MOST_SENTENCES = 8
+_MOST_TABLES = 3
 
 
 def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dict[str, str]:
@@ -28,7 +30,9 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
         "name": text(run.name),
         "status": text(status),
         "tone": tone,
-        "sentences": "".join(f"<p>{text(sentence)}</p>" for sentence in _sentences(run)),
+        "sentences": _folded(
+            [f"<p>{text(said)}</p>" for said in _sentences(run)], _MOST_SENTENCES, "sentences"
+        ),
         "warnings": _warnings(run, notes),
         "parameters": _parameters(run),
         "walks": _walks(run),
@@ -51,6 +55,15 @@ def _status(run: RunFolder) -> tuple[str, str]:
         return told, "bad"
     doubtful = any(p_swapped > _LIKELY_SWAPPED for _, p_swapped in _swapped(run)) or _unsteady(run)
     return told, "fair" if doubtful or told != "tracked" else "good"
+
+
+def _folded(items: list[str], most: int, what: str) -> str:
+    """Pieces of HTML; where there are many, those after the first `most` wait to be unfolded."""
+    shown, folded = items[:most], items[most:]
+    if not folded:
+        return "".join(shown)
+    more = f"<details><summary>{len(folded)} more {what}</summary>{''.join(folded)}</details>"
+    return "".join(shown) + more
 
 
 def _unsteady(run: RunFolder) -> bool:
@@ -81,11 +94,19 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
     if run.run.get("interrupted"):
         count = _counted(run.run["frames_read"], "frame")
         told.append(f"The run was interrupted after {count}: what came later was not looked at.")
-    for walk, p_swapped in _swapped(run):
-        if not run.run and p_swapped > _LIKELY_SWAPPED:  # else the sentences say so
-            told.append(f"Left and right of walk {walk + 1} may be swapped (probability {p_swapped:.0%}).")
-    for walk in _backward(run):
-        told.append(f"Walk {walk + 1} goes backwards: the band of normal gait is of people who walk forward.")
+    swapped = {walk: p_swapped for walk, p_swapped in _swapped(run) if p_swapped > _LIKELY_SWAPPED}
+    if swapped and (not run.run or len(_sentences(run)) > _MOST_SENTENCES):  # else sentences in sight say so
+        up_to = "up to " * (len(swapped) > 1)
+        told.append(
+            f"Left and right may be swapped in {_numbered(list(swapped))} "
+            f"(probability {up_to}{max(swapped.values()):.0%})."
+        )
+    if backward := _backward(run):
+        verb = "goes" if len(backward) == 1 else "go"
+        told.append(
+            f"{_numbered(backward).capitalize()} {verb} backwards: the band of normal gait is of people who "
+            "walk forward."
+        )
     if run.frames and not run.run.get("camera_given", True):
         told.append(
             "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
@@ -98,6 +119,12 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
             "There is no overlay.mp4: it was not wanted, was removed, or its drawing was interrupted."
         )
     return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
+
+
+def _numbered(walks: list[int]) -> str:
+    """`walk 2`, or `walks 1, 2 and 5`, counted from 1."""
+    *most, last = [str(walk + 1) for walk in walks]
+    return f"walks {', '.join(most)} and {last}" if most else f"walk {last}"
 
 
 def _swapped(run: RunFolder) -> list[tuple[int, float]]:
@@ -176,7 +203,8 @@ def _parameters(run: RunFolder) -> str:
         tables.append(rows_table(f"Walk {walk + 1}: value, 95 % interval, number of steps", header, rows))
     named = dict.fromkeys(line["parameter"] for line in lines)
     meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
-    return f"{''.join(tables)}<details open><summary>What they are</summary>{_listed(meanings)}</details>"
+    told = f"<details open><summary>What they are</summary>{_listed(meanings)}</details>"
+    return _folded(tables, _MOST_TABLES, "walks") + told
 
 
 def _measured(line: dict[str, Any]) -> str:

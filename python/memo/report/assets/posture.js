@@ -110,7 +110,7 @@ function showFrame() {
   lines.push(`${frame.survivors} postures left${count}.`);
   for (const broken of frame.cut_all ?? []) lines.push(`Nothing is left; the least violating posture: ${broken}`);
   lines.push(frame.linked_breaks?.length ? `The posture in the motion breaks: ${frame.linked_breaks.map((name) => name.replaceAll("_", " ")).join(", ")}.` : "The posture in the motion breaks no constraint.");
-  lines.push(isNumber(frame.margin_nats) ? `Margin in this frame to the best motion that differs here: ${told(frame.margin_nats, 2)} nats.` : "No other motion is in reach here.");
+  lines.push(isNumber(frame.margin_nats) ? `Margin of this frame, to the best motion that differs in it: ${told(frame.margin_nats, 2)} nats.` : "No other motion is in reach here.");
   $("frame-told").replaceChildren(...lines.map((line) => element("li", {}, line)));
   const rows = joints.map((name, index) => {
     const p = frame.p_mirrored[index];
@@ -130,7 +130,7 @@ function showFrame() {
 const times = frames.map(({ time_s: time }) => time);
 const drawn = [
   ["Postures left", "", 0, frames.map(({ survivors }) => survivors), undefined],
-  ["Margin, frame by frame", "nats", 2, frames.map(({ margin_nats: margin }) => margin), undefined],
+  ["Margin of each frame, to the best motion that differs in it", "nats", 2, frames.map(({ margin_nats: margin }) => margin), undefined],
   ["Largest P(mirrored) of all joints", "", 2, frames.map(({ p_mirrored: p }) => (p.some(isNumber) ? Math.max(...p.filter(isNumber)) : null)), [0, 1]],
   ["Distance of the neck from the camera", "m", 2, frames.map(({ anchor_m: anchor }) => anchor), undefined, frames.map(({ anchor_sd_m: sd }) => sd)],
 ].map(([title, unit, digits, ys, yRange, sds]) => {
