@@ -74,22 +74,84 @@ def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
             "A MOT or STO file has no place for points but the pelvis: left out.",
         ]
         lines = (tmp_path / name).read_text().split("\n")
-        assert lines[1:7] == ["version=1", "nRows=19", "nColumns=7", "inDegrees=yes", "up=Y", "endheader"]
+        assert lines[1:7] == ["version=1", "nRows=19", "nColumns=10", "inDegrees=yes", "up=Y", "endheader"]
         table = by_pandas(tmp_path / name, 7)
         assert [*table] == [
-            *("time", "pelvis_tx", "pelvis_ty", "pelvis_tz"),
+            *("time", "pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz"),
             *("hip_flexion_r", "knee_angle_r", "knee_angle_l"),
         ]
         known = np.isfinite(motion.angles["left_knee"])
         assert np.allclose(table["time"], motion.times_s[known], atol=1e-7)
         assert np.allclose(table["knee_angle_l"], motion.angles["left_knee"][known], atol=1e-7)
-        hips = [JOINTS.index("right_hip"), JOINTS.index("left_hip")]
-        middle = motion.points[known][:, hips].mean(axis=1)
-        assert np.allclose(table["pelvis_ty"], middle[:, 2], atol=1e-7)
-        assert np.allclose(table["pelvis_tz"], -middle[:, 1], atol=1e-7)
         read = read_motion(tmp_path / name)
-        assert read.names == ("pelvis",) and [*read.angles] == [*ANGLES] and read.notes == ()
-        assert np.allclose(read.points[:, 0], middle, atol=1e-7)
+        assert read.names == ("pelvis",) and read.notes == ()
+        assert [*read.angles] == ["pelvis_tilt", "pelvis_list", "pelvis_rotation", *ANGLES]
+        assert read.points[:, 0] == pytest.approx(table[["pelvis_tx", "pelvis_tz", "pelvis_ty"]] * [1, -1, 1])
+        again = tmp_path / "again.mot"
+        write_motion(again, read)
+        assert np.allclose(by_pandas(again, 7)[[*table]], table, atol=1e-6)
+
+
+def about(axis, angle_deg):
+    """(3, 3) rotation about x, y or z."""
+    c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    turn = np.eye(3)
+    turn[[i, j], [i, j]], turn[j, i], turn[i, j] = c, s, -s
+    return turn
+
+
+def test_the_legs_hang_from_the_pelvis_of_a_mot_as_they_do_in_the_motion(tmp_path):
+    motion, path = walk(gaps=False), tmp_path / "walk.mot"
+    write_motion(path, motion)
+    hip, knee, other = (
+        motion.points[:, JOINTS.index(f"{j}")] for j in ("right_hip", "right_knee", "left_hip")
+    )
+    y_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for frame, row in by_pandas(path, 7).iterrows():
+        pelvis = about("z", row.pelvis_tilt) @ about("x", row.pelvis_list) @ about("y", row.pelvis_rotation)
+        right = (hip - other)[frame] @ y_up
+        assert np.allclose(pelvis[:, 2], right / np.linalg.norm(right), atol=1e-7)
+        # OpenSim's hip: flexion about Z, then adduction about X; the figure's thighs are not adducted.
+        thigh = (knee - hip)[frame] @ y_up
+        bent = pelvis @ about("z", row.hip_flexion_r) @ [0, -1, 0]
+        assert np.allclose(bent, thigh / np.linalg.norm(thigh), atol=1e-7)
+        # The hips of Rajagopal's model.
+        place = [row.pelvis_tx, row.pelvis_ty, row.pelvis_tz]
+        between = (hip + other)[frame] / 2 @ y_up
+        assert np.allclose(pelvis.T @ (between - place), [-0.056276, -0.07849, 0], atol=1e-6)
+    notes = write_motion(path, motion, "z")
+    assert "OpenSim's pelvis angles are those of a world with Y up: left out." in notes
+    assert "pelvis_tilt" not in by_pandas(path, 7)
+    no_hip = Motion(JOINTS, motion.times_s, motion.points, angles={"left_knee": motion.angles["left_knee"]})
+    assert "place needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
+    assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
+
+
+def test_the_pelvis_angles_are_those_of_plug_in_gait(tmp_path):
+    """Plug-in Gait's own come from four markers, memo's from the hips, the right knee and the flexions."""
+    motion = read_motion(shared_motion("mocap", "formats", "PiG__PiG_Motion-FlatFoot-Hole.c3d"))
+    write_motion(tmp_path / "pig.mot", motion)
+    table = by_pandas(tmp_path / "pig.mot", 7)
+    rows = np.searchsorted(motion.times_s, table["time"] - 1e-6)
+    assert len(rows) > 300
+    for name, axis in (("pelvis_tilt", "x"), ("pelvis_list", "y"), ("pelvis_rotation", "z")):
+        off_deg = table[name] - motion.angles[f"RPelvisAngles_{axis}"][rows]
+        # The walk goes along -X, and angles of Plug-in Gait are against the direction of the walk.
+        assert np.abs(off_deg + 180 * (axis == "z")).max() < 0.01, name
+    assert np.allclose(table["hip_adduction_l"], motion.angles["LHipAngles_y"][rows], atol=1e-6)
+
+
+def test_knees_with_the_sign_of_gait2392_are_turned(tmp_path):
+    path = tmp_path / "gait2392.mot"
+    rows = "".join(f"{k}\t{-60 * k}\t{3 - k}\n" for k in range(3))
+    path.write_text(
+        "x\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee_angle_r\tknee_angle_l\n" + rows
+    )
+    motion = read_motion(path)
+    assert motion.angles["right_knee"].tolist() == [0, 60, 120]
+    assert motion.angles["left_knee"].tolist() == [3, 2, 1]
+    assert motion.notes == ("Knees bend towards negative angles, as in gait2392: their sign was turned.",)
 
 
 @pytest.mark.parametrize("up", ["z", "y"])
