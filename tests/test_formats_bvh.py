@@ -233,3 +233,52 @@ def test_deep_and_wide_skeletons_do_no_harm(tmp_path):
     path.write_text(head + "JOINT j { OFFSET 0 0 0 }\n" * 20_000)
     with pytest.raises(FormatError, match="more than 10000 joints"):
         read_motion(path)
+
+
+MOVING = """HIERARCHY
+ROOT Hips
+{
+	OFFSET 0 0 0
+	CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+	JOINT LeftUpLeg
+	{
+		OFFSET 10 0 0
+		CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+		JOINT LeftLeg
+		{
+			OFFSET 0 -40 0
+			CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+			JOINT LeftFoot
+			{
+				OFFSET 0 -40 0
+				CHANNELS 3 Zrotation Xrotation Yrotation
+				End Site
+				{
+					OFFSET 0 -5 0
+				}
+			}
+		}
+	}
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+"""
+
+
+def test_positions_below_the_root_stand_in_the_place_of_the_offset(tmp_path):
+    """The places are those of Blender 5.0.1 and bvhio 1.5.4."""
+    path = tmp_path / "moving.bvh"
+    path.write_text(
+        MOVING
+        + "0 90 0 0 0 0 10 0 0 0 0 0 0 -40 0 0 0 0 0 0 0\n0 90 0 0 0 0 10 1 0 0 0 0 0 -41 0 0 0 0 0 0 0\n"
+    )
+    motion = read_motion(path)
+    wanted = [[0, 90], [10, 91], [10, 50], [10, 10], [10, 5]]
+    assert motion.points[1][:, [0, 2]] == pytest.approx(np.array(wanted) / 100)
+    assert motion.notes[-1].startswith("2 joints below the root have positions, the first LeftUpLeg: they")
+    # Programs that add write what is left of the offset, nearly nothing.
+    path.write_text(
+        MOVING + "0 90 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n0 90 0 0 0 0 0 1 0 0 0 0 0 -1 0 0 0 0 0 0 0\n"
+    )
+    assert read_motion(path).points[1][:, [0, 2]] == pytest.approx(np.array(wanted) / 100)
