@@ -59,9 +59,9 @@ def write_parquet(
 
 
 def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
-    """Reads any flat table: whole numbers as int64 (float64 where some are null), texts as objects.
+    """Reads any flat table: whole numbers as int64 (float64 where some are null), texts and dates as objects.
 
-    Null becomes NaN, and an empty text among texts.
+    Decimals, as DuckDB makes of `0.04 * frame`, become float64, and null NaN, or an empty text among texts.
     """
     path = Path(path)
     pa, pq = _arrow()
@@ -144,7 +144,10 @@ def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
         checks = (
             types.is_integer,
             types.is_floating,
+            types.is_decimal,
+            types.is_null,
             types.is_boolean,
+            types.is_temporal,
             types.is_string,
             types.is_large_string,
         )
@@ -157,10 +160,13 @@ def _values(pa: ModuleType, column: Any) -> npt.NDArray[Any]:
     if pa.types.is_dictionary(kind):
         column = column.cast(kind.value_type)
         kind = kind.value_type
-    if pa.types.is_floating(kind) or (pa.types.is_integer(kind) and column.null_count):
+    as_floats = (pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
+    if any(is_kind(kind) for is_kind in as_floats) or (pa.types.is_integer(kind) and column.null_count):
         return np.asarray(column.cast(pa.float64()).to_numpy(), np.float64)
     if pa.types.is_integer(kind):
         return np.asarray(column.cast(pa.int64()).to_numpy())
     if pa.types.is_boolean(kind) and not column.null_count:
         return np.asarray(column.to_numpy())
+    if pa.types.is_temporal(kind):
+        column = column.cast(pa.string())
     return np.array(["" if value is None else value for value in column.to_pylist()], dtype=object)
