@@ -180,7 +180,7 @@ def test_hand_written_grammar_and_rotation_order(tmp_path):
     path.write_text(FILE)
     motion = read_motion(path)
     assert motion.names == ("Hips", "Left_Leg", "Left_Leg_end")
-    assert motion.notes[1] == "The file names no unit, and has no legs to measure: centimetres were assumed."
+    assert motion.notes[1] == "The file names no unit, and has no legs to measure: cm was assumed."
     assert motion.points[0] == pytest.approx(np.array([[0, 0, 1], [0, 0, 0.6], [0, 0, 0.2]]))
     # A quarter turn about Z brings -Y to +X; one about X before it brings -Y to -Z, which Z leaves.
     wanted = np.array([[0, 0, 1], [0.4, 0, 1], [0.4, 0.4, 1]])

@@ -346,3 +346,46 @@ def test_a_table_is_read_by_the_oldest_parser_there_is(tmp_path):
     text = (tmp_path / "walk.csv").read_text()
     table = np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
     assert np.allclose(table["left_ankle_z_m"], walk().points[:, -1, 2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "unit_m", "prefix"), [("mm", 0.001, "body_"), ("cm", 0.01, ""), ("m", 1, "")]
+)
+def test_tables_without_a_unit_are_read_in_the_one_that_fits(tmp_path, unit, unit_m, prefix):
+    """FreeMoCap's and anipose's tables: NAME_x without a unit, no times."""
+    motion, path = walk(), tmp_path / "body_3d_xyz.csv"
+    columns = {
+        f"{prefix}{name}_{axis}": motion.points[:, k, i] / unit_m
+        for k, name in enumerate(JOINTS)
+        for i, axis in enumerate("xyz")
+    }
+    pd.DataFrame(columns).to_csv(path, index=False)
+    with pytest.raises(FormatError, match="no column time_s and no frame rate in a comment: give --fps"):
+        read_motion(path)
+    read = read_motion(path, rate_hz=50)
+    assert np.allclose(read.points, motion.points, equal_nan=True)
+    assert read.notes == (
+        "The file does not say which axis is up: Z was assumed, as memo's tables have.",
+        f"The file names no unit: {unit} was taken, which makes the legs 0.87 m long.",
+    )
+    found = read_motion(path, rate_hz=50, unit_m=2 * unit_m, up="z")
+    assert np.allclose(found.points, 2 * motion.points, equal_nan=True) and found.notes == ()
+    path.write_text("# metres, Z up, 50 Hz\n" + path.read_text())
+    assert np.allclose(read_motion(path).points, motion.points / unit_m, equal_nan=True)
+    hand = [column for column in columns if "hip" not in column]
+    pd.DataFrame(columns)[hand].to_csv(path, index=False)
+    read = read_motion(path, rate_hz=50)
+    assert read.notes[1] == "The file names no unit, and has no legs to measure: m was assumed."
+
+
+def test_units_that_fit_nobody_or_are_named_twice_are_refused(tmp_path):
+    motion, path = walk(gaps=False), tmp_path / "walk.csv"
+    write_motion(path, motion)
+    with pytest.raises(FormatError, match="the columns name their unit: leave out a unit"):
+        read_motion(path, unit_m=0.001)
+    table = pd.read_csv(path)
+    table.columns = [name.removesuffix("_m") for name in table.columns]
+    table.loc[:, [name for name in table if name[-2:] in ("_x", "_y", "_z")]] *= 20
+    table.to_csv(path, index=False)
+    with pytest.raises(FormatError, match=r"legs of 17.4 fit none: give --unit"):
+        read_motion(path)

@@ -40,7 +40,7 @@ import numpy.typing as npt
 from memo.files import complete_file
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
-from memo.formats.reading import Given
+from memo.formats.reading import METRIC_M, Given, unit_of_legs
 from memo.formats.text import number, numbers, read_lines, whole_number
 
 __all__ = ["read_bvh", "write_bvh"]
@@ -49,8 +49,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST_NODES = 10_000
 _CMU_UNIT_M = 0.0254 / 0.45
-_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "CMU's unit of 0.05644 m": _CMU_UNIT_M}
-_LEG_M = (0.45, 1.3)  # thigh and shank, from children to giants
+_UNITS_M = METRIC_M | {"CMU's unit of 0.05644 m": _CMU_UNIT_M}
 _CHANNELS = {f"{axis}{kind}": (kind, k) for kind in ("position", "rotation") for k, axis in enumerate("XYZ")}
 
 
@@ -298,21 +297,8 @@ def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]
         for side in ("right", "left")
         if {f"{side}_knee", f"{side}_ankle"} <= found.keys()
     ]
-    fitting = [
-        unit for unit, unit_m in _UNITS_M.items() if legs and _LEG_M[0] <= legs[0] * unit_m <= _LEG_M[1]
-    ]
-    if fitting:
-        unit, unit_m = fitting[0], _UNITS_M[fitting[0]]
-        length = f"{legs[0] * unit_m:.2f} m"
-        notes.append(f"The file names no unit: {unit} was taken, which makes the legs {length} long.")
-    elif legs:
-        raise FormatError(
-            f"no unit is named, and legs of {legs[0]:g} fit none: give --unit, the metres in one unit"
-        )
-    else:
-        unit_m = 0.01
-        notes.append("The file names no unit, and has no legs to measure: centimetres were assumed.")
-    return up, unit_m, notes
+    unit_m, note = unit_of_legs(legs[0] if legs else None, _UNITS_M, "cm")
+    return up, unit_m, [*notes, note]
 
 
 # Writing.

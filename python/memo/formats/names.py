@@ -109,8 +109,8 @@ def listed(names: Sequence[str], most: int = 40) -> str:
 
 
 def _letters(name: str) -> str:
-    """A name without the name of its subject ("Anna:RKNE"), in small letters and digits."""
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
+    """A name without that of its subject ("Anna:RKNE") or FreeMoCap's `body_`, in small letters and digits."""
+    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower().removeprefix("body_"))
 
 
 def _those(spelled: Sequence[str], plain: dict[str, int]) -> list[str]:

@@ -83,7 +83,7 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
 
 def read_parquet_motion(path: Path, given: Given) -> Motion:
     """The points and angles of a table, as `memo.formats.table` reads them; its up axis is in `about`."""
-    given.check_used("rate_hz")
+    given.check_used("rate_hz", "unit_m")
     try:
         columns = read_parquet(path)
     except FormatError as error:
@@ -92,8 +92,9 @@ def read_parquet_motion(path: Path, given: Given) -> Motion:
     if not known:
         raise FormatError("no column of numbers in it")
     numbers = np.column_stack([columns[name].astype(np.float64) for name in known])
-    up = _about(path).get("up", "z")
-    table = NumberTable(path, {name: index for index, name in enumerate(known)}, numbers, [f"# {up} up"])
+    up = _about(path).get("up")
+    comments = [] if up is None else [f"# {up} up"]
+    table = NumberTable(path, {name: index for index, name in enumerate(known)}, numbers, comments)
     try:
         return motion_of_table(table, given)
     except ValueError as error:
