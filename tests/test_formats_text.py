@@ -178,9 +178,7 @@ def test_the_trc_of_pose2sim_is_read_as_pandas_reads_it():
     assert np.array_equal(motion.points, np.stack([x, -z, y], axis=-1))
     assert np.array_equal(motion.times_s, table[:, 1])
     assert motion.names[:3] == ("RHip", "RKnee", "RAnkle") and motion.names[-1] == "LWrist"
-    assert motion.notes == (
-        "The file does not say which axis is up: Y was assumed, as OpenSim's files have.",
-    )
+    assert motion.notes == ("The file does not say which axis is up: Y was taken, as the figure stands.",)
     assert motion.at_constant_rate()[0] == 60
     assert np.array_equal(read_motion(path, up="z").points, np.stack([x, y, z], axis=-1))
 
@@ -365,7 +363,7 @@ def test_tables_without_a_unit_are_read_in_the_one_that_fits(tmp_path, unit, uni
     read = read_motion(path, rate_hz=50)
     assert np.allclose(read.points, motion.points, equal_nan=True)
     assert read.notes == (
-        "The file does not say which axis is up: Z was assumed, as memo's tables have.",
+        "The file does not say which axis is up: Z was taken, as the figure stands.",
         f"The file names no unit: {unit} was taken, which makes the legs 0.87 m long.",
     )
     found = read_motion(path, rate_hz=50, unit_m=2 * unit_m, up="z")
@@ -389,3 +387,18 @@ def test_units_that_fit_nobody_or_are_named_twice_are_refused(tmp_path):
     table.to_csv(path, index=False)
     with pytest.raises(FormatError, match=r"legs of 17.4 fit none: give --unit"):
         read_motion(path)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_the_up_axis_of_a_trc_that_does_not_say_it_is_the_one_along_which_the_figure_stands(tmp_path, up):
+    motion, path = walk(), tmp_path / "walk.trc"
+    write_motion(path, motion, up)
+    path.write_text(path.read_text().replace(f"\tup={up.upper()}\n", "\n", 1))
+    read = read_motion(path)
+    said = f"The file does not say which axis is up: {up.upper()} was taken, as the figure stands."
+    assert read.notes == (said,) and read.metadata["up"] == up
+    assert np.allclose(read.points, motion.points, atol=1e-6, equal_nan=True)
+    lying = Motion(JOINTS, motion.times_s, motion.points[..., [2, 0, 1]])
+    write_motion(path, lying, "y")
+    path.write_text(path.read_text().replace("\tup=Y\n", "\n", 1))
+    assert "Y was assumed, as OpenSim's files have" in read_motion(path).notes[0]

@@ -59,8 +59,13 @@ def unit_of_legs(leg: float | None, units_m: Mapping[str, float], usual: str) ->
     raise FormatError(f"no unit is named, and legs of {leg:g} fit none: give --unit, the metres in one unit")
 
 
-def chosen_up(given: Given, said: str | None, usual: Up, because: str) -> tuple[Up, tuple[str, ...]]:
-    """The up axis: as given, else as the file says, else the usual one, which is told."""
+def chosen_up(
+    given: Given, said: str | None, usual: Up, because: str, stands: Up | None = None
+) -> tuple[Up, tuple[str, ...]]:
+    """The up axis: as given, else as the file says, else as the figure stands, else the usual one.
+
+    The last two are told.
+    """
     if given.up is not None:
         return given.up, ()
     if said is not None:
@@ -68,5 +73,7 @@ def chosen_up(given: Given, said: str | None, usual: Up, because: str) -> tuple[
         if up is None:
             raise FormatError(f"the up axis is {said!r}, wanted Y or Z: give --from-up")
         return up, ()
-    sentence = f"The file does not say which axis is up: {usual.upper()} was assumed, as {because}."
-    return usual, (sentence,)
+    silent = "The file does not say which axis is up:"
+    if stands is not None:
+        return stands, (f"{silent} {stands.upper()} was taken, as the figure stands.",)
+    return usual, (f"{silent} {usual.upper()} was assumed, as {because}.",)

@@ -5,7 +5,8 @@ caller. Z is up, as in all tables of memo, unless a comment before the header sa
 a comment is written, with Z up none, so that any program reads the file. Empty cells are missing.
 
 Tables of others (FreeMoCap, anipose) name their columns `<joint>_x`, without a unit: it is the one that
-gives the legs a human length, metres where there are none. It is told, and so is that Z was taken to be up.
+gives the legs a human length, metres where there are none. Up is the axis along which the figure stands,
+else Z. Both are told.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy.typing as npt
 
 from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
-from memo.formats.names import joints_found
+from memo.formats.names import joints_found, standing_up
 from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
 from memo.formats.text import MAX_TEXT_BYTES
 from memo.linkage import NumberTable, read_number_table
@@ -48,10 +49,11 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
     names, points = table.points(3)
     comments = "\n".join(table.comments)
     said = re.search(r"\b([yz])[ -]up\b", comments, re.IGNORECASE)
-    up, notes = chosen_up(given, said.group(1) if said else None, "z", "memo's tables have")
+    names_unit = f"{names[0]}_x_m" in table.column
+    stated = said.group(1) if said else "z" if names_unit else None
+    up, notes = chosen_up(given, stated, "z", "memo's tables have", standing_up(names, points))
     unit_m = 1.0
-    if f"{names[0]}_x_m" in table.column:
-        notes = ()
+    if names_unit:
         if given.unit_m is not None:
             raise FormatError("the columns name their unit: leave out a unit (--unit)")
     elif given.unit_m is not None:
