@@ -5,8 +5,8 @@ frame: number, time, X Y Z of every marker. Missing is written as `NaN`, which O
 split at white space read; empty cells are read too.
 
 The format has no field for the up axis. OpenSim's convention is Y up, which is the default in writing. In
-reading it is the axis along which the figure stands, where its joints are known by name, else Y. Files written here say `up=Y` in a fifth cell of the first row, which other
-readers skip.
+reading it is the axis along which the figure stands, where its joints are known by name, else Y. Files
+written here say `up=Y` in a fifth cell of the first row, which other readers skip.
 
 Units are those of the field `Units` (m, cm, mm). The rate must agree with the column of times.
 """
