@@ -1,5 +1,9 @@
 """BVH: what memo writes, read by pybvh; a real file, read by both; grammar and damage."""
 
+import subprocess
+import sys
+from importlib.util import find_spec
+
 import numpy as np
 import pybvh
 import pytest
@@ -233,6 +237,35 @@ def test_deep_and_wide_skeletons_do_no_harm(tmp_path):
     path.write_text(head + "JOINT j { OFFSET 0 0 0 }\n" * 20_000)
     with pytest.raises(FormatError, match="more than 10000 joints"):
         read_motion(path)
+
+
+IN_BLENDER = """
+import sys, bpy, addon_utils, numpy
+path, out, up = sys.argv[1:]
+addon_utils.enable("io_anim_bvh")
+axes = {"axis_forward": "-Z", "axis_up": "Y"} if up == "y" else {"axis_forward": "Y", "axis_up": "Z"}
+bpy.ops.import_anim.bvh(filepath=path, global_scale=0.01, update_scene_fps=True, **axes)
+figure, scene = bpy.context.object, bpy.context.scene
+names = [bone.name for bone in figure.pose.bones]
+places = []
+for frame in range(1, int(bpy.data.actions[0].frame_range[1]) + 1):
+    scene.frame_set(frame)
+    places.append([figure.matrix_world @ bone.head for bone in figure.pose.bones])
+numpy.savez(out, names=names, places=places, fps=scene.render.fps / scene.render.fps_base)
+"""
+
+
+@pytest.mark.skipif(find_spec("bpy") is None, reason="Blender is not there (pip install bpy)")
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_blender_places_every_joint_where_it_was(tmp_path, up):
+    motion, path, out = walk(frames=30, gaps=False), tmp_path / "walk.bvh", tmp_path / "blender.npz"
+    write_motion(path, motion, up)
+    subprocess.run([sys.executable, "-c", IN_BLENDER, str(path), str(out), up], check=True)
+    found = np.load(out)
+    assert found["fps"] == pytest.approx(50) and len(found["places"]) == 30
+    for k, joint in enumerate(JOINTS):
+        place = found["places"][:, [*found["names"]].index(BONES[joint])]
+        assert np.abs(place - motion.points[:, k]).max() < 1e-5, joint
 
 
 MOVING = """HIERARCHY
