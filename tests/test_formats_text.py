@@ -142,6 +142,26 @@ def test_the_pelvis_angles_are_those_of_plug_in_gait(tmp_path):
     assert np.allclose(table["hip_adduction_l"], motion.angles["LHipAngles_y"][rows], atol=1e-6)
 
 
+def test_the_states_file_of_a_simulation_is_read(tmp_path):
+    path = tmp_path / "states.sto"
+    labels = ["time", *(f"/jointset/ground_pelvis/pelvis_t{axis}/value" for axis in "xyz")]
+    labels += [
+        "/jointset/hip_r/hip_flexion_r/value",
+        "/jointset/hip_r/hip_flexion_r/speed",
+        "/forceset/soleus_r/x",
+    ]
+    row = "0 1 2 3 0.5 7 8".replace(" ", "\t")
+    path.write_text("x\ninDegrees=no\nnColumns=7\nnRows=1\nendheader\n" + "\t".join(labels) + f"\n{row}\n")
+    motion = read_motion(path)
+    assert motion.names == ("pelvis",) and motion.points[0, 0].tolist() == [1, -3, 2]
+    assert {name: values.tolist() for name, values in motion.angles.items()} == {
+        "right_hip": [pytest.approx(np.rad2deg(0.5))]
+    }
+    assert (
+        motion.notes[-1] == "Left out, no angles: 2 columns, the first /jointset/hip_r/hip_flexion_r/speed."
+    )
+
+
 def test_knees_with_the_sign_of_gait2392_are_turned(tmp_path):
     path = tmp_path / "gait2392.mot"
     rows = "".join(f"{k}\t{-60 * k}\t{3 - k}\n" for k in range(3))

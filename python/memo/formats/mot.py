@@ -18,8 +18,9 @@ Its Z is the line from the left hip to the right one, and it is tilted such that
 the unscaled model of Rajagopal 2016. Instants at which a value is missing are left out, since OpenSim stops
 reading there.
 
-In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point, and columns of forces, moments and the
-like are left out. All other columns are taken to be angles, as the format does not say. A knee that bends
+In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
+left out, and those of a states file that are no value of a coordinate; `/jointset/hip_r/hip_flexion_r/value`
+is `hip_flexion_r`. All other columns are taken to be angles, as the format does not say. A knee that bends
 further backwards than knees do has the sign of gait2392, and is turned. Tables of vectors
 (`DataType=Vec3`) are not read.
 """
@@ -66,7 +67,7 @@ _PLUG_IN_GAIT = {
 """OpenSim's coordinate for angles of a C3D file that mean the same, with the same sign."""
 
 _OURS = {name: joint for joint, name in OPENSIM.items()}
-_NO_ANGLES = ("force", "moment", "torque", "ground_", "activation", "power", "emg")
+_NO_ANGLES = ("/", "force", "moment", "torque", "ground_", "activation", "power", "emg")
 _MOST_HEADER_LINES = 1000
 _BACKWARDS_DEG = 30.0  # further than any knee
 
@@ -83,7 +84,7 @@ def read_mot(path: Path, given: Given) -> Motion:
     labels = lines[start].split() if start < len(lines) else []
     if not labels or labels[0].lower() != "time":
         raise FormatError(f"line {start + 1}: wanted a row of labels that begins with time")
-    labels[0] = "time"
+    labels = ["time", *map(_coordinate, labels[1:])]
     if len(set(labels)) < len(labels):
         repeated = next(name for k, name in enumerate(labels) if name in labels[:k])
         raise FormatError(f"line {start + 1}: column {repeated} occurs twice")
@@ -182,6 +183,12 @@ def _header(lines: list[str]) -> tuple[dict[str, str], int]:
             key, _, value = text.partition(" ")
         header.setdefault(key.strip().lower(), value.strip().lower())
     raise FormatError(f"no line endheader among the first {min(len(lines), _MOST_HEADER_LINES)}")
+
+
+def _coordinate(label: str) -> str:
+    """The coordinate whose value a column of an OpenSim states file holds; other labels as they are."""
+    parts = label.split("/")
+    return parts[-2] if label.startswith("/jointset/") and parts[-1] == "value" else label
 
 
 def _check_count(header: dict[str, str], keys: tuple[str, str], count: int, what: str) -> None:
