@@ -123,9 +123,11 @@ def test_the_legs_hang_from_the_pelvis_of_a_mot_as_they_do_in_the_motion(tmp_pat
     notes = write_motion(path, motion, "z")
     assert "OpenSim's pelvis angles are those of a world with Y up: left out." in notes
     assert "pelvis_tilt" not in by_pandas(path, 7)
-    no_hip = Motion(JOINTS, motion.times_s, motion.points, angles={"left_knee": motion.angles["left_knee"]})
-    assert "place needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
-    assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
+    knee_alone = {"left_knee": motion.angles["left_knee"]}
+    for angles in (knee_alone, knee_alone | {"right_hip": np.full(20, np.nan)}):
+        no_hip = Motion(JOINTS, motion.times_s, motion.points, angles=angles)
+        assert "place needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
+        assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
 
 
 def test_the_pelvis_angles_are_those_of_plug_in_gait(tmp_path):

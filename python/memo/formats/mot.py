@@ -239,6 +239,15 @@ def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     sides = [side for side in ("right", "left") if f"{side}_knee" in found and f"{side}_hip" in motion.angles]
     if not (sides and all(hip in found for hip in hips)):
         return {}, motion.points[:, found["pelvis"]] if "pelvis" in found else None
+    with np.errstate(over="ignore", invalid="ignore"):
+        angles, origin = _pelvis_of_legs(motion, found, sides)
+    return (angles, origin) if np.isfinite(origin).any() else ({}, None)
+
+
+def _pelvis_of_legs(
+    motion: Motion, found: dict[str, int], sides: list[str]
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The angles and the origin of the pelvis from which the thighs of the sides hang as they do."""
     points = {name: from_z_up(motion.points[:, k], "y") for name, k in found.items()}
     right = _unit(points["right_hip"] - points["left_hip"])
     ups = []
