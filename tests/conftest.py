@@ -17,7 +17,7 @@ SHARED_DATA = Path(
     os.environ.get("MEMO_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"
 )
 
-# The same cases every time, as for the property tests in Rust; `pytest --hypothesis-profile=default` draws others.
+# The same cases every time, as for the property tests in Rust; others: `pytest --hypothesis-profile=default`.
 settings.register_profile("repeatable", derandomize=True, database=None)
 settings.load_profile("repeatable")
 

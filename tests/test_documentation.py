@@ -36,7 +36,7 @@ NOT_RUN = {
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 5,
 }
-BLOCKS_RUN = 17
+BLOCKS_RUN = 18
 
 _FENCE = re.compile(
     r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL

@@ -1,5 +1,9 @@
 """BVH: what memo writes, read by pybvh; a real file, read by both; grammar and damage."""
 
+import subprocess
+import sys
+from importlib.util import find_spec
+
 import numpy as np
 import pybvh
 import pytest
@@ -180,7 +184,7 @@ def test_hand_written_grammar_and_rotation_order(tmp_path):
     path.write_text(FILE)
     motion = read_motion(path)
     assert motion.names == ("Hips", "Left_Leg", "Left_Leg_end")
-    assert motion.notes[1] == "The file names no unit, and has no legs to measure: centimetres were assumed."
+    assert motion.notes[1] == "The file names no unit, and has no legs to measure: cm was assumed."
     assert motion.points[0] == pytest.approx(np.array([[0, 0, 1], [0, 0, 0.6], [0, 0, 0.2]]))
     # A quarter turn about Z brings -Y to +X; one about X before it brings -Y to -Z, which Z leaves.
     wanted = np.array([[0, 0, 1], [0.4, 0, 1], [0.4, 0.4, 1]])
@@ -233,3 +237,81 @@ def test_deep_and_wide_skeletons_do_no_harm(tmp_path):
     path.write_text(head + "JOINT j { OFFSET 0 0 0 }\n" * 20_000)
     with pytest.raises(FormatError, match="more than 10000 joints"):
         read_motion(path)
+
+
+IN_BLENDER = """
+import sys, bpy, addon_utils, numpy
+path, out, up = sys.argv[1:]
+addon_utils.enable("io_anim_bvh")
+axes = {"axis_forward": "-Z", "axis_up": "Y"} if up == "y" else {"axis_forward": "Y", "axis_up": "Z"}
+bpy.ops.import_anim.bvh(filepath=path, global_scale=0.01, update_scene_fps=True, **axes)
+figure, scene = bpy.context.object, bpy.context.scene
+names = [bone.name for bone in figure.pose.bones]
+places = []
+for frame in range(1, int(bpy.data.actions[0].frame_range[1]) + 1):
+    scene.frame_set(frame)
+    places.append([figure.matrix_world @ bone.head for bone in figure.pose.bones])
+numpy.savez(out, names=names, places=places, fps=scene.render.fps / scene.render.fps_base)
+"""
+
+
+@pytest.mark.skipif(find_spec("bpy") is None, reason="Blender is not there (pip install bpy)")
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_blender_places_every_joint_where_it_was(tmp_path, up):
+    motion, path, out = walk(frames=30, gaps=False), tmp_path / "walk.bvh", tmp_path / "blender.npz"
+    write_motion(path, motion, up)
+    subprocess.run([sys.executable, "-c", IN_BLENDER, str(path), str(out), up], check=True)
+    found = np.load(out)
+    assert found["fps"] == pytest.approx(50) and len(found["places"]) == 30
+    for k, joint in enumerate(JOINTS):
+        place = found["places"][:, [*found["names"]].index(BONES[joint])]
+        assert np.abs(place - motion.points[:, k]).max() < 1e-5, joint
+
+
+MOVING = """HIERARCHY
+ROOT Hips
+{
+	OFFSET 0 0 0
+	CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+	JOINT LeftUpLeg
+	{
+		OFFSET 10 0 0
+		CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+		JOINT LeftLeg
+		{
+			OFFSET 0 -40 0
+			CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+			JOINT LeftFoot
+			{
+				OFFSET 0 -40 0
+				CHANNELS 3 Zrotation Xrotation Yrotation
+				End Site
+				{
+					OFFSET 0 -5 0
+				}
+			}
+		}
+	}
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+"""
+
+
+def test_positions_below_the_root_stand_in_the_place_of_the_offset(tmp_path):
+    """The places are those of Blender 5.0.1 and bvhio 1.5.4."""
+    path = tmp_path / "moving.bvh"
+    path.write_text(
+        MOVING
+        + "0 90 0 0 0 0 10 0 0 0 0 0 0 -40 0 0 0 0 0 0 0\n0 90 0 0 0 0 10 1 0 0 0 0 0 -41 0 0 0 0 0 0 0\n"
+    )
+    motion = read_motion(path)
+    wanted = [[0, 90], [10, 91], [10, 50], [10, 10], [10, 5]]
+    assert motion.points[1][:, [0, 2]] == pytest.approx(np.array(wanted) / 100)
+    assert motion.notes[-1].startswith("2 joints below the root have positions, the first LeftUpLeg: they")
+    # Programs that add write what is left of the offset, nearly nothing.
+    path.write_text(
+        MOVING + "0 90 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n0 90 0 0 0 0 0 1 0 0 0 0 0 -1 0 0 0 0 0 0 0\n"
+    )
+    assert read_motion(path).points[1][:, [0, 2]] == pytest.approx(np.array(wanted) / 100)

@@ -249,3 +249,14 @@ def test_labels_that_fit_no_file_are_refused(tmp_path):
         with pytest.raises(FormatError, match=says):
             write_motion(tmp_path / "x.c3d", motion)
     assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_without_y_screen_up_is_the_axis_along_which_the_figure_stands(tmp_path, up):
+    motion, path = walk(), tmp_path / "walk.c3d"
+    write_motion(path, motion, up)
+    path.write_bytes(path.read_bytes().replace(b"Y_SCREEN", b"Q_SCREEN"))
+    read = read_motion(path)
+    said = f"The file does not say which axis is up: {up.upper()} was taken, as the figure stands."
+    assert read.notes == (said,)
+    assert np.allclose(read.points, motion.points, atol=1e-6, equal_nan=True)

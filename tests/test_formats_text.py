@@ -74,22 +74,106 @@ def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
             "A MOT or STO file has no place for points but the pelvis: left out.",
         ]
         lines = (tmp_path / name).read_text().split("\n")
-        assert lines[1:7] == ["version=1", "nRows=19", "nColumns=7", "inDegrees=yes", "up=Y", "endheader"]
+        assert lines[1:7] == ["version=1", "nRows=19", "nColumns=10", "inDegrees=yes", "up=Y", "endheader"]
         table = by_pandas(tmp_path / name, 7)
         assert [*table] == [
-            *("time", "pelvis_tx", "pelvis_ty", "pelvis_tz"),
+            *("time", "pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz"),
             *("hip_flexion_r", "knee_angle_r", "knee_angle_l"),
         ]
         known = np.isfinite(motion.angles["left_knee"])
         assert np.allclose(table["time"], motion.times_s[known], atol=1e-7)
         assert np.allclose(table["knee_angle_l"], motion.angles["left_knee"][known], atol=1e-7)
-        hips = [JOINTS.index("right_hip"), JOINTS.index("left_hip")]
-        middle = motion.points[known][:, hips].mean(axis=1)
-        assert np.allclose(table["pelvis_ty"], middle[:, 2], atol=1e-7)
-        assert np.allclose(table["pelvis_tz"], -middle[:, 1], atol=1e-7)
         read = read_motion(tmp_path / name)
-        assert read.names == ("pelvis",) and [*read.angles] == [*ANGLES] and read.notes == ()
-        assert np.allclose(read.points[:, 0], middle, atol=1e-7)
+        assert read.names == ("pelvis",) and read.notes == ()
+        assert [*read.angles] == ["pelvis_tilt", "pelvis_list", "pelvis_rotation", *ANGLES]
+        assert read.points[:, 0] == pytest.approx(table[["pelvis_tx", "pelvis_tz", "pelvis_ty"]] * [1, -1, 1])
+        again = tmp_path / "again.mot"
+        write_motion(again, read)
+        assert np.allclose(by_pandas(again, 7)[[*table]], table, atol=1e-6)
+
+
+def about(axis, angle_deg):
+    """(3, 3) rotation about x, y or z."""
+    c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    turn = np.eye(3)
+    turn[[i, j], [i, j]], turn[j, i], turn[i, j] = c, s, -s
+    return turn
+
+
+def test_the_legs_hang_from_the_pelvis_of_a_mot_as_they_do_in_the_motion(tmp_path):
+    motion, path = walk(gaps=False), tmp_path / "walk.mot"
+    write_motion(path, motion)
+    hip, knee, other = (
+        motion.points[:, JOINTS.index(f"{j}")] for j in ("right_hip", "right_knee", "left_hip")
+    )
+    y_up = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for frame, row in by_pandas(path, 7).iterrows():
+        pelvis = about("z", row.pelvis_tilt) @ about("x", row.pelvis_list) @ about("y", row.pelvis_rotation)
+        right = (hip - other)[frame] @ y_up
+        assert np.allclose(pelvis[:, 2], right / np.linalg.norm(right), atol=1e-7)
+        # OpenSim's hip: flexion about Z, then adduction about X; the figure's thighs are not adducted.
+        thigh = (knee - hip)[frame] @ y_up
+        bent = pelvis @ about("z", row.hip_flexion_r) @ [0, -1, 0]
+        assert np.allclose(bent, thigh / np.linalg.norm(thigh), atol=1e-7)
+        # The hips of Rajagopal's model.
+        place = [row.pelvis_tx, row.pelvis_ty, row.pelvis_tz]
+        between = (hip + other)[frame] / 2 @ y_up
+        assert np.allclose(pelvis.T @ (between - place), [-0.056276, -0.07849, 0], atol=1e-6)
+    notes = write_motion(path, motion, "z")
+    assert "OpenSim's pelvis angles are those of a world with Y up: left out." in notes
+    assert "pelvis_tilt" not in by_pandas(path, 7)
+    knee_alone = {"left_knee": motion.angles["left_knee"]}
+    for angles in (knee_alone, knee_alone | {"right_hip": np.full(20, np.nan)}):
+        no_hip = Motion(JOINTS, motion.times_s, motion.points, angles=angles)
+        assert "place needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
+        assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
+
+
+def test_the_pelvis_angles_are_those_of_plug_in_gait(tmp_path):
+    """Plug-in Gait's own come from four markers, memo's from the hips, the right knee and the flexions."""
+    motion = read_motion(shared_motion("mocap", "formats", "PiG__PiG_Motion-FlatFoot-Hole.c3d"))
+    write_motion(tmp_path / "pig.mot", motion)
+    table = by_pandas(tmp_path / "pig.mot", 7)
+    rows = np.searchsorted(motion.times_s, table["time"] - 1e-6)
+    assert len(rows) > 300
+    for name, axis in (("pelvis_tilt", "x"), ("pelvis_list", "y"), ("pelvis_rotation", "z")):
+        off_deg = table[name] - motion.angles[f"RPelvisAngles_{axis}"][rows]
+        # The walk goes along -X, and angles of Plug-in Gait are against the direction of the walk.
+        assert np.abs(off_deg + 180 * (axis == "z")).max() < 0.01, name
+    assert np.allclose(table["hip_adduction_l"], motion.angles["LHipAngles_y"][rows], atol=1e-6)
+
+
+def test_the_states_file_of_a_simulation_is_read(tmp_path):
+    path = tmp_path / "states.sto"
+    labels = ["time", *(f"/jointset/ground_pelvis/pelvis_t{axis}/value" for axis in "xyz")]
+    labels += [
+        "/jointset/hip_r/hip_flexion_r/value",
+        "/jointset/hip_r/hip_flexion_r/speed",
+        "/forceset/soleus_r/x",
+    ]
+    row = "0 1 2 3 0.5 7 8".replace(" ", "\t")
+    path.write_text("x\ninDegrees=no\nnColumns=7\nnRows=1\nendheader\n" + "\t".join(labels) + f"\n{row}\n")
+    motion = read_motion(path)
+    assert motion.names == ("pelvis",) and motion.points[0, 0].tolist() == [1, -3, 2]
+    assert {name: values.tolist() for name, values in motion.angles.items()} == {
+        "right_hip": [pytest.approx(np.rad2deg(0.5))]
+    }
+    assert (
+        motion.notes[-1] == "Left out, no angles: 2 columns, the first /jointset/hip_r/hip_flexion_r/speed."
+    )
+
+
+def test_knees_with_the_sign_of_gait2392_are_turned(tmp_path):
+    path = tmp_path / "gait2392.mot"
+    rows = "".join(f"{k}\t{-60 * k}\t{3 - k}\n" for k in range(3))
+    path.write_text(
+        "x\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee_angle_r\tknee_angle_l\n" + rows
+    )
+    motion = read_motion(path)
+    assert motion.angles["right_knee"].tolist() == [0, 60, 120]
+    assert motion.angles["left_knee"].tolist() == [3, 2, 1]
+    assert motion.notes == ("Knees bend towards negative angles, as in gait2392: their sign was turned.",)
 
 
 @pytest.mark.parametrize("up", ["z", "y"])
@@ -116,9 +200,7 @@ def test_the_trc_of_pose2sim_is_read_as_pandas_reads_it():
     assert np.array_equal(motion.points, np.stack([x, -z, y], axis=-1))
     assert np.array_equal(motion.times_s, table[:, 1])
     assert motion.names[:3] == ("RHip", "RKnee", "RAnkle") and motion.names[-1] == "LWrist"
-    assert motion.notes == (
-        "The file does not say which axis is up: Y was assumed, as OpenSim's files have.",
-    )
+    assert motion.notes == ("The file does not say which axis is up: Y was taken, as the figure stands.",)
     assert motion.at_constant_rate()[0] == 60
     assert np.array_equal(read_motion(path, up="z").points, np.stack([x, y, z], axis=-1))
 
@@ -284,3 +366,61 @@ def test_a_table_is_read_by_the_oldest_parser_there_is(tmp_path):
     text = (tmp_path / "walk.csv").read_text()
     table = np.genfromtxt(io.StringIO(text), delimiter=",", names=True)
     assert np.allclose(table["left_ankle_z_m"], walk().points[:, -1, 2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "unit_m", "prefix"), [("mm", 0.001, "body_"), ("cm", 0.01, ""), ("m", 1, "")]
+)
+def test_tables_without_a_unit_are_read_in_the_one_that_fits(tmp_path, unit, unit_m, prefix):
+    """FreeMoCap's and anipose's tables: NAME_x without a unit, no times."""
+    motion, path = walk(), tmp_path / "body_3d_xyz.csv"
+    columns = {
+        f"{prefix}{name}_{axis}": motion.points[:, k, i] / unit_m
+        for k, name in enumerate(JOINTS)
+        for i, axis in enumerate("xyz")
+    }
+    pd.DataFrame(columns).to_csv(path, index=False)
+    with pytest.raises(FormatError, match="no column time_s and no frame rate in a comment: give --fps"):
+        read_motion(path)
+    read = read_motion(path, rate_hz=50)
+    assert np.allclose(read.points, motion.points, equal_nan=True)
+    assert read.notes == (
+        "The file does not say which axis is up: Z was taken, as the figure stands.",
+        f"The file names no unit: {unit} was taken, which makes the legs 0.87 m long.",
+    )
+    found = read_motion(path, rate_hz=50, unit_m=2 * unit_m, up="z")
+    assert np.allclose(found.points, 2 * motion.points, equal_nan=True) and found.notes == ()
+    path.write_text("# metres, Z up, 50 Hz\n" + path.read_text())
+    assert np.allclose(read_motion(path).points, motion.points / unit_m, equal_nan=True)
+    hand = [column for column in columns if "hip" not in column]
+    pd.DataFrame(columns)[hand].to_csv(path, index=False)
+    read = read_motion(path, rate_hz=50)
+    assert read.notes[1] == "The file names no unit, and has no legs to measure: m was assumed."
+
+
+def test_units_that_fit_nobody_or_are_named_twice_are_refused(tmp_path):
+    motion, path = walk(gaps=False), tmp_path / "walk.csv"
+    write_motion(path, motion)
+    with pytest.raises(FormatError, match="the columns name their unit: leave out a unit"):
+        read_motion(path, unit_m=0.001)
+    table = pd.read_csv(path)
+    table.columns = [name.removesuffix("_m") for name in table.columns]
+    table.loc[:, [name for name in table if name[-2:] in ("_x", "_y", "_z")]] *= 20
+    table.to_csv(path, index=False)
+    with pytest.raises(FormatError, match=r"legs of 17.4 fit none: give --unit"):
+        read_motion(path)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_the_up_axis_of_a_trc_that_does_not_say_it_is_the_one_along_which_the_figure_stands(tmp_path, up):
+    motion, path = walk(), tmp_path / "walk.trc"
+    write_motion(path, motion, up)
+    path.write_text(path.read_text().replace(f"\tup={up.upper()}\n", "\n", 1))
+    read = read_motion(path)
+    said = f"The file does not say which axis is up: {up.upper()} was taken, as the figure stands."
+    assert read.notes == (said,) and read.metadata["up"] == up
+    assert np.allclose(read.points, motion.points, atol=1e-6, equal_nan=True)
+    lying = Motion(JOINTS, motion.times_s, motion.points[..., [2, 0, 1]])
+    write_motion(path, lying, "y")
+    path.write_text(path.read_text().replace("\tup=Y\n", "\n", 1))
+    assert "Y was assumed, as OpenSim's files have" in read_motion(path).notes[0]

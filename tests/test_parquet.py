@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from decimal import Decimal
 
 import fastparquet
 import memo
@@ -11,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from memo.files import TRACK_COLUMNS, read_columns_csv, read_track, write_columns_csv, write_track_csv
-from memo.formats import FormatError
+from memo.formats import FormatError, Motion, read_motion, write_motion
 from memo.formats.parquet import read_parquet, write_parquet
 from memo.table import column_unit
 
@@ -131,6 +132,46 @@ def test_files_of_others_are_read(tmp_path):
         assert found["a_m"].dtype == np.float64 and found["d"].dtype == np.int64
 
 
+def test_decimals_dates_and_columns_of_nulls_are_read(tmp_path):
+    table = pa.table(
+        {
+            "time_s": pa.array([Decimal(0), Decimal(4), Decimal(8)], pa.decimal128(10, 2)),
+            "head_x_m": pa.array([1.5, None, float("nan")]),
+            "head_y_m": pa.array([1.0, 1.0, 1.0], pa.float32()),
+            "head_z_m": pa.array([1, None, 2], pa.int16()),
+            "when": pa.array([0, 1, None], pa.timestamp("us")),
+            "nothing": pa.nulls(3),
+        }
+    )
+    pq.write_table(table, tmp_path / "a.parquet")
+    found = read_parquet(tmp_path / "a.parquet")
+    assert found["time_s"].dtype == np.float64 and found["time_s"].tolist() == [0, 4, 8]
+    assert np.isnan(found["nothing"]).all() and np.isnan(found["head_x_m"][1:]).all()
+    assert found["when"].tolist() == ["1970-01-01 00:00:00.000000", "1970-01-01 00:00:00.000001", ""]
+    motion = read_motion(tmp_path / "a.parquet")
+    assert motion.names == ("head",) and motion.times_s.tolist() == [0, 4, 8]
+    assert np.isnan(motion.points[1:]).all() and motion.points[0, 0].tolist() == [1.5, 1, 1]
+
+
+@pytest.mark.parametrize("reader", ["polars", "duckdb"])
+def test_other_engines_read_null_and_write_what_memo_reads(tmp_path, reader):
+    engine = pytest.importorskip(reader)
+    points = np.arange(6.0).reshape(2, 1, 3)
+    points[1] = np.nan
+    motion = Motion(("head",), np.array([0.0, 0.04]), points)
+    path, back = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    write_motion(path, motion)
+    if reader == "polars":
+        table = engine.read_parquet(path)
+        assert table["head_x_m"].null_count() == 1 and table["head_x_m"].dtype == engine.Float64
+        table.write_parquet(back)
+    else:
+        assert engine.sql(f"select count(head_x_m), avg(head_x_m) from '{path}'").fetchall() == [(1, 0.0)]
+        engine.sql(f"copy (select *, 0.04 * time_s::decimal(9, 2) as d from '{path}') to '{back}'")
+    read = read_motion(back)
+    assert np.array_equal(read.points, points, equal_nan=True) and read.times_s.tolist() == [0, 0.04]
+
+
 def test_what_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "a.parquet"
     with pytest.raises(FormatError, match="no such file"):
@@ -168,6 +209,7 @@ def test_what_cannot_be_written_is_refused_and_leaves_nothing(tmp_path):
 def test_without_pyarrow_the_extra_is_named(tmp_path):
     code = f"""
 import sys
+from decimal import Decimal
 sys.modules["pyarrow"] = None
 from memo.formats import FormatError, parquet
 try:

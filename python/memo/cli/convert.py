@@ -68,7 +68,8 @@ def add_convert(app: "typer.Typer") -> None:
         walk: Annotated[int | None, typer.Option(help="One walk of a track, from 0; all of them.")] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate of a table without times.")] = None,
         unit: Annotated[
-            str | None, typer.Option(help="Unit of a .bvh SOURCE: m, cm, mm, or metres in one unit.")
+            str | None,
+            typer.Option(help="Unit of a SOURCE that names none: m, cm, mm, or metres in one unit."),
         ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,

@@ -78,7 +78,8 @@ def read_motion(
     """Reads a motion file, or the folder of `memo track` or `memo posture`.
 
     `up`: the file's up axis, whatever it says itself. `rate_hz`: frame rate of a table without times.
-    `unit_m`: metres in one unit of a BVH file. `walk`: one walk of a track, from 0; all of them otherwise.
+    `unit_m`: metres in one unit of a BVH file, or of a table that names none. `walk`: one walk of a track,
+    from 0; all of them otherwise.
     """
     path = Path(path)
     check_up(up)

@@ -1,10 +1,10 @@
 """BVH (Biovision): a skeleton of fixed limbs and its joints' rotations over time, as text.
 
 Reading is forward kinematics: with R_j the product of a joint's rotation channels in the order they
-stand, `R_world(j) = R_world(parent) R_j` and `p(j) = p(parent) + R_world(parent) (offset_j +
-translation_j)`; the root's translation channels hold its whole position and its offset counts only where
-there are none. Points are the joints and, under `NAME_end`, the ends of the last bones where these have a
-length.
+stand, `R_world(j) = R_world(parent) R_j` and `p(j) = p(parent) + R_world(parent) offset_j`. Position
+channels stand in the place of the offset, as in Blender; below the root some programs add the two, so
+positions there that are nearer to 0 than to the offset are added to it. Points are the joints and, under
+`NAME_end`, the ends of the last bones where these have a length.
 
 The format names neither unit nor up axis. The up axis is the one along which the resting skeleton is
 tallest between feet and head; the unit is the one that gives the legs a human length: metres,
@@ -40,7 +40,7 @@ import numpy.typing as npt
 from memo.files import complete_file
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
-from memo.formats.reading import Given
+from memo.formats.reading import METRIC_M, Given, unit_of_legs
 from memo.formats.text import number, numbers, read_lines, whole_number
 
 __all__ = ["read_bvh", "write_bvh"]
@@ -49,8 +49,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST_NODES = 10_000
 _CMU_UNIT_M = 0.0254 / 0.45
-_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "CMU's unit of 0.05644 m": _CMU_UNIT_M}
-_LEG_M = (0.45, 1.3)  # thigh and shank, from children to giants
+_UNITS_M = METRIC_M | {"CMU's unit of 0.05644 m": _CMU_UNIT_M}
 _CHANNELS = {f"{axis}{kind}": (kind, k) for kind in ("position", "rotation") for k, axis in enumerate("XYZ")}
 
 
@@ -82,6 +81,12 @@ def read_bvh(path: Path, given: Given) -> Motion:
     if len(values) * len(kept) > MAX_POINTS:
         raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
     up, unit_m, notes = _conventions(nodes, given)
+    moving = [node.name for node in nodes if node.parent >= 0 and _has_place(node)]
+    if moving:
+        notes.append(
+            f"{len(moving)} joints below the root have positions, the first {moving[0]}: they stand in the"
+            " place of the offsets, but are added where they are near 0."
+        )
     with np.errstate(over="ignore", invalid="ignore"):
         points = unit_m * np.stack([*_positions(nodes, values, kept)], axis=1)
     if not np.isfinite(points).all():
@@ -229,19 +234,31 @@ def _positions(nodes: list[_Node], values: Array, kept: list[int]) -> Iterable[A
                 moved[:, axis] += column
             else:
                 turn = turn @ _about(axis, np.deg2rad(column))
+        has_place = _has_place(node)
+        offset = moved if has_place else np.broadcast_to(node.offset, moved.shape)
         if node.parent < 0:
-            has_place = any(_CHANNELS[name][0] == "position" for name in node.channels)
-            places.append(moved if has_place else moved + node.offset)
+            places.append(offset)
             turns.append(turn)
         else:
             above = turns[node.parent]
             assert above is not None
-            places.append(places[node.parent] + np.einsum("tij,tj->ti", above, moved + node.offset))
+            if has_place and _is_added(moved, node.offset):
+                offset = moved + node.offset
+            places.append(places[node.parent] + np.einsum("tij,tj->ti", above, offset))
             turns.append(above @ turn if k in last_use else None)
             if last_use[node.parent] == k:
                 turns[node.parent] = None  # no more needed
         if k in wanted:
             yield places[k]
+
+
+def _has_place(node: _Node) -> bool:
+    return any(_CHANNELS[name][0] == "position" for name in node.channels)
+
+
+def _is_added(moved: Array, offset: Array) -> bool:
+    """Whether positions (T, 3) of a joint below the root are meant besides its offset, not in its place."""
+    return bool(np.abs(moved).sum() < np.abs(moved - offset).sum())
 
 
 def _about(axis: int, angle_rad: Array) -> Array:
@@ -280,21 +297,8 @@ def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]
         for side in ("right", "left")
         if {f"{side}_knee", f"{side}_ankle"} <= found.keys()
     ]
-    fitting = [
-        unit for unit, unit_m in _UNITS_M.items() if legs and _LEG_M[0] <= legs[0] * unit_m <= _LEG_M[1]
-    ]
-    if fitting:
-        unit, unit_m = fitting[0], _UNITS_M[fitting[0]]
-        length = f"{legs[0] * unit_m:.2f} m"
-        notes.append(f"The file names no unit: {unit} was taken, which makes the legs {length} long.")
-    elif legs:
-        raise FormatError(
-            f"no unit is named, and legs of {legs[0]:g} fit none: give --unit, the metres in one unit"
-        )
-    else:
-        unit_m = 0.01
-        notes.append("The file names no unit, and has no legs to measure: centimetres were assumed.")
-    return up, unit_m, notes
+    unit_m, note = unit_of_legs(legs[0] if legs else None, _UNITS_M, "cm")
+    return up, unit_m, [*notes, note]
 
 
 # Writing.

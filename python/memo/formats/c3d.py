@@ -14,8 +14,9 @@ Conventions: the time of the first frame is (its number - 1) / rate, as Vicon co
 EVENT, labels `Foot Strike` and `Foot Off`, contexts `Right` and `Left`) are on the same clock; of other
 events it is told how many there are. Points that POINT:ANGLES names are joint angles in degrees,
 `RKneeAngles` with flexion in X; those that FORCES, MOMENTS, POWERS and SCALARS name, and analog channels,
-are left out. POINT:Y_SCREEN names the up axis. Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD,
-labels and events beyond 255 go on in LABELS2, TIMES2 and so forth.
+are left out. POINT:Y_SCREEN names the up axis; without it, it is the one along which the figure stands.
+Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD, labels and events beyond 255 go on in LABELS2,
+TIMES2 and so forth.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ import numpy as np
 from memo import _memo
 from memo.files import complete_file
 from memo.formats.motion import MAX_FRAMES, FormatError, GaitEvent, Motion, Up, from_z_up, to_z_up
+from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
 
 __all__ = ["read_c3d", "write_c3d"]
@@ -86,9 +88,11 @@ def read_c3d(path: Path, given: Given) -> Motion:
     if not file.has("POINT", "UNITS"):
         notes.append("The file names no unit of length: millimetres were assumed.")
     unit, unit_m = unit_of(file.text("POINT", "UNITS") or "mm", "parameter POINT:UNITS")
-    up, up_note = chosen_up(given, file.text("POINT", "Y_SCREEN") or None, "z", "most laboratories have")
-    points = np.where(valid[:, is_point, None], to_z_up(values[:, is_point] * unit_m, up), np.nan)
     names, renamed = _unique([label for label, kept in zip(labels, is_point, strict=True) if kept])
+    points = np.where(valid[:, is_point, None], values[:, is_point] * unit_m, np.nan)
+    said = file.text("POINT", "Y_SCREEN") or None
+    up, up_note = chosen_up(given, said, "z", "most laboratories have", standing_up(names, points))
+    points = to_z_up(points, up)
     angles = _angles(values, valid, labels, is_angle)
     events, other_events = _events(file)
     notes += [

@@ -5,14 +5,23 @@ instant; `nColumns` counts the time. Both endings hold the same here. The older 
 (`datacolumns`, `datarows`) is read too.
 
 Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`, flexion positive as in
-the model of Rajagopal 2016; in gait2392 the knee has the other sign) and are written in degrees. Where
-both hips or the pelvis are known, the pelvis' position is written as `pelvis_tx`, `pelvis_ty`,
-`pelvis_tz`, metres, Y up unless asked otherwise; the header says which. Pelvis angles are not known and
-not written. Instants at
-which a value is missing are left out, since OpenSim stops reading there.
+the model of Rajagopal 2016; in gait2392 and gait2354 the knee has the other sign) and are written in
+degrees. Where both hips, a knee and the flexion of that hip are known, the place of the pelvis is written
+too, Y up unless asked otherwise; the header says which. The pelvis of OpenSim has X forward, Y up, Z to
+the right, and
 
-In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point, and columns of forces, moments and the
-like are left out. All other columns are taken to be angles, as the format does not say. Tables of vectors
+    R = R_z(pelvis_tilt) R_x(pelvis_list) R_y(pelvis_rotation).
+
+Its Z is the line from the left hip to the right one, and it is tilted such that the thigh, at its
+`hip_flexion`, points to the knee: of `memo track` the trunk, which is upright. `pelvis_tx`, `pelvis_ty`,
+`pelvis_tz` are its origin, midway between the anterior superior iliac spines, as far from the hips as in
+the unscaled model of Rajagopal 2016. Instants at which a value is missing are left out, since OpenSim stops
+reading there.
+
+In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
+left out, and those of a states file that are no value of a coordinate; `/jointset/hip_r/hip_flexion_r/value`
+is `hip_flexion_r`. All other columns are taken to be angles, as the format does not say. A knee that bends
+further backwards than knees do has the sign of gait2392, and is turned. Tables of vectors
 (`DataType=Vec3`) are not read.
 """
 
@@ -42,9 +51,25 @@ OPENSIM = {
 }
 """OpenSim's coordinate for each flexion of `track.csv`."""
 
+PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
+_HIPS_M = np.array([-0.056276, -0.07849, 0.0])
+"""The point between the hips in the axes of the pelvis, Rajagopal 2016."""
+
+_PLUG_IN_GAIT = {
+    f"{side.upper()}{part}Angles_{axis}": f"{name}_{side}"
+    for side in "rl"
+    for part, axis, name in (
+        ("Hip", "y", "hip_adduction"),
+        ("Hip", "z", "hip_rotation"),
+        ("Ankle", "x", "ankle_angle"),
+    )
+}
+"""OpenSim's coordinate for angles of a C3D file that mean the same, with the same sign."""
+
 _OURS = {name: joint for joint, name in OPENSIM.items()}
-_NO_ANGLES = ("force", "moment", "torque", "ground_", "activation", "power", "emg")
+_NO_ANGLES = ("/", "force", "moment", "torque", "ground_", "activation", "power", "emg")
 _MOST_HEADER_LINES = 1000
+_BACKWARDS_DEG = 30.0  # further than any knee
 
 
 def read_mot(path: Path, given: Given) -> Motion:
@@ -59,7 +84,7 @@ def read_mot(path: Path, given: Given) -> Motion:
     labels = lines[start].split() if start < len(lines) else []
     if not labels or labels[0].lower() != "time":
         raise FormatError(f"line {start + 1}: wanted a row of labels that begins with time")
-    labels[0] = "time"
+    labels = ["time", *map(_coordinate, labels[1:])]
     if len(set(labels)) < len(labels):
         repeated = next(name for k, name in enumerate(labels) if name in labels[:k])
         raise FormatError(f"line {start + 1}: column {repeated} occurs twice")
@@ -82,6 +107,11 @@ def read_mot(path: Path, given: Given) -> Motion:
         values = column[name]
         angles[_OURS.get(name, name)] = np.rad2deg(values) if in_degrees == "no" else values
     notes = [*up_note]
+    turned = [name for name in ("right_knee", "left_knee") if name in angles and _is_turned(angles[name])]
+    for name in turned:
+        angles[name] = -angles[name]
+    if turned:
+        notes.append("Knees bend towards negative angles, as in gait2392: their sign was turned.")
     if in_degrees is None:
         notes.append("The file does not say whether angles are in degrees: they were taken to be.")
     if others:
@@ -93,17 +123,20 @@ def read_mot(path: Path, given: Given) -> Motion:
 
 
 def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
-    """Writes the angles and the pelvis' position; returns what was left out, in sentences."""
+    """Writes the angles and the place of the pelvis; returns what was left out, in sentences."""
     if not motion.angles:
         raise FormatError(
             "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
         )
     columns = {"time": motion.times_s}
-    pelvis = _pelvis(motion)
-    if pelvis is not None:
-        turned = from_z_up(pelvis, up)
+    pelvis_angles, origin = _pelvis(motion)
+    if up == "y":
+        columns |= pelvis_angles
+    if origin is not None:
+        turned = from_z_up(origin, up)
         columns |= {f"pelvis_t{axis}": turned[:, k] for k, axis in enumerate("xyz")}
-    columns |= {OPENSIM.get(name, name): values for name, values in motion.angles.items()}
+    names = OPENSIM | _PLUG_IN_GAIT
+    columns |= {names.get(name, name): values for name, values in motion.angles.items()}
     columns = {name: values for name, values in columns.items() if np.isfinite(values).any()}
     for name in columns:
         if not name.isprintable() or " " in name:
@@ -129,6 +162,10 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
         for row in table.tolist():
             file.write("\t".join(f"{x:.7f}" for x in row) + "\n")
     notes = [f"{gaps} instants at which an angle or the pelvis is missing were left out."] if gaps else []
+    if pelvis_angles and up != "y":
+        notes.append("OpenSim's pelvis angles are those of a world with Y up: left out.")
+    if origin is None and motion.names:
+        notes.append("The pelvis' place needs both hips, a knee and the flexion of that hip: left out.")
     left_out = ["events"] * bool(motion.events)
     left_out += ["points but the pelvis"] * (len(motion.names) > 1)
     return notes + [f"A MOT or STO file has no place for {what}: left out." for what in left_out]
@@ -146,6 +183,12 @@ def _header(lines: list[str]) -> tuple[dict[str, str], int]:
             key, _, value = text.partition(" ")
         header.setdefault(key.strip().lower(), value.strip().lower())
     raise FormatError(f"no line endheader among the first {min(len(lines), _MOST_HEADER_LINES)}")
+
+
+def _coordinate(label: str) -> str:
+    """The coordinate whose value a column of an OpenSim states file holds; other labels as they are."""
+    parts = label.split("/")
+    return parts[-2] if label.startswith("/jointset/") and parts[-1] == "value" else label
 
 
 def _check_count(header: dict[str, str], keys: tuple[str, str], count: int, what: str) -> None:
@@ -183,10 +226,50 @@ def _points(
     return names, to_z_up(np.stack(points, axis=1), up), up_note
 
 
-def _pelvis(motion: Motion) -> np.ndarray | None:
-    """(T, 3) the point between the hips, else the pelvis, where either is known."""
+def _is_turned(knee_deg: np.ndarray) -> bool:
+    """Whether a knee's flexion is negative: it bends further to that side, and further than knees can."""
+    known = knee_deg[np.isfinite(knee_deg)]
+    return bool(len(known)) and known.min() < -_BACKWARDS_DEG and -known.min() > known.max()
+
+
+def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+    """The pelvis' angles (T,) in degrees, and (T, 3) its origin; that of a file that has one stays."""
     found = joints_found(motion.names)
-    if "right_hip" in found and "left_hip" in found:
-        middle: np.ndarray = motion.points[:, [found["right_hip"], found["left_hip"]]].mean(axis=1)
-        return middle
-    return motion.points[:, found["pelvis"]] if "pelvis" in found else None
+    hips = [f"{side}_hip" for side in ("right", "left")]
+    sides = [side for side in ("right", "left") if f"{side}_knee" in found and f"{side}_hip" in motion.angles]
+    if not (sides and all(hip in found for hip in hips)):
+        return {}, motion.points[:, found["pelvis"]] if "pelvis" in found else None
+    with np.errstate(over="ignore", invalid="ignore"):
+        angles, origin = _pelvis_of_legs(motion, found, sides)
+    return (angles, origin) if np.isfinite(origin).any() else ({}, None)
+
+
+def _pelvis_of_legs(
+    motion: Motion, found: dict[str, int], sides: list[str]
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The angles and the origin of the pelvis from which the thighs of the sides hang as they do."""
+    points = {name: from_z_up(motion.points[:, k], "y") for name, k in found.items()}
+    right = _unit(points["right_hip"] - points["left_hip"])
+    ups = []
+    for side in sides:
+        thigh = points[f"{side}_knee"] - points[f"{side}_hip"]
+        thigh = _unit(thigh - (thigh * right).sum(axis=1, keepdims=True) * right)
+        flexion = np.deg2rad(motion.angles[f"{side}_hip"])[:, None]
+        ups.append(np.sin(flexion) * np.cross(right, thigh) - np.cos(flexion) * thigh)
+    up = _unit(np.where(np.isfinite(ups), ups, 0).sum(axis=0))
+    turn = np.stack([np.cross(up, right), up, right], axis=-1)
+    tilt = np.arctan2(-turn[:, 0, 1], turn[:, 1, 1])
+    sideways = np.arcsin(np.clip(turn[:, 2, 1], -1, 1))
+    heading = np.arctan2(-turn[:, 2, 0], turn[:, 2, 2])
+    known = np.isfinite(heading)
+    heading[known] = np.unwrap(heading[known])
+    middle = (points["right_hip"] + points["left_hip"]) / 2
+    angles = dict(zip(PELVIS, np.rad2deg([tilt, sideways, heading]), strict=True))
+    return angles, to_z_up(middle - turn @ _HIPS_M, "y")
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """(T, 3) of length one; NaN where there is no direction."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit: np.ndarray = vectors / np.where(lengths > 1e-9, lengths, np.nan)
+    return unit

@@ -13,10 +13,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from memo.files import JOINTS
-from memo.formats.motion import FormatError, Motion
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["SHORT", "joint_points", "joints_found"]
+from memo.files import JOINTS
+from memo.formats.motion import FormatError, Motion, Up
+
+__all__ = ["SHORT", "joint_points", "joints_found", "standing_up"]
 
 _PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 
@@ -88,6 +91,26 @@ def joints_found(names: Sequence[str]) -> dict[str, int]:
     return max(found, key=lambda joints: sum(joint in joints for joint in JOINTS))
 
 
+def standing_up(names: Sequence[str], points: npt.NDArray[np.float64]) -> Up | None:
+    """The axis along which shoulders and head are above the ankles; None where no figure stands.
+
+    `points` (T, K, 3) in the axes of a file. Upright is twice as high as wide, in the median frame.
+    """
+    found = joints_found(names)
+    low = [found[joint] for joint in ("right_ankle", "left_ankle") if joint in found]
+    high = [found[joint] for joint in ("right_shoulder", "left_shoulder", "neck", "head") if joint in found]
+    if not low or not high:
+        return None
+    rise = points[:, high].mean(axis=1) - points[:, low].mean(axis=1)
+    rise = rise[np.isfinite(rise).all(axis=1)]
+    if not len(rise):
+        return None
+    x, y, z = np.median(rise, axis=0)
+    if y > 2 * max(abs(x), abs(z)):
+        return "y"
+    return "z" if z > 2 * max(abs(x), abs(y)) else None
+
+
 def joint_points(motion: Motion) -> Motion:
     """The motion of the twelve joints alone, in memo's order, and of the head where it is known.
 
@@ -109,8 +132,8 @@ def listed(names: Sequence[str], most: int = 40) -> str:
 
 
 def _letters(name: str) -> str:
-    """A name without the name of its subject ("Anna:RKNE"), in small letters and digits."""
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
+    """A name in small letters and digits, without its subject's ("Anna:RKNE") or FreeMoCap's `body_`."""
+    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower().removeprefix("body_"))
 
 
 def _those(spelled: Sequence[str], plain: dict[str, int]) -> list[str]:

@@ -59,9 +59,9 @@ def write_parquet(
 
 
 def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
-    """Reads any flat table: whole numbers as int64 (float64 where some are null), texts as objects.
+    """Reads any flat table: whole numbers as int64 (float64 where some are null), texts and dates as objects.
 
-    Null becomes NaN, and an empty text among texts.
+    Decimals, as DuckDB makes of `0.04 * frame`, become float64, and null NaN, or an empty text among texts.
     """
     path = Path(path)
     pa, pq = _arrow()
@@ -83,7 +83,7 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
 
 def read_parquet_motion(path: Path, given: Given) -> Motion:
     """The points and angles of a table, as `memo.formats.table` reads them; its up axis is in `about`."""
-    given.check_used("rate_hz")
+    given.check_used("rate_hz", "unit_m")
     try:
         columns = read_parquet(path)
     except FormatError as error:
@@ -92,8 +92,9 @@ def read_parquet_motion(path: Path, given: Given) -> Motion:
     if not known:
         raise FormatError("no column of numbers in it")
     numbers = np.column_stack([columns[name].astype(np.float64) for name in known])
-    up = _about(path).get("up", "z")
-    table = NumberTable(path, {name: index for index, name in enumerate(known)}, numbers, [f"# {up} up"])
+    up = _about(path).get("up")
+    comments = [] if up is None else [f"# {up} up"]
+    table = NumberTable(path, {name: index for index, name in enumerate(known)}, numbers, comments)
     try:
         return motion_of_table(table, given)
     except ValueError as error:
@@ -144,7 +145,10 @@ def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
         checks = (
             types.is_integer,
             types.is_floating,
+            types.is_decimal,
+            types.is_null,
             types.is_boolean,
+            types.is_temporal,
             types.is_string,
             types.is_large_string,
         )
@@ -157,10 +161,13 @@ def _values(pa: ModuleType, column: Any) -> npt.NDArray[Any]:
     if pa.types.is_dictionary(kind):
         column = column.cast(kind.value_type)
         kind = kind.value_type
-    if pa.types.is_floating(kind) or (pa.types.is_integer(kind) and column.null_count):
+    as_floats = (pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
+    if any(is_kind(kind) for is_kind in as_floats) or (pa.types.is_integer(kind) and column.null_count):
         return np.asarray(column.cast(pa.float64()).to_numpy(), np.float64)
     if pa.types.is_integer(kind):
         return np.asarray(column.cast(pa.int64()).to_numpy())
     if pa.types.is_boolean(kind) and not column.null_count:
         return np.asarray(column.to_numpy())
+    if pa.types.is_temporal(kind):
+        column = column.cast(pa.string())
     return np.array(["" if value is None else value for value in column.to_pylist()], dtype=object)

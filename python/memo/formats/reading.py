@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from memo.formats.motion import FormatError, Up
 
-__all__ = ["Given", "chosen_up", "unit_of"]
+__all__ = ["METRIC_M", "Given", "chosen_up", "unit_of", "unit_of_legs"]
 
 UNITS_M = {
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0),
     **dict.fromkeys(("cm", "centimeters", "centimetres"), 0.01),
     **dict.fromkeys(("mm", "millimeters", "millimetres"), 0.001),
 }
+
+METRIC_M = {unit: UNITS_M[unit] for unit in ("m", "cm", "mm")}
+_LEG_M = (0.45, 1.3)  # thigh and shank, from children to giants
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Given:
     rate_hz: float | None = None
     """Frame rate of a table without times."""
     unit_m: float | None = None
-    """Metres in one unit of length, for BVH, which has none."""
+    """Metres in one unit of length, for BVH and for tables that name none."""
 
     def check_used(self, *used: str) -> None:
         """Refuses what was given besides what a reader uses."""
@@ -41,8 +45,27 @@ def unit_of(text: str, where: str) -> tuple[str, float]:
     return unit, UNITS_M[unit]
 
 
-def chosen_up(given: Given, said: str | None, usual: Up, because: str) -> tuple[Up, tuple[str, ...]]:
-    """The up axis: as given, else as the file says, else the usual one, which is told."""
+def unit_of_legs(leg: float | None, units_m: Mapping[str, float], usual: str) -> tuple[float, str]:
+    """Metres in the first unit that makes legs, thigh and shank, a human length; a sentence that says so.
+
+    `leg`: their length in the file's unit, None where there are none to measure: `usual` then.
+    """
+    if leg is None:
+        return units_m[usual], f"The file names no unit, and has no legs to measure: {usual} was assumed."
+    for unit, unit_m in units_m.items():
+        if _LEG_M[0] <= leg * unit_m <= _LEG_M[1]:
+            made = f"which makes the legs {leg * unit_m:.2f} m long"
+            return unit_m, f"The file names no unit: {unit} was taken, {made}."
+    raise FormatError(f"no unit is named, and legs of {leg:g} fit none: give --unit, the metres in one unit")
+
+
+def chosen_up(
+    given: Given, said: str | None, usual: Up, because: str, stands: Up | None = None
+) -> tuple[Up, tuple[str, ...]]:
+    """The up axis: as given, else as the file says, else as the figure stands, else the usual one.
+
+    The last two are told.
+    """
     if given.up is not None:
         return given.up, ()
     if said is not None:
@@ -50,5 +73,7 @@ def chosen_up(given: Given, said: str | None, usual: Up, because: str) -> tuple[
         if up is None:
             raise FormatError(f"the up axis is {said!r}, wanted Y or Z: give --from-up")
         return up, ()
-    sentence = f"The file does not say which axis is up: {usual.upper()} was assumed, as {because}."
-    return usual, (sentence,)
+    silent = "The file does not say which axis is up:"
+    if stands is not None:
+        return stands, (f"{silent} {stands.upper()} was taken, as the figure stands.",)
+    return usual, (f"{silent} {usual.upper()} was assumed, as {because}.",)

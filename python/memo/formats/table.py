@@ -3,6 +3,10 @@
 Times are the column `time_s`, or follow from a rate in a comment ("# metres, Z up, 100 Hz") or from the
 caller. Z is up, as in all tables of memo, unless a comment before the header says `Y up`; with Y up such
 a comment is written, with Z up none, so that any program reads the file. Empty cells are missing.
+
+Tables of others (FreeMoCap, anipose) name their columns `<joint>_x`, without a unit: it is the one that
+gives the legs a human length, metres where there are none. Up is the axis along which the figure stands,
+else Z. Both are told.
 """
 
 from __future__ import annotations
@@ -16,7 +20,8 @@ import numpy.typing as npt
 
 from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
-from memo.formats.reading import Given, chosen_up
+from memo.formats.names import joints_found, standing_up
+from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
 from memo.formats.text import MAX_TEXT_BYTES
 from memo.linkage import NumberTable, read_number_table
 
@@ -25,7 +30,7 @@ __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 
 def read_table(path: Path, given: Given) -> Motion:
     """Reads points and angles of a table; other columns are passed over."""
-    given.check_used("rate_hz")
+    given.check_used("rate_hz", "unit_m")
     if path.stat().st_size > MAX_TEXT_BYTES:
         raise FormatError(f"more than the {MAX_TEXT_BYTES >> 20} MiB that are read")
     try:
@@ -42,15 +47,41 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
         if name.endswith("_deg") and name != "_deg"
     }
     names, points = table.points(3)
-    said = re.search(r"\b([yz])[ -]up\b", "\n".join(table.comments), re.IGNORECASE)
-    up, _ = chosen_up(given, said.group(1) if said else "z", "z", "memo's tables have")
+    comments = "\n".join(table.comments)
+    said = re.search(r"\b([yz])[ -]up\b", comments, re.IGNORECASE)
+    names_unit = f"{names[0]}_x_m" in table.column
+    stated = said.group(1) if said else "z" if names_unit else None
+    up, notes = chosen_up(given, stated, "z", "memo's tables have", standing_up(names, points))
+    unit_m = 1.0
+    if names_unit:
+        if given.unit_m is not None:
+            raise FormatError("the columns name their unit: leave out a unit (--unit)")
+    elif given.unit_m is not None:
+        unit_m = given.unit_m
+    elif not re.search(r"\bmet(er|re)s\b", comments, re.IGNORECASE):
+        unit_m, note = unit_of_legs(_leg(names, points), METRIC_M, "m")
+        notes = (*notes, note)
     return Motion(
         tuple(names),
         table.times_s(given.rate_hz),
-        to_z_up(points, up),
+        to_z_up(points * unit_m, up),
         angles=angles,
         metadata={"format": "csv", "up": up, "unit": "m"},
+        notes=notes,
     )
+
+
+def _leg(names: list[str], points: npt.NDArray[np.float64]) -> float | None:
+    """Length of thigh and shank in the file's unit, the median over time; None where they are not known."""
+    found = joints_found(names)
+    for side in ("right", "left"):
+        chain = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
+        if all(joint in found for joint in chain):
+            parts = np.diff(points[:, [found[joint] for joint in chain]], axis=1)
+            lengths = np.linalg.norm(parts, axis=2).sum(axis=1)
+            if np.isfinite(lengths).any():
+                return float(np.nanmedian(lengths))
+    return None
 
 
 def write_table(path: Path, motion: Motion, up: Up) -> list[str]:

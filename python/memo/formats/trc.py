@@ -4,9 +4,9 @@ Three header rows (path; names and values of eight fields), two rows of labels, 
 frame: number, time, X Y Z of every marker. Missing is written as `NaN`, which OpenSim and programs that
 split at white space read; empty cells are read too.
 
-The format has no field for the up axis. OpenSim's convention is Y up, which is assumed in reading and is
-the default in writing. Files written here say `up=Y` in a fifth cell of the first row, which other
-readers skip.
+The format has no field for the up axis. OpenSim's convention is Y up, which is the default in writing. In
+reading it is the axis along which the figure stands, where its joints are known by name, else Y. Files
+written here say `up=Y` in a fifth cell of the first row, which other readers skip.
 
 Units are those of the field `Units` (m, cm, mm). The rate must agree with the column of times.
 """
@@ -19,6 +19,7 @@ import numpy as np
 
 from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
+from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
 from memo.formats.text import number, numbers, read_lines, whole_number
 
@@ -54,8 +55,9 @@ def read_trc(path: Path, given: Given) -> Motion:
     times_s = table[:, 1]
     rate_hz = _checked_rate(fields, times_s)
     marked = next((cell.strip()[3:].lower() for cell in first[3:] if cell.lower().startswith("up=")), None)
-    up, note = chosen_up(given, marked, "y", "OpenSim's files have")
-    points = to_z_up(table[:, 2:].reshape(len(table), markers, 3) * unit_m, up)
+    points = table[:, 2:].reshape(len(table), markers, 3) * unit_m
+    up, note = chosen_up(given, marked, "y", "OpenSim's files have", standing_up(names, points))
+    points = to_z_up(points, up)
     metadata = {"format": "trc", "up": up, "unit": unit, "rate_hz": rate_hz}
     return Motion(tuple(names), times_s, points, metadata=metadata, notes=note)
 
