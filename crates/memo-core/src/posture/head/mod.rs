@@ -33,6 +33,7 @@ mod model;
 mod pose;
 mod search;
 mod table;
+mod three_points;
 
 pub use linear::{Conditioning, LinearHead, PaperView, linear_head};
 pub use model::{HeadModel, HeadPoint, LEE_CHEN_BODY_HEIGHT_M};

@@ -6,19 +6,21 @@
 //!
 //! with c the centroid of the head points, R -> R exp(w), by Levenberg and Marquardt's method (Moré 1978's
 //! scaling). The sum has several minima: the flatter the head and the farther away, the more alike are the
-//! pose and its mirror (Necker's reversal). So the search starts from the linear solution, from 24 rotations
-//! that leave none farther than 63 degrees away, and from the mirror of each minimum found, and keeps all
-//! minima that the noise cannot tell apart.
+//! pose and its mirror (Necker's reversal). So the search starts from the linear solution, from all poses in
+//! which three of four widespread points lie on their rays, and from the mirror of each minimum found, and
+//! keeps all minima that the noise cannot tell apart. With the focal length free, or where those starts lead
+//! nowhere, it starts from 24 rotations that leave none farther than 63 degrees away.
 //!
 //! Covariance: image_sd² (JᵀJ)⁻¹ at the minimum. It is first-order: where the depth's standard deviation is
 //! more than a tenth of the depth, the true distribution is skewed towards the far side.
 //!
-//! What it cannot do: four points of which two nearly coincide are three, with up to four poses; of those it
-//! may miss one (seen once in random draws: two points a thirtieth of the figure apart, and the nearest pose
-//! found 0.1 rad off). How often is not measured.
+//! What it cannot do: promise every minimum. Of exact images none was missed in 100,000 draws each of four to
+//! eight points, of four points of which two nearly coincide, and of points as far away as a thousand times their
+//! size (`no_planted_pose_is_missed`); the 24 rotations alone missed 7 of 100,000 of the second kind.
 
 use super::linear::LINEAR_POINTS;
 use super::pose::{Matrix7, Vector7, point_jacobian};
+use super::three_points::rotations_onto_rays;
 use super::{Conditioning, HeadError, HeadPose, MAX_COORDINATE, Shape, checked_shape, linear_head};
 use super::{centroid_and_spread, right_svd};
 use crate::model::Camera;
@@ -135,10 +137,15 @@ pub fn head_pose(
         is_focal_free: focal == Focal::Free,
         shape,
     };
-    // 1. Minima from all starting poses, then from the mirrors of those found.
-    let starts = starting_poses(&problem, points_in_head, focal);
+    // 1. Minima from the closed forms, if need be from all directions, then from the mirrors of those found.
+    let mut starts = closed_form_starts(&problem, points_in_head, focal);
     let mut minima = Vec::new();
     starts.iter().for_each(|start| problem.collect_minimum(*start, &mut minima));
+    if problem.is_focal_free || minima.is_empty() {
+        let turned = starts_in_all_directions(&problem, focal);
+        turned.iter().for_each(|start| problem.collect_minimum(*start, &mut minima));
+        starts.extend(turned);
+    }
     for found in minima.clone() {
         if let Some(mirror) = problem.start(problem.mirrored(&found.state), found.state.focal) {
             problem.collect_minimum(mirror, &mut minima);
@@ -170,11 +177,9 @@ fn check_options(focal: Focal, options: &HeadOptions) -> Result<(), HeadError> {
     Err(HeadError::Option { option: "min_probability", expected: "between 0 and 1", value })
 }
 
-/// The linear solution if there is one, and the 24 rotations of a cube.
-///
-/// With the focal length free, the cube's rotations are tried at three distances, 5, 15 and 45 times the
-/// head's radius, that the image's size turns into focal lengths.
-fn starting_poses(problem: &Problem, points_in_head: &[DVec3], focal: Focal) -> Vec<State> {
+/// The linear solution if there is one; with the focal length known, also the poses of three points, each three
+/// of the four widest.
+fn closed_form_starts(problem: &Problem, points_in_head: &[DVec3], focal: Focal) -> Vec<State> {
     let unit = match focal {
         Focal::Known(focal) => focal,
         Focal::Free => DVec2::ONE,
@@ -185,12 +190,47 @@ fn starting_poses(problem: &Problem, points_in_head: &[DVec3], focal: Focal) -> 
         let focal = if problem.is_focal_free { DVec2::splat(linear.focal) } else { unit };
         problem.start(linear.nearest_rotation()?, focal)
     });
+    let mut starts = Vec::from_iter(linear_start);
+    if problem.is_focal_free {
+        return starts;
+    }
+    let widest = widest_four(&problem.centred);
+    for left_out in 0..4 {
+        let three = [1, 2, 3].map(|step| widest[(left_out + step) % 4]);
+        let rays = three.map(|i| (problem.image[i] / unit).extend(1.0).normalize());
+        let rotations = rotations_onto_rays(three.map(|i| problem.centred[i]), rays);
+        starts.extend(rotations.into_iter().filter_map(|rotation| problem.start(rotation, unit)));
+    }
+    starts
+}
+
+/// The point farthest from the origin, that farthest from it, from their line, and from the nearest of the three.
+fn widest_four(points: &[DVec3]) -> [usize; 4] {
+    let farthest = |taken: &[usize], distance: &dyn Fn(DVec3) -> f64| {
+        let others = (0..points.len()).filter(|i| !taken.contains(i));
+        others.max_by(|i, j| distance(points[*i]).total_cmp(&distance(points[*j]))).unwrap_or(0)
+    };
+    let a = farthest(&[], &|p| p.length());
+    let b = farthest(&[a], &|p| p.distance(points[a]));
+    let c = farthest(&[a, b], &|p| (points[b] - points[a]).cross(p - points[a]).length());
+    let d = farthest(&[a, b, c], &|p| {
+        [a, b, c].map(|i| p.distance(points[i])).into_iter().fold(f64::INFINITY, f64::min)
+    });
+    [a, b, c, d]
+}
+
+/// The 24 rotations of a cube.
+///
+/// With the focal length free, they are tried at three distances, 5, 15 and 45 times the head's radius, that the
+/// image's size turns into focal lengths.
+fn starts_in_all_directions(problem: &Problem, focal: Focal) -> Vec<State> {
     let focals: Vec<DVec2> = match focal {
         Focal::Known(focal) => vec![focal],
         Focal::Free => [5.0, 15.0, 45.0].map(|radii| DVec2::splat(radii * problem.spread)).to_vec(),
     };
-    let grid = focals.iter().flat_map(|f| cube_rotations().into_iter().filter_map(|r| problem.start(r, *f)));
-    linear_start.into_iter().chain(grid).collect()
+    let starts =
+        focals.iter().flat_map(|f| cube_rotations().into_iter().filter_map(|r| problem.start(r, *f)));
+    starts.collect()
 }
 
 /// The rotations that take a cube into itself.
@@ -793,11 +833,73 @@ mod tests {
         }
     }
 
-    /// Distance of the two points nearest to each other.
-    fn closest(points: &[DVec3]) -> f64 {
-        let pairs =
-            points.iter().enumerate().flat_map(|(i, p)| points[..i].iter().map(move |q| p.distance(*q)));
-        pairs.fold(f64::INFINITY, f64::min)
+    /// A pose and points in it: 4 to 8 of any shape down to a ten-thousandth of flatness, or with a `gap` four of
+    /// which two are so far apart. `log_depth` of the figure's half width. `None` where a point is too close to
+    /// the camera or all are nearly on a line.
+    fn planted(random: &mut Random, gap: Option<f64>, log_depth: f64) -> Option<(Vec<DVec3>, DMat3, DVec3)> {
+        let count = if gap.is_some() { 4 } else { random.uniform(4.0, 9.0) as usize };
+        let cube =
+            |random: &mut Random| DVec3::from_array(std::array::from_fn(|_| random.uniform(-1.0, 1.0)));
+        let mut shape: Vec<DVec3> = (0..count).map(|_| cube(random)).collect();
+        if let Some(gap) = gap {
+            shape[3] = shape[0] + gap * cube(random).try_normalize()?;
+        }
+        let stretch = DVec3::new(1.0, 1.0, 10_f64.powf(random.uniform(-4.0, 0.0)));
+        let size = 10_f64.powf(random.uniform(-2.0, 2.0));
+        let points: Vec<DVec3> = shape.iter().map(|p| *p * stretch * size).collect();
+        let rotation = DMat3::from_axis_angle(cube(random).try_normalize()?, random.uniform(0.0, 3.1));
+        let aside = DVec3::new(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), 1.0);
+        let translation = aside * 10_f64.powf(log_depth) * size;
+        let is_in_front = points.iter().all(|p| (rotation * *p + translation).z > 0.2 * size);
+        (is_in_front && shape_of_ratio(&points) > 0.1).then_some((points, rotation, translation))
+    }
+
+    /// Of the family of the property test, of four points of which two are a tenth to a thousandth of the half
+    /// width apart, and of the first family from as far as a thousand half widths away; 100,000 draws of each with
+    /// `MEMO_FULL=1`.
+    #[test]
+    fn no_planted_pose_is_missed() {
+        let draws = if std::env::var_os("MEMO_FULL").is_some() { 100_000 } else { 1_000 };
+        for (family, has_twins, most_log_depth) in
+            [("any shape", false, 1.5), ("twins", true, 1.5), ("far away", false, 3.0)]
+        {
+            let mut random = Random::new(8);
+            let (mut drawn, mut missed, mut seconds) = (0, 0, 0.0);
+            while drawn < draws {
+                let gap = has_twins.then(|| 10_f64.powf(random.uniform(-3.0, -1.0)));
+                let log_depth = random.uniform(0.45, most_log_depth);
+                let Some((points, rotation, translation)) = planted(&mut random, gap, log_depth) else {
+                    continue;
+                };
+                drawn += 1;
+                let image = projected(&points, (rotation, translation), 800.0);
+                let start = std::time::Instant::now();
+                let solution = head_pose(&points, &image, known(800.0), &with_sd(1e-3)).unwrap();
+                seconds += start.elapsed().as_secs_f64();
+                missed += u32::from(solution.poses.iter().all(|p| angle(p.rotation, rotation) > 1e-5));
+            }
+            eprintln!(
+                "{family}: {missed} of {drawn} missed, {:.0} us a pose",
+                1e6 * seconds / f64::from(drawn)
+            );
+            assert_eq!(missed, 0, "{family}");
+        }
+    }
+
+    /// Symmetric figures have double roots.
+    #[test]
+    fn a_square_is_found_head_on_and_turned_about_its_axes() {
+        let square =
+            [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]].map(DVec3::from);
+        for (axis, turn) in [DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0).normalize()]
+            .into_iter()
+            .flat_map(|axis| [0.0, 0.3, -0.8].map(|turn| (axis, turn)))
+        {
+            let rotation = DMat3::from_axis_angle(axis, turn);
+            let image = projected(&square, (rotation, DVec3::new(0.0, 0.0, 6.0)), 800.0);
+            let solution = head_pose(&square, &image, known(800.0), &with_sd(1e-3)).unwrap();
+            assert!(angle(solution.best().rotation, rotation) < 1e-6, "{axis} {turn}");
+        }
     }
 
     fn unit_vectors() -> impl Strategy<Value = DVec3> {
@@ -810,8 +912,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Any shape, down to a ten-thousandth of flatness, any rotation, from close by to far away; but no two of
-        /// four points close together, see the head of the module.
+        /// Any shape, down to a ten-thousandth of flatness, any rotation, from close by to far away.
         #[test]
         fn a_planted_pose_is_among_the_poses(
             shape in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 4..9),
@@ -827,7 +928,6 @@ mod tests {
             let truth = (DMat3::from_axis_angle(axis, turn), DVec3::new(x, y, 1.0) * depth);
             prop_assume!(points.iter().all(|p| (truth.0 * *p + truth.1).z > 0.2 * size));
             prop_assume!(shape_of_ratio(&points) > 0.1);
-            prop_assume!(points.len() > 4 || closest(&points) > 0.1 * size);
             let image = projected(&points, truth, 800.0);
             let solution = head_pose(&points, &image, known(800.0), &with_sd(1e-3)).unwrap();
             let angles = solution.poses.iter().map(|p| angle(p.rotation, truth.0));
