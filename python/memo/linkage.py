@@ -20,13 +20,22 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, complete_file
+from memo.keypoints import read_keypoints
 from memo.table import data_frame
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
+__all__ = [
+    "PlanarFigure",
+    "Points",
+    "planar",
+    "read_points_csv",
+    "read_tracks",
+    "write_figure_csv",
+    "write_points_csv",
+]
 
 _log = logging.getLogger(__name__)
 
@@ -208,6 +217,39 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     names, positions = table.points(dimensions)
     scales = table.numbers[:, table.column["scale"]] if "scale" in table.column else None
     return Points([_SHORT.get(name, name) for name in names], table.times_s(rate_hz), positions, scales)
+
+
+def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Points:
+    """Image points to look for limbs in: of a CSV file as `read_points_csv` takes it, or of keypoints.
+
+    Keypoints are what `read_keypoints` takes; of a CSV file their scores, a column `joint` or columns NAME_x
+    without NAME_z tell. Of one person the shoulders, elbows, wrists, hips, knees and ankles are taken.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder")
+    if not _holds_keypoints(path):
+        return read_points_csv(path, 2, rate_hz)
+    keypoints = read_keypoints(path, fps=rate_hz)
+    limbs = [name for name in keypoints.names if name in _SHORT]
+    if len(limbs) < 2:
+        raise ValueError(
+            f"{path}: fewer than two joints of arms or legs; it has {', '.join(keypoints.names)}"
+        )
+    places = [keypoints.names.index(name) for name in limbs]
+    return Points([_SHORT[name] for name in limbs], keypoints.times_s, keypoints.points[:, places])
+
+
+def _holds_keypoints(path: Path) -> bool:
+    if path.is_dir() or path.suffix.lower() in (".json", ".trc", ".parquet"):
+        return True
+    header = next((line for line in _lines(path) if line.strip() and not line.startswith("#")), "")
+    columns = [cell.strip() for cell in header.replace(";", ",").replace("\t", ",").split(",")]
+
+    def some(end: str) -> bool:
+        return any(column.endswith(end) for column in columns)
+
+    return "joint" in columns or some("_score") or (some("_x") and not some("_z"))
 
 
 @dataclass(frozen=True)

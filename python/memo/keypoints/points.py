@@ -26,6 +26,7 @@ MAX_FRAME = 10**9
 # A sequence may have gaps, but frame numbers that are mostly gaps are not those of a video.
 _MAX_FRAMES_PER_SEEN = 20
 _MAX_GAP = 1000
+_LARGEST_PART = 1.5  # of width or height; points may lie a little outside the picture
 
 
 class KeypointsError(ValueError):
@@ -124,6 +125,16 @@ class Keypoints:
             people=np.isfinite(all_points).any(axis=(1, 2)).astype(np.int64),
             source=Source(Path("arrays"), None),
         )
+
+    def check_pixels(self) -> None:
+        """Refuses coordinates that are parts of the picture's width and height, 0 to 1 or -1 to 1."""
+        there = np.isfinite(self.points).all(axis=2)
+        largest = float(np.abs(self.points[there]).max(initial=0))
+        if there.sum() > 1 and largest <= _LARGEST_PART:
+            raise KeypointsError(
+                f"{self.source.path}: coordinates up to {largest:.3g}: these are parts of the picture's "
+                "width and height, and pixels are needed: multiply by them"
+            )
 
     def replaced(self, points: npt.ArrayLike, scores: npt.ArrayLike) -> Keypoints:
         """The same with other points and scores of the same shapes."""
