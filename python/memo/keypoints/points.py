@@ -11,12 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["Array", "Keypoints", "KeypointsError", "Source", "layouts"]
 
@@ -55,7 +60,7 @@ class Source:
     files: tuple[Path, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class Keypoints:
     """One person's image points over time."""
 
@@ -124,6 +129,29 @@ class Keypoints:
             image_size=image_size,
             people=np.isfinite(all_points).any(axis=(1, 2)).astype(np.int64),
             source=Source(Path("arrays"), None),
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row a frame, with the columns that `write_csv` writes, as a `pandas.DataFrame`."""
+        columns: dict[str, npt.NDArray[Any]] = {"frame": self.frames, "time_s": self.times_s}
+        for index, name in enumerate(self.names):
+            columns[f"{name}_u_px"], columns[f"{name}_v_px"] = self.points[:, index].T
+            columns[f"{name}_score"] = self.scores[:, index]
+        return data_frame(columns)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the ways of the points through the picture into `ax`, or Axes of its own, and returns them.
+        Needs matplotlib."""
+        from memo.plot import new_axes, plot_keypoints
+
+        return plot_keypoints(new_axes() if ax is None else ax, self)
+
+    def __repr__(self) -> str:
+        seen = np.isfinite(self.points).all(axis=2).mean()
+        crowd = f", up to {self.people.max()} people" if self.people.max() > 1 else ""
+        return (
+            f"Keypoints({len(self.names)} points{f' of {self.layout}' if self.layout else ''}, "
+            f"frames {self.frames[0]} to {self.frames[-1]}, {seen:.0%} seen{crowd})"
         )
 
     def check_pixels(self) -> None:
