@@ -187,7 +187,7 @@ def test_files_from_elsewhere_are_read_or_named(tmp_path):
     path.write_text("time_s,a_u,a_v\n0,1,2\n1,1,2\n", encoding="utf-8-sig")
     assert figure.read_points_csv(path, 2).times_s.tolist() == [0, 1]
     path.write_bytes(b"\xff\xfe\x00a")
-    with pytest.raises(ValueError, match=r"points\.csv: no UTF-8 text"):
+    with pytest.raises(ValueError, match=r"points\.csv: not text in UTF-8"):
         figure.read_points_csv(path, 2)
 
 
