@@ -637,8 +637,13 @@ def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
                     linewidth=1.8 if fits else 0.6, linestyle="-" if fits else "--",
                     label=f"A{a} B{b}: {apart:.1f} cm" + (", kept" if fits else ", cut"))  # fmt: skip
     ax.set(aspect="equal", xlabel="distance from the camera, m", ylabel="to the right, m")
-    ax.legend(frameon=False, fontsize=8, title=f"shoulder to shoulder {wanted:g} cm", loc="center left",
-              bbox_to_anchor=(1, 0.5))  # fmt: skip
+    figure.legend(
+        frameon=False,
+        fontsize=8,
+        title=f"shoulder to shoulder {wanted:g} cm",
+        loc="outside lower center",
+        ncols=2,
+    )
 
 
 def _draw_sequences(figure: Figure) -> None:
