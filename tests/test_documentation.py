@@ -213,8 +213,30 @@ def shell(script, where):
     return done.stdout
 
 
+@pytest.fixture(scope="session")
+def made_once():
+    """`memo.demo_scene` and `memo.track`, giving the same again for the same: most examples begin alike."""
+    demo_scene, track = memo.demo_scene, memo.track
+    scenes, tracks = {}, {}
+
+    def scene_of(seed):
+        if seed not in scenes:
+            scenes[seed] = demo_scene(seed=seed)
+        return scenes[seed]
+
+    def track_of(frames, **options):
+        key = (id(frames), *((name, id(options[name])) for name in sorted(options)))
+        if key not in tracks:
+            tracks[key] = (track(frames, **options), frames, options)  # what is kept keeps its id
+        return tracks[key][0]
+
+    return {"demo_scene": scene_of, "track": track_of}
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs_and_draws(example, workplace):
+def test_an_example_runs_and_draws(example, workplace, made_once, monkeypatch):
+    for called, function in made_once.items():
+        monkeypatch.setattr(memo, called, function)
     from matplotlib import pyplot as plt
 
     try:

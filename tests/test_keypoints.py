@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import os
+import pickle
 import shutil
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from conftest import SHARED_DATA
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from memo import _memo
-from memo.keypoints import KeypointsError, layouts, read_keypoints
+from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints
 
 FUZZ_EXAMPLES = int(os.environ.get("MEMO_FUZZ_EXAMPLES", "100"))
 
@@ -648,3 +649,22 @@ def test_a_real_sequence_is_written_as_it_was(tmp_path):
         assert (tmp_path / "same" / file.name).read_bytes() == file.read_bytes()
     found.replaced(found.points + 1, found.scores).write(tmp_path / "moved")
     np.testing.assert_array_equal(read_keypoints(tmp_path / "moved", fps=60).points, found.points + 1)
+
+
+def test_keypoints_in_a_notebook(tmp_path):
+    from memo.keypoints import write_csv
+
+    points = np.random.default_rng(0).uniform(0, 500, (4, 3, 2))
+    points[2, 1] = np.nan
+    seen = Keypoints.from_arrays(points, names=["right_hip", "left_hip", "nose"], fps=25)
+    assert repr(seen) == "Keypoints(3 points, frames 0 to 3, 92% seen)"
+    frame = seen.to_pandas()
+    write_csv(tmp_path / "points.csv", seen)
+    with (tmp_path / "points.csv").open(newline="") as file:
+        assert next(csv.reader(file)) == list(frame)
+    assert np.array_equal(frame["left_hip_v_px"], points[:, 1, 1], equal_nan=True)
+    assert frame.attrs["units"]["nose_u_px"] == "px" and frame["left_hip_score"][2] == 0
+    ax = seen.plot()
+    assert ax.yaxis_inverted() and ax.get_title(loc="left") == "frame 0"
+    again = pickle.loads(pickle.dumps(seen))
+    assert np.array_equal(again.points, seen.points, equal_nan=True) and again != seen

@@ -187,7 +187,7 @@ def test_files_from_elsewhere_are_read_or_named(tmp_path):
     path.write_text("time_s,a_u,a_v\n0,1,2\n1,1,2\n", encoding="utf-8-sig")
     assert figure.read_points_csv(path, 2).times_s.tolist() == [0, 1]
     path.write_bytes(b"\xff\xfe\x00a")
-    with pytest.raises(ValueError, match=r"points\.csv: no UTF-8 text"):
+    with pytest.raises(ValueError, match=r"points\.csv: not text in UTF-8"):
         figure.read_points_csv(path, 2)
 
 
@@ -258,6 +258,30 @@ def test_frame_rates_are_used(tmp_path, text, rate_hz):
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "memo.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_limbs_are_found_in_keypoints(tmp_path):
+    from memo.keypoints import Keypoints, write_keypoints
+
+    shown = display(azimuth_deg=30, noise_sd_px=1.0)
+    names = ["nose" if name == "HEAD" else name for name in walk()["names"]]
+    seen = Keypoints.from_arrays(shown["positions_px"] + 500, names=names, times_s=shown["times_s"])
+    rate_hz = 1 / (shown["times_s"][1] - shown["times_s"][0])
+    for written in ("openpose", "coco", "csv"):
+        path = tmp_path / {"openpose": "walk_json", "coco": "walk.json", "csv": "walk.csv"}[written]
+        write_keypoints(path, seen, written)
+        points = figure.read_tracks(path, rate_hz)
+        assert set(points.names) == figure.JOINT_NAMES and points.positions.shape == (66, 12, 2)
+        found = memo.planar(points.positions, points.times_s, 1.0)
+        links = {frozenset((points.names[a][1:], points.names[b][1:])) for a, b, *_ in found.links()}
+        assert links == {frozenset(pair) for pair in (("SH", "EL"), ("EL", "WR"), ("HP", "KN"), ("KN", "AN"))}
+        assert len(found.links()) == 8
+    options = ["--fps", rate_hz, "--noise-px", 1, "--no-video", "--out", tmp_path / "out"]
+    done = run("planar", tmp_path / "walk_json", *options)
+    assert done.returncode == 0 and "RHP - RKN: " in done.stdout
+    for path, reason in ((tmp_path / "none.csv", "no such file"), (tmp_path / "walk_json", "frame rate")):
+        with pytest.raises(ValueError, match=reason):
+            figure.read_tracks(path)
 
 
 def test_commands_make_and_read_a_display(tmp_path):

@@ -374,6 +374,7 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["walk.csv", "--out", "walk.csv"], "cannot be written to"),
         (["upside.csv"], "from the extent: the figure is upside down in this camera"),
         (["upside.csv"], "from the trunk: no distance fits"),
+        (["parts.csv"], "parts.csv: coordinates up to 0.7"),
     ],
     ids=lambda value: "_".join(value[1:]) if isinstance(value, list) else "",
 )
@@ -391,6 +392,7 @@ def test_mistakes_are_told_in_one_line(scene, tmp_path, monkeypatch, memo_postur
     (tmp_path / "unknown.json").write_text(json.dumps(true_lengths(truth) | {"tail": 0.3}))
     (tmp_path / "broken.json").write_text('{"neck_to_pelvis": ')
     write_table(tmp_path / "upside.csv", truth, change=lambda pixels: [0, SIZE[1]] + pixels * [1, -1])
+    write_table(tmp_path / "parts.csv", truth, change=lambda pixels: pixels / SIZE)
     (tmp_path / "image.png").write_bytes(b"\x89PNG\xff\xfe")
     monkeypatch.chdir(tmp_path)
     defaults = {"--camera": folder / "camera.toml", "--fps": RATE_HZ, "--out": "out"}
@@ -540,6 +542,29 @@ def test_points_beyond_the_picture_are_noticed(found, scene, tmp_path):
     (said,) = (warning for warning in large.warnings if "picture" in warning)
     beyond = (np.nan_to_num(large.points_px) > np.array(SIZE) + 5.5).any(axis=-1).sum()
     assert said.startswith(f"{beyond} of {large.points_px[..., 0].size} points") and "1280x720" in said
+
+
+def test_a_figure_on_its_head_is_noticed(found, scene, tmp_path):
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    path = write_table(tmp_path / "upwards.csv", truth, change=lambda pixels: [0, SIZE[1]] + pixels * [1, -1])
+    upwards = memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ, anchor="given", distance_m=5.0)
+    said = "the neck is below the pelvis in 40 of 40 frames: v of the keypoints must be counted downwards"
+    assert upwards.warnings[0] == said
+    assert not any("below the pelvis" in warning for warning in found.warnings)
+
+
+def test_it_is_told_that_one_of_several_people_was_followed(scene, tmp_path, memo_posture):
+    folder, _ = scene
+    header, *rows = (folder / "walk.csv").read_text().splitlines()
+    other = [",".join([row.split(",")[0], *["5"] * header.count(",")]) for row in rows[:7]]
+    crowd = [f"person,{header}", *(f"0,{row}" for row in rows), *(f"1,{row}" for row in other)]
+    (tmp_path / "crowd.csv").write_text("\n".join(crowd))
+    arguments = [tmp_path / "crowd.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--no-plots"]
+    arguments += ["--lengths", folder / "lengths.csv", "--out", tmp_path / "out"]
+    _, said, _ = memo_posture(*arguments)
+    assert "Up to 2 people in 7 of 40 frames: one was followed; --person takes another." in said
+    assert "people" not in memo_posture(*arguments, "--person", 0)[1]
 
 
 def test_one_frame_has_no_way(scene, tmp_path):

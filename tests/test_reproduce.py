@@ -47,7 +47,7 @@ FIGURES = {
 @pytest.fixture(scope="module")
 def scene():
     """The synthetic scene, tracked once for all tests."""
-    once = scene_sequence(lambda _: None)
+    once = scene_sequence(lambda *_: None)
     with pytest.MonkeyPatch.context() as patch:
         # The package's attribute `rohr` is the function, not the module.
         patch.setattr(sys.modules["memo.reproduce.rohr"], "scene_sequence", lambda progress: once)
@@ -55,8 +55,17 @@ def scene():
 
 
 @pytest.fixture(scope="module")
-def papers(scene):
-    return {name: reproduce() for name, reproduce in EXPERIMENTS.items()}
+def told():
+    """What each paper was told of its progress, by its name."""
+    return {name: [] for name in EXPERIMENTS}
+
+
+@pytest.fixture(scope="module")
+def papers(scene, told):
+    return {
+        name: reproduce(progress=lambda *step, name=name: told[name].append(step))
+        for name, reproduce in EXPERIMENTS.items()
+    }
 
 
 @pytest.fixture
@@ -68,10 +77,34 @@ def made_before(papers, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def written(papers, tmp_path_factory):
+def written(papers, told, tmp_path_factory):
     """The files of the paper whose figures are drawn soonest."""
-    folder = tmp_path_factory.mktemp("written")
-    return folder, papers["hoffman-flinchbaugh"].write(folder)
+    folder, name = tmp_path_factory.mktemp("written"), "hoffman-flinchbaugh"
+    return folder, papers[name].write(folder, lambda *step: told[name].append(step))
+
+
+def test_progress_says_how_much_of_what_is_done(papers, written, told):
+    steps = told["lee-chen"]
+    assert [step[1:] for step in steps] == [(0, 3), (1, 3), (2, 3)]
+    drawn = [step for step in told["hoffman-flinchbaugh"] if "drawing" in step[0]]
+    assert [step[1:] for step in drawn] == [(k, 7) for k in range(7)]
+    assert all(step.startswith(f"{name}: ") for name in told for step, _, _ in told[name])
+
+
+def test_tracking_the_scene_tells_each_frame():
+    told = []
+
+    class Enough(Exception):
+        pass
+
+    def progress(*step):
+        told.append(step)
+        if len(told) == 3:
+            raise Enough
+
+    with pytest.raises(Enough):
+        scene_sequence(progress)
+    assert told == [("rohr: tracking the synthetic scene", done, 80) for done in range(3)]
 
 
 def read_csv(path):

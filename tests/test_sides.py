@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from memo import cli
 from memo.files import FLIP_COLUMNS
-from memo.keypoints import KeypointsError, read_keypoints
+from memo.keypoints import KeypointsError, read_keypoints, write_csv
 
 NAMES = [f"{side}_{part}" for part in ("hip", "knee", "ankle", "heel") for side in ("right", "left")]
 EXCHANGED = [12, 13, 14, 30, 47]
@@ -170,3 +170,19 @@ def test_the_command_writes_an_openpose_folder(tmp_path, monkeypatch, memo_unswa
         assert data["people"][0]["hand_left_keypoints_2d"] == [t]
         values = np.array(data["people"][0]["pose_keypoints_2d"]).reshape(18, 3)
         np.testing.assert_array_equal(values[[8, 11], :2], points[t, :2].round(2))
+
+
+def test_a_file_is_read_as_for_posture_and_mistakes_are_told(tmp_path):
+    names = ["right_hip", "left_hip", "right_knee", "left_knee"]
+    points = np.random.default_rng(0).uniform(0, 500, (9, 4, 2))
+    write_csv(tmp_path / "points.csv", memo.Keypoints.from_arrays(points, names=names, fps=25))
+    read = memo.read_keypoints(tmp_path / "points.csv", fps=25)
+    assert memo.unswap(tmp_path / "points.csv", fps=25).flips == memo.unswap(read).flips
+    for options, reason in (
+        ({"fps": 25}, "still to be read"),
+        ({"groups": "legs"}, "a list of legs and arms"),
+    ):
+        with pytest.raises(ValueError, match=reason):
+            memo.unswap(read, **options)
+    with pytest.raises(memo.KeypointsError, match="frame rate must be positive"):
+        memo.read_keypoints(tmp_path / "points.csv", fps="25")

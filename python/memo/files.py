@@ -23,11 +23,13 @@ __all__ = [
     "EVENT_COLUMNS",
     "FLIP_COLUMNS",
     "JOINTS",
+    "MAX_TEXT_BYTES",
     "TRACK_COLUMNS",
     "complete_file",
     "plain",
     "read_columns_csv",
     "read_events_csv",
+    "read_text",
     "read_text_columns",
     "read_track",
     "read_track_csv",
@@ -80,6 +82,8 @@ _DIGITS = {
     "similarity": 5,
     "walk": 0,
 }
+
+MAX_TEXT_BYTES = 256 << 20
 
 Column = npt.NDArray[Any]
 
@@ -222,6 +226,20 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
             raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
     place = {name: index for index, name in enumerate(header)}
     return {name: [row[place[name]] for row in rows if row] for name in names or header}
+
+
+def read_text(
+    path: str | PathLike[str], error: type[ValueError] = ValueError, most_bytes: int = MAX_TEXT_BYTES
+) -> str:
+    """A text in UTF-8, with or without a byte order mark; `error` where it is none or longer than that."""
+    path = Path(path)
+    size = path.stat().st_size
+    if size > most_bytes:
+        raise error(f"{path}: {size >> 20} MiB; at most {most_bytes >> 20} MiB are read")
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as wrong:
+        raise error(f"{path}: not text in UTF-8 (byte {wrong.start})") from None
 
 
 @contextmanager

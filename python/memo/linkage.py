@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import logging
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,14 +18,23 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
-from memo.files import JOINTS, complete_file
-from memo.table import data_frame
+from memo.files import JOINTS, complete_file, read_text
+from memo.keypoints import read_keypoints
+from memo.table import data_frame, read_number_table
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["PlanarFigure", "Points", "planar", "read_points_csv", "write_figure_csv", "write_points_csv"]
+__all__ = [
+    "PlanarFigure",
+    "Points",
+    "planar",
+    "read_points_csv",
+    "read_tracks",
+    "write_figure_csv",
+    "write_points_csv",
+]
 
 _log = logging.getLogger(__name__)
 
@@ -210,125 +218,39 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     return Points([_SHORT.get(name, name) for name in names], table.times_s(rate_hz), positions, scales)
 
 
-@dataclass(frozen=True)
-class NumberTable:
-    """A CSV file of numbers with one header row, and the comments before it."""
+def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Points:
+    """Image points to look for limbs in: of a CSV file as `read_points_csv` takes it, or of keypoints.
 
-    path: str | PathLike[str]
-    column: dict[str, int]
-    """Place of each column, by its name."""
-    numbers: Array
-    """(rows, columns), NaN for empty cells."""
-    comments: list[str]
-
-    def points(self, dimensions: int) -> tuple[list[str], Array]:
-        """Names and positions (T, K, 2) or (T, K, 3) of the points, as `read_points_csv` finds them."""
-        known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
-        for axes in known:
-            names = list(
-                dict.fromkeys(
-                    name.removesuffix(f"_{axis}")
-                    for axis in axes
-                    for name in self.column
-                    if name.endswith(f"_{axis}") and name != f"_{axis}"
-                )
-            )
-            if not names:
-                continue
-            for name in names:
-                absent = [f"{name}_{axis}" for axis in axes if f"{name}_{axis}" not in self.column]
-                if absent:
-                    raise ValueError(f"{self.path}: point {name} has no column {absent[0]}")
-            picked = [[self.column[f"{name}_{axis}"] for axis in axes] for name in names]
-            return names, self.numbers[:, np.array(picked)]
-        wanted = " or ".join(", ".join(f"NAME_{axis}" for axis in axes) for axes in known)
-        raise ValueError(f"{self.path}: no columns {wanted}; it has {', '.join([*self.column][:6])}")
-
-    def times_s(self, rate_hz: float | None) -> Array:
-        """The column time_s, which a given rate may not contradict; else from the rate given or stated."""
-        return _times(self.path, self.column, self.numbers, self.comments, rate_hz)
+    Keypoints are what `read_keypoints` takes; of a CSV file their scores, a column `joint` or columns NAME_x
+    without NAME_z tell. Of one person the shoulders, elbows, wrists, hips, knees and ankles are taken.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder")
+    if not _holds_keypoints(path):
+        return read_points_csv(path, 2, rate_hz)
+    keypoints = read_keypoints(path, fps=rate_hz)
+    limbs = [name for name in keypoints.names if name in _SHORT]
+    if len(limbs) < 2:
+        raise ValueError(
+            f"{path}: fewer than two joints of arms or legs; it has {', '.join(keypoints.names)}"
+        )
+    places = [keypoints.names.index(name) for name in limbs]
+    return Points([_SHORT[name] for name in limbs], keypoints.times_s, keypoints.points[:, places])
 
 
-def read_number_table(path: str | PathLike[str]) -> NumberTable:
-    """Reads a CSV file of numbers; words are refused in columns of coordinates and times."""
-    lines = _lines(path)
-    comments = [line for line in lines if line.startswith("#")]
-    try:
-        rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
-    except csv.Error as error:
-        raise ValueError(f"{path}: no CSV file: {error}") from None
-    if len(rows) < 2:
-        raise ValueError(f"{path}: no header and rows of numbers")
-    header, body = [name.strip() for name in rows[0]], rows[1:]
-    twice = next((name for name, count in Counter(header).items() if count > 1), None)
-    if twice is not None:
-        raise ValueError(f"{path}: column {twice} occurs {header.count(twice)} times")
-    for number, row in enumerate(body):
-        if len(row) != len(header):
-            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
-    table = np.full((len(body), len(header)), np.nan)
-    for number, row in enumerate(body):
-        for index, cell in enumerate(row):
-            table[number, index] = _number(path, number, header[index], cell)
-    return NumberTable(path, {name: index for index, name in enumerate(header)}, table, comments)
+def _holds_keypoints(path: Path) -> bool:
+    if path.is_dir() or path.suffix.lower() in (".json", ".trc", ".parquet"):
+        return True
+    header = next(
+        (line for line in read_text(path).splitlines() if line.strip() and not line.startswith("#")), ""
+    )
+    columns = [cell.strip() for cell in header.replace(";", ",").replace("\t", ",").split(",")]
 
+    def some(end: str) -> bool:
+        return any(column.endswith(end) for column in columns)
 
-def _lines(path: str | PathLike[str]) -> list[str]:
-    """The lines of a text file, with or without a byte order mark."""
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        try:
-            return file.read().splitlines()
-        except UnicodeDecodeError as error:
-            raise ValueError(f"{path}: no UTF-8 text (byte {error.start})") from None
-
-
-def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
-    """A cell's number, NaN where it is empty; words only where no point is."""
-    if not cell.strip():
-        return np.nan
-    try:
-        value = float(cell)
-    except ValueError:
-        if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "deg", "scale"):
-            return np.nan
-        raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
-    if np.isinf(value):
-        raise ValueError(f"{path}: row {row}, column {column}: infinite; leave unseen points empty")
-    return value
-
-
-def _times(
-    path: str | PathLike[str],
-    column: dict[str, int],
-    table: Array,
-    comments: list[str],
-    rate_hz: float | None,
-) -> Array:
-    """The column time_s, which a given rate may not contradict; else from the rate given or in a comment."""
-    if rate_hz is not None and not (rate_hz > 0 and np.isfinite(rate_hz)):
-        raise ValueError(f"a frame rate must be positive and finite, got {rate_hz:g}")
-    if "time_s" not in column:
-        return np.arange(len(table)) / (_stated_rate(path, comments) if rate_hz is None else rate_hz)
-    times_s = table[:, column["time_s"]]
-    late = np.flatnonzero(~(np.diff(times_s) > 0))
-    if len(late):
-        raise ValueError(f"{path}: row {late[0] + 1}, column time_s: times must increase")
-    if rate_hz is not None and len(times_s) > 1:
-        timed_hz = 1 / float(np.median(np.diff(times_s)))
-        if abs(timed_hz / rate_hz - 1) > 0.02:
-            raise ValueError(f"{path}: column time_s has {timed_hz:.4g} frames a second, not {rate_hz:g}")
-    return times_s
-
-
-def _stated_rate(path: str | PathLike[str], comments: list[str]) -> float:
-    """The frame rate in the comments, where just one number stands before "Hz"."""
-    stated = {float(rate) for rate in re.findall(r"(?<![\w.,-])(\d+(?:\.\d*)?) *Hz\b", "\n".join(comments))}
-    if len(stated) > 1:
-        rates = ", ".join(f"{rate:g}" for rate in sorted(stated))
-        raise ValueError(f"{path}: the comments hold several rates ({rates} Hz): give --fps")
-    if not stated or 0 in stated:
-        raise ValueError(f"{path}: no column time_s and no frame rate in a comment: give --fps")
-    return stated.pop()
+    return "joint" in columns or some("_score") or (some("_x") and not some("_z"))
 
 
 def write_points_csv(path: str | PathLike[str], points: Points) -> None:

@@ -114,6 +114,8 @@ def write_turned_video(
                 right.plot(ends[:, 0], ends[:, 1], "o-", color=COLOURS[index % len(COLOURS)], linewidth=3)
             right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
             canvas.draw()
+            if frame == 0:
+                drawing.set_layout_engine("none")  # the same for all frames, and dear
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
             if progress is not None:
                 progress(frame + 1, len(flat))

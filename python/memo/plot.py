@@ -140,6 +140,21 @@ def plot_over_time(ax: Axes, track: Any, what: str) -> Axes:
     return ax
 
 
+def plot_keypoints(ax: Axes, keypoints: Any) -> Axes:
+    """The ways of the points through the picture: right orange, left blue, others grey; dots in one frame."""
+    colours = {"right": RIGHT, "left": LEFT}
+    seen = np.isfinite(keypoints.points).all(axis=2)
+    row = int(seen.sum(axis=1).argmax())
+    for index, name in enumerate(keypoints.names):
+        colour = colours.get(name.partition("_")[0], NEUTRAL)
+        ax.plot(*keypoints.points[:, index].T, color=colour, linewidth=0.6, alpha=0.5)
+        ax.plot(*keypoints.points[row, index], ".", color=colour)
+    ax.set(aspect="equal", xlabel="u, px", ylabel="v, px")
+    ax.invert_yaxis()
+    ax.set_title(f"frame {keypoints.frames[row]}", loc="left")
+    return ax
+
+
 def plot_exchanges(ax: Axes, repair: Any) -> Axes:
     """Where right and left were exchanged in keypoints, as a bar over time a group; grey where undecided."""
     keypoints = repair.keypoints

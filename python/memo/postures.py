@@ -338,6 +338,7 @@ def posture(
     elif not fps is layout is person is None:
         raise ValueError("fps, layout and person are for keypoints that are still to be read")
     _check_joints_there(keypoints)
+    keypoints.check_pixels()
     _check_camera_fits(keypoints, camera)
     repair = sides.unswap(keypoints) if unswap else None
     used = keypoints if repair is None else repair.keypoints
@@ -361,6 +362,7 @@ def posture(
         max_groups=max_groups,
         progress=progress,
     )
+    found["warnings"] = [*_head_down(found["linked"]), *found["warnings"]]
     for warning in found["warnings"]:
         _log.warning("%s", warning)
     return _named(found, used, camera, points_px, weights, repair)
@@ -452,6 +454,20 @@ def _check_camera_fits(keypoints: Keypoints, camera: _memo.Camera) -> None:
     raise ValueError(
         f"the camera is for {width}x{height} pixels, the keypoints are of {own_width}x{own_height}"
     )
+
+
+def _head_down(linked_m: Array) -> list[str]:
+    """A warning where the motion found has its neck below its pelvis, as v counted upwards gives."""
+    joints = _memo.joint_names()
+    above_m = linked_m[:, joints.index("neck"), 2] - linked_m[:, joints.index("pelvis"), 2]
+    known = np.isfinite(above_m)
+    upside_down = int((above_m[known] < 0).sum())
+    if 2 * upside_down <= known.sum():
+        return []
+    return [
+        f"the neck is below the pelvis in {upside_down} of {int(known.sum())} frames: "
+        "v of the keypoints must be counted downwards"
+    ]
 
 
 def _stick_points(keypoints: Keypoints) -> tuple[Array, Array, Array | None]:

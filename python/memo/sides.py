@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from memo import _memo
 from memo.files import FLIP_COLUMNS
-from memo.keypoints import Keypoints, KeypointsError
+from memo.keypoints import Keypoints, KeypointsError, read_keypoints
 from memo.table import data_frame
 
 if TYPE_CHECKING:
@@ -66,12 +67,27 @@ class SideRepair:
         return f"SideRepair({groups}; of {len(self.keypoints.frames)} frames)"
 
 
-def unswap(keypoints: Keypoints, groups: Sequence[str] = ("legs", "arms")) -> SideRepair:
+def unswap(
+    keypoints: Keypoints | str | PathLike[str],
+    groups: Sequence[str] = ("legs", "arms"),
+    *,
+    fps: float | None = None,
+    layout: str | None = None,
+    person: int | None = None,
+) -> SideRepair:
     """Exchanges right and left, in legs and arms apart, where the motion shows that they were confused.
 
+    `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
     It mends changes over time only: which leg is the left one is what most frames say, so labels exchanged in
     all frames, or most, cannot be seen by it. Nothing is moved, made up or removed.
     """
+    unknown = [group for group in groups if group not in _LEVELS]
+    if isinstance(groups, str) or unknown:
+        raise ValueError(f"groups must be a list of {' and '.join(_LEVELS)}, got {groups!r}")
+    if not isinstance(keypoints, Keypoints):
+        keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
+    elif not fps is layout is person is None:
+        raise ValueError("fps, layout and person are for keypoints that are still to be read")
     pairs = {group: levels for group in groups if (levels := _levels(keypoints.names, group))}
     if not pairs:
         raise KeypointsError(

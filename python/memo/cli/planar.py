@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 EPILOG = """Examples:
   memo planar dots.csv
   memo planar joints.csv --fps 60 --noise-px 1 --names
+  memo planar walk_json --fps 30 --noise-px 2 --names
 
 Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 3 no window shows planar motion; 4 the app extra is not installed."""
@@ -28,7 +29,11 @@ def add_planar(app: "typer.Typer") -> None:
     @app.command(epilog=EPILOG)
     def planar(
         tracks: Annotated[
-            Path, typer.Argument(metavar="TRACKS", help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps).")
+            Path,
+            typer.Argument(
+                metavar="TRACKS",
+                help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps), or keypoints as for memo posture.",
+            ),
         ],
         noise_px: Annotated[float, typer.Option(help="Standard deviation of a coordinate, pixels.")] = 0.5,
         window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
@@ -70,11 +75,11 @@ def _planar(
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.linkage import JOINT_NAMES, read_points_csv, write_figure_csv
+    from memo.linkage import JOINT_NAMES, read_tracks, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
     _check(options["focal_px"], turn_deg)
-    points, out = read_points_csv(tracks, 2, fps).at_one_scale(), delivery.out
+    points, out = read_tracks(tracks, fps).at_one_scale(), delivery.out
     if names and not any(name in JOINT_NAMES for name in points.names):
         raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)

@@ -12,7 +12,7 @@ import numpy as np
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
 from memo.cli.given import check_apart, check_writable, checked_height, load_camera
-from memo.cli.unswap import exchanges
+from memo.cli.unswap import exchanges, one_of_several
 from memo.postures import WRITTEN, write_postures
 
 if TYPE_CHECKING:
@@ -162,7 +162,9 @@ def _posture(
             from memo.posture_plot import write_posture_plot
 
             written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
-    delivery.tell(postures.summary, _lines(postures), written)
+    first, *others = _lines(postures)
+    lines = [first + one_of_several(keypoints, reading["person"]), *others]
+    delivery.tell(postures.summary, lines, written)
     return Exit.DONE if (postures.survivors > 0).any() else Exit.NOBODY
 
 

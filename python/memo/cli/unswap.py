@@ -71,7 +71,8 @@ def add_unswap(app: "typer.Typer") -> None:
 def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
     check_writable(delivery.out)
     with with_elapsed("looking at right and left", delivery):
-        repair = memo.unswap(memo.read_keypoints(path, **options))
+        keypoints = memo.read_keypoints(path, **options)
+        repair = memo.unswap(keypoints)
         source = repair.keypoints.source.path.resolve()
         stem = source.stem.removesuffix("_json")
         name = source.name if as_format is Written.SAME else stem + _ENDS[as_format]
@@ -97,10 +98,20 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
         "left_out": left_out,
     }
     lines = [f"Right and left exchanged, of {frames} frames: {exchanges(repair)}; {_majority(repair)}."]
+    lines[0] += one_of_several(keypoints, options["person"])
     if left_out:
         lines.append(f"{as_format.value} has no place for {', '.join(left_out)}.")
     delivery.tell(summary, lines, written)
     return Exit.DONE
+
+
+def one_of_several(keypoints: memo.Keypoints, person: int | None) -> str:
+    """A sentence to go on with where nobody said which of several people is meant."""
+    crowded = int((keypoints.people > 1).sum())
+    if person is not None or not crowded:
+        return ""
+    frames = f"{crowded} of {len(keypoints.frames)} frames"
+    return f" Up to {keypoints.people.max()} people in {frames}: one was followed; --person takes another."
 
 
 def exchanges(repair: memo.SideRepair) -> str:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file, read_track
+from memo.files import complete_file, read_text, read_track
 from memo.formats.motion import FormatError
 from memo.run import contours_of_run
 
@@ -32,7 +32,6 @@ __all__ = ["boxes_from_contours", "read_motchallenge", "write_motchallenge"]
 
 Array = npt.NDArray[np.float64]
 
-_MAX_BYTES = 256 << 20
 _MAX_NUMBER = 1e9
 _BOX = ("left_px", "top_px", "width_px", "height_px")
 _WORLD = ("x_m", "y_m", "z_m")
@@ -109,12 +108,7 @@ def _check_up(up: str) -> None:
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """The lines that are not blank, by their number."""
     try:
-        size = path.stat().st_size
-        if size > _MAX_BYTES:
-            raise FormatError(f"{path}: {size >> 20} MiB; at most {_MAX_BYTES >> 20} MiB are read")
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{path}: not text in UTF-8 (byte {error.start})") from None
+        text = read_text(path, FormatError)
     except OSError as error:
         raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from None
     return ((number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip())

@@ -24,8 +24,7 @@ from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
-from memo.linkage import NumberTable
-from memo.table import column_unit
+from memo.table import NumberTable, column_unit
 
 __all__ = ["read_parquet", "read_parquet_motion", "write_parquet", "write_parquet_motion"]
 

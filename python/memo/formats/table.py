@@ -22,8 +22,7 @@ from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, standing_up
 from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
-from memo.formats.text import MAX_TEXT_BYTES
-from memo.linkage import NumberTable, read_number_table
+from memo.table import NumberTable, read_number_table
 
 __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 
@@ -31,8 +30,6 @@ __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 def read_table(path: Path, given: Given) -> Motion:
     """Reads points and angles of a table; other columns are passed over."""
     given.check_used("rate_hz", "unit_m")
-    if path.stat().st_size > MAX_TEXT_BYTES:
-        raise FormatError(f"more than the {MAX_TEXT_BYTES >> 20} MiB that are read")
     try:
         return motion_of_table(read_number_table(path), given)
     except ValueError as error:

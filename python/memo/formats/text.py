@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from memo.files import MAX_TEXT_BYTES
 from memo.formats.motion import FormatError
 
-__all__ = ["MAX_TEXT_BYTES", "number", "numbers", "read_lines", "whole_number"]
-
-MAX_TEXT_BYTES = 256 << 20
+__all__ = ["number", "numbers", "read_lines", "whole_number"]
 
 
 def read_lines(path: Path) -> list[str]:

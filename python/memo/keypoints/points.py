@@ -11,12 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.table import data_frame
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 __all__ = ["Array", "Keypoints", "KeypointsError", "Source", "layouts"]
 
@@ -26,6 +31,7 @@ MAX_FRAME = 10**9
 # A sequence may have gaps, but frame numbers that are mostly gaps are not those of a video.
 _MAX_FRAMES_PER_SEEN = 20
 _MAX_GAP = 1000
+_LARGEST_PART = 1.5  # of width or height; points may lie a little outside the picture
 
 
 class KeypointsError(ValueError):
@@ -54,7 +60,7 @@ class Source:
     files: tuple[Path, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class Keypoints:
     """One person's image points over time."""
 
@@ -124,6 +130,39 @@ class Keypoints:
             people=np.isfinite(all_points).any(axis=(1, 2)).astype(np.int64),
             source=Source(Path("arrays"), None),
         )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row a frame, with the columns that `write_csv` writes, as a `pandas.DataFrame`."""
+        columns: dict[str, npt.NDArray[Any]] = {"frame": self.frames, "time_s": self.times_s}
+        for index, name in enumerate(self.names):
+            columns[f"{name}_u_px"], columns[f"{name}_v_px"] = self.points[:, index].T
+            columns[f"{name}_score"] = self.scores[:, index]
+        return data_frame(columns)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the ways of the points through the picture into `ax`, or Axes of its own, and returns them.
+        Needs matplotlib."""
+        from memo.plot import new_axes, plot_keypoints
+
+        return plot_keypoints(new_axes() if ax is None else ax, self)
+
+    def __repr__(self) -> str:
+        seen = np.isfinite(self.points).all(axis=2).mean()
+        crowd = f", up to {self.people.max()} people" if self.people.max() > 1 else ""
+        return (
+            f"Keypoints({len(self.names)} points{f' of {self.layout}' if self.layout else ''}, "
+            f"frames {self.frames[0]} to {self.frames[-1]}, {seen:.0%} seen{crowd})"
+        )
+
+    def check_pixels(self) -> None:
+        """Refuses coordinates that are parts of the picture's width and height, 0 to 1 or -1 to 1."""
+        there = np.isfinite(self.points).all(axis=2)
+        largest = float(np.abs(self.points[there]).max(initial=0))
+        if there.sum() > 1 and largest <= _LARGEST_PART:
+            raise KeypointsError(
+                f"{self.source.path}: coordinates up to {largest:.3g}: these are parts of the picture's "
+                "width and height, and pixels are needed: multiply by them"
+            )
 
     def replaced(self, points: npt.ArrayLike, scores: npt.ArrayLike) -> Keypoints:
         """The same with other points and scores of the same shapes."""

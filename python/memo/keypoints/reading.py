@@ -44,7 +44,7 @@ def read_keypoints(
     `track.parquet`) the projected joints are read.
     """
     path = Path(path)
-    if fps is not None and not 0 < fps < math.inf:
+    if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
         raise KeypointsError(f"the frame rate must be positive, got {fps}")
     if person is not None and (isinstance(person, bool) or not isinstance(person, int) or person < 0):
         raise KeypointsError(f"person {person!r} is not a place in the list of people: 0, 1, ...")

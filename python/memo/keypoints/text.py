@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from memo.files import complete_file
+from memo.files import complete_file, read_text
 from memo.keypoints.points import MAX_FRAME, KeypointsError
 
 __all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_text"]
@@ -20,12 +20,7 @@ LONGEST_NAME = 60
 def content_of(path: Path, most: int = MAX_FILE_BYTES) -> str:
     """The text of a file in UTF-8 of at most so many bytes."""
     try:
-        size = path.stat().st_size
-        if size > most:
-            raise KeypointsError(f"{path}: {size >> 20} MiB; at most {most >> 20} MiB are read")
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise KeypointsError(f"{path}: not text in UTF-8 (byte {error.start})") from None
+        return read_text(path, KeypointsError, most)
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
 

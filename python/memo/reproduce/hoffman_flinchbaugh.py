@@ -7,7 +7,6 @@ statement, counted here over problems drawn from a seed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,19 @@ from memo import _memo
 from memo.linkage import PlanarFigure, planar
 from memo.linkage_plot import COLOURS
 from memo.plot import LEFT, NEUTRAL, RIGHT
-from memo.reproduce.result import EQUAL, Drawing, Reproduction, Row, Table, Verdict, cannot, compared, in_kind
+from memo.reproduce.result import (
+    EQUAL,
+    Drawing,
+    Progress,
+    Reproduction,
+    Row,
+    Table,
+    Verdict,
+    cannot,
+    compared,
+    in_kind,
+    unseen,
+)
 
 __all__ = ["hoffman_flinchbaugh"]
 
@@ -43,15 +54,15 @@ NEAR = "lie so near to a degenerate case that 1e-6 is beyond double precision"
 Array = npt.NDArray[np.float64]
 
 
-def hoffman_flinchbaugh(progress: Callable[[str], object] = lambda _: None) -> Reproduction:
+def hoffman_flinchbaugh(progress: Progress = unseen) -> Reproduction:
     """Every statement and figure of Hoffman and Flinchbaugh (1982) that can be computed."""
-    progress("hoffman-flinchbaugh: rods")
+    progress("hoffman-flinchbaugh: rods", 0, 3)
     rods = _memo.hoffman_flinchbaugh_rods(TRIALS, SEED)
-    progress("hoffman-flinchbaugh: hinges")
+    progress("hoffman-flinchbaugh: hinges", 1, 3)
     hinges = _memo.hoffman_flinchbaugh_hinges(TRIALS, SEARCHED, SEED)
     false_rods, false_hinges = _memo.hoffman_flinchbaugh_false_targets(TRIALS, SEED)
     degenerate = _memo.hoffman_flinchbaugh_degenerate(1000, SEED)
-    progress("hoffman-flinchbaugh: point-light walker")
+    progress("hoffman-flinchbaugh: point-light walker", 2, 3)
     walker = _Walker()
     rows = [
         *_proposition_1(rods),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from statistics import median
 from typing import Any
 
@@ -15,7 +14,17 @@ from matplotlib.figure import Figure
 from memo import _memo
 from memo.plot import LEFT, NEUTRAL, RIGHT
 from memo.posture_plot import draw_figure
-from memo.reproduce.result import Drawing, Reproduction, Row, Table, cannot, compared, in_kind
+from memo.reproduce.result import (
+    Drawing,
+    Progress,
+    Reproduction,
+    Row,
+    Table,
+    cannot,
+    compared,
+    in_kind,
+    unseen,
+)
 
 __all__ = ["lee_chen", "plot_posture", "plot_superposition"]
 
@@ -75,16 +84,16 @@ TABLE_A2 = {
 Points = npt.NDArray[np.float64]
 
 
-def lee_chen(progress: Callable[[str], object] = lambda _: None) -> Reproduction:
+def lee_chen(progress: Progress = unseen) -> Reproduction:
     """Every table and figure of Lee and Chen (1985)."""
-    progress("lee-chen: inputs and Table 2")
+    progress("lee-chen: inputs and Table 2", 0, 3)
     inputs, head = _memo.lee_chen_inputs(), _memo.lee_chen_head()
-    progress("lee-chen: Tables 3 and 4")
+    progress("lee-chen: Tables 3 and 4", 1, 3)
     counts = {
         sequence: [_memo.lee_chen_counts(sequence, merge_m) for merge_m in (0.04, 0.0)]
         for sequence in SEQUENCES
     }
-    progress("lee-chen: rules 1 to 5 over ten phases")
+    progress("lee-chen: rules 1 to 5 over ten phases", 2, 3)
     stages = _last_stages()
     left = {sequence: _memo.lee_chen_figures(sequence) for sequence in SEQUENCES}
     rows = [*_input_rows(inputs), *_head_rows(head)]
@@ -628,8 +637,13 @@ def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
                     linewidth=1.8 if fits else 0.6, linestyle="-" if fits else "--",
                     label=f"A{a} B{b}: {apart:.1f} cm" + (", kept" if fits else ", cut"))  # fmt: skip
     ax.set(aspect="equal", xlabel="distance from the camera, m", ylabel="to the right, m")
-    ax.legend(frameon=False, fontsize=8, title=f"shoulder to shoulder {wanted:g} cm", loc="center left",
-              bbox_to_anchor=(1, 0.5))  # fmt: skip
+    figure.legend(
+        frameon=False,
+        fontsize=8,
+        title=f"shoulder to shoulder {wanted:g} cm",
+        loc="outside lower center",
+        ncols=2,
+    )
 
 
 def _draw_sequences(figure: Figure) -> None:

@@ -23,6 +23,7 @@ from memo.files import complete_file
 __all__ = [
     "EQUAL",
     "Drawing",
+    "Progress",
     "Reproduction",
     "Row",
     "Table",
@@ -30,8 +31,17 @@ __all__ = [
     "cannot",
     "compared",
     "in_kind",
+    "unseen",
     "write_index",
 ]
+
+Progress = Callable[[str, int, int | None], object]
+"""Is told how far a reproduction is: the step, how much of it is done and of how much (None: unknown)."""
+
+
+def unseen(step: str, done: int, total: int | None) -> None:
+    """The progress of one who does not ask."""
+
 
 EQUAL = "equal (0)"
 """What is printed of the difference of an equation's two sides."""
@@ -142,16 +152,14 @@ class Reproduction:
         found = Counter(row.verdict for row in self.rows)
         return {verdict.value: found[verdict] for verdict in Verdict}
 
-    def write(
-        self, folder: str | PathLike[str], progress: Callable[[str], object] = lambda _: None
-    ) -> list[Path]:
+    def write(self, folder: str | PathLike[str], progress: Progress = unseen) -> list[Path]:
         """Writes reproduction.md, reproduction.csv, the tables and the figures; their paths."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         self._remove_others(folder)
         written = [folder / "reproduction.md", folder / "reproduction.csv"]
-        for drawing in self.figures:
-            progress(f"{self.name}: drawing {drawing.item}")
+        for done, drawing in enumerate(self.figures):
+            progress(f"{self.name}: drawing {drawing.item}", done, len(self.figures))
             written.append(drawing.write(folder))
         written += [table.write(folder) for table in self.tables]
         _write_csv(

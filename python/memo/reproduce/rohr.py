@@ -6,12 +6,21 @@ of a sequence is shown of the synthetic scene of `memo demo`, or of a video that
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from memo import _memo
-from memo.reproduce.result import EQUAL, Reproduction, Row, Table, Verdict, cannot, compared, in_kind
+from memo.reproduce.result import (
+    EQUAL,
+    Progress,
+    Reproduction,
+    Row,
+    Table,
+    Verdict,
+    cannot,
+    compared,
+    in_kind,
+    unseen,
+)
 from memo.reproduce.rohr_figures import figures, similarity_peaks, start_outliers
 from memo.reproduce.sequence import Clip, NobodyTracked, Sequence, clip_sequence, scene_sequence
 
@@ -25,14 +34,14 @@ paper's synthetic sequence was) or on a video that is given. They are not the pa
 CURVES = ("hip", "knee", "shoulder", "elbow")
 
 
-def rohr(clip: Clip | None = None, progress: Callable[[str], object] = lambda _: None) -> Reproduction:
+def rohr(clip: Clip | None = None, progress: Progress = unseen) -> Reproduction:
     """Every number, equation and figure of Rohr (1994); figures of real sequences from `clip`, if given.
 
     Raises `NobodyTracked` where nobody is tracked in the clip.
     """
     filmed = clip_sequence(clip, progress) if clip is not None else None
     scene = scene_sequence(progress)
-    progress("rohr: numbers and equations")
+    progress("rohr: numbers and equations", 0, None)
     numbers, deviations = dict(_memo.rohr_numbers()), dict(_memo.rohr_deviations(0))
     rows = [
         *_model_rows(numbers, deviations),

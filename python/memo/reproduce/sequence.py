@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.reproduce.result import Progress
 from memo.scene import demo_scene
 from memo.tracking import Track, Tracker
 
@@ -95,7 +96,7 @@ class Sequence:
         return self.truth[name][at]
 
 
-def scene_sequence(progress: Callable[[str], object]) -> Sequence:
+def scene_sequence(progress: Progress) -> Sequence:
     """The synthetic scene, tracked with the model it was drawn with, as the paper's was."""
     scene = demo_scene(SEED)
 
@@ -104,12 +105,11 @@ def scene_sequence(progress: Callable[[str], object]) -> Sequence:
             (k, float(t), f) for k, (t, f) in enumerate(zip(scene.times_s, scene.frames, strict=True))
         )
 
-    progress("rohr: tracking the synthetic scene")
-    tracker = Tracker(scene.height_m, scene.camera, adapt=False)
-    return _sequence("the synthetic scene", scene.height_m, frames, tracker, scene.truth, progress)
+    tracker, count = Tracker(scene.height_m, scene.camera, adapt=False), len(scene.frames)
+    return _sequence("the synthetic scene", scene.height_m, frames, count, tracker, scene.truth, progress)
 
 
-def clip_sequence(clip: Clip, progress: Callable[[str], object]) -> Sequence:
+def clip_sequence(clip: Clip, progress: Progress) -> Sequence:
     """A video. Raises `NobodyTracked` where no walker is found."""
     from memo.video import VideoReader
 
@@ -117,24 +117,24 @@ def clip_sequence(clip: Clip, progress: Callable[[str], object]) -> Sequence:
         with VideoReader(clip.video, rate_hz=clip.fps) as reader:
             yield from ((frame.index, frame.time_s, frame.luma) for frame in reader)
 
-    name = Path(clip.video).name
-    progress(f"rohr: tracking {name}")
+    with VideoReader(clip.video, rate_hz=clip.fps) as reader:
+        count = reader.frame_count
     tracker = Tracker(clip.height_m, clip.camera)
-    return _sequence(name, clip.height_m, frames, tracker, None, progress)
+    return _sequence(Path(clip.video).name, clip.height_m, frames, count, tracker, None, progress)
 
 
 def _sequence(
     label: str,
     height_m: float,
     frames: Callable[[], Frames],
+    count: int | None,
     tracker: Tracker,
     truth: dict[str, npt.NDArray[Any]] | None,
-    progress: Callable[[str], object],
+    progress: Progress,
 ) -> Sequence:
-    for index, time_s, luma in frames():
+    for done, (_, time_s, luma) in enumerate(frames()):
+        progress(f"rohr: tracking {label}", done, count)
         tracker.update(luma, time_s)
-        if index % 25 == 24:
-            progress(f"rohr: tracking {label}, frame {index + 1}")
     whole = tracker.finish()
     walks = [walk for walk in whole.walks if isinstance(walk, _memo.Walk)]
     if not walks:
@@ -142,7 +142,6 @@ def _sequence(
     longest = max(walks, key=lambda walk: (walk.direction == "forward", len(walk)))
     track = Track([longest], whole.seek_report, whole.camera)
     row_of = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
-    progress(f"rohr: looking at {label} again")
     example_rows = _spread(sorted(row_of[int(f)] for f in track.start["frame"] if int(f) in row_of), 2)
     shown_rows = _spread(range(len(track)), 4)
     step = max(1, len(track) // RECTANGLES)
@@ -150,7 +149,8 @@ def _sequence(
     shown: list[tuple[int, Luma]] = []
     rectangles: list[list[float]] = []
     window: deque[tuple[int, Luma]] = deque(maxlen=3)
-    for index, _, luma in frames():
+    for done, (index, _, luma) in enumerate(frames()):
+        progress(f"rohr: looking at {label} again", done, count)
         window.append((index, np.array(luma)))
         if len(window) < 3 or window[1][0] not in row_of:
             continue
