@@ -124,7 +124,7 @@ impl Distortion {
     ///
     /// With one radial term the iterates approach from one side and no step is halved.
     fn brown_inverse(&self, x_d: DVec2) -> Option<DVec2> {
-        let mut x = if self.is_unfolded(x_d) { x_d } else { DVec2::ZERO };
+        let mut x = if self.is_before_the_fold(x_d) { x_d } else { DVec2::ZERO };
         let mut error = self.brown(x) - x_d;
         for _ in 0..MAX_ITERATIONS {
             if error.length() <= TOLERANCE * (1.0 + x_d.length()) {
@@ -140,13 +140,18 @@ impl Distortion {
         None
     }
 
-    /// The first of x - step, x - step/2, ... that is unfolded and brings the distorted point closer to
+    /// [`Self::is_unfolded`], and on the near side of the fold where the tangential terms shift it.
+    fn is_before_the_fold(&self, x: DVec2) -> bool {
+        self.is_unfolded(x) && self.brown_jacobian(x).determinant() > 0.0
+    }
+
+    /// The first of x - step, x - step/2, ... that is before the fold and brings the distorted point closer to
     /// `x_d`.
     fn closer(&self, x: DVec2, step: DVec2, x_d: DVec2, error_length: f64) -> Option<(DVec2, DVec2)> {
         (0..40).find_map(|halvings| {
             let x = x - step * 0.5_f64.powi(halvings);
             let error = self.brown(x) - x_d;
-            (self.is_unfolded(x) && error.length() < error_length).then_some((x, error))
+            (self.is_before_the_fold(x) && error.length() < error_length).then_some((x, error))
         })
     }
 }
@@ -223,6 +228,16 @@ mod tests {
             let slope = (lens.brown(x + axis * 1e-6) - lens.brown(x - axis * 1e-6)) / 2e-6;
             assert!((jacobian * axis - slope).length() < 1e-8);
         }
+    }
+
+    #[test]
+    fn a_start_beyond_the_fold_that_tangential_terms_shift_is_given_up() {
+        let k = [0.3871901297456689, -0.1434687956196204, 0.0022347674297831213, 0.0018532744519083966];
+        let lens = Distortion::from_opencv([k[0], k[1], -0.03122052206013254, k[2], k[3]]);
+        let ideal = DVec2::new(-0.8569709873993293, 0.6245862876882984);
+        let distorted = lens.distort(ideal).unwrap();
+        assert!(lens.is_unfolded(distorted) && lens.brown_jacobian(distorted).determinant() < 0.0);
+        assert!((lens.undistort(distorted).unwrap() - ideal).length() < 1e-12);
     }
 
     proptest! {
