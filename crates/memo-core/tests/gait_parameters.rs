@@ -1,5 +1,11 @@
 //! Gait parameters against what was drawn: a population of walkers who deviate from the average as people are
-//! said to by the head of `track::gait_parameters`. `MEMO_FULL=1` counts over 200 walkers instead of 4.
+//! said to by the head of `track::gait_parameters`. `MEMO_FULL=1` counts over 120 walkers instead of 4, and an
+//! interval that never misses is too wide.
+//!
+//! Drawn of each: how much the steps vary, the reach of the feet, when heels strike, the height given, the field of
+//! view of a camera that is not told; and style and proportions, with knees bent by 0.08 rad more or less and shanks
+//! tilted by 0.03, strides 7 % longer or shorter, joints 1.2 % of the height higher or lower (chosen: the offsets
+//! `track::person` reckons with are larger, but the model's foot does not bend and would leave the ground).
 
 use memo_core::synth::{Random, SceneOptions, SynthScene, Uneven};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
@@ -147,7 +153,7 @@ fn intervals_hold_what_was_drawn() {
         let half = count.half_sum / count.all as f64;
         println!("{name:22} {:4} of {:4} {:5.1} %, ±{half:.1} %", count.held, count.all, 100.0 * share);
         assert!(count.all as f64 >= 0.9 * seeds as f64, "{name} was told {} times only", count.all);
-        assert!(!is_full || (0.90..=0.98).contains(&share), "{name}: {} of {}", count.held, count.all);
+        assert!(!is_full || (0.9..1.0).contains(&share), "{name}: {} of {}", count.held, count.all);
         (held, all) = (held + count.held, all + count.all);
     }
     assert!(10 * held >= 8 * all, "{held} of {all}");
