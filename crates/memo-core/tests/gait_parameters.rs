@@ -1,6 +1,6 @@
 //! Gait parameters against what was drawn: a population of walkers who deviate from the average as people are
-//! said to by the head of `track::gait_parameters`. `MEMO_FULL=1` counts over 120 walkers instead of 4, and an
-//! interval that never misses is too wide.
+//! said to by the head of `track::gait_parameters`. `MEMO_FULL=1` counts over 120 walkers instead of 4, and
+//! intervals that hardly ever miss are too wide.
 //!
 //! Drawn of each: how much the steps vary, the reach of the feet, when heels strike, the height given, the field of
 //! view of a camera that is not told; and style and proportions, with knees bent by 0.08 rad more or less and shanks
@@ -153,10 +153,10 @@ fn intervals_hold_what_was_drawn() {
         let half = count.half_sum / count.all as f64;
         println!("{name:22} {:4} of {:4} {:5.1} %, ±{half:.1} %", count.held, count.all, 100.0 * share);
         assert!(count.all as f64 >= 0.9 * seeds as f64, "{name} was told {} times only", count.all);
-        assert!(!is_full || (0.9..1.0).contains(&share), "{name}: {} of {}", count.held, count.all);
+        assert!(!is_full || share >= 0.9, "{name}: {} of {}", count.held, count.all);
         (held, all) = (held + count.held, all + count.all);
     }
-    assert!(10 * held >= 8 * all, "{held} of {all}");
+    assert!(10 * held >= 8 * all && (!is_full || 100 * held <= 98 * all), "{held} of {all}");
 }
 
 /// 20 % of the step time between the sides, as in a marked limp.
