@@ -1,8 +1,9 @@
 """Gait parameters of walks: the table, what its lines mean, and what they say in plain words.
 
 The numbers come from the core (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
-the height that was given: lengths scale with it. They are wide rather than narrow: of 120 drawn walks, of
-people unlike the model, they held the truth in every one (`tests/gait_parameters.rs` of the core).
+the height that was given, known to 2 cm: lengths scale with it. They are for the person's walking, of which
+the steps seen are a sample; the mean of just these steps is known better. How often they hold the truth is
+counted on drawn people who vary as real ones do (`tests/gait_parameters.rs` of the core).
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ GAIT_COLUMNS = ("walk", "parameter", "side", "value", "unit", "ci_low", "ci_high
 
 DEFINITIONS: dict[str, str] = {
     "cadence": "Steps a minute. Measured: the rate of the gait phase over all frames of the walk. "
-    "Interval: scatter of the frames about that rate, a step counting as one independent observation.",
+    "Interval: scatter of the frames about that rate, a step counting as one independent observation, or "
+    "that of steps that vary by 3 %, whichever is larger.",
     "speed": "Speed of the trunk along its straight path, negative when walking backwards. Measured: the "
-    "rate of its place over all frames. Interval: scatter about that rate, and the scale (distance from "
+    "rate of its place over all frames. Interval: scatter as for cadence, and the scale (distance from "
     "the camera as the person's height in the picture tells it; without a camera file also the assumed "
     "field of view, as far as the path runs along the line of sight).",
     "stride_time": "Duration of a cycle of two steps, 120 / cadence. Measured.",
@@ -47,7 +49,7 @@ DEFINITIONS: dict[str, str] = {
     "against the average gait.",
     "step_length": "Way of the trunk from the other foot's heel strike to this side's; without a side, "
     "half the stride length. The model's feet land equally far ahead of the trunk, so a difference in "
-    "how far the two feet reach is not seen; the interval allows for 1.5 cm of it, beside what step_time "
+    "how far the two feet reach is not seen; the interval allows for 1.2 cm of it, beside what step_time "
     "and speed allow for.",
     "step_time_symmetry": "100 (right - left) / mean of the two step times; 0 is symmetric, positive "
     "when the right step takes longer. Interval as for the sides; small asymmetries are not resolved.",
