@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// A scene whose walker is not the average one.
 fn scene(seed: u64, late_left: f64) -> SynthScene {
-    let mut scene = SynthScene::new(SceneOptions { seed, late_left, ..SceneOptions::default() });
+    let mut scene = SynthScene::new(SceneOptions { seed, late_left, ..SceneOptions::default() }).unwrap();
     let mut random = Random::new(1000 + seed);
     let style = &mut scene.walker.style;
     style.hip_offset = random.uniform(-0.12, 0.12);
@@ -38,7 +38,7 @@ fn tracked(scene: &SynthScene, frames: impl Iterator<Item = usize>, knows_camera
 }
 
 fn truth(scene: &SynthScene, late_left: f64, line: &GaitParameter) -> Option<f64> {
-    let (stride_s, speed) = (1.0 / scene.rate_hz, scene.speed_mps);
+    let (stride_s, speed) = (1.0 / scene.cycle_hz, scene.speed_mps);
     let share = match line.side {
         Some(Side::Right) => 0.5 - late_left,
         Some(Side::Left) => 0.5 + late_left,
@@ -109,14 +109,15 @@ fn line(table: &[GaitParameter], quantity: GaitQuantity, side: Option<Side>) -> 
 
 #[test]
 fn walking_backwards_has_a_negative_speed_and_no_sides() {
-    let scene = SynthScene::new(SceneOptions { seed: 5, empty_frames: 0, ..SceneOptions::default() });
+    let scene =
+        SynthScene::new(SceneOptions { seed: 5, empty_frames: 0, ..SceneOptions::default() }).unwrap();
     let walk = tracked(&scene, (0..scene.len()).rev(), true).remove(0);
     assert_eq!(walk.direction(), Direction::Backward);
     let table = walk.gait_parameters();
     let speed = line(&table, GaitQuantity::Speed, None);
     assert!((speed.value.unwrap() + scene.speed_mps).abs() < 0.02, "{speed:?}");
     let cadence = line(&table, GaitQuantity::Cadence, None).value.unwrap();
-    assert!((cadence - 120.0 * scene.rate_hz).abs() < 1.0, "{cadence}");
+    assert!((cadence - 120.0 * scene.cycle_hz).abs() < 1.0, "{cadence}");
     for quantity in [GaitQuantity::StepTimeSymmetry, GaitQuantity::Stance] {
         let line = line(&table, quantity, None);
         assert_eq!((line.value, line.interval, line.n), (None, None, 0));
@@ -126,7 +127,7 @@ fn walking_backwards_has_a_negative_speed_and_no_sides() {
 
 #[test]
 fn what_is_not_known_is_left_open() {
-    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() });
+    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() }).unwrap();
     let mut walk = tracked(&scene, 0..scene.len(), true).remove(0);
     let sure = walk.gait_parameters();
     assert!(line(&sure, GaitQuantity::StepLength, Some(Side::Right)).value.is_some());

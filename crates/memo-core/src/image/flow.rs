@@ -33,6 +33,7 @@ use thiserror::Error;
 
 /// Why no velocity field was computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FlowError {
     /// The frames or the mask differ in size.
     #[error(transparent)]

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// Why a frame was refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// The buffer is shorter than the image it should hold.
     #[error("a {width}x{height} frame with rows {stride} apart needs {needed} bytes, got {got}")]

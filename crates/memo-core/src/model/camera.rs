@@ -26,6 +26,7 @@ pub const MAX_DISTANCE_M: f64 = 200.0;
 
 /// Why a camera was refused or could not answer.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// An image side is zero.
     #[error("image size must be positive, got {}x{}", size[0], size[1])]

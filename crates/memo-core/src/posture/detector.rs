@@ -308,6 +308,7 @@ const SIDE_PARTS: [(SwapGroup, &str, &str, &[&str]); 17] = [
 
 /// Why points were refused.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum DetectorError {
     /// No layout of this name.
     #[error("unknown keypoint layout `{name}`{}; known are {}", hint(nearest), layout_names().join(", "))]

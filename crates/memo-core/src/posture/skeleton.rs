@@ -225,6 +225,7 @@ impl StickFigure {
 
 /// Why segment lengths were refused.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LengthError {
     /// A length is not a positive number.
     #[error("the length of {segment} must be positive and finite metres, got {length_m}")]

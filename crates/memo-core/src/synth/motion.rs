@@ -27,6 +27,7 @@ pub const WALKER_LIMBS: [[&str; 2]; 8] = [
 
 /// Why positions over time are not a motion.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MotionError {
     /// No frame or no point.
     #[error("a motion needs frames and points, got {frames} frames of {points} points")]

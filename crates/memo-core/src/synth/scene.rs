@@ -11,6 +11,32 @@ use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;
+use thiserror::Error;
+
+/// Longest side of a frame, pixels: a scene holds its background.
+const MOST_SIDE_PX: u32 = 16_384;
+
+/// Why a scene cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A frame has no pixels, or too many.
+    #[error("frames must have sides of 1 to {MOST_SIDE_PX} pixels, got {}x{}", size[0], size[1])]
+    Size {
+        /// Width and height, pixels.
+        size: [u32; 2],
+    },
+    /// An option makes no sense.
+    #[error("{name} must be {wanted}, got {got}")]
+    Option {
+        /// Its name.
+        name: &'static str,
+        /// What is accepted.
+        wanted: &'static str,
+        /// What was given.
+        got: f64,
+    },
+}
 
 /// What is drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,11 +47,11 @@ pub struct SceneOptions {
     pub frames: usize,
     /// Frames before the walker is there.
     pub empty_frames: usize,
-    /// Frames a second. 25, as in the paper.
+    /// Frames a second, 1 to 10,000. 25, as in the paper.
     pub rate_hz: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Standard deviation of the sensor noise, grey levels.
+    /// Standard deviation of the sensor noise, grey levels, 0 to 255.
     pub noise_sd: f32,
     /// Whether the walker goes to the left; `None` lets the seed decide.
     pub leftward: Option<bool>,
@@ -46,6 +72,25 @@ impl Default for SceneOptions {
             leftward: None,
             late_left: 0.0,
         }
+    }
+}
+
+impl SceneOptions {
+    fn check(&self) -> Result<(), SceneError> {
+        if !self.size.iter().all(|side| (1..=MOST_SIDE_PX).contains(side)) {
+            return Err(SceneError::Size { size: self.size });
+        }
+        let noise_sd = f64::from(self.noise_sd);
+        for (name, got, range, wanted) in [
+            ("rate_hz", self.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
+            ("noise_sd", noise_sd, 0.0..=255.0, "0 to 255 grey levels"),
+            ("late_left", self.late_left, -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
+        ] {
+            if !range.contains(&got) {
+                return Err(SceneError::Option { name, wanted, got });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -74,7 +119,7 @@ pub struct SynthScene {
     /// Speed, metres a second.
     pub speed_mps: f64,
     /// Gait cycles a second.
-    pub rate_hz: f64,
+    pub cycle_hz: f64,
     options: SceneOptions,
     start: Hypothesis,
     background: Image<f32>,
@@ -84,7 +129,12 @@ pub struct SynthScene {
 
 impl SynthScene {
     /// Draws lots for everything the options leave open.
-    pub fn new(options: SceneOptions) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// A size, a rate, a noise or a lateness that cannot be drawn.
+    pub fn new(options: SceneOptions) -> Result<Self, SceneError> {
+        options.check()?;
         let mut random = Random::new(options.seed);
         let height_m = random.uniform(1.6, 1.9);
         let body = Body::from_height(height_m).expect("heights between 1.6 and 1.9 m are plausible");
@@ -100,11 +150,11 @@ impl SynthScene {
             height_m: walker.level_torso_height_m(),
             phase: random.uniform(0.0, 1.0),
         };
-        let rate_hz = speed_mps / stride_length_m(&walker);
+        let cycle_hz = speed_mps / stride_length_m(&walker);
         let grey = part_greys(&mut random);
         let background = wall_and_floor(&camera, &mut random);
         let path = Path { origin: DVec2::ZERO, heading_rad };
-        Self { camera, walker, path, speed_mps, rate_hz, options, start, background, grey }
+        Ok(Self { camera, walker, path, speed_mps, cycle_hz, options, start, background, grey })
     }
 
     /// Number of frames.
@@ -131,7 +181,7 @@ impl SynthScene {
         let hypothesis = Hypothesis {
             along_m: self.start.along_m + self.speed_mps * time_s,
             height_m: self.start.height_m,
-            phase: self.phase(self.start.phase + self.rate_hz * time_s),
+            phase: self.phase(self.start.phase + self.cycle_hz * time_s),
         };
         let scene = Scene { walker: &self.walker, camera: &self.camera, path: &self.path };
         Some(Truth { frame, time_s, hypothesis, posed: scene.pose(&hypothesis) })
@@ -151,8 +201,9 @@ impl SynthScene {
         if let Some(truth) = self.truth(frame) {
             self.draw(&truth.posed, &mut levels);
         }
-        let mut random =
-            Random::new(self.options.seed ^ (frame as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let mut random = Random::new(
+            self.options.seed ^ (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15),
+        );
         let mut grey = Image::filled(levels.width(), levels.height(), 0u8);
         for (out, level) in grey.pixels_mut().chunks_mut(2).zip(levels.pixels().chunks(2)) {
             let noise = random.normal_pair();
@@ -260,7 +311,32 @@ mod tests {
     use super::*;
 
     fn scene(options: SceneOptions) -> SynthScene {
-        SynthScene::new(options)
+        SynthScene::new(options).unwrap()
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_refused() {
+        let refused = |options| SynthScene::new(options).unwrap_err().to_string();
+        let base = SceneOptions::default;
+        for size in [[0, 480], [640, 0], [u32::MAX, 1]] {
+            assert!(refused(SceneOptions { size, ..base() }).contains(&format!("{}x{}", size[0], size[1])));
+        }
+        for rate_hz in [0.0, -25.0, f64::NAN, f64::INFINITY] {
+            assert!(refused(SceneOptions { rate_hz, ..base() }).starts_with("rate_hz must be 1 to 10000"));
+        }
+        assert!(refused(SceneOptions { noise_sd: f32::NAN, ..base() }).ends_with("got NaN"));
+        assert!(refused(SceneOptions { late_left: 0.5, ..base() }).ends_with("got 0.5"));
+    }
+
+    #[test]
+    fn scenes_of_one_pixel_of_no_frames_and_beyond_the_last_frame_can_be_drawn() {
+        for (size, frames) in [([1, 1], 80), ([1, 2000], 80), ([2000, 3], 0), ([9, 9], usize::MAX)] {
+            let scene = scene(SceneOptions { size, frames, ..SceneOptions::default() });
+            for frame in [0, 40, 10_000, usize::MAX] {
+                let drawn = scene.frame(frame);
+                assert_eq!([drawn.width() as u32, drawn.height() as u32], size);
+            }
+        }
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub const FOCAL_CM: f64 = 5.0;
 
 /// Why a walker could not be made of segment lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum StickWalkerError {
     /// No rigid torso has these distances between neck, pelvis and shoulders.
     #[error(

@@ -25,6 +25,7 @@ use thiserror::Error;
 
 /// Why tracking stopped with an error.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// The body height makes no sense.
     #[error(transparent)]

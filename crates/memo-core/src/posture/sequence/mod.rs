@@ -228,6 +228,7 @@ impl Default for SequenceOptions {
 
 /// Why there are no postures.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SequenceError {
     /// No frames.
     #[error("there are no frames")]
