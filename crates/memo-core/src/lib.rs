@@ -12,7 +12,7 @@
 //! use memo_core::synth::{SceneOptions, SynthScene};
 //! use memo_core::track::tracker::{Tracker, TrackerOptions};
 //!
-//! let scene = SynthScene::new(SceneOptions::default());
+//! let scene = SynthScene::new(SceneOptions::default())?;
 //! let height_m = scene.walker.body.height_m;
 //! let options = TrackerOptions { camera: Some(scene.camera.clone()), ..TrackerOptions::for_height(height_m) };
 //! let mut tracker = Tracker::new(options)?;
@@ -28,7 +28,7 @@
 //!     let error = (row.phase - true_phase + 0.5).rem_euclid(1.0) - 0.5;
 //!     assert!(error.abs() < 0.02);
 //! }
-//! # Ok::<(), memo_core::track::tracker::TrackError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! `tracker.current()` is what is known while frames still come; [`track::result::TrackedWalk::events`] and
@@ -43,21 +43,22 @@
 //! ```
 //! use memo_core::glam::DVec2;
 //! use memo_core::model::Camera;
-//! use memo_core::posture::detector::{Detector, Layout};
+//! use memo_core::posture::detector::Detector;
 //! use memo_core::posture::sequence::{KeypointSequence, SequenceOptions, postures};
 //! use memo_core::posture::skeleton::{Joint, PerJoint};
 //! use memo_core::synth::{WalkOptions, sampled_walk};
 //! use memo_core::track::tracker::TrackerOptions;
 //!
-//! // A walk seen from its side as COCO-17 keypoints.
+//! // A walk seen from its side, its points called RSH, REL and so on; of a known detector it is
+//! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
 //! let walk = sampled_walk(&walker, &WalkOptions { frames: 30, rate_hz: 25.0, ..WalkOptions::default() })?;
 //! let camera = Camera::level([1280, 720], 1.0, 1.2, 6.0)?;
-//! let detector = Detector::from_layout(Layout::by_name("coco-17")?);
+//! let detector = Detector::from_names(walk.names())?;
 //! let (mut points_px, mut weights) = (Vec::new(), Vec::new());
 //! for frame in 0..walk.frames() {
-//!     let pixel = |name: &&str| camera.project(walk.at(frame, walk.index_of(name)?)?);
-//!     let seen: Vec<DVec2> = detector.names().iter().map(|n| pixel(n).unwrap_or(DVec2::NAN)).collect();
+//!     let pixel = |point| camera.project(walk.at(frame, point)?);
+//!     let seen: Vec<DVec2> = (0..walk.points()).map(|p| pixel(p).unwrap_or(DVec2::NAN)).collect();
 //!     let joints = detector.stick_joints(&seen, &vec![1.0; seen.len()])?;
 //!     points_px.push(PerJoint(joints.points_px));
 //!     weights.push(PerJoint(joints.weights));
@@ -73,7 +74,7 @@
 //! let found = postures(&keypoints, &camera, &options)?;
 //! found.warnings.iter().for_each(|warning| println!("{warning}"));
 //!
-//! let ankle = walk.index_of("right_ankle").expect("a point of the walk");
+//! let ankle = walk.index_of("RAN").expect("a point of the walk");
 //! for (frame, figure) in found.linked.figures.iter().enumerate() {
 //!     let truth = walk.at(frame, ankle).expect("known throughout");
 //!     assert!(figure[Joint::RightAnkle].distance(truth) < 0.25);
