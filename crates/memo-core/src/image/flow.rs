@@ -532,6 +532,7 @@ fn field_of_motion(
 
 #[cfg(test)]
 mod tests {
+    use super::multigrid::Solved;
     use super::*;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;

@@ -75,6 +75,7 @@ pub struct Hinge {
 
 impl Hinge {
     /// The same images read the other way round.
+    #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|view| view.map(|z| -z)), ..*self }
     }

@@ -85,6 +85,7 @@ pub struct Rod {
 
 impl Rod {
     /// The same images read the other way round.
+    #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|z| -z), ..*self }
     }

@@ -47,6 +47,7 @@ impl Side {
     pub const BOTH: [Self; 2] = [Self::Right, Self::Left];
 
     /// The other side.
+    #[must_use]
     pub fn other(self) -> Self {
         match self {
             Self::Right => Self::Left,
@@ -148,6 +149,7 @@ impl Joint {
     }
 
     /// The same joint of the other side; neck and pelvis are their own.
+    #[must_use]
     pub fn mirrored(self) -> Self {
         match self {
             Self::Neck | Self::Pelvis => self,

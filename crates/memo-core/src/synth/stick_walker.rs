@@ -110,6 +110,7 @@ impl StickWalker {
     }
 
     /// The same walker with another phase in frame 0 and another cadence, cycles a second.
+    #[must_use]
     pub fn in_rhythm(self, phase0: f64, cadence_hz: f64) -> Self {
         Self { phase0, cadence_hz, ..self }
     }

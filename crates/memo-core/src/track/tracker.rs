@@ -243,6 +243,7 @@ impl Tracker {
     }
 
     /// The walks that have ended since this was last asked.
+    #[must_use]
     pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
         std::mem::take(&mut self.finished)
     }

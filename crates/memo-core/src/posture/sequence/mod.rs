@@ -409,6 +409,7 @@ fn to_world(linked: LinkedPath, camera: &Camera) -> LinkedPath {
 mod tests {
     use super::*;
     use crate::posture::constraint::ConstraintKind;
+    use crate::posture::skeleton::SegmentLengths;
     use crate::synth::Random;
     use crate::synth::stick_walker::{StickWalker, world_from_head};
     use proptest::prelude::*;
