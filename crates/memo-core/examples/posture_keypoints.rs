@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn an_empty_field_is_a_missing_joint_and_a_short_row_is_named() -> Result<(), Box<dyn Error>> {
         let full = vec!["1.5"; 2 * JOINT_COUNT].join(",");
-        let (times_s, points_px) = read(&format!("header\n0,{full}\n0.04,,{}\n", &full[3..]))?;
+        let (times_s, points_px) = read(&format!("header\n0,{full}\n0.04,{}\n", &full[3..]))?;
         assert_eq!(times_s, [0.0, 0.04]);
         assert!(points_px[0].0.iter().all(|p| p.is_finite()));
         assert!(points_px[1][Joint::Neck].x.is_nan() && points_px[1][Joint::LeftAnkle].is_finite());
