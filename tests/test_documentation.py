@@ -32,7 +32,7 @@ NOT_RUN = {
     "README.md": 4,
     "CONTRIBUTING.md": 2,
     "docs/start/install.md": 2,
-    "docs/start/rust.md": 2,
+    "docs/start/rust.md": 3,
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 5,
 }

@@ -1,6 +1,6 @@
 //! Finds the postures in a CSV of keypoints, or of a synthetic walker, and prints them as rows.
 //!
-//! `cargo run --release -p memo-core --example posture_keypoints -- KEYPOINTS.csv CAMERA.toml [HEIGHT_M]`
+//! `cargo run --release -p memo-core --example posture_keypoints -- KEYPOINTS.csv CAMERA [HEIGHT_M]`
 //! `cargo run --release -p memo-core --example posture_keypoints -- --walker FRAMES`
 //!
 //! The CSV has a header and rows of time_s, then u, v in pixels of the 14 joints from neck to left ankle; an
@@ -8,7 +8,7 @@
 //! of the linked joints.
 
 use glam::DVec2;
-use memo_core::model::Camera;
+use memo_core::model::{Camera, CameraFileOptions};
 use memo_core::posture::sequence::{KeypointSequence, PostureSequence, SequenceOptions, postures};
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::synth::Random;
@@ -18,18 +18,24 @@ use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let start = Instant::now();
+    let found = found(&arguments)?;
+    eprintln!("{} frames in {:.2} s", found.frames.len(), start.elapsed().as_secs_f64());
+    print(&found);
+    Ok(())
+}
+
+fn found(arguments: &[String]) -> Result<PostureSequence, Box<dyn Error>> {
     let mut options = SequenceOptions::default();
-    let ((times_s, points_px), camera) = match arguments.as_slice() {
+    let ((times_s, points_px), camera) = match arguments {
         [walker, frames] if walker == "--walker" => synthetic(frames.parse()?)?,
         [csv, camera, height_m @ ..] if height_m.len() < 2 => {
             options.height_m = height_m.first().map(|height_m| height_m.parse()).transpose()?;
-            let camera = Camera::from_toml_str(&std::fs::read_to_string(camera)?, None)?;
+            let camera = Camera::from_file(camera.as_ref(), &CameraFileOptions::default())?;
             (read(&std::fs::read_to_string(csv)?)?, camera)
         }
         _ => {
-            return Err(
-                "usage: posture_keypoints KEYPOINTS.csv CAMERA.toml [HEIGHT_M] | --walker FRAMES".into()
-            );
+            return Err("usage: posture_keypoints KEYPOINTS.csv CAMERA [HEIGHT_M] | --walker FRAMES".into());
         }
     };
     let weights = vec![PerJoint([1.0; JOINT_COUNT]); times_s.len()];
@@ -39,11 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         weights: &weights,
         head_points_px: None,
     };
-    let start = Instant::now();
-    let found = postures(&sequence, &camera, &options)?;
-    eprintln!("{} frames in {:.2} s", times_s.len(), start.elapsed().as_secs_f64());
-    print(&found);
-    Ok(())
+    Ok(postures(&sequence, &camera, &options)?)
 }
 
 fn print(found: &PostureSequence) {
@@ -102,4 +104,28 @@ fn synthetic(frames: usize) -> Result<(Keypoints, Camera), Box<dyn Error>> {
         points_px.push(pixels);
     }
     Ok(((times_s, points_px), camera))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_synthetic_walk_has_a_posture_in_every_frame() -> Result<(), Box<dyn Error>> {
+        let found = found(&["--walker".to_owned(), "8".to_owned()])?;
+        assert_eq!(found.linked.figures.len(), 8);
+        assert!(found.linked.figures.iter().all(|figure| figure[Joint::RightAnkle].is_finite()));
+        Ok(())
+    }
+
+    #[test]
+    fn an_empty_field_is_a_missing_joint_and_a_short_row_is_named() -> Result<(), Box<dyn Error>> {
+        let full = vec!["1.5"; 2 * JOINT_COUNT].join(",");
+        let (times_s, points_px) = read(&format!("header\n0,{full}\n0.04,{}\n", &full[3..]))?;
+        assert_eq!(times_s, [0.0, 0.04]);
+        assert!(points_px[0].0.iter().all(|p| p.is_finite()));
+        assert!(points_px[1][Joint::Neck].x.is_nan() && points_px[1][Joint::LeftAnkle].is_finite());
+        assert!(read("header\n0,1,2\n").unwrap_err().to_string().starts_with("row 1"));
+        Ok(())
+    }
 }

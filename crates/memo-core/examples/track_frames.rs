@@ -3,21 +3,34 @@
 //! `cargo run --release -p memo-core --example track_frames -- FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]`
 
 use memo_core::image::Image;
-use memo_core::model::{Camera, SideJoints};
+use memo_core::model::{Camera, CameraFileOptions, SideJoints};
 use memo_core::track::result::{Row, TrackedWalk};
-use memo_core::track::tracker::{Tracker, TrackerOptions};
+use memo_core::track::tracker::{SeekReport, Tracker, TrackerOptions};
 use std::error::Error;
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [frames, rate_hz, height_m, rest @ ..] = arguments.as_slice() else {
+    let (walks, seek_report) = tracked(&arguments)?;
+    println!("{}", header());
+    for walk in &walks {
+        report(walk);
+        walk.rows().iter().for_each(|row| println!("{}", csv_row(row, walk)));
+    }
+    if walks.is_empty() {
+        eprintln!("nobody followed: {seek_report:?}");
+    }
+    Ok(())
+}
+
+fn tracked(arguments: &[String]) -> Result<(Vec<TrackedWalk>, SeekReport), Box<dyn Error>> {
+    let [frames, rate_hz, height_m, rest @ ..] = arguments else {
         return Err("usage: track_frames FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]".into());
     };
     let rate_hz: f64 = rate_hz.parse()?;
     let mut options = TrackerOptions::for_height(height_m.parse()?);
     if let Some(file) = rest.first() {
-        options.camera = Some(Camera::from_toml_str(&std::fs::read_to_string(file)?, None)?);
+        options.camera = Some(Camera::from_file(file.as_ref(), &CameraFileOptions::default())?);
     }
 
     let mut files: Vec<PathBuf> =
@@ -33,17 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         tracker.update(&frame.as_frame(), index as f64 / rate_hz)?;
     }
     tracker.finish()?;
-
-    let walks = tracker.take_finished();
-    println!("{}", header());
-    for walk in &walks {
-        report(walk);
-        walk.rows().iter().for_each(|row| println!("{}", csv_row(row, walk)));
-    }
-    if walks.is_empty() {
-        eprintln!("nobody followed: {:?}", tracker.seek_report());
-    }
-    Ok(())
+    Ok((tracker.take_finished(), tracker.seek_report()))
 }
 
 fn report(walk: &TrackedWalk) {
@@ -93,4 +96,39 @@ fn csv_row(row: &Row, walk: &TrackedWalk) -> String {
     }
     let values: Vec<String> = values.iter().map(|v| format!("{v:.6}")).collect();
     format!("{},{}", row.frame, values.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use memo_core::synth::{SceneOptions, SynthScene};
+
+    #[test]
+    fn a_walker_in_a_folder_of_frames_is_followed_in_the_order_of_their_numbers() -> Result<(), Box<dyn Error>>
+    {
+        let scene = SynthScene::new(SceneOptions { frames: 50, ..SceneOptions::default() })?;
+        let folder = std::env::temp_dir().join(format!("memo-track-frames-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)?;
+        for k in 0..scene.len() {
+            let frame = scene.frame(k);
+            let (width, height) = (frame.width() as u32, frame.height() as u32);
+            let png = image::GrayImage::from_raw(width, height, frame.into_vec()).ok_or("as many pixels")?;
+            png.save(folder.join(format!("frame{k}.png")))?;
+        }
+        let camera = folder.join("camera.toml");
+        std::fs::write(&camera, scene.camera.to_toml_string("camera")?)?;
+        let height_m = scene.walker.body.height_m.to_string();
+        let arguments =
+            [folder.display().to_string(), "25".to_owned(), height_m, camera.display().to_string()];
+        let found = tracked(&arguments);
+        std::fs::remove_dir_all(&folder)?;
+        let (walks, _) = found?;
+        let [walk] = walks.as_slice() else { return Err(format!("{} walks", walks.len()).into()) };
+        for row in walk.rows() {
+            let truth = scene.truth(row.frame).ok_or("the walker is there")?;
+            assert!(row.torso_centre.distance(truth.posed.torso_centre) < 0.1);
+            assert_eq!(csv_row(&row, walk).split(',').count(), header().split(',').count());
+        }
+        Ok(())
+    }
 }

@@ -12,7 +12,7 @@
 //! use memo_core::synth::{SceneOptions, SynthScene};
 //! use memo_core::track::tracker::{Tracker, TrackerOptions};
 //!
-//! let scene = SynthScene::new(SceneOptions::default());
+//! let scene = SynthScene::new(SceneOptions::default())?;
 //! let height_m = scene.walker.body.height_m;
 //! let options = TrackerOptions { camera: Some(scene.camera.clone()), ..TrackerOptions::for_height(height_m) };
 //! let mut tracker = Tracker::new(options)?;
@@ -28,16 +28,90 @@
 //!     let error = (row.phase - true_phase + 0.5).rem_euclid(1.0) - 0.5;
 //!     assert!(error.abs() < 0.02);
 //! }
-//! # Ok::<(), memo_core::track::tracker::TrackError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `tracker.current()` is what is known while frames still come; [`track::result::TrackedWalk::events`] and
+//! [`gait_parameters`](track::result::TrackedWalk::gait_parameters) are what a finished walk says.
+//!
+//! # Postures from keypoints
+//!
+//! Image points of joints, a camera, lengths or a height: [`posture::sequence::postures`] gives every posture
+//! they allow and the likeliest motion. [`posture::detector::Detector`] makes the fourteen joints of the points
+//! of a detector, and [`model::Camera::from_file`] reads the camera.
+//!
+//! ```
+//! use memo_core::glam::DVec2;
+//! use memo_core::model::Camera;
+//! use memo_core::posture::detector::Detector;
+//! use memo_core::posture::sequence::{KeypointSequence, SequenceOptions, postures};
+//! use memo_core::posture::skeleton::{Joint, PerJoint};
+//! use memo_core::synth::{WalkOptions, sampled_walk};
+//! use memo_core::track::tracker::TrackerOptions;
+//!
+//! // A walk seen from its side, its points called RSH, REL and so on; of a known detector it is
+//! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
+//! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
+//! let walk = sampled_walk(&walker, &WalkOptions { frames: 30, rate_hz: 25.0, ..WalkOptions::default() })?;
+//! let camera = Camera::level([1280, 720], 1.0, 1.2, 6.0)?;
+//! let detector = Detector::from_names(walk.names())?;
+//! let (mut points_px, mut weights) = (Vec::new(), Vec::new());
+//! for frame in 0..walk.frames() {
+//!     let pixel = |point| camera.project(walk.at(frame, point)?);
+//!     let seen: Vec<DVec2> = (0..walk.points()).map(|p| pixel(p).unwrap_or(DVec2::NAN)).collect();
+//!     let joints = detector.stick_joints(&seen, &vec![1.0; seen.len()])?;
+//!     points_px.push(PerJoint(joints.points_px));
+//!     weights.push(PerJoint(joints.weights));
+//! }
+//!
+//! let keypoints = KeypointSequence {
+//!     times_s: walk.times_s(),
+//!     points_px: &points_px,
+//!     weights: &weights,
+//!     head_points_px: None,
+//! };
+//! let options = SequenceOptions { height_m: Some(1.75), noise_px: 0.5, ..SequenceOptions::default() };
+//! let found = postures(&keypoints, &camera, &options)?;
+//! found.warnings.iter().for_each(|warning| println!("{warning}"));
+//!
+//! let ankle = walk.index_of("RAN").expect("a point of the walk");
+//! for (frame, figure) in found.linked.figures.iter().enumerate() {
+//!     let truth = walk.at(frame, ankle).expect("known throughout");
+//!     assert!(figure[Joint::RightAnkle].distance(truth) < 0.25);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Limbs among unnamed dots
+//!
+//! [`planar::interpret_figure`] finds which dots are linked, and in which planes they swing.
+//!
+//! ```
+//! use memo_core::planar::{FigureOptions, interpret_figure};
+//! use memo_core::synth::{PointLightOptions, WalkOptions, limbs_of, point_light_display, sampled_walk};
+//! use memo_core::track::tracker::TrackerOptions;
+//!
+//! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
+//! let walk = sampled_walk(&walker, &WalkOptions::default())?;
+//! let shown = point_light_display(&walk, &PointLightOptions::default())?;
+//!
+//! let read = interpret_figure(&shown.tracks(), &shown.times_s, &FigureOptions::default())?;
+//! let links: Vec<[usize; 2]> = read.windows[0].figure.links().map(|link| link.points).collect();
+//! assert!(limbs_of(walk.names()).iter().all(|limb| links.contains(limb)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # The other ways in
 //!
-//! * Image points of joints, a camera, lengths: [`posture::sequence::postures`] gives every posture they allow
-//!   and the likeliest motion.
-//! * Unnamed moving dots: [`planar::interpret_figure`] finds which are linked, and in which planes they swing.
+//! * A camera that nobody calibrated: [`calibrate`], from measured points or from a person who walks.
 //! * A stage alone: [`image`] from pixels to edges, [`model`] from a phase to visible contours, [`track::score`]
 //!   where the two meet.
+//!
+//! # Errors, threads, versions
+//!
+//! Bad input is a typed error with the offending values, one enum a concept, which may grow. Every type is
+//! [`Send`] and [`Sync`]. Points and matrices of the interface are those of [`glam`] and [`nalgebra`], which are
+//! re-exported in the versions used here.
 //!
 //! # Conventions
 //!
@@ -49,6 +123,8 @@
 //! * Gait phase in [0, 1), 0 = right heel strike; the left side is at phase + 0.5.
 //! * Angles in radians inside, flexion positive; files say `_deg` where they hold degrees.
 
+pub use {glam, nalgebra};
+
 pub mod calibrate;
 pub mod image;
 pub mod model;
@@ -57,3 +133,27 @@ pub mod posture;
 pub mod progress;
 pub mod synth;
 pub mod track;
+
+#[cfg(test)]
+mod tests {
+    /// Compiles only while all of it may go to another thread.
+    #[test]
+    fn what_people_hold_is_send_and_sync() {
+        fn sent_and_shared<T: Send + Sync + 'static>() {}
+        sent_and_shared::<crate::model::Camera>();
+        sent_and_shared::<crate::model::CameraFileError>();
+        sent_and_shared::<crate::image::Image<u8>>();
+        sent_and_shared::<crate::image::Frame<'static>>();
+        sent_and_shared::<crate::track::tracker::Tracker>();
+        sent_and_shared::<crate::track::tracker::TrackError>();
+        sent_and_shared::<crate::track::result::TrackedWalk>();
+        sent_and_shared::<crate::posture::sequence::PostureSequence>();
+        sent_and_shared::<crate::posture::sequence::SequenceError>();
+        sent_and_shared::<crate::planar::Interpretation>();
+        sent_and_shared::<crate::planar::FigureError>();
+        sent_and_shared::<crate::calibrate::PointCalibration>();
+        sent_and_shared::<crate::calibrate::WalkerCalibration>();
+        sent_and_shared::<crate::progress::Progress>();
+        sent_and_shared::<crate::synth::SynthScene>();
+    }
+}

@@ -53,7 +53,7 @@ impl Drawn {
         let uneven = Uneven { step_time_sd: step_sd, step_length_sd: step_sd, right_reach_m };
         let options =
             SceneOptions { seed, late_left, slant_rad, field_of_view_rad, uneven, ..SceneOptions::default() };
-        let scene = SynthScene::new(options);
+        let scene = SynthScene::new(options).unwrap();
         let mut walker = scene.walker.clone();
         let style = &mut walker.style;
         style.knee_offset = normal(&mut random, 0.08);
@@ -66,7 +66,7 @@ impl Drawn {
         sizes.hip_height += normal(&mut random, 0.012);
         let given_height_m = walker.body.height_m + normal(&mut random, 0.02);
         let strike = [normal(&mut random, 0.008), normal(&mut random, 0.008)];
-        let scene = scene.with_walker(walker);
+        let scene = scene.with_walker(walker).unwrap();
         Self { scene, late_left, strike, right_reach_m, given_height_m, knows_camera }
     }
 
@@ -78,7 +78,7 @@ impl Drawn {
 
     /// What is true of the walker, not of the few steps that were drawn.
     fn truth(&self, line: &GaitParameter) -> Option<f64> {
-        let (stride_s, speed) = (1.0 / self.scene.rate_hz, self.scene.speed_mps);
+        let (stride_s, speed) = (1.0 / self.scene.cycle_hz, self.scene.speed_mps);
         let late_right = self.strike[0] - self.strike[1] - self.late_left;
         let sign = match line.side {
             Some(Side::Right) => 1.0,
@@ -183,14 +183,15 @@ fn line(table: &[GaitParameter], quantity: GaitQuantity, side: Option<Side>) -> 
 
 #[test]
 fn walking_backwards_has_a_negative_speed_and_no_sides() {
-    let scene = SynthScene::new(SceneOptions { seed: 5, empty_frames: 0, ..SceneOptions::default() });
+    let scene =
+        SynthScene::new(SceneOptions { seed: 5, empty_frames: 0, ..SceneOptions::default() }).unwrap();
     let walk = tracked(&scene, (0..scene.len()).rev(), scene.walker.body.height_m, true).remove(0);
     assert_eq!(walk.direction(), Direction::Backward);
     let table = walk.gait_parameters();
     let speed = line(&table, GaitQuantity::Speed, None);
     assert!((speed.value.unwrap() + scene.speed_mps).abs() < 0.02, "{speed:?}");
     let cadence = line(&table, GaitQuantity::Cadence, None).value.unwrap();
-    assert!((cadence - 120.0 * scene.rate_hz).abs() < 1.0, "{cadence}");
+    assert!((cadence - 120.0 * scene.cycle_hz).abs() < 1.0, "{cadence}");
     for quantity in [GaitQuantity::StepTimeSymmetry, GaitQuantity::Stance] {
         let line = line(&table, quantity, None);
         assert_eq!((line.value, line.interval, line.n), (None, None, 0));
@@ -200,7 +201,7 @@ fn walking_backwards_has_a_negative_speed_and_no_sides() {
 
 #[test]
 fn what_is_not_known_is_left_open() {
-    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() });
+    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() }).unwrap();
     let mut walk = tracked(&scene, 0..scene.len(), scene.walker.body.height_m, true).remove(0);
     let sure = walk.gait_parameters();
     assert!(line(&sure, GaitQuantity::StepLength, Some(Side::Right)).value.is_some());

@@ -52,7 +52,8 @@ fn twenty_seeds_in_both_directions() {
     let mut all = [0.0f64; 3];
     for seed in 0..20 {
         let scene =
-            SynthScene::new(SceneOptions { seed, leftward: Some(seed % 2 == 0), ..SceneOptions::default() });
+            SynthScene::new(SceneOptions { seed, leftward: Some(seed % 2 == 0), ..SceneOptions::default() })
+                .unwrap();
         let walks = tracked(&scene);
         assert_eq!(walks.len(), 1, "seed {seed}: {} walks", walks.len());
         let walk = &walks[0];
@@ -77,7 +78,8 @@ fn twenty_seeds_in_both_directions() {
 
 #[test]
 fn a_film_played_backwards_shows_somebody_walking_backwards() {
-    let scene = SynthScene::new(SceneOptions { seed: 3, empty_frames: 0, ..SceneOptions::default() });
+    let scene =
+        SynthScene::new(SceneOptions { seed: 3, empty_frames: 0, ..SceneOptions::default() }).unwrap();
     let walks = tracked_with(&scene, (0..scene.len()).rev(), options_for(&scene));
     assert_eq!(walks.len(), 1);
     assert_eq!(walks[0].direction(), Direction::Backward);
@@ -87,7 +89,7 @@ fn a_film_played_backwards_shows_somebody_walking_backwards() {
 
 #[test]
 fn a_planted_deviation_is_believed_and_recovered_and_an_average_walker_left_alone() {
-    let mut scene = SynthScene::new(SceneOptions { seed: 5, ..SceneOptions::default() });
+    let mut scene = SynthScene::new(SceneOptions { seed: 5, ..SceneOptions::default() }).unwrap();
     let average = tracked(&scene)[0].person_fit.expect("80 frames suffice for a fit");
     assert!(!average.is_believed, "{average:?}");
     scene.walker.style.hip_offset = -10f64.to_radians();
@@ -100,7 +102,7 @@ fn a_planted_deviation_is_believed_and_recovered_and_an_average_walker_left_alon
 
 #[test]
 fn heel_strikes_fall_where_the_true_phase_passes() {
-    let scene = SynthScene::new(SceneOptions { seed: 8, ..SceneOptions::default() });
+    let scene = SynthScene::new(SceneOptions { seed: 8, ..SceneOptions::default() }).unwrap();
     let walk = &tracked(&scene)[0];
     let strikes: Vec<_> = walk.events().into_iter().filter(|e| e.kind == EventKind::HeelStrike).collect();
     assert!(strikes.len() >= 3, "{strikes:?}");
@@ -116,7 +118,7 @@ fn heel_strikes_fall_where_the_true_phase_passes() {
 #[test]
 fn a_path_20_degrees_off_the_image_plane_is_found() {
     let mut scene =
-        SynthScene::new(SceneOptions { seed: 2, leftward: Some(false), ..SceneOptions::default() });
+        SynthScene::new(SceneOptions { seed: 2, leftward: Some(false), ..SceneOptions::default() }).unwrap();
     scene.path.heading_rad = 20f64.to_radians();
     let walk = &tracked(&scene)[0];
     let off = walk.rows()[30].heading_rad - scene.path.heading_rad;
@@ -126,7 +128,7 @@ fn a_path_20_degrees_off_the_image_plane_is_found() {
 
 #[test]
 fn other_gaits_and_velocity_weights_track_as_well() {
-    let scene = SynthScene::new(SceneOptions { seed: 1, ..SceneOptions::default() });
+    let scene = SynthScene::new(SceneOptions { seed: 1, ..SceneOptions::default() }).unwrap();
     for gait in [GaitChoice::Sampled10, GaitChoice::Boulic] {
         let walks = tracked_with(&scene, 0..scene.len(), TrackerOptions { gait, ..options_for(&scene) });
         assert!(errors(&scene, &walks[0])[2] < 0.06, "{gait:?}");
@@ -140,7 +142,8 @@ fn other_gaits_and_velocity_weights_track_as_well() {
 
 #[test]
 fn an_empty_scene_has_nobody_and_misuse_is_refused() {
-    let scene = SynthScene::new(SceneOptions { frames: 20, empty_frames: 20, ..SceneOptions::default() });
+    let scene =
+        SynthScene::new(SceneOptions { frames: 20, empty_frames: 20, ..SceneOptions::default() }).unwrap();
     assert!(tracked(&scene).is_empty());
     let mut tracker = Tracker::new(options_for(&scene)).unwrap();
     let frame = scene.frame(0);
@@ -161,7 +164,7 @@ fn an_empty_scene_has_nobody_and_misuse_is_refused() {
 #[test]
 fn a_high_camera_does_not_make_a_straight_path_slant() {
     for seed in [2, 9, 14] {
-        let mut scene = SynthScene::new(SceneOptions { seed, ..SceneOptions::default() });
+        let mut scene = SynthScene::new(SceneOptions { seed, ..SceneOptions::default() }).unwrap();
         scene.camera = memo_core::model::Camera::level([640, 480], 0.9, 2.0, 7.0).unwrap();
         let walk = &tracked(&scene)[0];
         let off = walk.rows()[30].heading_rad - scene.path.heading_rad;
@@ -172,7 +175,7 @@ fn a_high_camera_does_not_make_a_straight_path_slant() {
 
 #[test]
 fn a_sliding_box_is_not_a_walker_and_cut_off_feet_are_not_fully_visible() {
-    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() });
+    let scene = SynthScene::new(SceneOptions { seed: 2, ..SceneOptions::default() }).unwrap();
     let mut slid = Tracker::new(options_for(&scene)).unwrap();
     let mut cropped = Tracker::new(TrackerOptions::for_height(scene.walker.body.height_m)).unwrap();
     for k in 0..scene.len() {

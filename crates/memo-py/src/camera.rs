@@ -170,6 +170,12 @@ impl PyCamera {
         camera.validated().map(Self).map_err(value_error)
     }
 
+    /// The camera of the same pictures with `n` by `n` pixels averaged to one, as `VideoReader` with `shrink=n`
+    /// gives them.
+    fn shrunk(&self, n: u32) -> PyResult<Self> {
+        self.0.shrunk(n).map(Self).map_err(value_error)
+    }
+
     /// As a section of a Pose2Sim TOML file holds them: `size`, `matrix`, `distortions` (k1, k2, p1, p2, k3),
     /// `rotation` (axis times angle), `translation` (metres). Of Tsai's lens the distortions are those nearest over
     /// the picture, zeros where none are, and `tsai_kappa` is the number itself.

@@ -2,6 +2,7 @@
 
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
+use crate::error::value_error;
 use memo_core::synth::{SceneOptions, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -23,16 +24,11 @@ impl PyScene {
         late_left: f64,
     ) -> PyResult<Self> {
         let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..SceneOptions::default() };
-        if frames <= options.empty_frames || !(0.0..=255.0).contains(&noise_sd) {
-            let wanted =
-                format!("frames must exceed {} and noise_sd lie between 0 and 255", options.empty_frames);
-            return Err(PyValueError::new_err(format!("{wanted}; got {frames} and {noise_sd}")));
-        }
-        if !(-0.1..=0.1).contains(&late_left) {
-            let message = format!("late_left must lie between -0.1 and 0.1 of a cycle, got {late_left}");
+        if frames <= options.empty_frames {
+            let message = format!("frames must exceed {}, got {frames}", options.empty_frames);
             return Err(PyValueError::new_err(message));
         }
-        Ok(Self(SynthScene::new(options)))
+        SynthScene::new(options).map(Self).map_err(value_error)
     }
 
     /// One grey frame, (H, W) uint8.

@@ -11,7 +11,7 @@ use memo_core::image::flow::FlowOptions;
 use memo_core::model::{Camera, SideJoints, VisibilityOptions, VisibleSegment};
 use memo_core::track::gait_parameters::GaitParameter;
 use memo_core::track::person::PersonOptions;
-use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
+use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
@@ -233,11 +233,7 @@ impl PyWalk {
     #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
     fn gait_parameters(&self) -> Vec<(&'static str, &'static str, f64, &'static str, f64, f64, usize)> {
         let line = |p: GaitParameter| {
-            let side = match p.side {
-                Some(Side::Right) => "right",
-                Some(Side::Left) => "left",
-                None => "",
-            };
+            let side = p.side.map_or("", |side| side.name());
             let [low, high] = p.interval.unwrap_or([f64::NAN; 2]);
             (p.quantity.name(), side, p.value.unwrap_or(f64::NAN), p.quantity.unit(), low, high, p.n)
         };
@@ -251,15 +247,7 @@ impl PyWalk {
 
     /// Gait events: (time_s, frame, event, side).
     fn events(&self) -> Vec<(f64, f64, &'static str, &'static str)> {
-        let kind = |kind| match kind {
-            EventKind::HeelStrike => "heel_strike",
-            EventKind::ToeOff => "toe_off",
-        };
-        let side = |side| match side {
-            Side::Right => "right",
-            Side::Left => "left",
-        };
-        self.walk.events().into_iter().map(|e| (e.time_s, e.frame, kind(e.kind), side(e.side))).collect()
+        self.walk.events().into_iter().map(|e| (e.time_s, e.frame, e.kind.name(), e.side.name())).collect()
     }
 
     /// Best measured hypotheses per frame, (rows, 3): x or place along the path in world x, z in metres,

@@ -44,6 +44,7 @@ const MAX_COORDINATE: f64 = 1e6;
 
 /// Why no camera was found.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PointError {
     /// Places and pixels are not paired.
     #[error("{world} places but {image} pixels")]

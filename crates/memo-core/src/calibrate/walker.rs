@@ -56,6 +56,7 @@ const HEIGHT: usize = 3;
 
 /// Why no camera was found.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum WalkerError {
     /// The person's height makes no sense.
     #[error("the person's height must be 0.5 to 2.5 metres, got {height_m}")]

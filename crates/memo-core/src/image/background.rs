@@ -38,6 +38,7 @@ impl Default for BackgroundOptions {
 
 /// Why no background was made.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum BackgroundError {
     /// No frame was given.
     #[error("a background needs at least one frame")]

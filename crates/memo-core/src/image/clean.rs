@@ -36,6 +36,7 @@ impl Default for CleanOptions {
 
 /// Why a mask was not cleaned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum CleanError {
     /// With these thresholds the recursion could run for ever.
     #[error("pixels are deleted at up to {few} neighbours and marked from {many}: the first must be smaller")]

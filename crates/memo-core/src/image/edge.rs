@@ -19,6 +19,7 @@ use thiserror::Error;
 
 /// Why edges were not looked for.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum EdgeError {
     /// The scale is not a number, too small to be sampled on the pixel grid, or absurdly large.
     #[error("sigma of {sigma_px} px: must lie between {min} and {max}", min = SIGMA_PX.0, max = SIGMA_PX.1)]

@@ -8,8 +8,9 @@ use thiserror::Error;
 
 /// Why a frame was refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FrameError {
-    /// The buffer is shorter than the image it should hold.
+    /// The buffer is shorter than the image it should hold; for an owned image, of another length.
     #[error("a {width}x{height} frame with rows {stride} apart needs {needed} bytes, got {got}")]
     TooShort {
         /// Width in pixels.
@@ -71,8 +72,8 @@ impl<T: Copy> Image<T> {
         if width == 0 || height == 0 {
             return Err(FrameError::BadShape { width, height, stride: width });
         }
-        if data.len() != width * height {
-            let needed = width * height;
+        let needed = width.saturating_mul(height);
+        if data.len() != needed {
             return Err(FrameError::TooShort { width, height, stride: width, needed, got: data.len() });
         }
         Ok(Self { width, height, data })
@@ -99,21 +100,37 @@ impl<T: Copy> Image<T> {
     }
 
     /// One row.
+    ///
+    /// # Panics
+    ///
+    /// Below the last row.
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
     /// One row.
+    ///
+    /// # Panics
+    ///
+    /// Below the last row.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         &mut self.data[y * self.width..(y + 1) * self.width]
     }
 
     /// The value at column `x`, row `y`.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
     }
 
     /// Sets the value at column `x`, row `y`.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
     pub fn set(&mut self, x: usize, y: usize, value: T) {
         self.data[y * self.width + x] = value;
     }
@@ -146,7 +163,7 @@ impl<'a> Frame<'a> {
         if width == 0 || height == 0 || stride < width {
             return Err(FrameError::BadShape { width, height, stride });
         }
-        let needed = (height - 1) * stride + width;
+        let needed = (height - 1).saturating_mul(stride).saturating_add(width);
         if data.len() < needed {
             return Err(FrameError::TooShort { width, height, stride, needed, got: data.len() });
         }
@@ -164,12 +181,20 @@ impl<'a> Frame<'a> {
     }
 
     /// One row of grey values.
+    ///
+    /// # Panics
+    ///
+    /// Below the last row.
     pub fn row(&self, y: usize) -> &'a [u8] {
         let start = y * self.stride;
         &self.data[start..start + self.width]
     }
 
     /// The grey value at column `x`, row `y`.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
     pub fn at(&self, x: usize, y: usize) -> u8 {
         self.data[y * self.stride + x]
     }
@@ -214,5 +239,13 @@ mod tests {
         assert_eq!(error, FrameError::TooShort { width: 3, height: 2, stride: 3, needed: 6, got: 5 });
         assert!(Frame::new(&[0; 5], 0, 2, 3).is_err());
         assert!(Image::from_vec(2, 2, vec![0u8; 3]).is_err());
+    }
+
+    #[test]
+    fn shapes_beyond_all_memory_are_refused() {
+        let half = usize::MAX / 2 + 1;
+        assert!(Frame::new(&[0; 5], 3, 2, usize::MAX - 1).is_err());
+        assert!(Frame::new(&[0; 5], 3, half + 1, 4).is_err());
+        assert!(Image::<u8>::from_vec(half, 2, vec![]).is_err());
     }
 }

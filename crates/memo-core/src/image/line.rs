@@ -14,6 +14,7 @@ use thiserror::Error;
 
 /// Why no straight edges were computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LineError {
     /// The tolerance is not a positive number.
     #[error("line tolerance of {max_deviation_px} px: must be positive")]

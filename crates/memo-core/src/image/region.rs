@@ -67,6 +67,7 @@ impl Rectangle {
     }
 
     /// The smallest rectangle that holds both.
+    #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
             left: self.left.min(other.left),

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 /// Why no silhouettes were made.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SilhouetteError {
     /// The threshold is negative or not a number.
     #[error("threshold must be a number of grey levels from 0, got {threshold}")]
@@ -61,7 +62,7 @@ mod tests {
 
     #[test]
     fn the_drawn_walker_is_cut_out() {
-        let scene = SynthScene::new(SceneOptions { seed: 4, ..SceneOptions::default() });
+        let scene = SynthScene::new(SceneOptions { seed: 4, ..SceneOptions::default() }).unwrap();
         let shown: Vec<usize> = (0..80).step_by(5).collect();
         let images: Vec<_> = shown.iter().map(|&k| scene.frame(k)).collect();
         let views: Vec<_> = images.iter().map(|image| image.as_frame()).collect();

@@ -18,6 +18,7 @@ pub const PART_COUNT: usize = 14;
 
 /// Why a body could not be made.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum BodyError {
     /// Body height is not plausible for a human in metres.
     #[error("body height must lie between 0.4 and 2.6 metres, got {height_m}{}", centimetre_hint(*.height_m))]

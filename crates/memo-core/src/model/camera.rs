@@ -26,6 +26,7 @@ pub const MAX_DISTANCE_M: f64 = 200.0;
 
 /// Why a camera was refused or could not answer.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// An image side is zero.
     #[error("image size must be positive, got {}x{}", size[0], size[1])]
@@ -347,6 +348,13 @@ impl Camera {
         scaled.validated()
     }
 
+    /// The camera of the same images with `n` by `n` pixels averaged to one; columns at the right and rows at the
+    /// bottom that do not fill one are left out.
+    pub fn shrunk(&self, n: u32) -> Result<Self, CameraError> {
+        let scaled = self.scaled(1.0 / f64::from(n))?;
+        Self { size: self.size.map(|side| side / n), ..scaled }.validated()
+    }
+
     /// K of `h (u, v, 1)ᵀ = K x_cam`.
     pub(crate) fn intrinsics(&self) -> DMat3 {
         let (f, c) = (self.focal_px, self.centre_px);
@@ -495,6 +503,19 @@ mod tests {
         assert_eq!(camera.ground_point(camera.centre_px - DVec2::Y), None);
         assert!(camera.ground_point(camera.centre_px + DVec2::Y).is_some());
         assert!(camera.point_at_height(camera.centre_px - DVec2::Y, 2.0).is_some());
+    }
+
+    #[test]
+    fn a_shrunk_image_has_the_means_of_its_pixels() {
+        let camera = Camera::level([643, 481], 0.9, 1.3, 6.0).unwrap();
+        let shrunk = camera.shrunk(3).unwrap();
+        assert_eq!(shrunk.size, [214, 160]);
+        let point = DVec3::new(0.4, 0.2, 1.1);
+        // The nine pixels 0, 1, 2 have their mean at 1, which is 0 in the shrunk image.
+        let expected = (camera.project(point).unwrap() - 1.0) / 3.0;
+        assert!((shrunk.project(point).unwrap() - expected).length() < 1e-9);
+        assert!(camera.shrunk(0).is_err() && camera.shrunk(1000).is_err());
+        assert_eq!(camera.shrunk(1).unwrap(), camera);
     }
 
     #[test]

@@ -59,6 +59,7 @@ const VERTICAL_PHASE: f64 = 0.30;
 
 /// Why a gait could not be made.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum GaitError {
     /// Boulic's formulas cover 0.5 to 3 leg lengths a second.
     #[error(

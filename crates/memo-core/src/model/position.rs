@@ -94,6 +94,7 @@ pub struct FootPosition {
 
 /// Why no position was found.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PositionError {
     /// The height is not positive.
     #[error("person height must be positive and finite metres, got {height_m}")]

@@ -86,6 +86,7 @@ impl PeriodicCubic {
     }
 
     /// The same curve with every value multiplied by `factor` and `offset` added.
+    #[must_use]
     pub fn affine(&self, factor: f64, offset: f64) -> Self {
         Self {
             knots: self.knots.clone(),

@@ -21,6 +21,7 @@ pub const NO_PART: u8 = u8::MAX;
 
 /// Why no surface map was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// Part indices are bytes, and one value means "none".
     #[error("{count} parts, at most 255 can be told apart")]

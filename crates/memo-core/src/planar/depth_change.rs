@@ -13,6 +13,7 @@ use thiserror::Error;
 
 /// Why views could not be brought to one scale.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ScaleError {
     /// Every view needs one.
     #[error("{points} views of the points, {given} scales or times")]

@@ -28,6 +28,7 @@ const PARALLEL: f64 = 1e-13;
 
 /// Why two views of three points have no hinge, or not one alone.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum HingeRefusal {
     /// An image vector is NaN, infinite, or so large or small that its square is not a number.
     #[error("an image vector is not a usable number")]
@@ -74,6 +75,7 @@ pub struct Hinge {
 
 impl Hinge {
     /// The same images read the other way round.
+    #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|view| view.map(|z| -z)), ..*self }
     }

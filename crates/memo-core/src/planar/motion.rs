@@ -33,6 +33,7 @@ pub struct RodMotion {
 
 /// Why motions have no plane, or not one alone.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MotionRefusal {
     /// A vector is NaN, infinite, or its square is.
     #[error("a position or velocity is not a usable number")]

@@ -25,6 +25,7 @@ impl Plane {
     }
 
     /// Reflected about the image plane: the other reading of the same images.
+    #[must_use]
     pub fn mirror(&self) -> Self {
         Self { p: -self.p, q: -self.q }
     }

@@ -32,6 +32,7 @@ const SAME: f64 = 1e-13;
 
 /// Why three views of two points have no rod, or not one alone.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RodRefusal {
     /// An image vector is NaN, infinite, or so large or small that its square is not a number.
     #[error("an image vector is not a usable number")]
@@ -84,6 +85,7 @@ pub struct Rod {
 
 impl Rod {
     /// The same images read the other way round.
+    #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|z| -z), ..*self }
     }

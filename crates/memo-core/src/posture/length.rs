@@ -104,6 +104,7 @@ pub struct LengthFit {
 
 /// Why no lengths were estimated.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LengthFitError {
     /// Too few frames with an anchor.
     #[error("lengths need at least {MIN_FRAMES} frames with a known distance of the neck, got {frames}")]

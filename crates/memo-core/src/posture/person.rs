@@ -32,6 +32,7 @@ impl Default for FollowOptions {
 
 /// Why people were refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum FollowError {
     /// The lists do not belong together.
     #[error(

@@ -147,6 +147,7 @@ impl Tolerance {
     }
 
     /// With a distance of the joint from the body plane.
+    #[must_use]
     pub fn with_distance_m(self, distance_m: f64) -> Self {
         Self { distance_m, ..self }
     }
@@ -228,6 +229,7 @@ impl MotionModel {
     }
 
     /// The same with a rule.
+    #[must_use]
     pub fn with(mut self, rule: Rule, tolerance: Tolerance) -> Self {
         self.tolerances[rule as usize] = Some(tolerance);
         self

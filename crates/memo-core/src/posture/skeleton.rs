@@ -47,6 +47,7 @@ impl Side {
     pub const BOTH: [Self; 2] = [Self::Right, Self::Left];
 
     /// The other side.
+    #[must_use]
     pub fn other(self) -> Self {
         match self {
             Self::Right => Self::Left,
@@ -148,6 +149,7 @@ impl Joint {
     }
 
     /// The same joint of the other side; neck and pelvis are their own.
+    #[must_use]
     pub fn mirrored(self) -> Self {
         match self {
             Self::Neck | Self::Pelvis => self,
@@ -225,6 +227,7 @@ impl StickFigure {
 
 /// Why segment lengths were refused.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LengthError {
     /// A length is not a positive number.
     #[error("the length of {segment} must be positive and finite metres, got {length_m}")]

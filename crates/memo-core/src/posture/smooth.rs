@@ -17,6 +17,7 @@ impl Measured {
     pub const NOTHING: Self = Self { value: f64::NAN, sd: f64::NAN };
 
     /// Both measurements of one quantity together.
+    #[must_use]
     pub fn fused(self, other: Self) -> Self {
         let weight = |m: Self| if m.value.is_finite() { 1.0 / (m.sd * m.sd).max(1e-12) } else { 0.0 };
         let [a, b] = [weight(self), weight(other)];

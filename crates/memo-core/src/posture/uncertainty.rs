@@ -29,6 +29,7 @@ pub struct Causes {
 
 /// Why no uncertainty was computed.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum UncertaintyError {
     /// A standard deviation must be zero or positive.
     #[error("{what} must not be negative and must be finite, got {value}")]

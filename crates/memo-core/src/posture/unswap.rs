@@ -94,6 +94,7 @@ impl Default for UnswapOptions {
 
 /// Input that cannot be repaired because it is not joints over time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UnswapError {
     /// Counts of points and frames disagree.
     #[error("wanted {frames} frames x {joints} joints = {wanted} points, got {got}")]

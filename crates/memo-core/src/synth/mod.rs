@@ -12,5 +12,5 @@ pub use pointlight::{
     PointLightError, PointLightOptions, View, point_light_display,
 };
 pub use random::Random;
-pub use scene::{SceneOptions, SynthScene, Truth, Uneven};
+pub use scene::{SceneError, SceneOptions, SynthScene, Truth, Uneven};
 pub use stick_walker::{StickCamera, StickView, StickWalker};

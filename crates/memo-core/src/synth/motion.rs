@@ -8,8 +8,9 @@ use crate::model::{PosedBody, Walker};
 use glam::DVec3;
 use thiserror::Error;
 
-/// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist; right then left hip, knee,
-/// ankle; head.
+/// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist (`RSH`, `REL`, `RWR`, `LSH`,
+/// `LEL`, `LWR`); right then left hip, knee, ankle (`RHP`, `RKN`, `RAN`, `LHP`, `LKN`, `LAN`); head (`HEAD`).
+/// [`joint_name`](crate::posture::detector::joint_name) spells them out.
 pub const WALKER_NAMES: [&str; 13] =
     ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN", "HEAD"];
 
@@ -27,6 +28,7 @@ pub const WALKER_LIMBS: [[&str; 2]; 8] = [
 
 /// Why positions over time are not a motion.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MotionError {
     /// No frame or no point.
     #[error("a motion needs frames and points, got {frames} frames of {points} points")]
@@ -150,9 +152,10 @@ impl Motion {
         &self.positions
     }
 
-    /// A point at a frame, `None` where it is not known.
+    /// A point at a frame, `None` where it is not known or does not exist.
     pub fn at(&self, frame: usize, point: usize) -> Option<DVec3> {
-        let p = *self.positions.get(frame * self.points() + point)?;
+        let of_frame = self.positions.chunks_exact(self.points()).nth(frame)?;
+        let p = *of_frame.get(point)?;
         (!p.is_nan()).then_some(p)
     }
 
@@ -311,6 +314,14 @@ mod tests {
         // Phase 0.15 to 0.35 of a cycle of a little over a second.
         let moved = motion.at(20, ankle).unwrap() - motion.at(10, ankle).unwrap();
         assert!(moved.x.abs() < 0.06, "{moved}");
+    }
+
+    #[test]
+    fn a_point_or_a_frame_that_does_not_exist_is_nowhere() {
+        let walk = walk(&WalkOptions::default()).unwrap();
+        let [frames, points] = [walk.frames(), walk.points()];
+        assert!(walk.at(frames - 1, points - 1).is_some());
+        assert_eq!([walk.at(0, points), walk.at(frames, 0), walk.at(usize::MAX, usize::MAX)], [None; 3]);
     }
 
     #[test]

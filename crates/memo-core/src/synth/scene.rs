@@ -13,7 +13,35 @@ use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;
+use thiserror::Error;
 
+/// Longest side of a frame, pixels: a scene holds its background.
+const MOST_SIDE_PX: u32 = 16_384;
+
+/// Why a scene cannot be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A frame has no pixels, or too many.
+    #[error("frames must have sides of 1 to {MOST_SIDE_PX} pixels, got {}x{}", size[0], size[1])]
+    Size {
+        /// Width and height, pixels.
+        size: [u32; 2],
+    },
+    /// An option makes no sense.
+    #[error("{name} must be {wanted}, got {got}")]
+    Option {
+        /// Its name.
+        name: &'static str,
+        /// What is accepted.
+        wanted: &'static str,
+        /// What was given.
+        got: f64,
+    },
+}
+
+/// Steps drawn one by one, some fifteen hours; whoever walks on does so as in the last.
+const MOST_STEPS: usize = 100_000;
 /// Correlation of a step's duration and length: on four motion-captured walks (11 degrees of freedom) durations
 /// vary by 3.3 %, lengths by 3.6 % and their ratio by 3.4 %.
 const LONGER_WITH_TIME: f64 = 0.5;
@@ -21,11 +49,11 @@ const LONGER_WITH_TIME: f64 = 0.5;
 /// How steps differ from the average one of the same walker.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Uneven {
-    /// Standard deviation of a step's duration, share of the average one.
+    /// Standard deviation of a step's duration, share of the average one, 0 to 0.2.
     pub step_time_sd: f64,
-    /// Standard deviation of the way of the trunk in a step, share of the average one.
+    /// Standard deviation of the way of the trunk in a step, share of the average one, 0 to 0.2.
     pub step_length_sd: f64,
-    /// By how much farther ahead of the trunk the right foot lands than the left, metres.
+    /// By how much farther ahead of the trunk the right foot lands than the left, metres, -0.2 to 0.2.
     pub right_reach_m: f64,
 }
 
@@ -38,11 +66,11 @@ pub struct SceneOptions {
     pub frames: usize,
     /// Frames before the walker is there.
     pub empty_frames: usize,
-    /// Frames a second. 25, as in the paper.
+    /// Frames a second, 1 to 10,000. 25, as in the paper.
     pub rate_hz: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Standard deviation of the sensor noise, grey levels.
+    /// Standard deviation of the sensor noise, grey levels, 0 to 255.
     pub noise_sd: f32,
     /// Whether the walker goes to the left; `None` lets the seed decide.
     pub leftward: Option<bool>,
@@ -51,9 +79,9 @@ pub struct SceneOptions {
     pub late_left: f64,
     /// How the steps differ. By default they are all alike.
     pub uneven: Uneven,
-    /// By how much the path is turned out of the image plane, radians. 0.
+    /// By how much the path is turned out of the image plane, radians, -1 to 1. 0.
     pub slant_rad: f64,
-    /// Horizontal field of view, radians; the camera stands as far away as shows the walker equally large. 0.9.
+    /// Horizontal field of view, radians, 0.2 to 2; the camera stands as far away as shows the walker equally large. 0.9.
     pub field_of_view_rad: f64,
 }
 
@@ -72,6 +100,30 @@ impl Default for SceneOptions {
             slant_rad: 0.0,
             field_of_view_rad: 0.9,
         }
+    }
+}
+
+impl SceneOptions {
+    fn check(&self) -> Result<(), SceneError> {
+        if !self.size.iter().all(|side| (1..=MOST_SIDE_PX).contains(side)) {
+            return Err(SceneError::Size { size: self.size });
+        }
+        let noise_sd = f64::from(self.noise_sd);
+        for (name, got, range, wanted) in [
+            ("rate_hz", self.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
+            ("noise_sd", noise_sd, 0.0..=255.0, "0 to 255 grey levels"),
+            ("late_left", self.late_left, -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
+            ("step_time_sd", self.uneven.step_time_sd, 0.0..=0.2, "0 to 0.2 of a step"),
+            ("step_length_sd", self.uneven.step_length_sd, 0.0..=0.2, "0 to 0.2 of a step"),
+            ("right_reach_m", self.uneven.right_reach_m, -0.2..=0.2, "-0.2 to 0.2 m"),
+            ("slant_rad", self.slant_rad, -1.0..=1.0, "-1 to 1 rad"),
+            ("field_of_view_rad", self.field_of_view_rad, 0.2..=2.0, "0.2 to 2 rad"),
+        ] {
+            if !range.contains(&got) {
+                return Err(SceneError::Option { name, wanted, got });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -100,7 +152,7 @@ pub struct SynthScene {
     /// Speed, metres a second.
     pub speed_mps: f64,
     /// Gait cycles a second.
-    pub rate_hz: f64,
+    pub cycle_hz: f64,
     options: SceneOptions,
     start: Hypothesis,
     steps: Vec<DrawnStep>,
@@ -111,7 +163,12 @@ pub struct SynthScene {
 
 impl SynthScene {
     /// Draws lots for everything the options leave open.
-    pub fn new(options: SceneOptions) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// A size or an option out of the range it states.
+    pub fn new(options: SceneOptions) -> Result<Self, SceneError> {
+        options.check()?;
         let mut random = Random::new(options.seed);
         let height_m = random.uniform(1.6, 1.9);
         let body = Body::from_height(height_m).expect("heights between 1.6 and 1.9 m are plausible");
@@ -130,21 +187,30 @@ impl SynthScene {
             height_m: walker.level_torso_height_m(),
             phase: random.uniform(0.0, 1.0),
         };
-        let rate_hz = speed_mps / stride_length_m(&walker);
+        let cycle_hz = speed_mps / stride_length_m(&walker);
         let grey = part_greys(&mut random);
         let background = wall_and_floor(&camera, &mut random);
         let path = Path { origin: DVec2::ZERO, heading_rad: across_rad + options.slant_rad };
-        let steps = drawn_steps(&options, start.phase, rate_hz, speed_mps);
-        Self { camera, walker, path, speed_mps, rate_hz, options, start, steps, background, grey }
+        let steps = drawn_steps(&options, start.phase, cycle_hz, speed_mps);
+        Ok(Self { camera, walker, path, speed_mps, cycle_hz, options, start, steps, background, grey })
     }
 
     /// The same scene with somebody else in it, who walks as fast, as high above the ground and with such strides
     /// as fit the body and the style.
-    pub fn with_walker(mut self, walker: Walker) -> Self {
-        self.rate_hz = self.speed_mps / stride_length_m(&walker);
+    ///
+    /// # Errors
+    ///
+    /// A body and style whose feet do not move: strides of less than 0.1 m.
+    pub fn with_walker(mut self, walker: Walker) -> Result<Self, SceneError> {
+        let stride_m = stride_length_m(&walker);
+        if !(0.1..=10.0).contains(&stride_m) {
+            let (name, wanted) = ("the walker's stride", "0.1 to 10 m");
+            return Err(SceneError::Option { name, wanted, got: stride_m });
+        }
+        self.cycle_hz = self.speed_mps / stride_m;
         self.start.height_m = walker.level_torso_height_m();
-        self.steps = drawn_steps(&self.options, self.start.phase, self.rate_hz, self.speed_mps);
-        Self { walker, ..self }
+        self.steps = drawn_steps(&self.options, self.start.phase, self.cycle_hz, self.speed_mps);
+        Ok(Self { walker, ..self })
     }
 
     /// Number of frames.
@@ -221,8 +287,9 @@ impl SynthScene {
         if let Some(truth) = self.truth(frame) {
             self.draw(&truth.posed, &mut levels);
         }
-        let mut random =
-            Random::new(self.options.seed ^ (frame as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let mut random = Random::new(
+            self.options.seed ^ (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15),
+        );
         let mut grey = Image::filled(levels.width(), levels.height(), 0u8);
         for (out, level) in grey.pixels_mut().chunks_mut(2).zip(levels.pixels().chunks(2)) {
             let noise = random.normal_pair();
@@ -274,17 +341,17 @@ struct DrawnStep {
 }
 
 /// The steps of the whole scene, each half a cycle long; the first is under way when the scene begins.
-fn drawn_steps(options: &SceneOptions, phase0: f64, rate_hz: f64, speed_mps: f64) -> Vec<DrawnStep> {
+fn drawn_steps(options: &SceneOptions, phase0: f64, cycle_hz: f64, speed_mps: f64) -> Vec<DrawnStep> {
     let mut random = Random::new(options.seed ^ 0x5EED_0F57_E950);
     let Uneven { step_time_sd, step_length_sd, .. } = options.uneven;
-    let (average_s, average_m) = (0.5 / rate_hz, 0.5 * speed_mps / rate_hz);
+    let (average_s, average_m) = (0.5 / cycle_hz, 0.5 * speed_mps / cycle_hz);
     let end_s = options.frames as f64 / options.rate_hz;
     // Deviations beyond three standard deviations are none of a walk.
     let share = |sd: f64, normal: f64| 1.0 + sd * normal.clamp(-3.0, 3.0);
     let mut steps: Vec<DrawnStep> = Vec::new();
     let mut cycles = (2.0 * phase0).floor() / 2.0;
     let (mut time_s, mut along_m) = (0.0, 0.0);
-    while steps.is_empty() || time_s < end_s {
+    while steps.is_empty() || (time_s < end_s && steps.len() < MOST_STEPS) {
         let [longer, own] = random.normal_pair().map(f64::from);
         let duration_s = average_s * share(step_time_sd, longer);
         let alike = LONGER_WITH_TIME * longer + (1.0 - LONGER_WITH_TIME.powi(2)).sqrt() * own;
@@ -367,7 +434,42 @@ mod tests {
     use super::*;
 
     fn scene(options: SceneOptions) -> SynthScene {
-        SynthScene::new(options)
+        SynthScene::new(options).unwrap()
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_refused() {
+        let refused = |options| SynthScene::new(options).unwrap_err().to_string();
+        let base = SceneOptions::default;
+        for size in [[0, 480], [640, 0], [u32::MAX, 1]] {
+            assert!(refused(SceneOptions { size, ..base() }).contains(&format!("{}x{}", size[0], size[1])));
+        }
+        for rate_hz in [0.0, -25.0, f64::NAN, f64::INFINITY] {
+            assert!(refused(SceneOptions { rate_hz, ..base() }).starts_with("rate_hz must be 1 to 10000"));
+        }
+        assert!(refused(SceneOptions { noise_sd: f32::NAN, ..base() }).ends_with("got NaN"));
+        assert!(refused(SceneOptions { late_left: 0.5, ..base() }).ends_with("got 0.5"));
+        let slanted = refused(SceneOptions { slant_rad: f64::NAN, ..SceneOptions::default() });
+        assert_eq!(slanted, "slant_rad must be -1 to 1 rad, got NaN");
+        let uneven = Uneven { step_time_sd: 0.5, ..Uneven::default() };
+        let jumpy = refused(SceneOptions { uneven, ..SceneOptions::default() });
+        assert_eq!(jumpy, "step_time_sd must be 0 to 0.2 of a step, got 0.5");
+        let scene = SynthScene::new(SceneOptions::default()).unwrap();
+        let mut still = scene.walker.clone();
+        still.style.leg_amplitude = 0.0;
+        let error = scene.with_walker(still).unwrap_err().to_string();
+        assert!(error.starts_with("the walker's stride must be 0.1 to 10 m, got"), "{error}");
+    }
+
+    #[test]
+    fn scenes_of_one_pixel_of_no_frames_and_beyond_the_last_frame_can_be_drawn() {
+        for (size, frames) in [([1, 1], 80), ([1, 2000], 80), ([2000, 3], 0), ([9, 9], usize::MAX)] {
+            let scene = scene(SceneOptions { size, frames, ..SceneOptions::default() });
+            for frame in [0, 40, 10_000, usize::MAX] {
+                let drawn = scene.frame(frame);
+                assert_eq!([drawn.width() as u32, drawn.height() as u32], size);
+            }
+        }
     }
 
     #[test]
@@ -412,8 +514,8 @@ mod tests {
             let sum_sq: f64 = scene.steps.iter().map(|s| (share(s) / average - 1.0).powi(2)).sum();
             (sum_sq / scene.steps.len() as f64).sqrt()
         };
-        assert!((spread(|s| s.duration_s, 0.5 / scene.rate_hz) - 0.03).abs() < 0.002);
-        assert!((spread(|s| s.length_m, 0.5 * scene.speed_mps / scene.rate_hz) - 0.04).abs() < 0.002);
+        assert!((spread(|s| s.duration_s, 0.5 / scene.cycle_hz) - 0.03).abs() < 0.002);
+        assert!((spread(|s| s.length_m, 0.5 * scene.speed_mps / scene.cycle_hz) - 0.04).abs() < 0.002);
         let last = scene.truth(scene.len() - 1).unwrap();
         let (walked_m, expected_m) =
             (last.hypothesis.along_m - scene.start.along_m, scene.speed_mps * last.time_s);

@@ -28,6 +28,7 @@ pub const FOCAL_CM: f64 = 5.0;
 
 /// Why a walker could not be made of segment lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
 pub enum StickWalkerError {
     /// No rigid torso has these distances between neck, pelvis and shoulders.
     #[error(
@@ -109,6 +110,7 @@ impl StickWalker {
     }
 
     /// The same walker with another phase in frame 0 and another cadence, cycles a second.
+    #[must_use]
     pub fn in_rhythm(self, phase0: f64, cadence_hz: f64) -> Self {
         Self { phase0, cadence_hz, ..self }
     }

@@ -19,6 +19,7 @@ use thiserror::Error;
 
 /// Why a frame gave no evidence.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum EvidenceError {
     /// The frame does not fit the ones before.
     #[error(transparent)]

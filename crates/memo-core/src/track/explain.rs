@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn the_tracker_s_own_similarity_comes_out_again_and_no_near_phase_beats_it() {
-        let scene = SynthScene::new(SceneOptions { seed: 3, frames: 60, ..SceneOptions::default() });
+        let scene = SynthScene::new(SceneOptions { seed: 3, frames: 60, ..SceneOptions::default() }).unwrap();
         let options = TrackerOptions {
             camera: Some(scene.camera.clone()),
             ..TrackerOptions::for_height(scene.walker.body.height_m)

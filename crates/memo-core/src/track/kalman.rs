@@ -68,6 +68,7 @@ impl ConstantVelocity {
     }
 
     /// Eqs. (14), (15): p* = Phi p, P* = Phi P Phi^T + Q with Phi = (1 dt; 0 1) and Q on the velocity alone.
+    #[must_use]
     pub fn predict(&self, dt_s: f64, noise: &Noise) -> Self {
         let [pp, pv, vv] = self.covariance;
         Self {
@@ -82,6 +83,7 @@ impl ConstantVelocity {
     }
 
     /// Eqs. (16)-(18) with H = (1 0): K = P* H^T (H P* H^T + R)^-1, p = p* + K (z - H p*), P = (I - K H) P*.
+    #[must_use]
     pub fn update(&self, measured: f64, noise: &Noise) -> Self {
         let [pp, pv, vv] = self.covariance;
         let s = pp + noise.measurement_variance;

@@ -17,6 +17,7 @@ use thiserror::Error;
 
 /// Why no path was found.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LocateError {
     /// The rectangles do not fit a person standing on the ground before this camera.
     #[error(transparent)]

@@ -13,6 +13,8 @@ use super::walk::{Step, Walk, WalkOptions};
 use crate::model::{Camera, Posture, SideJoints};
 use glam::DVec3;
 
+pub use crate::posture::skeleton::Side;
+
 /// A walk that has ended, with everything it was made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedWalk {
@@ -65,20 +67,24 @@ pub struct Row {
     pub hypothesis: Hypothesis,
 }
 
-/// A side of the body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the names say it")]
-pub enum Side {
-    Right,
-    Left,
-}
-
 /// What happens at a gait event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names say it")]
+#[non_exhaustive]
 pub enum EventKind {
     HeelStrike,
     ToeOff,
+}
+
+impl EventKind {
+    /// The name in files, `heel_strike` or `toe_off`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HeelStrike => "heel_strike",
+            Self::ToeOff => "toe_off",
+        }
+    }
 }
 
 /// A gait event between two frames.

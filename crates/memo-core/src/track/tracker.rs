@@ -25,6 +25,7 @@ use thiserror::Error;
 
 /// Why tracking stopped with an error.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// The body height makes no sense.
     #[error(transparent)]
@@ -242,6 +243,7 @@ impl Tracker {
     }
 
     /// The walks that have ended since this was last asked.
+    #[must_use]
     pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
         std::mem::take(&mut self.finished)
     }

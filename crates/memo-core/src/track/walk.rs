@@ -54,6 +54,7 @@ impl State {
     }
 
     /// Eqs. (14), (15) for all coordinates.
+    #[must_use]
     pub fn predict(&self, dt_s: f64, options: &FilterOptions) -> Self {
         Self {
             along: self.along.predict(dt_s, &options.along),

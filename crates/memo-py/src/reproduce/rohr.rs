@@ -8,7 +8,7 @@ use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
 use glam::{DVec2, DVec3};
-use memo_core::image::{ChangeOptions, outlines, pair_changes};
+use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
 use memo_core::model::body::Part;
 use memo_core::model::{Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours};
 use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
@@ -136,15 +136,15 @@ pub fn image_stages<'py>(
     let [before, frame, after] = [arrays[0].as_frame()?, arrays[1].as_frame()?, arrays[2].as_frame()?];
     let options = EvidenceOptions::default();
     let firm = ChangeOptions { min_threshold: options.rectangle_threshold, ..options.change };
-    let mut changed = pair_changes(&before, &frame, &firm).map_err(value_error)?;
-    let following = pair_changes(&frame, &after, &firm).map_err(value_error)?;
-    changed.pixels_mut().iter_mut().zip(following.pixels()).for_each(|(pixel, too)| *pixel |= too);
-    let mut stream = EvidenceStream::new(options);
-    let mut evidence = None;
+    let (mut detector, mut stream) = (ChangeDetector::new(firm), EvidenceStream::new(options));
+    let (mut changed, mut evidence) = (None, None);
     for (index, frame) in [before, frame, after].iter().enumerate() {
+        changed = detector.push(frame).map_err(value_error)?;
         evidence = stream.push(frame, index as f64).map_err(value_error)?;
     }
-    let evidence = evidence.ok_or_else(|| PyValueError::new_err("three frames gave no evidence"))?;
+    let (Some(changed), Some(evidence)) = (changed, evidence) else {
+        return Err(PyValueError::new_err("three frames gave no evidence"));
+    };
     let dict = PyDict::new(py);
     let main = evidence.candidates(&options).into_iter().next();
     let outline = |pixels: Vec<[usize; 2]>| {

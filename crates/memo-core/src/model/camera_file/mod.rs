@@ -157,6 +157,7 @@ impl fmt::Display for Place {
 
 /// Why a calibration file was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CameraFileError {
     /// The file cannot be read.
     #[error("{path}: {message}", path = path.display())]

@@ -47,6 +47,7 @@ pub const MOST_TRACKS: usize = 200;
 
 /// Why tracks could not be read as a figure.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FigureError {
     /// Fewer than two points, or too many.
     #[error("{points} points: between 2 and {MOST_TRACKS} can be linked")]

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Why points in several views could not be fitted.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FitError {
     /// Every point needs one position a view.
     #[error("the points have {pivot} and {end} views; they must be as many")]

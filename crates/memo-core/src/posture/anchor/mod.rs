@@ -110,6 +110,7 @@ impl Anchor {
 
 /// Why there is no anchor.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum AnchorError {
     /// A quantity must be a positive number.
     #[error("{what} must be positive and finite, got {value}")]

@@ -31,6 +31,7 @@ use trunk::{Trunk, joints_of};
 
 /// Why a sequence cannot be linked.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LinkError {
     /// A time does not follow the one before.
     #[error("times must increase: frame {frame} is at {time_s} s, the one before at {before_s} s")]

@@ -12,6 +12,7 @@ use crate::posture::tree::{Interpretations, TreeError, TreeOptions, View};
 
 /// Why a frame says nothing.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FrameProblem {
     /// Everything hangs on the neck.
     #[error("the neck is not seen")]

@@ -13,20 +13,18 @@ mod frame;
 mod heading;
 mod lengths;
 mod neck;
+mod options;
 mod warning;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::anchor::{AnchorError, AnchorOptions, AnchorSource, Ground, SmoothOptions};
+use super::anchor::{AnchorError, AnchorSource, Ground};
 use super::constraint::Constraint;
-use super::group::DEFAULT_GROUP_M;
 use super::lift::JointRays;
 use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress};
-use super::prior::MotionPrior;
-use super::rules::MotionModel;
-use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
+use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, StickFigure};
 use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
 use crate::model::camera::{Camera, CameraError};
@@ -36,6 +34,7 @@ pub use frame::{FrameProblem, FrameReading, MOST_GROUPED, ReasonTotal, Represent
 pub use heading::{Heading, HeadingFrom};
 pub use lengths::{LengthOrigin, SequenceLengths};
 pub use neck::{NeckFrom, NeckTrack, SourceConflict};
+pub use options::{AnchorChoice, DEFAULT_DISTANCE_SD_M, Motion, SequenceOptions, Strength};
 pub use warning::Warning;
 
 /// Keypoints of one person over time.
@@ -51,183 +50,9 @@ pub struct KeypointSequence<'a> {
     pub head_points_px: Option<&'a [[DVec2; 6]]>,
 }
 
-/// Rules of motion beyond what a body can do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Motion {
-    /// None: anybody doing anything.
-    Physical,
-    /// Rules 1 to 5: walking straight on.
-    Walking,
-    /// Rules 1 and 2 alone: arms and legs swing in opposition.
-    WalkingGeneral,
-    /// An example, not measured.
-    Running,
-    /// An example, not measured.
-    Standing,
-}
-
-impl Motion {
-    /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Physical, Self::Walking, Self::WalkingGeneral, Self::Running, Self::Standing];
-
-    /// The name in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Physical => "physical",
-            Self::Walking => "walking",
-            Self::WalkingGeneral => "walking_general",
-            Self::Running => "running",
-            Self::Standing => "standing",
-        }
-    }
-
-    /// The motion of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|motion| motion.name() == name)
-    }
-
-    /// What cuts.
-    pub fn tree(self, strength: Strength) -> TreeOptions {
-        let is_paper = strength == Strength::Paper;
-        let options = if is_paper { TreeOptions::physical_paper() } else { TreeOptions::physical() };
-        match (self, is_paper) {
-            (Self::Physical, _) => options,
-            (Self::Walking, false) => options.with_motion(MotionModel::walking()),
-            (Self::Walking, true) => options.with_motion(MotionModel::walking_paper()),
-            (Self::WalkingGeneral, false) => options.with_motion(MotionModel::walking_general()),
-            (Self::WalkingGeneral, true) => options.with_motion(MotionModel::walking_general_paper()),
-            (Self::Running, _) => options.with_motion(MotionModel::running()),
-            (Self::Standing, _) => options.with_motion(MotionModel::standing()),
-        }
-    }
-
-    /// Whether its rules or what is usual are measured against the moving direction.
-    fn needs_heading(self) -> bool {
-        matches!(self, Self::Walking | Self::WalkingGeneral | Self::Running)
-    }
-
-    /// What a person does.
-    fn noun(self) -> &'static str {
-        match self {
-            Self::Physical => "a person",
-            Self::Walking | Self::WalkingGeneral => "walking",
-            Self::Running => "running",
-            Self::Standing => "standing",
-        }
-    }
-
-    /// What is usual.
-    fn prior(self) -> MotionPrior {
-        match self {
-            Self::Walking | Self::WalkingGeneral => MotionPrior::walking(),
-            Self::Physical | Self::Running | Self::Standing => MotionPrior::any(),
-        }
-    }
-}
-
-/// How hard the limits are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Strength {
-    /// As real people and noise need it.
-    Measured,
-    /// As Lee and Chen print them.
-    Paper,
-}
-
-impl Strength {
-    /// The name in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Paper => "paper",
-        }
-    }
-
-    /// The strength of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Measured, Self::Paper].into_iter().find(|strength| strength.name() == name)
-    }
-}
-
-/// From where the neck's distance is taken.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AnchorChoice {
-    /// Ground, trunk and extent together, those of them that a frame gives; the head where none does.
-    Auto,
-    /// One source alone: ground, trunk, extent or head. `Combined` is `Auto` without the head.
-    Source(AnchorSource),
-    /// Known distances along the neck's ray: one for all frames or one each (NaN: unknown).
-    Given {
-        /// Distances, metres.
-        distance_m: Vec<f64>,
-        /// Their standard deviation, metres.
-        sd_m: f64,
-    },
-}
-
-/// Standard deviation of a given distance where none is stated, metres: a tape measure to where somebody
-/// stands.
-pub const DEFAULT_DISTANCE_SD_M: f64 = 0.05;
-
-/// Distances that are taken, metres: nearer the lens touches the person, farther nobody is resolved.
-const DISTANCES_M: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
-
-/// How postures are found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SequenceOptions {
-    /// Segment lengths, if measured; else from `height_m` and the sequence.
-    pub lengths: Option<SegmentLengths>,
-    /// Body height, if known, metres; without lengths and height the scale comes from the ground.
-    pub height_m: Option<f64>,
-    /// Standard deviation of a pixel coordinate. 2: good detections of a person some 500 px high; detectors
-    /// that disagree with the joints by 8 px want 8.
-    pub noise_px: f64,
-    /// Rules. Walking: what the rules of the paper are of.
-    pub motion: Motion,
-    /// Their strength. Measured: limits as printed reject most true frames of walking.
-    pub strength: Strength,
-    /// Source of the neck's distance.
-    pub anchor: AnchorChoice,
-    /// The moving direction in the world, if known; its vertical part is not used.
-    pub moving_direction: Option<DVec3>,
-    /// Joints of less weight count as missing. 0.2: what detectors score below is guessed more than seen.
-    pub min_weight: f64,
-    /// The way on the ground from which the moving direction is taken, metres. 0.5: a step is longer, and
-    /// swaying on the spot shorter.
-    pub min_travel_m: f64,
-    /// Surviving postures within this distance in every joint are one group, metres.
-    pub group_m: f64,
-    /// Most groups of a frame that are returned, largest first. 64: more than that are not told apart by eye.
-    pub max_groups: usize,
-    /// Assumptions of the sources of the neck's distance.
-    pub anchor_options: AnchorOptions,
-    /// How distances are smoothed.
-    pub smooth_options: SmoothOptions,
-}
-
-impl Default for SequenceOptions {
-    fn default() -> Self {
-        Self {
-            lengths: None,
-            height_m: None,
-            noise_px: 2.0,
-            motion: Motion::Walking,
-            strength: Strength::Measured,
-            anchor: AnchorChoice::Auto,
-            moving_direction: None,
-            min_weight: 0.2,
-            min_travel_m: 0.5,
-            group_m: DEFAULT_GROUP_M,
-            max_groups: 64,
-            anchor_options: AnchorOptions::default(),
-            smooth_options: SmoothOptions::default(),
-        }
-    }
-}
-
 /// Why there are no postures.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SequenceError {
     /// No frames.
     #[error("there are no frames")]
@@ -444,45 +269,9 @@ fn check(sequence: &KeypointSequence, options: &SequenceOptions) -> Result<(), S
             return Err(SequenceError::Times { frame: before + 1, time_s, before_s });
         }
     }
-    check_options(options)?;
+    options::check_options(options)?;
     if options.anchor == AnchorChoice::Source(AnchorSource::Head) && sequence.head_points_px.is_none() {
         return Err(SequenceError::NoHeadPoints);
-    }
-    Ok(())
-}
-
-fn check_options(options: &SequenceOptions) -> Result<(), SequenceError> {
-    let at_least_0 = [
-        ("noise_px", options.noise_px),
-        ("min_weight", options.min_weight),
-        ("min_travel_m", options.min_travel_m),
-        ("group_m", options.group_m),
-    ];
-    for (name, value) in at_least_0 {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(SequenceError::Quantity { name, wanted: "finite and not negative", value });
-        }
-    }
-    if let AnchorChoice::Given { distance_m, sd_m } = &options.anchor {
-        if let Some(&value) = distance_m.iter().find(|d| !(d.is_nan() || DISTANCES_M.contains(d))) {
-            let wanted = "a distance of 0.1 to 1000 m (NaN: unknown)";
-            return Err(SequenceError::Quantity { name: "distance_m", wanted, value });
-        }
-        if !(*sd_m > 0.0 && sd_m <= DISTANCES_M.end()) {
-            let wanted = "positive and at most 1000 m";
-            return Err(SequenceError::Quantity { name: "distance_sd_m", wanted, value: *sd_m });
-        }
-    }
-    if let Some(lengths) = options.lengths {
-        lengths.validated()?;
-    }
-    if let Some(height_m) = options.height_m {
-        SegmentLengths::from_height(height_m)?;
-    }
-    if let Some(value) = options.moving_direction
-        && !(value.is_finite() && value.truncate().try_normalize().is_some())
-    {
-        return Err(SequenceError::Direction { value });
     }
     Ok(())
 }
@@ -620,6 +409,7 @@ fn to_world(linked: LinkedPath, camera: &Camera) -> LinkedPath {
 mod tests {
     use super::*;
     use crate::posture::constraint::ConstraintKind;
+    use crate::posture::skeleton::SegmentLengths;
     use crate::synth::Random;
     use crate::synth::stick_walker::{StickWalker, world_from_head};
     use proptest::prelude::*;

@@ -20,6 +20,7 @@ impl Path {
     }
 
     /// The same with a joint at the far root.
+    #[must_use]
     pub fn with_far(self, joint: Joint) -> Self {
         Self(self.0 | 1 << joint as u16)
     }

@@ -39,6 +39,7 @@ pub const DEFAULT_LENGTH_SD_M: f64 = 0.005;
 
 /// Why a tree cannot be grown.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TreeError {
     /// The neck is not a point before the camera.
     #[error("the neck must be a point before the camera (z > 0, finite), got {neck}")]

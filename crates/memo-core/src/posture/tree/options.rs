@@ -40,11 +40,13 @@ impl TreeOptions {
     }
 
     /// With the rules of a motion.
+    #[must_use]
     pub fn with_motion(self, motion: MotionModel) -> Self {
         Self { motion: Some(motion), ..self }
     }
 
     /// With bearings in camera axes.
+    #[must_use]
     pub fn with_bearings(self, bearings: Bearings) -> Self {
         Self { bearings, ..self }
     }

@@ -62,7 +62,15 @@ impl PointLightDisplay {
         if dot >= self.dots {
             return None;
         }
-        self.positions_px.get(frame * self.dots + dot).copied().filter(|p| p.is_finite())
+        let index = frame.checked_mul(self.dots)?.checked_add(dot)?;
+        self.positions_px.get(index).copied().filter(|p| p.is_finite())
+    }
+
+    /// The dots one by one, N tracks of T pixels, as [`interpret_figure`](crate::planar::interpret_figure) takes
+    /// them.
+    pub fn tracks(&self) -> Vec<Vec<DVec2>> {
+        let track = |dot| self.positions_px.iter().skip(dot).step_by(self.dots).copied().collect();
+        (0..self.dots).map(track).collect()
     }
 }
 

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// Why a display could not be made.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PointLightError {
     /// A number is out of its range.
     #[error("{parameter} must be {wanted}, got {value}")]
