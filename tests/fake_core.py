@@ -34,6 +34,9 @@ class Camera:
         table = tables[name] if name else next(iter(tables.values()))
         return Camera(tuple(table["size"]))
 
+    def shrunk(self, n):
+        return Camera(tuple(side // n for side in self.size))
+
     @staticmethod
     def from_file(path, name=None, unit=None, *, size=None, v_up=None, lens_only=False):
         return Camera.from_toml(path, name)

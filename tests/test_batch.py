@@ -229,6 +229,17 @@ def test_every_option_of_track_is_a_column():
     }
 
 
+@pytest.mark.parametrize("shrink", ["0", 2.5, True, "two", -1])
+def test_pictures_shrink_by_whole_numbers(tmp_path, shrink):
+    video = tmp_path / "a.mp4"
+    video.write_text("x")
+    (good, bad) = batch.read_manifest(
+        [{"video": video, "name": "b", "shrink": 2}, {"video": video} | {"shrink": shrink}]
+    ).rows
+    assert good.arguments[1:] == ["--shrink", "2"] and not good.problems
+    assert f"{shrink!r} is not a whole number from 1 to 9999" in bad.problems[0]
+
+
 def test_all_problems_are_told_together_with_their_lines(tmp_path):
     (tmp_path / "a.mp4").write_text("x")
     (tmp_path / "empty.mp4").touch()

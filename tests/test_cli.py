@@ -218,7 +218,11 @@ def test_a_damaged_video_is_tracked_and_told(memo_command, write_video, luma_fra
 
 def test_a_picture_larger_than_any_tested_is_told(memo_command, write_video, luma_frames, tmp_path):
     path = write_video("large.mp4", luma_frames(count=3, size=(1924, 32)))
-    _, _, complaint = memo_command("track", path, "--no-plots", "--no-overlay", "--out", tmp_path / "out")
+    undrawn = ("track", path, "--no-plots", "--no-overlay", "--out", tmp_path / "out")
+    _, said, complaint = memo_command(*undrawn)
+    assert not complaint and "Tracked at 962x16 of the 1924x32 pixels" in said
+    _, said, complaint = memo_command(*undrawn, "--shrink", "1")
+    assert "Tracked at" not in said
     assert complaint.count("\n") == 1 and "1924x32 pixels are more than memo was tested on" in complaint
 
 

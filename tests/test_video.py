@@ -151,6 +151,31 @@ def test_bad_choices_are_refused(write_video, luma_frames, choice):
         VideoReader(write_video("ten.mp4", luma_frames(count=2)), **choice)
 
 
+def test_shrunk_pictures_are_means_of_whole_blocks(write_video, luma_frames):
+    luma = luma_frames(size=(50, 36))
+    path = write_video("walk.mp4", luma)
+    with VideoReader(path, shrink=3) as reader:
+        assert (reader.size, reader.full_size, reader.shrink) == ((16, 12), (50, 36), 3)
+        found = [frame.luma for frame in reader]
+    blocks = luma[:, :36, :48].reshape(-1, 12, 3, 16, 3)
+    np.testing.assert_array_equal(found, np.floor(blocks.mean(axis=(2, 4)) + 0.5))
+    set_display_matrix(path, 0, 1, -1, 0)
+    with VideoReader(path, shrink=3) as reader:
+        assert reader.size == (12, 16)
+        assert [frame.luma.shape for frame in reader] == 8 * [(16, 12)]
+    with pytest.raises(VideoError, match="36x50 pixels cannot be shrunk by 40"):
+        VideoReader(path, shrink=40)
+
+
+@pytest.mark.parametrize(
+    ("size", "shrink"), [((50, 36), 1), ((1280, 32), 1), ((1282, 32), 2), ((32, 3840), 3)]
+)
+def test_large_pictures_shrink_until_they_are_of_a_size_memo_knows(write_video, luma_frames, size, shrink):
+    path = write_video("walk.mp4", luma_frames(count=2, size=size))
+    with VideoReader(path, shrink=None) as reader:
+        assert reader.shrink == shrink and reader.size == tuple(side // shrink for side in size)
+
+
 def test_titles_in_any_encoding_do_no_harm(write_video, luma_frames):
     path = write_video("title.mp4", luma_frames(count=2))
     data = path.read_bytes()

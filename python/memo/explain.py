@@ -132,7 +132,7 @@ def explain(
     stop = min(first + count, max(wanted, default=first - 2) + 2)
     if stop <= first:
         return iter(())
-    reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"])
+    reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"], shrink=run["shrink"])
     return _explained(run, file, reader, stop - first, wanted, explainer, progress)
 
 

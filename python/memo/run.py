@@ -2,12 +2,13 @@
 
 Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
 stop], stop null for the end), `frames_read`, `interrupted` (whether frames that were asked for were left
-unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `camera_given`, `camera` (the camera
-given, or the one guessed for the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa`
-beside the distortions nearest to it; null where nobody was tracked without a camera), `options` (of
-`Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk `message`, `start_s`,
-`end_s`, `direction`, `gait`, `p_swapped`, and what `memo.explain` and `contours_of_run` need; frames there
-are counted from the first one read).
+unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `shrink` (how many pixels of the video,
+each way, made one of the pictures that were tracked; camera and options are those of the pictures),
+`camera_given`, `camera` (the camera given, or the one guessed for the longest walk; the keys of a Pose2Sim
+TOML, and for Tsai's lens `tsai_kappa` beside the distortions nearest to it; null where nobody was tracked
+without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk
+`message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and what `memo.explain` and `contours_of_run`
+need; frames there are counted from the first one read).
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class Source:
     """The rate given in place of the time stamps."""
     camera_given: bool = False
     """Whether a calibration was given."""
+    shrink: int = 1
+    """How many pixels of the video, each way, made one of a frame."""
 
 
 def write_run(
@@ -73,6 +76,7 @@ def write_run(
             "interrupted": interrupted,
             "rate_hz": source.rate_hz,
             "fps_given": source.fps_given,
+            "shrink": source.shrink,
             "camera_given": source.camera_given,
             "camera": camera,
             "options": dict(options),
@@ -93,6 +97,7 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "interrupted": (bool,),
     "rate_hz": (int, float),
     "fps_given": (int, float, type(None)),
+    "shrink": (int,),
     "camera_given": (bool,),
     "camera": (dict, type(None)),
     "options": (dict,),
@@ -105,7 +110,7 @@ _KINDS: dict[str, tuple[type, ...]] = {
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     """Reads `run.json` of a folder; its keys are all there and of their kind.
 
-    `interrupted` may be missing, as in older folders, and is then `False`.
+    `interrupted` and `shrink` may be missing, as in older folders, and are then `False` and 1.
     """
     path = Path(folder) / NAME
     try:
@@ -119,6 +124,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     if not isinstance(run, dict):
         raise RunError(f"{path}: an object was wanted, got {type(run).__name__}")
     run.setdefault("interrupted", False)
+    run.setdefault("shrink", 1)
     for key, kinds in _KINDS.items():
         if key not in run:
             raise RunError(f"{path}: {key} is missing")
@@ -128,6 +134,8 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     first, stop = run["frames"] if len(run["frames"]) == 2 else (None, None)
     if not isinstance(first, int) or first < 0 or not (stop is None or isinstance(stop, int)):
         raise RunError(f"{path}: frames must be [first, stop], got {json.dumps(run['frames'])[:60]}")
+    if run["shrink"] < 1:
+        raise RunError(f"{path}: shrink must be at least 1, got {run['shrink']}")
     if run["frames_read"] < 0:
         raise RunError(f"{path}: frames_read must not be negative, got {run['frames_read']}")
     if not all(isinstance(walk, dict) for walk in run["walks"]):
@@ -138,10 +146,10 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
 def contours_of_run(
     path: str | PathLike[str], columns: Mapping[str, npt.NDArray[Any]]
 ) -> list[npt.NDArray[np.float64]]:
-    """Visible contours of the model, (n, 2, 2) pixels, as `Track.contours` has them, for each row of a track.
+    """Visible contours of the model, (n, 2, 2) pixels of the video, for each row of a track.
 
-    `path` is the folder of a run or a table in it, `columns` are those of the table. A row whose place or
-    phase is not known has none.
+    They are those of `Track.contours`. `path` is the folder of a run or a table in it, `columns` are those of
+    the table. A row whose place or phase is not known has none.
     """
     folder = Path(path) if Path(path).is_dir() else Path(path).parent
     run = read_run(folder)
@@ -158,5 +166,5 @@ def contours_of_run(
         except (TypeError, ValueError, OverflowError) as error:
             raise RunError(f"{folder / NAME}: {error}") from None
         for row, (segments, _) in zip(rows.tolist(), found, strict=True):
-            contours[row] = segments
+            contours[row] = (segments + 0.5) * run["shrink"] - 0.5
     return contours

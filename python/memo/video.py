@@ -27,6 +27,8 @@ __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 Luma = npt.NDArray[np.uint8]
 
 _IMAGE_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff"}
+# Beyond twice this many pixels a walk loses the way it faces: contours are matched within a few pixels.
+_LONGEST_PX = 1280
 # Fewer missing frames than this are edit lists and rounding, not a recording that was cut off.
 _MISSING_FRAMES_TOLERATED = 2
 
@@ -56,6 +58,10 @@ class VideoReader:
 
     `start` and `stop` choose frames like a slice. `rate_hz` replaces the time stamps: needed for a
     folder of images, and for slow-motion video that was stored at another rate than it was recorded.
+
+    `shrink=n` averages n by n pixels to one, and leaves out columns at the right and rows at the bottom that
+    do not fill one; `None` takes the least n that makes the picture at most 1280 pixels long and high, as
+    `memo track` does.
     """
 
     def __init__(
@@ -65,6 +71,7 @@ class VideoReader:
         start: int = 0,
         stop: int | None = None,
         rate_hz: float | None = None,
+        shrink: int | None = 1,
     ) -> None:
         if start < 0 or (stop is not None and stop <= start):
             raise VideoError(f"frames {start}:{'' if stop is None else stop} is not a range of frames")
@@ -81,11 +88,17 @@ class VideoReader:
             if self._first is None:
                 raise VideoError(f"{self.path}: no frame of it can be decoded")
             height, width = _upright(_luma(self._first), self._first).shape
+            self.shrink: int = -(-max(width, height) // _LONGEST_PX) if shrink is None else shrink
+            """How many pixels of the video, each way, make one of a frame."""
+            if not 1 <= self.shrink <= min(width, height):
+                raise VideoError(f"{self.path}: {width}x{height} pixels cannot be shrunk by {self.shrink}")
         except BaseException:
             self.close()
             raise
-        self.size: tuple[int, int] = (width, height)
-        """Width and height of the upright frames, pixels."""
+        self.full_size: tuple[int, int] = (width, height)
+        """Width and height of the upright video, pixels."""
+        self.size: tuple[int, int] = (width // self.shrink, height // self.shrink)
+        """Width and height of the frames, pixels."""
 
     @property
     def rate_hz(self) -> float:
@@ -145,12 +158,12 @@ class VideoReader:
 
     def _checked(self, index: int, decoded: av.VideoFrame) -> Luma:
         luma = _upright(_luma(decoded), decoded)
-        if luma.shape != self.size[::-1]:
-            (width, height), (now_height, now_width) = self.size, luma.shape
+        if luma.shape != self.full_size[::-1]:
+            (width, height), (now_height, now_width) = self.full_size, luma.shape
             raise VideoError(
                 f"{self.path}: frame {index} is {now_width}x{now_height}, those before it {width}x{height}"
             )
-        return luma
+        return luma if self.shrink == 1 else _shrunk(luma, self.shrink)
 
     def _report_damage(self, read: int) -> None:
         announced, undecodable = self._source.announced, self._source.undecodable
@@ -295,6 +308,17 @@ def _upright(luma: Luma, decoded: av.VideoFrame) -> Luma:
     if max(abs(a), abs(d)) < 0.01 * min(abs(b), abs(c)):
         return luma.T[:: 1 if b > 0 else -1, :: 1 if c > 0 else -1]
     raise VideoError(f"the video is turned by {decoded.rotation} degrees; only quarter turns can be read")
+
+
+def _shrunk(luma: Luma, n: int) -> Luma:
+    """Means of n by n pixels, rounded."""
+    height, width = luma.shape[0] // n, luma.shape[1] // n
+    total = np.zeros((height, width), np.uint32 if n > 16 else np.uint16)
+    for row in range(n):
+        for column in range(n):
+            total += luma[row : height * n : n, column : width * n : n]
+    means: Luma = ((total + n * n // 2) // (n * n)).astype(np.uint8)
+    return means
 
 
 def _display_matrix(decoded: av.VideoFrame) -> tuple[int, int, int, int] | None:

@@ -47,6 +47,7 @@ OPTIONS = {
     "fov_deg": Option("--fov-deg", float),
     "frames": Option("--frames", str),
     "fps": Option("--fps", float),
+    "shrink": Option("--shrink", int),
     "overlay": Option("--overlay", bool),
     "plots": Option("--plots", bool),
     "report": Option("--report", bool),
@@ -285,6 +286,10 @@ def _converted(value: Any, kind: type, base: Path) -> Value:
         except (TypeError, ValueError):
             hint = ": write a point" if re.fullmatch(r"\d+,\d+", str(value)) else ""
             raise ValueError(f"{value!r} is not a number{hint}") from None
+    if kind is int:
+        if not re.fullmatch(r"[1-9]\d{0,3}", str(value)):
+            raise ValueError(f"{value!r} is not a whole number from 1 to 9999")
+        return int(value)
     if not isinstance(value, str | PathLike):
         raise ValueError(f"{value!r} is not text")
     return base / os.path.expanduser(value) if kind is Path else str(value)

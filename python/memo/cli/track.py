@@ -33,7 +33,7 @@ Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
 (what was tracked until then is written)."""
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
-_LARGEST_PX = 1920  # of a side; the same walk enlarged to 2560 and more lost the way it faces
+_LARGEST_PX = 1920  # of a side; a walk enlarged to 2560 and more lost the way it faces
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 
@@ -61,6 +61,14 @@ def add_track(app: "typer.Typer") -> None:
         fps: Annotated[
             float | None, typer.Option(help="True frame rate, in place of the time stamps (slow motion).")
         ] = None,
+        shrink: Annotated[
+            int | None,
+            typer.Option(
+                help="Average N by N pixels to one; of itself until the picture has at most 1280.",
+                metavar="N",
+                min=1,
+            ),
+        ] = None,
         out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
         plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
@@ -76,7 +84,7 @@ def add_track(app: "typer.Typer") -> None:
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
             tracker_options = checked_options(height, camera, reading, fov_deg)
-            return _track_video(video, frame_range(frames), fps, tracker_options, page, delivery)
+            return _track_video(video, frame_range(frames), fps, shrink, tracker_options, page, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -85,6 +93,7 @@ def _track_video(
     video: Path,
     frame_range: tuple[int, int | None],
     fps: float | None,
+    shrink: int | None,
     tracker_options: dict[str, Any],
     page: bool,
     delivery: Delivery,
@@ -94,20 +103,22 @@ def _track_video(
     check_writable(delivery.out)
 
     def opened() -> VideoReader:
-        return VideoReader(video, start=frame_range[0], stop=frame_range[1], rate_hz=fps)
+        start, stop = frame_range
+        return VideoReader(video, start=start, stop=stop, rate_hz=fps, shrink=shrink)
 
     with opened() as reader:
-        _check_camera_fits(tracker_options, reader)
+        tracker_options = _fitted(tracker_options, reader)
         if max(reader.size) > _LARGEST_PX:
             width, height = reader.size
             complain(
                 f"{video}: {width}x{height} pixels are more than memo was tested on: which way the person "
-                "faces and which leg is which may be wrong; try a smaller copy"
+                "faces and which leg is which may be wrong; leave --shrink out"
             )
         if "camera" not in tracker_options and reader.pixel_aspect != 1:
             complain(f"{video}: pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera")
         tracker = new_tracker(tracker_options)
-        source = Source(video, frame_range, reader.rate_hz, fps, "camera" in tracker_options)
+        source = Source(video, frame_range, reader.rate_hz, fps, "camera" in tracker_options, reader.shrink)
+        shrunk_to = "" if reader.shrink == 1 else "{}x{} of the {}x{}".format(*reader.size, *reader.full_size)
         track, interrupted = follow(reader, tracker, reader.frame_count, source, delivery)
         if reader.damage:
             complain(f"{video}: {reader.damage}")
@@ -118,6 +129,8 @@ def _track_video(
     if page:
         written.append(write_page(delivery.out, delivery.out / "report.html", delivery).path)
     report(track, written, delivery)
+    if shrunk_to and delivery.talks:
+        print(f"Tracked at {shrunk_to} pixels of the video (--shrink).")
     if "camera" not in tracker_options and delivery.talks and len(track.columns["frame"]):
         print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
     return exit_code(track)
@@ -193,11 +206,14 @@ def checked_options(
     return options
 
 
-def _check_camera_fits(tracker_options: dict[str, Any], reader: Any) -> None:
+def _fitted(tracker_options: dict[str, Any], reader: Any) -> dict[str, Any]:
+    """The options with the camera of the frames as they are read."""
     camera = tracker_options.get("camera")
-    if camera is None or tuple(camera.size) == reader.size:
-        return
-    (width, height), (video_width, video_height) = camera.size, reader.size
+    if camera is None:
+        return tracker_options
+    if tuple(camera.size) == reader.full_size:
+        return {**tracker_options, "camera": camera.shrunk(reader.shrink)}
+    (width, height), (video_width, video_height) = camera.size, reader.full_size
     turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
     raise InputError(
         f"{reader.path}: the camera is for {width}x{height} pixels, the video has "

@@ -145,7 +145,8 @@ def _video_pictures(
     stop = run.first_frame + run.run["frames_read"] if run.run else None
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
     nobody = not run.frames  # then what moves is shown, for that is where memo looks for a walker
-    with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=run.run.get("fps_given")) as reader:
+    rate_hz, shrink = run.run.get("fps_given"), run.run.get("shrink", 1)
+    with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=rate_hz, shrink=shrink) as reader:
         size = run.size
         if size is not None and tuple(size) != reader.size:
             raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")

@@ -114,12 +114,12 @@ def clip_sequence(clip: Clip, progress: Progress) -> Sequence:
     from memo.video import VideoReader
 
     def frames() -> Frames:
-        with VideoReader(clip.video, rate_hz=clip.fps) as reader:
+        with VideoReader(clip.video, rate_hz=clip.fps, shrink=None) as reader:
             yield from ((frame.index, frame.time_s, frame.luma) for frame in reader)
 
-    with VideoReader(clip.video, rate_hz=clip.fps) as reader:
-        count = reader.frame_count
-    tracker = Tracker(clip.height_m, clip.camera)
+    with VideoReader(clip.video, rate_hz=clip.fps, shrink=None) as reader:
+        count, shrink = reader.frame_count, reader.shrink
+    tracker = Tracker(clip.height_m, clip.camera and clip.camera.shrunk(shrink))
     return _sequence(Path(clip.video).name, clip.height_m, frames, count, tracker, None, progress)
 
 

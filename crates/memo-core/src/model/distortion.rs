@@ -232,8 +232,9 @@ mod tests {
 
     #[test]
     fn a_start_beyond_the_fold_that_tangential_terms_shift_is_given_up() {
-        let k = [0.3871901297456689, -0.1434687956196204, 0.0022347674297831213, 0.0018532744519083966];
-        let lens = Distortion::from_opencv([k[0], k[1], -0.03122052206013254, k[2], k[3]]);
+        let (k1, k2, k3) = (0.3871901297456689, -0.1434687956196204, -0.03122052206013254);
+        let (p1, p2) = (0.0022347674297831213, 0.0018532744519083966);
+        let lens = Distortion::from_opencv([k1, k2, p1, p2, k3]);
         let ideal = DVec2::new(-0.8569709873993293, 0.6245862876882984);
         let distorted = lens.distort(ideal).unwrap();
         assert!(lens.is_unfolded(distorted) && lens.brown_jacobian(distorted).determinant() < 0.0);

@@ -8,6 +8,10 @@
 //! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`]
 //! or `start_frames` frames, whichever is more, and the rows of the walk under way, which is handed out in
 //! pieces of [`LONGEST_WALK`] frames.
+//!
+//! Edges are matched within a few pixels whatever the size of the picture. Pictures longer or higher than about
+//! 1280 pixels are to be averaged down first, their camera with [`Camera::shrunk`]: a walk of 720p enlarged to
+//! 1080p was tracked as well, to 1440p it was taken for a backward one.
 
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
