@@ -747,13 +747,17 @@ mod tests {
             let truth = swing(&times_s.iter().map(|t| t - start_s).collect::<Vec<_>>(), scale_px);
             let mut seen = truth.clone();
             let mut scores = vec![0.9; 160];
+            let mut exchanged = 0;
             for t in 0..80 {
                 scores[2 * t] = 0.8;
                 if random.uniform(0.0, 1.0) < share {
+                    exchanged += 1;
                     seen.swap(2 * t, 2 * t + 1);
                     scores.swap(2 * t, 2 * t + 1);
                 }
             }
+            // The side that most frames name is taken for the right one.
+            proptest::prop_assume!(exchanged < 40);
             let found = solve(&times_s, &seen, Some(&scores));
             proptest::prop_assert_eq!(&found.points_px, &truth);
             proptest::prop_assert!(found.scores.unwrap().chunks(2).all(|s| s == [0.8, 0.9]));
