@@ -27,7 +27,7 @@ __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 Luma = npt.NDArray[np.uint8]
 
 _IMAGE_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff"}
-# Beyond twice this many pixels a walk loses the way it faces: contours are matched within a few pixels.
+# From twice this many pixels on a walk loses the way it faces: contours are matched within a few pixels.
 _LONGEST_PX = 1280
 # Fewer missing frames than this are edit lists and rounding, not a recording that was cut off.
 _MISSING_FRAMES_TOLERATED = 2
