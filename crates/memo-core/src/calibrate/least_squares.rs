@@ -2,25 +2,26 @@
 
 use nalgebra::{DMatrix, DVector};
 
-const MAX_ITERATIONS: usize = 200;
+/// Iterations after which a camera's search is given up.
+pub(crate) const MOST_ITERATIONS: usize = 200;
 /// Relative decrease of the sum of squares that ends the search.
 const TOLERANCE: f64 = 1e-14;
 
 /// Where the search ended.
 #[derive(Debug, Clone)]
-pub(super) struct Fit {
-    pub(super) parameters: DVector<f64>,
-    pub(super) residuals: DVector<f64>,
+pub(crate) struct Fit {
+    pub(crate) parameters: DVector<f64>,
+    pub(crate) residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
 }
 
 impl Fit {
-    pub(super) fn sum_sq(&self) -> f64 {
+    pub(crate) fn sum_sq(&self) -> f64 {
         self.residuals.norm_squared()
     }
 
     /// Covariance for residuals of unit variance: (JᵀJ)⁻¹; `None` if some parameter has no influence.
-    pub(super) fn unit_covariance(&self) -> Option<DMatrix<f64>> {
+    pub(crate) fn unit_covariance(&self) -> Option<DMatrix<f64>> {
         // Scaled to unit diagonal, so that the parameters' units do not decide what is singular.
         let normal = self.jacobian.tr_mul(&self.jacobian);
         let scale: Vec<f64> = normal.diagonal().iter().map(|d| d.sqrt()).collect();
@@ -38,19 +39,21 @@ impl Fit {
     }
 }
 
-/// The parameters of least squared residuals reached from `start`; `steps` are those of the derivatives.
+/// The parameters of least squared residuals reached from `start` in at most so many iterations; `steps` are those of
+/// the derivatives.
 ///
 /// `residuals` gives `None` where the model has no answer, such as a point behind the camera.
-pub(super) fn minimise(
+pub(crate) fn minimise(
     start: DVector<f64>,
     steps: &[f64],
+    iterations: usize,
     residuals: impl Fn(&DVector<f64>) -> Option<DVector<f64>>,
 ) -> Option<Fit> {
     let mut parameters = start;
     let mut current = residuals(&parameters)?;
     let mut jacobian = derivatives(&parameters, steps, &residuals)?;
     let mut damping = 1e-3;
-    for _ in 0..MAX_ITERATIONS {
+    for _ in 0..iterations {
         let normal = jacobian.tr_mul(&jacobian);
         let gradient = jacobian.tr_mul(&current);
         let before = current.norm_squared();

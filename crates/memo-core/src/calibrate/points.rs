@@ -21,7 +21,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use thiserror::Error;
 
 use super::Estimate;
-use super::least_squares::{Fit, minimise};
+use super::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
 use crate::posture::head::{Focal, HeadOptions, head_pose};
@@ -497,7 +497,7 @@ impl<'a> Problem<'a> {
             Some(DVector::from_vec(all))
         };
         let steps: Vec<f64> = free.iter().map(|&i| STEPS[i]).collect();
-        let fit = minimise(DVector::zeros(free.len()), &steps, residuals)?;
+        let fit = minimise(DVector::zeros(free.len()), &steps, MOST_ITERATIONS, residuals)?;
         let state = self.state(start, free, &fit.parameters);
         Some((state, fit))
     }

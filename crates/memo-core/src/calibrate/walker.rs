@@ -27,7 +27,7 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::DVector;
 use thiserror::Error;
 
-use super::least_squares::{Fit, minimise};
+use super::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use super::{Estimate, KnownLens};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
@@ -370,7 +370,7 @@ impl Problem {
             Some(DVector::from_vec(all))
         };
         // What is above the horizon at the start cannot be fitted.
-        minimise(DVector::from_vec(free.clone()), &vec![1e-6; free.len()], residuals)
+        minimise(DVector::from_vec(free.clone()), &vec![1e-6; free.len()], MOST_ITERATIONS, residuals)
     }
 
     fn without_outliers(&self, start: &[f64; 4]) -> Result<(Fit, Vec<usize>), WalkerError> {

@@ -1,11 +1,13 @@
 //! The seeded generator of scenes with ground truth that tests, benches and the demo share.
 
+pub mod clothed;
 pub mod motion;
 pub mod pointlight;
 pub mod random;
 pub mod scene;
 pub mod stick_walker;
 
+pub use clothed::{ClothedOptions, ClothedScene, ClothedTruth, Contact, Mover};
 pub use motion::{Motion, MotionError, WALKER_LIMBS, WalkOptions, limbs_of, sampled_walk};
 pub use pointlight::{
     DotSource, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay,

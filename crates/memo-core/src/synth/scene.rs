@@ -105,25 +105,32 @@ impl Default for SceneOptions {
 
 impl SceneOptions {
     fn check(&self) -> Result<(), SceneError> {
-        if !self.size.iter().all(|side| (1..=MOST_SIDE_PX).contains(side)) {
-            return Err(SceneError::Size { size: self.size });
-        }
-        let noise_sd = f64::from(self.noise_sd);
-        for (name, got, range, wanted) in [
+        check_size(self.size)?;
+        check_ranges(&[
             ("rate_hz", self.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
-            ("noise_sd", noise_sd, 0.0..=255.0, "0 to 255 grey levels"),
+            ("noise_sd", f64::from(self.noise_sd), 0.0..=255.0, "0 to 255 grey levels"),
             ("late_left", self.late_left, -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
             ("step_time_sd", self.uneven.step_time_sd, 0.0..=0.2, "0 to 0.2 of a step"),
             ("step_length_sd", self.uneven.step_length_sd, 0.0..=0.2, "0 to 0.2 of a step"),
             ("right_reach_m", self.uneven.right_reach_m, -0.2..=0.2, "-0.2 to 0.2 m"),
             ("slant_rad", self.slant_rad, -1.0..=1.0, "-1 to 1 rad"),
             ("field_of_view_rad", self.field_of_view_rad, 0.2..=2.0, "0.2 to 2 rad"),
-        ] {
-            if !range.contains(&got) {
-                return Err(SceneError::Option { name, wanted, got });
-            }
-        }
-        Ok(())
+        ])
+    }
+}
+
+pub(super) fn check_size(size: [u32; 2]) -> Result<(), SceneError> {
+    let is_drawn = size.iter().all(|side| (1..=MOST_SIDE_PX).contains(side));
+    if is_drawn { Ok(()) } else { Err(SceneError::Size { size }) }
+}
+
+/// An option with its value, the range it may have, and that range in words.
+pub(super) type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>, &'static str);
+
+pub(super) fn check_ranges(options: &[Ranged]) -> Result<(), SceneError> {
+    match options.iter().find(|(_, got, range, _)| !range.contains(got)) {
+        Some(&(name, got, _, wanted)) => Err(SceneError::Option { name, wanted, got }),
+        None => Ok(()),
     }
 }
 
@@ -287,17 +294,10 @@ impl SynthScene {
         if let Some(truth) = self.truth(frame) {
             self.draw(&truth.posed, &mut levels);
         }
-        let mut random = Random::new(
+        let random = Random::new(
             self.options.seed ^ (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15),
         );
-        let mut grey = Image::filled(levels.width(), levels.height(), 0u8);
-        for (out, level) in grey.pixels_mut().chunks_mut(2).zip(levels.pixels().chunks(2)) {
-            let noise = random.normal_pair();
-            for ((out, level), noise) in out.iter_mut().zip(level).zip(noise) {
-                *out = (level + self.options.noise_sd * noise).round().clamp(0.0, 255.0) as u8;
-            }
-        }
-        grey
+        with_noise(&levels, self.options.noise_sd, random)
     }
 
     /// Draws the body with 2x2 samples a pixel.
@@ -327,6 +327,18 @@ impl SynthScene {
         let lit = Vec3::from(map.normal.at(x, y)).dot(light).max(0.0);
         Some(self.grey[map.part.at(x, y) as usize] * (0.7 + 0.3 * lit))
     }
+}
+
+/// Grey values with sensor noise, rounded.
+pub(super) fn with_noise(levels: &Image<f32>, noise_sd: f32, mut random: Random) -> Image<u8> {
+    let mut grey = Image::filled(levels.width(), levels.height(), 0u8);
+    for (out, level) in grey.pixels_mut().chunks_mut(2).zip(levels.pixels().chunks(2)) {
+        let noise = random.normal_pair();
+        for ((out, level), noise) in out.iter_mut().zip(level).zip(noise) {
+            *out = (level + noise_sd * noise).round().clamp(0.0, 255.0) as u8;
+        }
+    }
+    grey
 }
 
 /// A step as drawn: where it begins, and how long it takes and leads.

@@ -1,0 +1,410 @@
+//! A person in clothes who walks through a room: truth that does not come from the tracker's own model.
+//!
+//! Body, gait and picture share no code with [`model`](crate::model): round cones instead of elliptic cylinders,
+//! joint curves of other sources with deviations of 5 to 10 degrees from the shipped average, uneven sides, a
+//! pelvis that turns and drops, feet that roll from heel to toe and stand where they stand, clothes that are
+//! wider than the body, hair, stripes, a wall of blocks, tiles, and a contact shadow. Proportions, clothes, gait,
+//! heading, camera and room follow from the seed. What tracking reaches here is nearer to what it reaches on
+//! people than on [`SynthScene`](super::SynthScene), where the walker is the model.
+//!
+//! Contacts are where the drawn foot touches the floor; nothing assumes a phase for them. Frames are drawn one by
+//! one and in any order; the same seed gives the same pixels.
+//!
+//! It cannot: turn on the way, wear skirts or coats, cast shadows on the wall or reflect in the floor.
+
+mod person;
+mod render;
+mod room;
+mod round_cone;
+mod stride;
+
+use super::random::Random;
+use super::scene::{SceneError, check_ranges, check_size};
+use crate::image::Image;
+use crate::model::{Camera, SideAngles, SideJoints};
+use crate::track::result::{EventKind, Side};
+use glam::{DMat3, DVec2, DVec3};
+use person::{Clothes, Sizes, Solid};
+use render::draw;
+use room::Room;
+use round_cone::RoundCone;
+use std::f64::consts::{PI, TAU};
+use stride::{Figure, Stride};
+
+/// What moves through the room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mover {
+    /// A person who walks.
+    #[default]
+    Walker,
+    /// The same person, carried along in one posture as on a scooter.
+    Rider,
+    /// The same person, who stands and swings the arms.
+    Waver,
+    /// A trolley as high as a person.
+    Trolley,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClothedOptions {
+    /// Everything not fixed here follows from the seed.
+    pub seed: u64,
+    /// Number of frames. The walker passes the middle of the picture half-way through them.
+    pub frames: usize,
+    /// Frames a second, 1 to 10,000.
+    pub rate_hz: f64,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Standard deviation of the sensor noise, grey levels, 0 to 255; by lot 2 to 5.
+    pub noise_sd: Option<f32>,
+    /// Whether the walk goes to the left; by lot.
+    pub leftward: Option<bool>,
+    /// By how much the path is turned out of the image plane, radians, -1 to 1; by lot within 0.12.
+    pub slant_rad: Option<f64>,
+    /// By how much of a cycle the left side comes late, -0.1 to 0.1; by lot, a few thousandths.
+    pub late_left: Option<f64>,
+    /// What moves.
+    pub mover: Mover,
+}
+
+impl Default for ClothedOptions {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            frames: 80,
+            rate_hz: 25.0,
+            size: [640, 480],
+            noise_sd: None,
+            leftward: None,
+            slant_rad: None,
+            late_left: None,
+            mover: Mover::Walker,
+        }
+    }
+}
+
+/// The truth of one frame with a walker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClothedTruth {
+    /// Number of the frame.
+    pub frame: usize,
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Mean of both shoulders and both hips, metres.
+    pub torso_centre: DVec3,
+    /// Joints of the right side, metres.
+    pub right: SideJoints,
+    /// Joints of the left side, metres.
+    pub left: SideJoints,
+    /// Angles of the right and left side in the vertical plane of the path, radians: thigh against the vertical, knee,
+    /// upper arm against the trunk, elbow.
+    pub angles: [SideAngles; 2],
+    /// Gait phase, linear in time between initial contacts: right 0, left 0.5.
+    pub phase: f64,
+}
+
+/// A foot that touches or leaves the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Initial contact (heel strike) or toe-off.
+    pub kind: EventKind,
+    /// Which foot.
+    pub side: Side,
+    /// Where the heel is at that time, metres.
+    pub heel: DVec3,
+}
+
+/// A scene: a room with somebody in it, a camera, and frames on demand.
+#[derive(Debug, Clone)]
+pub struct ClothedScene {
+    /// The camera.
+    pub camera: Camera,
+    /// Body height of the person, crown to sole, metres.
+    pub height_m: f64,
+    /// Direction of the path, radians about world Z; the person faces it.
+    pub heading_rad: f64,
+    /// Mean speed, metres a second.
+    pub speed_mps: f64,
+    /// Mean rate of the gait, cycles a second.
+    pub cycle_hz: f64,
+    /// Share of the cycle for which the right and the left foot touch the floor.
+    pub stance: [f64; 2],
+    options: ClothedOptions,
+    noise_sd: f32,
+    sizes: Sizes,
+    clothes: Clothes,
+    stride: Stride,
+    /// Cycles at the beginning, and how the rate varies: amplitude and phase of a slow wave.
+    start_cycles: f64,
+    sway: [f64; 2],
+    room: Room,
+    empty: Image<f32>,
+}
+
+/// How many cycles the slow variation of the rate takes.
+const SWAY_CYCLES: f64 = 2.3;
+
+impl ClothedScene {
+    /// Draws lots for everything the options leave open.
+    ///
+    /// # Errors
+    ///
+    /// A size or an option out of the range it states.
+    pub fn new(options: ClothedOptions) -> Result<Self, SceneError> {
+        check(&options)?;
+        let mut random = Random::new(options.seed ^ 0xC107_4ED0);
+        let room = Room::drawn(&mut random);
+        // 1. The person and the gait.
+        let height_m = random.uniform(1.52, 1.95);
+        let sizes = Sizes::drawn(height_m, &mut random);
+        let clothes = Clothes::drawn(room.wall, &mut random);
+        let stride = Stride::drawn(&sizes, options.late_left, &mut random);
+        let cycle_hz = random.uniform(0.82, 1.02);
+        // 2. The camera.
+        let camera = drawn_camera(options.size, &mut random);
+        // 3. The path.
+        let leftward = random.uniform(0.0, 1.0) < 0.5;
+        let slant = random.uniform(-0.12, 0.12);
+        let across_rad = if options.leftward.unwrap_or(leftward) { PI } else { 0.0 };
+        let heading_rad = across_rad + options.slant_rad.unwrap_or(slant);
+        let noise_sd = random.uniform(2.0, 5.0) as f32;
+        let empty = room.seen_by(&camera);
+        Ok(Self {
+            camera,
+            height_m,
+            heading_rad,
+            speed_mps: stride.length_m * cycle_hz,
+            cycle_hz,
+            stance: [0, 1].map(|side| stride.leaves[side] - stride.strikes[side]),
+            noise_sd: options.noise_sd.unwrap_or(noise_sd),
+            options,
+            sizes,
+            clothes,
+            stride,
+            start_cycles: random.uniform(0.0, 1.0),
+            sway: [random.uniform(0.0, 0.03) * SWAY_CYCLES / TAU, random.uniform(0.0, TAU)],
+            room,
+            empty,
+        })
+    }
+
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.options.frames
+    }
+
+    /// Whether the scene has no frame.
+    pub fn is_empty(&self) -> bool {
+        self.options.frames == 0
+    }
+
+    /// Time of a frame, seconds.
+    pub fn time_s(&self, frame: usize) -> f64 {
+        frame as f64 / self.options.rate_hz
+    }
+
+    /// The truth of a frame, `None` unless somebody walks.
+    pub fn truth(&self, frame: usize) -> Option<ClothedTruth> {
+        if self.options.mover != Mover::Walker {
+            return None;
+        }
+        let time_s = self.time_s(frame);
+        let [right, left] = self.figure(time_s).joints;
+        Some(ClothedTruth {
+            frame,
+            time_s,
+            torso_centre: 0.25 * (right.shoulder + left.shoulder + right.hip + left.hip),
+            right,
+            left,
+            angles: self.angles([right, left]),
+            phase: self.phase(time_s),
+        })
+    }
+
+    /// Initial contacts and toe-offs from the first to the last frame, in order; none unless somebody walks.
+    pub fn contacts(&self) -> Vec<Contact> {
+        if self.options.mover != Mover::Walker || self.is_empty() {
+            return Vec::new();
+        }
+        let end_s = self.time_s(self.len() - 1);
+        let last = self.cycles(end_s);
+        let mut contacts = Vec::new();
+        for (index, side) in [Side::Right, Side::Left].into_iter().enumerate() {
+            let strike = (EventKind::HeelStrike, self.stride.strikes[index]);
+            let leave = (EventKind::ToeOff, self.stride.leaves[index]);
+            for (kind, cycles) in [strike, leave] {
+                let first = (self.start_cycles - cycles).ceil() as i64;
+                for turn in first..=(last - cycles).floor() as i64 {
+                    let time_s = self.time_of(turn as f64 + cycles);
+                    let heel = self.figure(time_s).feet[index][0];
+                    contacts.push(Contact { time_s, kind, side, heel });
+                }
+            }
+        }
+        contacts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        contacts
+    }
+
+    /// Way from the other foot's heel to a side's own at its initial contact, and the time between these, metres and
+    /// seconds, of an undisturbed step.
+    pub fn step(&self, side: Side) -> (f64, f64) {
+        let own = usize::from(side == Side::Left);
+        let [here, there] = [own, 1 - own].map(|side| self.stride.strikes[side]);
+        let lasts = (here - there).rem_euclid(1.0);
+        let heel = |side: usize, cycles: f64| self.stride.figure(cycles).feet[side][0].x;
+        (heel(own, here) - heel(1 - own, here - lasts), lasts / self.cycle_hz)
+    }
+
+    /// The grey frame.
+    pub fn frame(&self, frame: usize) -> Image<u8> {
+        let mut levels = self.empty.clone();
+        let (solids, shadows) = self.solids(self.time_s(frame));
+        draw(&solids, &shadows, &self.room, &self.camera, &mut levels);
+        let lot = (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        super::scene::with_noise(&levels, self.noise_sd, Random::new(self.options.seed ^ lot))
+    }
+
+    /// What stands in the room at a time, and the spheres near the floor that take its light.
+    fn solids(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
+        if self.options.mover == Mover::Trolley {
+            return self.trolley(time_s);
+        }
+        let figure = self.figure(time_s);
+        let radii = self.sizes.foot_radii_m();
+        let feet = figure.feet.iter().flat_map(|foot| foot.iter().copied().zip(radii));
+        (person::solids(&figure, &self.sizes, &self.clothes), feet.collect())
+    }
+
+    /// The person as posed at a time.
+    fn figure(&self, time_s: f64) -> Figure {
+        let cycles = self.cycles(time_s);
+        let middle = self.stride.length_m * self.cycles(self.middle_s());
+        let still = self.start_cycles;
+        // Carried on from where the posture of the beginning stands.
+        let carried =
+            |way: f64| self.stride.figure(still).placed(0.0, DVec3::X * (way - self.stride.length_m * still));
+        let figure = match self.options.mover {
+            Mover::Walker | Mover::Trolley => self.stride.figure(cycles),
+            Mover::Rider => carried(self.stride.length_m * cycles),
+            Mover::Waver => waving(carried(middle), (TAU * self.cycle_hz * time_s).sin()),
+        };
+        let heading = DVec2::from_angle(self.heading_rad);
+        figure.placed(self.heading_rad, (-middle * heading).extend(0.0))
+    }
+
+    /// Four posts on a board with wheels.
+    fn trolley(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
+        let heading = DVec2::from_angle(self.heading_rad).extend(0.0);
+        let across = heading.cross(DVec3::Z);
+        let centre = self.speed_mps * (time_s - self.middle_s()) * heading;
+        let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
+        let corner = |(x, y): (f64, f64)| centre + 0.16 * x * heading + 0.12 * y * across;
+        let cloths = self.clothes.of_a_trolley();
+        let mut solids = Vec::new();
+        let mut wheels = Vec::new();
+        for place in corners.map(corner) {
+            let shape = |low, high, radius| {
+                RoundCone::new(place + DVec3::Z * low, place + DVec3::Z * high, radius, radius)
+            };
+            solids.push(Solid { shape: shape(0.3, self.height_m - 0.12, 0.12), cloth: cloths[0] });
+            solids.push(Solid { shape: shape(0.06, 0.08, 0.06), cloth: cloths[1] });
+            wheels.push((place + DVec3::Z * 0.06, 0.06));
+        }
+        (solids, wheels)
+    }
+
+    /// The time at which the middle of the picture is passed.
+    fn middle_s(&self) -> f64 {
+        0.5 * self.options.frames as f64 / self.options.rate_hz
+    }
+
+    /// Gait cycles at a time: a constant rate with a slow wave.
+    fn cycles(&self, time_s: f64) -> f64 {
+        let [amplitude, phase] = self.sway;
+        let even = self.cycle_hz * time_s;
+        self.start_cycles + even + amplitude * ((TAU * even / SWAY_CYCLES + phase).sin() - phase.sin())
+    }
+
+    /// The time at which so many cycles are walked, by bisection: the wave is small, the cycles rise.
+    fn time_of(&self, cycles: f64) -> f64 {
+        let even = (cycles - self.start_cycles) / self.cycle_hz;
+        let (mut low, mut high) = (even - 0.1, even + 0.1);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.cycles(middle) < cycles { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
+    }
+
+    fn phase(&self, time_s: f64) -> f64 {
+        let cycles = self.cycles(time_s);
+        let [right, left] = self.stride.strikes;
+        // The last contact of either side, then the next of the other.
+        let since = |strike: f64| (cycles - strike).rem_euclid(1.0);
+        let (base, from, to) = if since(right) < since(left) {
+            (0.0, cycles - since(right), left)
+        } else {
+            (0.5, cycles - since(left), right)
+        };
+        let to = from + (to - from).rem_euclid(1.0);
+        let [from_s, to_s] = [from, to].map(|at| self.time_of(at));
+        (base + 0.5 * (time_s - from_s) / (to_s - from_s)).rem_euclid(1.0)
+    }
+
+    fn angles(&self, joints: [SideJoints; 2]) -> [SideAngles; 2] {
+        let forward = DVec2::from_angle(self.heading_rad).extend(0.0);
+        let elevation = |from: DVec3, to: DVec3| (to - from).dot(forward).atan2(from.z - to.z);
+        let [right, left] = joints;
+        let trunk = elevation(right.shoulder.midpoint(left.shoulder), right.hip.midpoint(left.hip));
+        joints.map(|j| {
+            let (thigh, upper_arm) = (elevation(j.hip, j.knee), elevation(j.shoulder, j.elbow));
+            SideAngles {
+                hip: thigh,
+                knee: thigh - elevation(j.knee, j.ankle),
+                shoulder: upper_arm - trunk,
+                elbow: elevation(j.elbow, j.wrist) - upper_arm,
+            }
+        })
+    }
+}
+
+fn check(options: &ClothedOptions) -> Result<(), SceneError> {
+    check_size(options.size)?;
+    check_ranges(&[
+        ("rate_hz", options.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
+        ("noise_sd", options.noise_sd.map_or(0.0, f64::from), 0.0..=255.0, "0 to 255 grey levels"),
+        ("slant_rad", options.slant_rad.unwrap_or(0.0), -1.0..=1.0, "-1 to 1 rad"),
+        ("late_left", options.late_left.unwrap_or(0.0), -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
+    ])
+}
+
+/// A camera on a tripod, nearly level, that sees the walk across the middle of the picture.
+fn drawn_camera(size: [u32; 2], random: &mut Random) -> Camera {
+    let field_of_view_rad = random.uniform(0.7, 1.05);
+    let height_m = random.uniform(0.8, 1.7);
+    // Wide pictures show more than the walk; narrow ones must hold the person.
+    let distance_m = random.uniform(5.2, 6.4) * (0.5 * 0.9f64).tan() / (0.5 * field_of_view_rad).tan();
+    let pitch_rad = ((height_m - 0.95) / distance_m).atan() + random.uniform(-0.01, 0.01);
+    let level = Camera::level(size, field_of_view_rad, height_m, distance_m)
+        .expect("a camera about a metre above the ground is valid");
+    let rotation = DMat3::from_rotation_x(pitch_rad) * level.rotation;
+    Camera { translation: rotation * -level.position(), rotation, ..level }
+}
+
+/// Arms that swing about the shoulders by a share of 1 rad, and a head that nods.
+fn waving(mut figure: Figure, swings: f64) -> Figure {
+    for (joints, hand) in figure.joints.iter_mut().zip(&mut figure.hands) {
+        let turn = DMat3::from_rotation_y(-swings);
+        let swung = |point: DVec3| joints.shoulder + turn * (point - joints.shoulder);
+        [joints.elbow, joints.wrist, *hand] = [joints.elbow, joints.wrist, *hand].map(swung);
+    }
+    let nod = DMat3::from_rotation_y(0.1 * swings);
+    figure.head = figure.neck + nod * (figure.head - figure.neck);
+    figure
+}
+
+#[cfg(test)]
+mod tests;

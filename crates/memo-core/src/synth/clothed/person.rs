@@ -1,0 +1,233 @@
+//! Sizes and clothes of a drawn person, and the solids that show them.
+//!
+//! Mean lengths are those of Drillis and Contini 1966 (in Winter, *Biomechanics and Motor Control of Human
+//! Movement*, fig. 4.1); every person's differ from them by 3 %. Girths are chosen, clothes drawn by lot.
+
+use super::round_cone::RoundCone;
+use super::stride::Figure;
+use crate::synth::Random;
+use glam::DVec3;
+
+/// Lengths of a person, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sizes {
+    /// Crown to sole, standing straight.
+    pub(super) height_m: f64,
+    pub(super) ankle_height_m: f64,
+    pub(super) shank_m: f64,
+    pub(super) thigh_m: f64,
+    /// Hips to shoulders.
+    pub(super) trunk_m: f64,
+    pub(super) neck_m: f64,
+    pub(super) head_above_shoulders_m: f64,
+    pub(super) upper_arm_m: f64,
+    pub(super) forearm_m: f64,
+    pub(super) hand_m: f64,
+    pub(super) hip_half_width_m: f64,
+    pub(super) shoulder_half_width_m: f64,
+    foot_length_m: f64,
+    /// Factor on all radii.
+    girth: f64,
+}
+
+impl Sizes {
+    /// Draws lots for everything but the height.
+    pub(super) fn drawn(height_m: f64, random: &mut Random) -> Self {
+        let mut share =
+            |mean: f64, sd: f64| mean * (1.0 + sd * f64::from(random.normal_pair()[0].clamp(-2.5, 2.5)));
+        let [ankle, shank, thigh, trunk] = [0.039, 0.246, 0.245, 0.288].map(|mean| share(mean, 0.03));
+        let head = share(0.182, 0.03);
+        let scale = height_m / (ankle + shank + thigh + trunk + head);
+        let mut long = |mean: f64| height_m * share(mean, 0.03);
+        Self {
+            height_m,
+            ankle_height_m: scale * ankle,
+            shank_m: scale * shank,
+            thigh_m: scale * thigh,
+            trunk_m: scale * trunk,
+            neck_m: 0.25 * scale * head,
+            head_above_shoulders_m: scale * head - 0.072 * height_m,
+            upper_arm_m: long(0.186),
+            forearm_m: long(0.146),
+            hand_m: long(0.060),
+            hip_half_width_m: long(0.050),
+            shoulder_half_width_m: long(0.108),
+            foot_length_m: long(0.152),
+            girth: share(1.0, 0.06) * height_m,
+        }
+    }
+
+    /// Radii of heel, ball and toe.
+    pub(super) fn foot_radii_m(&self) -> [f64; 3] {
+        [0.018, 0.014, 0.011].map(|radius| radius * self.height_m)
+    }
+
+    /// Heel, ball and toe about the ankle of a level foot: x forward, z up.
+    pub(super) fn foot_m(&self) -> [DVec3; 3] {
+        let [heel, ball, toe] = self.foot_radii_m();
+        let back = -0.27 * self.foot_length_m;
+        let at = |x: f64, radius: f64| DVec3::new(x, 0.0, radius - self.ankle_height_m);
+        [
+            at(back + heel, heel),
+            at(back + 0.72 * self.foot_length_m, ball),
+            at(back + self.foot_length_m - toe, toe),
+        ]
+    }
+}
+
+/// What a solid is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cloth {
+    /// Grey level in full light.
+    pub(super) grey: f64,
+    /// Stripes across the solid: share by which they are darker, and how many there are.
+    pub(super) stripes: (f64, f64),
+}
+
+/// A solid as drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Solid {
+    pub(super) shape: RoundCone,
+    pub(super) cloth: Cloth,
+}
+
+/// A person's clothes and skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Clothes {
+    skin: Cloth,
+    hair: Cloth,
+    shirt: Cloth,
+    trousers: Cloth,
+    shoes: Cloth,
+    long_sleeves: bool,
+    long_trousers: bool,
+    /// Thickness of the cloth, metres.
+    loose_m: f64,
+}
+
+impl Clothes {
+    /// Draws lots before a wall of a grey level: shirt and trousers differ from it and from each other.
+    pub(super) fn drawn(wall: f64, random: &mut Random) -> Self {
+        let plain = |grey: f64| Cloth { grey, stripes: (0.0, 0.0) };
+        let skin = random.uniform(110.0, 215.0);
+        let mut unlike = |others: &[f64]| loop {
+            let grey = random.uniform(25.0, 235.0);
+            if others.iter().all(|other| (grey - other).abs() > 35.0) {
+                return grey;
+            }
+        };
+        let shirt = unlike(&[wall]);
+        let trousers = unlike(&[wall, shirt]);
+        let striped = random.uniform(0.0, 1.0) < 0.4;
+        let stripes = if striped { (random.uniform(0.1, 0.3), random.uniform(3.0, 9.0)) } else { (0.0, 0.0) };
+        Self {
+            skin: plain(skin),
+            hair: plain(random.uniform(20.0, 120.0)),
+            shirt: Cloth { grey: shirt, stripes },
+            trousers: plain(trousers),
+            shoes: plain(random.uniform(15.0, 60.0)),
+            long_sleeves: random.uniform(0.0, 1.0) < 0.6,
+            long_trousers: random.uniform(0.0, 1.0) < 0.85,
+            loose_m: random.uniform(0.002, 0.014),
+        }
+    }
+}
+
+impl Clothes {
+    /// What a trolley of the same colours is covered with, and its wheels.
+    pub(super) fn of_a_trolley(&self) -> [Cloth; 2] {
+        [self.shirt, self.shoes]
+    }
+}
+
+/// The solids of a figure.
+pub(super) fn solids(figure: &Figure, sizes: &Sizes, clothes: &Clothes) -> Vec<Solid> {
+    let mut solids = trunk_and_head(figure, sizes, clothes);
+    for side in 0..2 {
+        solids.extend(arm(figure, side, sizes, clothes));
+        solids.extend(leg(figure, side, sizes, clothes));
+    }
+    solids
+}
+
+fn trunk_and_head(figure: &Figure, sizes: &Sizes, clothes: &Clothes) -> Vec<Solid> {
+    let g = sizes.girth;
+    let forward = figure.forward;
+    let [right, left] = figure.joints;
+    let (shoulders, hips) = (right.shoulder.midpoint(left.shoulder), right.hip.midpoint(left.hip));
+    let up = (shoulders - hips).normalize();
+    let ahead = |point: DVec3, by: f64, above: f64| point + by * g * forward + above * g * up;
+    let loose = clothes.loose_m;
+    let solid = |cloth, shape| Solid { shape, cloth };
+    let mut solids = vec![
+        solid(clothes.skin, RoundCone::ball(ahead(figure.head, 0.0, 0.018), 0.052 * g)),
+        solid(
+            clothes.skin,
+            RoundCone::new(figure.head, ahead(figure.head, 0.018, -0.032), 0.046 * g, 0.030 * g),
+        ),
+        solid(clothes.hair, RoundCone::ball(ahead(figure.head, -0.014, 0.024), 0.0525 * g)),
+        solid(clothes.skin, RoundCone::new(figure.neck, figure.head, 0.034 * g, 0.030 * g)),
+        solid(
+            clothes.shirt,
+            RoundCone::new(
+                ahead(shoulders, 0.004, -0.055),
+                ahead(hips, 0.0, 0.03),
+                0.066 * g + loose,
+                0.064 * g + loose,
+            ),
+        ),
+        solid(clothes.trousers, RoundCone::new(right.hip, left.hip, 0.054 * g + loose, 0.054 * g + loose)),
+        solid(clothes.trousers, RoundCone::ball(ahead(hips, -0.022, -0.005), 0.060 * g)),
+    ];
+    for (joints, other) in [(right, left), (left, right)] {
+        let shoulder = joints.shoulder.lerp(other.shoulder, 0.16);
+        let waist = joints.hip.lerp(other.hip, 0.05) + 0.05 * g * up;
+        let shape = RoundCone::new(shoulder, waist, 0.040 * g + loose, 0.052 * g + loose);
+        solids.push(solid(clothes.shirt, shape));
+    }
+    solids
+}
+
+fn arm(figure: &Figure, side: usize, sizes: &Sizes, clothes: &Clothes) -> [Solid; 3] {
+    let (g, joints) = (sizes.girth, figure.joints[side]);
+    let sleeve = if clothes.long_sleeves { clothes.shirt } else { clothes.skin };
+    let loose = clothes.loose_m;
+    let forearm = if clothes.long_sleeves { loose } else { 0.0 };
+    [
+        Solid {
+            shape: RoundCone::new(joints.shoulder, joints.elbow, 0.030 * g + loose, 0.024 * g + loose),
+            cloth: clothes.shirt,
+        },
+        Solid {
+            shape: RoundCone::new(joints.elbow, joints.wrist, 0.024 * g + forearm, 0.016 * g + forearm),
+            cloth: sleeve,
+        },
+        Solid {
+            shape: RoundCone::new(joints.wrist, figure.hands[side], 0.017 * g, 0.016 * g),
+            cloth: clothes.skin,
+        },
+    ]
+}
+
+fn leg(figure: &Figure, side: usize, sizes: &Sizes, clothes: &Clothes) -> [Solid; 5] {
+    let (g, joints) = (sizes.girth, figure.joints[side]);
+    let [heel, ball, toe] = figure.feet[side];
+    let [heel_r, ball_r, toe_r] = sizes.foot_radii_m();
+    let shank = if clothes.long_trousers { clothes.trousers } else { clothes.skin };
+    let loose = clothes.loose_m;
+    let low = if clothes.long_trousers { loose } else { 0.0 };
+    let calf = joints.knee.lerp(joints.ankle, 0.28) - 0.009 * g * figure.forward;
+    [
+        Solid {
+            shape: RoundCone::new(joints.hip, joints.knee, 0.052 * g + loose, 0.034 * g + loose),
+            cloth: clothes.trousers,
+        },
+        Solid {
+            shape: RoundCone::new(joints.knee, joints.ankle, 0.032 * g + low, 0.020 * g + 1.5 * low),
+            cloth: shank,
+        },
+        Solid { shape: RoundCone::ball(calf, 0.033 * g + low), cloth: shank },
+        Solid { shape: RoundCone::new(heel, ball, heel_r, ball_r), cloth: clothes.shoes },
+        Solid { shape: RoundCone::new(ball, toe, ball_r, toe_r), cloth: clothes.shoes },
+    ]
+}
