@@ -106,6 +106,22 @@ pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLi
     Some(TwinLines { best, twin })
 }
 
+/// The best line of constant phase: what somebody shows who does not walk but is carried along in one posture, or
+/// stands; `None` without curves.
+pub fn frozen_line(curves: &[PhaseCurve]) -> Option<PhaseLine> {
+    if curves.is_empty() {
+        return None;
+    }
+    let line = |index: usize| {
+        let phase_at_start = index as f64 / OFFSET_STEPS as f64;
+        let sum: f64 = curves.iter().map(|curve| curve.at(phase_at_start)).sum();
+        PhaseLine { phase_at_start, rate_hz: 0.0, similarity: sum / curves.len() as f64 }
+    };
+    (0..OFFSET_STEPS)
+        .map(line)
+        .reduce(|best, line| if line.similarity > best.similarity { line } else { best })
+}
+
 /// One frame's best phase and its similarity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhaseEstimate {
@@ -228,6 +244,8 @@ pub struct StartReport {
     pub lines: TwinLines,
     /// Best line of the other direction.
     pub other_direction: PhaseLine,
+    /// Best line of constant phase, in the chosen direction.
+    pub frozen: PhaseLine,
     /// The paper's choice on the same frames, for comparison.
     pub two_line_rule: TwoLineChoice,
     /// Similarity over the whole cycle, frame by frame, in the chosen direction.
@@ -283,6 +301,7 @@ pub fn start(
     let beginning = beginning(frames, &faced, &lines.best)?;
     let used = if is_forward { *rates } else { reversed };
     let two_line_rule = two_line_rule(&estimates(&faced.curves), &used)?;
+    let frozen = frozen_line(&faced.curves)?;
     Some(StartReport {
         path: faced.path,
         beginning,
@@ -290,6 +309,7 @@ pub fn start(
         p_other_direction,
         lines,
         other_direction: other.best,
+        frozen,
         two_line_rule,
         curves: faced.curves,
         frames: frames.iter().map(|f| f.frame).collect(),

@@ -370,7 +370,8 @@ impl Tracker {
         let walker = self.options.walker(course.speed_mps).ok()?;
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
         let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
-        if start.contrast() < LEAST_CONTRAST {
+        // What is carried along in one posture looks like a walker, but no phase explains it better than one that stays.
+        if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
             return None;
         }
         let mut walk = Walk::new(walker, start.path, start.beginning);
