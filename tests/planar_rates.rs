@@ -5,7 +5,7 @@
 //! four. Four walkers are few, so a rate is good to about one part in three. Run with `--nocapture` for the
 //! tables.
 
-mod mocap;
+use crate::mocap;
 
 use glam::DVec2;
 use memo_core::planar::{
@@ -252,8 +252,9 @@ fn assert_rates(results: &[Cell]) {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn hinges_keep_the_stated_rates() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let results = table(&walks, 3);
     assert_rates(&results);
     for Cell { views, noise_px, limbs, .. } in results {
@@ -265,8 +266,9 @@ fn hinges_keep_the_stated_rates() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn rods_keep_the_stated_rates() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let results = table(&walks, 2);
     assert_rates(&results);
     // A rod is weaker evidence than a hinge: at 1 % and with noise few true ones pass.

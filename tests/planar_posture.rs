@@ -1,10 +1,9 @@
 //! What the planarity assumption gives on recorded motion beyond links: the reflection of named limbs, arms
 //! that leave their planes, limbs that never reach full extension.
 //!
-//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`;
-//! without it the tests say so and pass. `--nocapture` prints the figures.
+//! Needs the recordings. `--nocapture` prints the figures.
 
-mod mocap;
+use crate::mocap;
 
 use glam::{DVec2, DVec3};
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
@@ -24,8 +23,9 @@ fn in_px(points: &[DVec2]) -> Vec<DVec2> {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn named_limbs_have_the_reflection_of_the_walker() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let joints: Vec<_> = JOINTS.iter().map(|name| joint_of(name)).collect();
     let mut random = Random::new(21);
     for noise_px in [0.0, 1.0] {
@@ -91,8 +91,9 @@ fn out_of_plane(frames: &[[DVec3; 12]], [a, o, b]: [usize; 3]) -> f64 {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn punching_arms_get_no_interpretation() {
-    let Some((rate_hz, frames)) = mocap::joints("CMU_02_05_punch") else { return };
+    let (rate_hz, frames) = mocap::joints("CMU_02_05_punch");
     let (every, long) = ((rate_hz / 60.0).round() as usize, (1.2 * rate_hz) as usize);
     let mut random = Random::new(22);
     for noise_px in [0.0, 1.0] {

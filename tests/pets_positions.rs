@@ -1,11 +1,10 @@
 //! Positions of PETS 2009 S2.L1 view 1 from its published boxes and Tsai calibration.
 //!
 //! The published X, Y are the ground points below unrounded boxes, so this tests the calibration and the
-//! equations, not how well boxes locate people. The data are not part of this repository: `MEMO_SHARED_DATA`
-//! names the folder that holds `video/pets09_s2l1`; without it the tests say so and pass.
+//! equations, not how well boxes locate people. Needs the recordings.
 
+use crate::recordings;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 use memo_core::model::position::{
@@ -32,20 +31,11 @@ struct Scene {
     people: Vec<Person>,
 }
 
-fn scene() -> Option<Scene> {
-    let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let folder = shared.join("video/pets09_s2l1");
-    let read = |name| std::fs::read_to_string(folder.join(name));
-    let (Ok(xml), Ok(rows)) = (read("View_001.xml"), read("gt.txt")) else {
-        println!("skipped: no PETS data in {} (set MEMO_SHARED_DATA)", folder.display());
-        return None;
-    };
-    let camera = Camera::from_tsai(&tsai(&xml)).unwrap();
+fn scene() -> Scene {
+    let camera = Camera::from_tsai(&tsai(&recordings::text("video/pets09_s2l1/View_001.xml"))).unwrap();
+    let rows = recordings::text("video/pets09_s2l1/gt.txt");
     let people = rows.lines().map(|row| person(&camera, row)).collect();
-    Some(Scene { camera, people })
+    Scene { camera, people }
 }
 
 /// The number in `name="..."`.
@@ -117,8 +107,9 @@ fn heights_by_id(scene: &Scene) -> BTreeMap<u32, f64> {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn equation_6_finds_the_published_positions() {
-    let Some(scene) = scene() else { return };
+    let scene = scene();
     assert_eq!(scene.people.len(), 4650);
     let (camera, options) = (&scene.camera, PositionOptions::default());
     let feet_kept = PositionOptions { bottom_weight: 1.0, ..options.clone() };
@@ -143,8 +134,9 @@ fn equation_6_finds_the_published_positions() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn a_known_height_places_people_less_well_than_the_ground() {
-    let Some(scene) = scene() else { return };
+    let scene = scene();
     let (camera, options) = (&scene.camera, PositionOptions::default());
     let heights = heights_by_id(&scene);
     let own = |p: &Person| heights[&p.id];

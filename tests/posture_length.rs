@@ -1,6 +1,6 @@
 //! Segment lengths from a sequence against motion capture and against triangulated joints.
 
-mod recorded;
+use crate::recorded;
 
 use glam::DVec3;
 use memo_core::model::Camera;
@@ -10,7 +10,8 @@ use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths};
 use memo_core::synth::Random;
 
-use recorded::{Walk, camera, detected, shared, triangulated, view, walks};
+use crate::recordings;
+use recorded::{Walk, camera, detected, triangulated, view, walks};
 
 /// One of each kind of segment.
 const KINDS: [&str; 10] = [
@@ -97,8 +98,9 @@ impl Table {
 
 /// Relative errors in %, root mean square over four walkers of known height, on the ground.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn lengths_from_a_walk_are_better_than_proportions() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     println!("columns: {}", KINDS.join(" "));
     let mut all = Table::default();
     for (name, azimuth) in [("front", 0.0), ("45", 45.0), ("side", 90.0)] {
@@ -132,8 +134,9 @@ fn lengths_from_a_walk_are_better_than_proportions() {
 
 /// Without height the scale comes from the ground; without ground from nothing, and both are said.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn the_scale_is_told_from_where_it_is() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut ratios = Vec::new();
     for walk in &walks {
         let (rays, ground) = seen(walk, 45.0, 1.0);
@@ -160,8 +163,9 @@ fn the_scale_is_told_from_where_it_is() {
 
 /// A man on a beam: the height of the beam is given, for the ground must be what he stands on.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn lengths_of_the_man_on_the_beam() {
-    let Some(folder) = shared("keypoints/pose2sim_balancing") else { return };
+    let folder = recordings::path("keypoints/pose2sim_balancing");
     let read = |path: &str| std::fs::read_to_string(folder.join(path)).unwrap();
     let truth = triangulated(&read("S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc"));
     let truth = SegmentLengths::from_figures(&truth).unwrap();

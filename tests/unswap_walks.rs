@@ -1,10 +1,9 @@
 //! Exchanged leg and arm labels, planted in projected motion capture, and how many are found.
 //!
 //! Joints of real walks, seen at 480 px/m by a camera of the test's own; labels exchanged on purpose, so the
-//! truth is known frame by frame. The data are not part of this repository: `MEMO_SHARED_DATA` names the
-//! folder that holds `mocap/joints`; without it the tests say so and pass. `--nocapture` prints the tables.
+//! truth is known frame by frame. Needs the recordings. `--nocapture` prints the tables.
 
-use std::path::PathBuf;
+use crate::recordings;
 
 use memo_core::posture::unswap::{
     Keypoints, Level, LimbGroup, Reason, UnswapOptions, Unswapped, Verdict, unswap,
@@ -25,23 +24,15 @@ struct Motion {
     frames: Vec<[[f64; 3]; JOINTS]>,
 }
 
-fn motion(name: &str, skip: usize) -> Option<Motion> {
-    let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let path = shared.join("mocap/joints").join(format!("{name}.csv"));
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: no {} (set MEMO_SHARED_DATA)", path.display());
-        return None;
-    };
+fn motion(name: &str, skip: usize) -> Motion {
+    let text = recordings::text(&format!("mocap/joints/{name}.csv"));
     let rate = text.lines().next().unwrap().split(", ").find_map(|part| part.strip_suffix(" Hz")).unwrap();
     let row = |line: &str| {
         let numbers: Vec<f64> = line.split(',').skip(1).map(|n| n.parse().unwrap()).collect();
         std::array::from_fn(|j| std::array::from_fn(|k| numbers[3 * j + k]))
     };
     let frames = text.lines().skip(2 + skip).map(row).collect();
-    Some(Motion { rate_hz: rate.parse().unwrap(), frames })
+    Motion { rate_hz: rate.parse().unwrap(), frames }
 }
 
 impl Motion {
@@ -259,7 +250,7 @@ impl Calibration {
     }
 }
 
-fn walks() -> Option<Vec<Motion>> {
+fn walks() -> Vec<Motion> {
     WALKS.iter().map(|&(name, skip)| motion(name, skip)).collect()
 }
 
@@ -299,8 +290,9 @@ fn planted_cases(
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn exchanged_legs_are_found() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut calibration = Calibration::default();
     let mut all = Count::default();
     for (name, azimuth) in VIEWS {
@@ -336,8 +328,9 @@ fn without_crossings(times_s: &[f64], crossings_s: &[f64], gap_s: f64) -> Vec<f6
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn unseen_crossings_are_undecided_rather_than_wrong() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut calibration = Calibration::default();
     for gap_s in [0.12, 0.24, 0.36] {
         for rate in RATES {
@@ -380,8 +373,9 @@ fn unseen_crossings_are_undecided_rather_than_wrong() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn knee_and_ankle_alone_are_found() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut all = [Count::default(); 2];
     let outer = LimbGroup { name: "legs".into(), levels: legs().levels[1..].to_vec() };
     for (name, azimuth) in VIEWS {
@@ -420,8 +414,9 @@ fn knee_and_ankle_alone_are_found() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn exchanged_arms_are_found() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut all = Count::default();
     for (name, azimuth) in VIEWS {
         for rate in RATES {
@@ -446,8 +441,9 @@ fn exchanged_arms_are_found() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn missing_joints_and_bad_detections_cost_little() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let missing = |points: &mut [[f64; 2]], random: &mut Random| {
         points.iter_mut().filter(|_| random.uniform(0.0, 1.0) < 0.1).for_each(|p| *p = [f64::NAN; 2]);
     };
@@ -484,9 +480,10 @@ fn missing_joints_and_bad_detections_cost_little() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn nothing_is_exchanged_where_nothing_was() {
     for (name, skip) in WALKS.into_iter().chain([("CMU_02_05_punch", 0)]) {
-        let Some(motion) = motion(name, skip) else { return };
+        let motion = motion(name, skip);
         let mut counts = [Count::default(); 2];
         for (_, azimuth) in VIEWS {
             for rate in RATES {
@@ -508,8 +505,9 @@ fn nothing_is_exchanged_where_nothing_was() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn punching_while_standing() {
-    let Some(punch) = motion("CMU_02_05_punch", 0) else { return };
+    let punch = motion("CMU_02_05_punch", 0);
     for group in [legs(), arms()] {
         for (name, azimuth) in VIEWS {
             let mut count = Count::default();

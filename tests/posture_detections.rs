@@ -1,9 +1,9 @@
 //! Postures from real detections of a man balancing on a beam, seen by two cameras, against joints triangulated
 //! from four cameras. He does not walk: physical constraints alone.
 //!
-//! `cargo test --release -p memo-core --test posture_detections -- --nocapture` prints the table.
+//! `cargo test --release -p memo-tests posture_detections -- --nocapture` prints the table.
 
-mod recorded;
+use crate::recorded;
 
 use glam::{DVec2, DVec3};
 use memo_core::model::Camera;
@@ -14,7 +14,8 @@ use memo_core::posture::sequence::{
 };
 use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 
-use recorded::{keypoints, shared, triangulated};
+use crate::recordings;
+use recorded::{keypoints, triangulated};
 
 /// The frame rate of the recording.
 const RATE_HZ: f64 = 60.0;
@@ -29,8 +30,8 @@ struct Recording {
     truth: Vec<StickFigure>,
 }
 
-fn recording(name: &str) -> Option<Recording> {
-    let folder = shared("keypoints/pose2sim_balancing")?;
+fn recording(name: &str) -> Recording {
+    let folder = recordings::path("keypoints/pose2sim_balancing");
     let read = |path: &str| std::fs::read_to_string(folder.join(path)).unwrap();
     let truth = triangulated(&read("S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc"));
     let camera = Camera::from_toml_str(&read("Calib_qualisys.toml"), Some(name)).unwrap();
@@ -57,7 +58,7 @@ fn recording(name: &str) -> Option<Recording> {
         found.weights.push(PerJoint(joints.weights));
         found.head_px.push(detector.head_points(&points, &scores).unwrap().points_px);
     }
-    Some(found)
+    found
 }
 
 impl Recording {
@@ -118,10 +119,11 @@ fn physical(lengths: Option<SegmentLengths>, anchor: AnchorChoice) -> SequenceOp
 /// He leans and bends on a beam that is not the ground, so no source is exact; with lengths known, trunk and
 /// all sources together must place the joints better than all at the neck's depth, over both cameras.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn postures_are_nearer_than_a_flat_figure() {
     let mut sums = [[0.0; 3]; 2];
     for name in ["cam_02", "cam_04"] {
-        let Some(recording) = recording(name) else { return };
+        let recording = recording(name);
         let lengths = SegmentLengths::from_figures(&recording.truth).unwrap();
         for (label, lengths) in [("known lengths", Some(lengths)), ("estimated", None)] {
             for source in CHOICES {
@@ -162,9 +164,10 @@ fn postures_are_nearer_than_a_flat_figure() {
 
 /// The distance of the neck given: what is left is the posture alone.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn with_the_neck_known_joints_are_nearer_than_flat() {
     for (name, most_of_flat) in [("cam_02", 0.9), ("cam_04", 0.95)] {
-        let Some(recording) = recording(name) else { return };
+        let recording = recording(name);
         let lengths = SegmentLengths::from_figures(&recording.truth).unwrap();
         let neck = |f: &StickFigure| recording.camera.camera_from_world(f[Joint::Neck]).length();
         let distance_m = recording.truth.iter().map(neck).collect();
@@ -181,9 +184,10 @@ fn with_the_neck_known_joints_are_nearer_than_flat() {
 
 /// What the rules of walking say of a man who balances.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn rules_of_walking_on_a_man_who_balances() {
     for name in ["cam_02", "cam_04"] {
-        let Some(recording) = recording(name) else { return };
+        let recording = recording(name);
         let lengths = SegmentLengths::from_figures(&recording.truth).unwrap();
         let options =
             SequenceOptions { motion: Motion::Walking, ..physical(Some(lengths), AnchorChoice::Auto) };
@@ -199,8 +203,9 @@ fn rules_of_walking_on_a_man_who_balances() {
 /// Four walks of motion capture, three views at 1 px, the neck by all sources: rules of walking leave postures,
 /// and no warning says that this is no walk.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn real_walks_look_like_walking() {
-    let Some(walks) = recorded::walks() else { return };
+    let walks = recorded::walks();
     let mut rejected = [0; 2];
     for azimuth_deg in [0.0, 45.0, 90.0] {
         for walk in &walks {

@@ -3,7 +3,7 @@
 //!
 //! Run with `--nocapture` for the figures.
 
-mod mocap;
+use crate::mocap;
 
 use glam::DVec2;
 use memo_core::planar::{EvidenceOptions, FalseTargetRate, FitOptions, Verdict, fit_hinge, link_three};
@@ -24,8 +24,8 @@ fn depth_rms(found: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
 
 /// 90th percentiles of the relative error of length and of depth over length: thigh and shank, or upper and
 /// forearm.
-fn limb_errors(limbs: [usize; 2], noise_px: f64) -> Option<[f64; 2]> {
-    let walks = walks()?;
+fn limb_errors(limbs: [usize; 2], noise_px: f64) -> [f64; 2] {
+    let walks = walks();
     let mut random = Random::new(11);
     let noise_sd = noise_px * PIXEL_M;
     let options = FitOptions { noise_sd, ..FitOptions::default() };
@@ -56,28 +56,31 @@ fn limb_errors(limbs: [usize; 2], noise_px: f64) -> Option<[f64; 2]> {
         100.0 * tail[0],
         100.0 * tail[1]
     );
-    Some(tail)
+    tail
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn legs_have_their_lengths_and_depths() {
     for noise_px in [0.0, 1.0] {
-        let Some([length, depth]) = limb_errors([2, 3], noise_px) else { return };
+        let [length, depth] = limb_errors([2, 3], noise_px);
         assert!(length <= 0.02 && depth <= 0.15, "{noise_px} px: length {length}, depth {depth}");
     }
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn arms_have_their_lengths_roughly() {
     for noise_px in [0.0, 1.0] {
-        let Some([length, _]) = limb_errors([0, 1], noise_px) else { return };
+        let [length, _] = limb_errors([0, 1], noise_px);
         assert!(length <= 0.15, "{noise_px} px: {length}");
     }
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn the_knee_is_the_pivot_of_a_mocap_leg() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut random = Random::new(12);
     for noise_px in [0.0, 1.0] {
         let noise_sd = noise_px * PIXEL_M;

@@ -1,21 +1,18 @@
 //! Real joints in space and views of them, for tests of postures.
 //!
-//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`;
-//! without it [`load`] says so and gives None. Joint centres carry neither neck nor pelvis: the neck is put
+//! Needs the recordings. Joint centres carry neither neck nor pelvis: the neck is put
 //! 3.77 cm before the middle of the shoulders, where the trunk of Table A.1 (Lee and Chen 1985) has it, and
 //! the pelvis 10 cm from the middle of the hips towards the shoulders.
 
-#![allow(dead_code, reason = "each test uses its own part")]
-
 pub mod stride;
-
-use std::path::PathBuf;
 
 use glam::{DMat3, DVec2, DVec3};
 use memo_core::model::{Camera, Distortion};
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::synth::Random;
+
+use crate::recordings;
 
 /// The walks; two systems of measurement, four people.
 pub const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
@@ -37,16 +34,8 @@ pub const JOINTS: [&str; 12] =
     ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN"];
 
 /// The joints of every frame of a recorded motion, metres in the world, NaN where missing; and its rate.
-pub fn joints(name: &str) -> Option<(f64, Vec<[DVec3; 12]>)> {
-    let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let file = shared.join("mocap/joints").join(format!("{name}.csv"));
-    let Ok(text) = std::fs::read_to_string(&file) else {
-        println!("skipped: no {} (set MEMO_SHARED_DATA)", file.display());
-        return None;
-    };
+pub fn joints(name: &str) -> (f64, Vec<[DVec3; 12]>) {
+    let text = recordings::text(&format!("mocap/joints/{name}.csv"));
     let mut lines = text.lines();
     let rate_hz = rate_hz(lines.next().unwrap());
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -57,12 +46,12 @@ pub fn joints(name: &str) -> Option<(f64, Vec<[DVec3; 12]>)> {
     };
     // The first frames of this walk are a calibration posture.
     let skipped = if name == "CMU_12_01" { 10 } else { 0 };
-    Some((rate_hz, lines.skip(skipped).map(row).collect()))
+    (rate_hz, lines.skip(skipped).map(row).collect())
 }
 
 /// A recorded motion, every fifth frame (20-24 a second).
-pub fn load(name: &str) -> Option<Motion> {
-    let (rate_hz, frames) = joints(name)?;
+pub fn load(name: &str) -> Motion {
+    let (rate_hz, frames) = joints(name);
     let skipped = if name == "CMU_12_01" { 10 } else { 0 };
     let taken = || frames.iter().enumerate().step_by(5);
     let times_s = taken().map(|(frame, _)| (frame + skipped) as f64 / rate_hz).collect();
@@ -70,7 +59,7 @@ pub fn load(name: &str) -> Option<Motion> {
         .map(|(_, row)| figure(|joint| row[JOINTS.iter().position(|j| *j == joint).unwrap()]))
         .collect();
     let heading = heading(&figures);
-    Some(Motion { name: name.to_owned(), times_s, figures, heading })
+    Motion { name: name.to_owned(), times_s, figures, heading }
 }
 
 fn rate_hz(header: &str) -> f64 {
@@ -124,11 +113,7 @@ fn heading(figures: &[StickFigure]) -> DVec3 {
 
 /// What a camera sees of a figure.
 pub struct Seen {
-    /// The camera.
-    pub camera: Camera,
-    /// Pixels of the joints with noise.
-    pub pixels: PerJoint<DVec2>,
-    /// Their rays.
+    /// Rays of the noisy joints.
     pub rays: JointRays,
     /// The true joints in camera axes, metres.
     pub figure_in_camera: StickFigure,
@@ -167,11 +152,9 @@ pub fn view(figure: &StickFigure, heading: DVec3, azimuth_deg: f64, noise_px: f6
     let weight = PerJoint([1.0; JOINT_COUNT]);
     let rays = JointRays::from_pixels(&camera, &pixels, &weight, noise_px).unwrap();
     Seen {
-        pixels,
         rays,
         figure_in_camera: PerJoint(figure.0.map(|point| camera.camera_from_world(point))),
         up: rotation * DVec3::Z,
         heading: rotation * heading,
-        camera,
     }
 }

@@ -1,12 +1,7 @@
 //! Motion capture and real detections for tests of postures.
 //!
-//! The data are not part of this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints` and
-//! `keypoints/pose2sim_balancing`; without it the tests say so and pass. Four walks at 20-24 Hz; the camera
+//! Needs the recordings. Four walks at 20-24 Hz; the camera
 //! is 1.2 m high, f = 1920 px.
-
-#![allow(dead_code, reason = "each test file uses its part")]
-
-use std::path::PathBuf;
 
 use glam::{DMat3, DVec2, DVec3};
 use memo_core::model::Camera;
@@ -14,20 +9,9 @@ use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{Joint, PELVIS_ON_TRUNK, PerJoint, SegmentLengths, StickFigure};
 use memo_core::synth::Random;
 
-const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
-pub fn shared(path: &str) -> Option<PathBuf> {
-    let shared = std::env::var_os("MEMO_SHARED_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let found = shared.join(path);
-    if !found.exists() {
-        println!("skipped: no {} (set MEMO_SHARED_DATA)", found.display());
-        return None;
-    }
-    Some(found)
-}
+use crate::recordings;
 
+const WALKS: [&str; 4] = ["BTK_ANTO_M_hole", "BTK_BELT_C", "CMU_02_01", "CMU_12_01"];
 pub struct Walk {
     pub name: &'static str,
     pub rate_hz: f64,
@@ -36,10 +20,9 @@ pub struct Walk {
     pub forward: DVec3,
 }
 
-pub fn walks() -> Option<Vec<Walk>> {
-    let folder = shared("mocap/joints")?;
-    let walk = |name| walk(name, &std::fs::read_to_string(folder.join(format!("{name}.csv"))).unwrap());
-    Some(WALKS.into_iter().map(walk).collect())
+pub fn walks() -> Vec<Walk> {
+    let walk = |name| walk(name, &recordings::text(&format!("mocap/joints/{name}.csv")));
+    WALKS.into_iter().map(walk).collect()
 }
 
 /// Every 5th raw frame; the neck 3.77 cm before the middle of the shoulders, the pelvis 10 cm above that of

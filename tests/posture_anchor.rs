@@ -1,6 +1,6 @@
 //! Where the neck is, from each source, against motion capture and against triangulated joints.
 
-mod recorded;
+use crate::recorded;
 
 use memo_core::model::Camera;
 use memo_core::posture::anchor::{
@@ -10,7 +10,8 @@ use memo_core::posture::lift::JointRays;
 use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::synth::Random;
 
-use recorded::{camera, detected, shared, triangulated, view, walks};
+use crate::recordings;
+use recorded::{camera, detected, triangulated, view, walks};
 
 /// Errors of one source with what it stated.
 #[derive(Default)]
@@ -77,8 +78,9 @@ fn mismeasured(lengths: &SegmentLengths, random: &mut Random) -> SegmentLengths 
 /// The stated standard deviations against the errors, with lengths as inexact as assumed. A walker's habits
 /// are errors common to all frames of the walk, so the shares are coarse.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn the_neck_is_where_its_standard_deviation_says() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let mut pooled: [Errors; 4] = Default::default();
     for (view_name, azimuth) in [("front", 0.0), ("45", 45.0), ("side", 90.0)] {
         for noise_px in [0.0, 1.0, 3.0] {
@@ -113,8 +115,9 @@ const PLANTED: [usize; 3] = [10, 26, 43];
 
 /// A camera that stands still, every fourth frame missing and three frames far off.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn a_smoothed_walk_is_nearer_than_its_frames() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let (mut frames, mut tracks) = (Errors::default(), Errors::default());
     let (mut frames_about, mut tracks_about) = (Errors::default(), Errors::default());
     for (w, walk) in walks.iter().enumerate() {
@@ -164,8 +167,9 @@ fn a_smoothed_walk_is_nearer_than_its_frames() {
 /// Real detections of a man balancing on a beam. His posture is not that of walking and the beam is not the
 /// ground, so ground and extent are printed for comparison and only the trunk is held to what it states.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn the_sources_against_triangulated_joints() {
-    let Some(folder) = shared("keypoints/pose2sim_balancing") else { return };
+    let folder = recordings::path("keypoints/pose2sim_balancing");
     let read = |path: &str| std::fs::read_to_string(folder.join(path)).unwrap();
     let truth = triangulated(&read("S00_P00_T01_BalancingTrial_0-100_filt_butterworth.trc"));
     let lengths = SegmentLengths::from_figures(&truth).unwrap();

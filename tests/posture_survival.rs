@@ -1,6 +1,6 @@
 //! Which true postures of real people the constraints keep, and how many others.
 
-mod mocap;
+use crate::mocap;
 
 use std::collections::BTreeMap;
 
@@ -85,7 +85,7 @@ fn tally(motions: &[Motion], setting: &Setting) -> Tally {
     tally
 }
 
-fn motions(names: &[&str]) -> Option<Vec<Motion>> {
+fn motions(names: &[&str]) -> Vec<Motion> {
     names.iter().map(|name| load(name)).collect()
 }
 
@@ -101,22 +101,25 @@ fn assert_kept(motions: &[Motion], what: &str, noise_px: f64, options: &TreeOpti
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn true_walking_survives_without_noise() {
-    let Some(walks) = motions(&WALKS) else { return };
+    let walks = motions(&WALKS);
     assert_kept(&walks, "walks, physical", 0.0, &TreeOptions::physical(), 99.0);
     assert_kept(&walks, "walks, rules 1-5", 0.0, &walking(), 97.0);
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn true_walking_survives_three_pixels_of_noise() {
-    let Some(walks) = motions(&WALKS) else { return };
+    let walks = motions(&WALKS);
     assert_kept(&walks, "walks, rules 1-5", 3.0, &walking(), 95.0);
 }
 
 /// What is no walk keeps the physical constraints; the rules of walking refuse much of it.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn true_jumping_and_punching_survive_the_physical_constraints() {
-    let Some(others) = motions(&NOT_WALKING) else { return };
+    let others = motions(&NOT_WALKING);
     for motion in &others {
         let motion = std::slice::from_ref(motion);
         let name = &motion[0].name;
@@ -137,8 +140,9 @@ fn walking() -> TreeOptions {
 
 /// What the limits as printed lose and the measured ones keep, view by view.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn limits_as_printed_lose_true_postures() {
-    let Some(walks) = motions(&WALKS) else { return };
+    let walks = motions(&WALKS);
     let physical = |motion| TreeOptions::physical().with_motion(motion);
     let paper = |motion| TreeOptions::physical_paper().with_motion(motion);
     let settings = [

@@ -11,7 +11,6 @@ pub const LIMBS: [[usize; 3]; 4] = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]
 /// A walk on the spot: the mean forward motion is taken out.
 #[derive(Debug, Clone)]
 pub struct Walk {
-    pub name: &'static str,
     rate_hz: f64,
     frames: Vec<[DVec3; 12]>,
     /// Horizontal unit vector of progression.
@@ -26,14 +25,14 @@ pub struct Views {
     pub depth: Vec<Vec<f64>>,
 }
 
-/// The four level walks, or none where the data are absent.
-pub fn walks() -> Option<Vec<Walk>> {
+/// The four level walks.
+pub fn walks() -> Vec<Walk> {
     WALKS.into_iter().map(Walk::read).collect()
 }
 
 impl Walk {
-    fn read(name: &'static str) -> Option<Self> {
-        let (rate_hz, mut frames) = joints(name)?;
+    fn read(name: &'static str) -> Self {
+        let (rate_hz, mut frames) = joints(name);
         if name == "CMU_12_01" {
             // What is left of its calibration posture.
             frames.drain(..40);
@@ -54,7 +53,7 @@ impl Walk {
         };
         let lags = (0.85 * rate_hz) as usize..((1.6 * rate_hz) as usize).min(frames.len() - 10);
         let stride = lags.min_by(|&a, &b| miss(a).total_cmp(&miss(b))).unwrap() as f64;
-        Some(Self { name, rate_hz, frames, forward, stride })
+        Self { rate_hz, frames, forward, stride }
     }
 
     /// One stride in `count` views, started at `start` in [0, 1] of what the walk allows, seen orthographically

@@ -2,12 +2,11 @@
 //!
 //! Motion capture seen orthographically from 15 to 60 degrees off the side at 200 px/m, windows of a stride,
 //! with 0, 1 and 2 px of noise; also with two unrelated points added, or one joint missing. The eight limb
-//! links count; links inside the trunk (shoulders, hips, head) count neither way. The data are not part of
-//! this repository: `MEMO_SHARED_DATA` names the folder that holds `mocap/joints`; without it the tests say
-//! so and pass. `MEMO_FULL=1` takes all walks, views and windows instead of every fourth; `--nocapture`
+//! links count; links inside the trunk (shoulders, hips, head) count neither way. Needs the
+//! recordings. `MEMO_FULL=1` takes all walks, views and windows instead of every fourth; `--nocapture`
 //! prints the table.
 
-mod mocap;
+use crate::mocap;
 
 use std::f64::consts::TAU;
 
@@ -29,24 +28,24 @@ struct Walk {
     stride: usize,
 }
 
-fn walks() -> Option<Vec<Walk>> {
+fn walks() -> Vec<Walk> {
     mocap::WALKS.into_iter().map(walk).collect()
 }
 
-fn walk(name: &str) -> Option<Walk> {
-    let (rate_hz, frames) = mocap::joints(name)?;
+fn walk(name: &str) -> Walk {
+    let (rate_hz, frames) = mocap::joints(name);
     let frames: Vec<[DVec3; 12]> = frames.into_iter().step_by(2).collect();
     let rate_hz = rate_hz / 2.0;
     let pelvis = |f: &[DVec3; 12]| 0.5 * (f[6] + f[9]);
-    let forward = (pelvis(frames.last()?) - pelvis(&frames[0])).with_z(0.0).normalize();
+    let forward = (pelvis(frames.last().unwrap()) - pelvis(&frames[0])).with_z(0.0).normalize();
     let apart: Vec<f64> = frames.iter().map(|f| (f[8] - f[11]).dot(forward)).collect();
     let change = |p: usize| {
         (0..apart.len() - p).map(|i| (apart[i + p] - apart[i]).powi(2)).sum::<f64>()
             / (apart.len() - p) as f64
     };
     let strides = (0.8 * rate_hz) as usize..((1.5 * rate_hz) as usize).min(apart.len() - 10);
-    let stride = strides.min_by(|&a, &b| change(a).total_cmp(&change(b)))?;
-    Some(Walk { frames, rate_hz, forward, stride })
+    let stride = strides.min_by(|&a, &b| change(a).total_cmp(&change(b))).unwrap();
+    Walk { frames, rate_hz, forward, stride }
 }
 
 /// A view `off_deg` off the side: image of a point at 200 px/m.
@@ -181,8 +180,9 @@ fn scenes() -> Vec<(&'static str, Vec<Vec<usize>>)> {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn limbs_of_real_walks_are_linked() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     let is_full = std::env::var_os("MEMO_FULL").is_some();
     println!("precision / recall / windows without an error");
     println!("{:34} {:>22} {:>22} {:>22}", "", "0 px", "1 px", "2 px");
@@ -241,8 +241,9 @@ fn limbs_of_real_walks_are_linked() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn a_spanning_forest_finds_most_limbs() {
-    let Some(walks) = walks() else { return };
+    let walks = walks();
     // At 2 px it finds eight in ten: rods seen nearly edge-on lose their lengths.
     for (noise_px, wanted) in [(0.0, 0.95), (1.0, 0.9), (2.0, 0.75)] {
         let (mut hits, mut found) = (0, 0);

@@ -1,9 +1,9 @@
 //! Linked postures on real walks: four people of motion capture seen by a level camera 4 m away, from the
 //! front, at 45 degrees and from the side; segment lengths and the neck's depth known.
 //!
-//! `cargo test --release -p memo-core --test posture_linking -- --nocapture` prints the table.
+//! `cargo test --release -p memo-tests posture_linking -- --nocapture` prints the table.
 
-mod mocap;
+use crate::mocap;
 
 use glam::DVec3;
 use memo_core::posture::lift::{JointRays, roots};
@@ -22,8 +22,8 @@ struct Walk {
     options: LinkOptions,
 }
 
-fn walk(name: &str, azimuth_deg: f64, noise_px: f64, seed: u64) -> Option<Walk> {
-    let motion = mocap::load(name)?;
+fn walk(name: &str, azimuth_deg: f64, noise_px: f64, seed: u64) -> Walk {
+    let motion = mocap::load(name);
     let lengths = SegmentLengths::from_figures(&motion.figures).unwrap();
     let mut options = LinkOptions::default();
     let (mut frames, mut truth) = (vec![], vec![]);
@@ -36,7 +36,7 @@ fn walk(name: &str, azimuth_deg: f64, noise_px: f64, seed: u64) -> Option<Walk> 
         frames.push(LinkFrame { time_s, rays: seen.rays, neck });
         truth.push(seen.figure_in_camera);
     }
-    Some(Walk { frames, truth, lengths, options })
+    Walk { frames, truth, lengths, options }
 }
 
 /// At every segment the root whose segment vector is nearer to the true one.
@@ -95,14 +95,14 @@ fn score(walk: &Walk, path: &LinkedPath) -> Score {
     score
 }
 
-/// The mean over the four walks, or none without data.
-fn view(azimuth_deg: f64, noise_px: f64) -> Option<Score> {
+/// The mean over the four walks.
+fn view(azimuth_deg: f64, noise_px: f64) -> Score {
     let seeds: &[u64] = if noise_px == 0.0 { &[0] } else { &[1, 2, 3] };
     let mut mean = Score::default();
     let runs = (seeds.len() * mocap::WALKS.len()) as f64;
     for name in mocap::WALKS {
         for &seed in seeds {
-            let walk = walk(name, azimuth_deg, noise_px, seed)?;
+            let walk = walk(name, azimuth_deg, noise_px, seed);
             let one = score(&walk, &link(&walk.frames, &walk.lengths, &walk.options).unwrap());
             mean.frames_near_leaf += one.frames_near_leaf / runs;
             mean.joints_near_leaf += one.joints_near_leaf / runs;
@@ -128,24 +128,26 @@ fn view(azimuth_deg: f64, noise_px: f64) -> Option<Score> {
         mean.smoothed_near_leaf,
         mean.no_root
     );
-    Some(mean)
+    mean
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn walks_without_noise_are_linked_to_the_true_posture() {
     // From the front and the side some forearms and thighs stand so nearly perpendicular to the view that both
     // roots are equally far from the truth; the share of frames near the true leaf is limited by them.
     for (azimuth_deg, frames, error_cm) in [(0.0, 80.0, 1.7), (45.0, 92.0, 1.2), (90.0, 86.0, 1.2)] {
-        let Some(score) = view(azimuth_deg, 0.0) else { return };
+        let score = view(azimuth_deg, 0.0);
         assert!(score.frames_near_leaf >= frames, "{}", score.frames_near_leaf);
         assert!(score.error_cm <= error_cm && score.smoothed_cm <= error_cm, "{}", score.error_cm);
     }
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn walks_at_3_px_of_noise_keep_nine_joints_in_ten() {
     for azimuth_deg in [0.0, 45.0, 90.0] {
-        let Some(score) = view(azimuth_deg, 3.0) else { return };
+        let score = view(azimuth_deg, 3.0);
         assert!(score.joints_near_leaf >= 92.0, "{}", score.joints_near_leaf);
         assert!(score.smoothed_cm <= 4.0, "{}", score.smoothed_cm);
     }
@@ -153,12 +155,12 @@ fn walks_at_3_px_of_noise_keep_nine_joints_in_ten() {
 
 /// Segments mirrored by mistake, by margin: (nats from, segments, mirrored). Only where root and truth are both
 /// clearly on one side.
-fn mirrored(prior: &MotionPrior) -> Option<Vec<(f64, usize, usize)>> {
+fn mirrored(prior: &MotionPrior) -> Vec<(f64, usize, usize)> {
     let mut bins = [0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0].map(|from| (from, 0, 0)).to_vec();
     for name in mocap::WALKS {
         for azimuth_deg in [0.0, 45.0, 90.0] {
             for noise_px in [1.0, 3.0] {
-                let mut walk = walk(name, azimuth_deg, noise_px, 7)?;
+                let mut walk = walk(name, azimuth_deg, noise_px, 7);
                 walk.options.prior = prior.clone();
                 let path = link(&walk.frames, &walk.lengths, &walk.options).unwrap();
                 for (t, truth) in walk.truth.iter().enumerate() {
@@ -167,7 +169,7 @@ fn mirrored(prior: &MotionPrior) -> Option<Vec<(f64, usize, usize)>> {
                         let [found, true_m] = [&path.figures[t], truth].map(|f| f.segment(joint).dot(ray));
                         if 2.0 * found.abs().min(true_m.abs()) >= NEAR_M {
                             let margin = path.mirror_margin[t][joint];
-                            let bin = bins.iter_mut().rev().find(|bin| margin >= bin.0)?;
+                            let bin = bins.iter_mut().rev().find(|bin| margin >= bin.0).unwrap();
                             bin.1 += 1;
                             bin.2 += usize::from(found * true_m < 0.0);
                         }
@@ -176,14 +178,15 @@ fn mirrored(prior: &MotionPrior) -> Option<Vec<(f64, usize, usize)>> {
             }
         }
     }
-    Some(bins)
+    bins
 }
 
 /// The odds exp(-margin) were set on these walks, so this says that they hold there, not elsewhere.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn margins_are_no_surer_than_right() {
     for (name, prior) in [("walking", MotionPrior::walking()), ("any", MotionPrior::any())] {
-        let Some(bins) = mirrored(&prior) else { return };
+        let bins = mirrored(&prior);
         for (from, segments, wrong) in bins {
             let share = wrong as f64 / segments as f64;
             println!("{name}: margin from {from:3}: {segments:5} segments, {:.1} % mirrored", 100.0 * share);
@@ -194,8 +197,9 @@ fn margins_are_no_surer_than_right() {
 }
 
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn the_number_of_threads_changes_nothing() {
-    let Some(walk) = walk("BTK_BELT_C", 45.0, 3.0, 5) else { return };
+    let walk = walk("BTK_BELT_C", 45.0, 3.0, 5);
     let paths = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| link(&walk.frames, &walk.lengths, &walk.options).unwrap())
@@ -207,9 +211,10 @@ fn the_number_of_threads_changes_nothing() {
 
 /// A joint that is missing, for a moment or for good, costs its limb and nothing else.
 #[test]
+#[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
 fn missing_joints_cost_their_limb_alone() {
-    let Some(whole) = walk("CMU_02_01", 45.0, 0.0, 0) else { return };
-    let mut partial = walk("CMU_02_01", 45.0, 0.0, 0).unwrap();
+    let whole = walk("CMU_02_01", 45.0, 0.0, 0);
+    let mut partial = walk("CMU_02_01", 45.0, 0.0, 0);
     for frame in &mut partial.frames {
         frame.rays.ray[Joint::LeftElbow] = DVec3::NAN;
     }

@@ -1,0 +1,283 @@
+//! The whole tracker on people in clothes, whose body, gait and picture share nothing with the model: finding,
+//! sides, events, places, angles, intervals, and what does not walk.
+//!
+//! The bounds are floors under what was measured on other seeds, not aims; `--nocapture` prints the figures, and
+//! `MEMO_FULL=1` draws eight times as many.
+
+use memo_core::synth::{ClothedOptions, ClothedScene, Contact, Mover};
+use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
+use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
+use memo_core::track::start::Direction;
+use memo_core::track::tracker::{Tracker, TrackerOptions};
+use std::sync::LazyLock;
+
+/// Above this probability of interchanged sides a walk claims nothing by side.
+const OPEN: f64 = 0.2;
+
+fn many(few: u64) -> u64 {
+    if std::env::var_os("MEMO_FULL").is_some() { 8 * few } else { few }
+}
+
+fn scene(options: ClothedOptions) -> ClothedScene {
+    ClothedScene::new(options).unwrap()
+}
+
+/// Tracks frames in the given order, shown at the scene's rate.
+fn tracked(
+    scene: &ClothedScene,
+    frames: impl Iterator<Item = usize>,
+    knows_camera: bool,
+) -> Vec<TrackedWalk> {
+    let camera = knows_camera.then(|| scene.camera.clone());
+    let mut tracker =
+        Tracker::new(TrackerOptions { camera, ..TrackerOptions::for_height(scene.height_m) }).unwrap();
+    for (index, frame) in frames.enumerate() {
+        tracker.update(&scene.frame(frame).as_frame(), scene.time_s(index)).unwrap();
+    }
+    tracker.finish().unwrap();
+    tracker.take_finished()
+}
+
+/// Somebody who walked, and what was found of it.
+struct Followed {
+    seed: u64,
+    scene: ClothedScene,
+    walks: Vec<TrackedWalk>,
+}
+
+/// People with the camera given, drawn and tracked once for all tests.
+static FOLLOWED: LazyLock<Vec<Followed>> = LazyLock::new(|| {
+    let of = |seed| {
+        let scene = scene(ClothedOptions { seed, ..ClothedOptions::default() });
+        let walks = tracked(&scene, 0..scene.len(), true);
+        Followed { seed, scene, walks }
+    };
+    (0..many(10)).map(of).collect()
+});
+
+/// Difference of two phases, -0.5 to 0.5.
+fn phase_off(tracked: f64, truth: f64) -> f64 {
+    let off = tracked - truth;
+    off - off.round()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v * v, count + 1.0));
+    (sum / count).sqrt()
+}
+
+impl Followed {
+    fn rows(&self) -> Vec<Row> {
+        self.walks[0].rows()
+    }
+
+    /// Errors of every row: along the path, across it, in height (metres) and in phase.
+    fn errors(&self) -> Vec<[f64; 4]> {
+        let ahead = glam::DVec2::from_angle(self.scene.heading_rad);
+        let of = |row: &Row| {
+            let truth = self.scene.truth(row.frame).unwrap();
+            let off = row.torso_centre - truth.torso_centre;
+            let level = off.truncate();
+            [level.dot(ahead), level.dot(ahead.perp()), off.z, phase_off(row.phase, truth.phase)]
+        };
+        self.rows().iter().map(of).collect()
+    }
+
+    /// Errors of hip and knee of both sides, degrees.
+    fn angle_errors(&self) -> [Vec<f64>; 2] {
+        let mut errors = [Vec::new(), Vec::new()];
+        for row in self.rows() {
+            let truth = self.scene.truth(row.frame).unwrap();
+            for (found, drawn) in [row.posture.right, row.posture.left].into_iter().zip(truth.angles) {
+                errors[0].push((found.hip - drawn.hip).to_degrees());
+                errors[1].push((found.knee - drawn.knee).to_degrees());
+            }
+        }
+        errors
+    }
+
+    /// By how much each contact was found late, seconds; `None` for those that were not found within 0.15 s.
+    fn late_s(&self) -> Vec<(Contact, Option<f64>)> {
+        let events = self.walks[0].events();
+        let of = |contact: Contact| {
+            let late = events
+                .iter()
+                .filter(|event| event.kind == contact.kind && event.side == contact.side)
+                .map(|event| event.time_s - contact.time_s)
+                .min_by(|a, b| a.abs().total_cmp(&b.abs()));
+            (contact, late.filter(|late| late.abs() < 0.15))
+        };
+        self.scene.contacts().into_iter().map(of).collect()
+    }
+}
+
+#[test]
+fn everybody_is_followed_and_the_sides_are_right() {
+    for person in FOLLOWED.iter() {
+        let seed = person.seed;
+        assert_eq!(person.walks.len(), 1, "seed {seed}");
+        let walk = &person.walks[0];
+        assert_eq!(walk.direction(), Direction::Forward, "seed {seed}");
+        let rows = person.rows();
+        assert!(rows.len() >= 72, "seed {seed}: {} of {} frames", rows.len(), person.scene.len());
+        let phase = median(person.errors().iter().map(|e| e[3].abs()).collect());
+        let swapped = phase > 0.25;
+        println!("seed {seed}: phase {phase:.3}, p_swapped {:.3}", walk.p_swapped());
+        assert!(!swapped || walk.p_swapped() > OPEN, "seed {seed}: wrong sides, p {}", walk.p_swapped());
+        assert!(swapped || phase < 0.06, "seed {seed}: phase off by {phase}");
+    }
+    let open = FOLLOWED.iter().filter(|person| person.walks[0].p_swapped() > OPEN).count();
+    assert!(5 * open <= FOLLOWED.len(), "{open} of {} sides left open", FOLLOWED.len());
+}
+
+#[test]
+fn places_are_near_the_truth_and_their_deviations_neither_boast_nor_fear() {
+    let errors: Vec<[f64; 4]> = FOLLOWED.iter().flat_map(Followed::errors).collect();
+    let [along, across, height, phase] = [0, 1, 2, 3].map(|i| rms(errors.iter().map(|e| e[i])));
+    println!("torso: along {along:.3} m, across {across:.3} m, height {height:.3} m; phase {phase:.3}");
+    assert!(along < 0.05 && across < 0.15 && height < 0.04 && phase < 0.05);
+    // Of each coordinate, the root mean square of error over standard deviation.
+    let shares: Vec<[f64; 4]> = FOLLOWED
+        .iter()
+        .flat_map(|person| person.rows().into_iter().zip(person.errors()).collect::<Vec<_>>())
+        .map(|(row, error)| {
+            let [x, y, z, phase] = row.sd;
+            // Most paths are nearly along x, none deviates by more than seven degrees.
+            [error[0] / x, error[1] / y, error[2] / z, error[3] / phase]
+        })
+        .collect();
+    let [along, across, height, phase] = [0, 1, 2, 3].map(|i| rms(shares.iter().map(|s| s[i])));
+    println!(
+        "in standard deviations: along {along:.2}, across {across:.2}, height {height:.2}, phase {phase:.2}"
+    );
+    for share in [along, across, height, phase] {
+        assert!((0.3..3.0).contains(&share), "{share}");
+    }
+}
+
+#[test]
+fn hips_and_knees_are_as_near_as_the_average_gait_allows() {
+    let [hip, knee] =
+        [0, 1].map(|i| rms(FOLLOWED.iter().flat_map(|person| person.angle_errors()[i].clone())));
+    println!("hip {hip:.1}, knee {knee:.1} degrees");
+    assert!(hip < 5.0 && knee < 8.5, "{hip} {knee}");
+}
+
+#[test]
+fn contacts_are_found_within_a_frame_or_two() {
+    for (kind, most_s) in [(EventKind::HeelStrike, 0.035), (EventKind::ToeOff, 0.035)] {
+        let sure = FOLLOWED.iter().filter(|person| person.walks[0].p_swapped() <= OPEN);
+        let all: Vec<(Contact, Option<f64>)> =
+            sure.flat_map(Followed::late_s).filter(|(contact, _)| contact.kind == kind).collect();
+        let late: Vec<f64> = all.iter().filter_map(|(_, late)| *late).collect();
+        let mean = late.iter().sum::<f64>() / late.len() as f64;
+        let spread = rms(late.iter().map(|late| late - mean));
+        println!(
+            "{}: {} of {}, {:+.0} ms, sd {:.0} ms",
+            kind.name(),
+            late.len(),
+            all.len(),
+            1e3 * mean,
+            1e3 * spread
+        );
+        assert!(10 * late.len() >= 9 * all.len(), "{} of {}", late.len(), all.len());
+        assert!(mean.abs() < most_s && spread < 0.035, "{kind:?}: {mean} +- {spread}");
+    }
+}
+
+/// What is true of a parameter.
+fn truth(scene: &ClothedScene, line: &GaitParameter) -> Option<f64> {
+    let stride_s = 1.0 / scene.cycle_hz;
+    let step = |side| scene.step(side);
+    let ((right_m, right_s), (left_m, left_s)) = (step(Side::Right), step(Side::Left));
+    let difference = |right: f64, left: f64| 200.0 * (right - left) / (right + left);
+    Some(match line.quantity {
+        GaitQuantity::Cadence => 120.0 * scene.cycle_hz,
+        GaitQuantity::Speed => scene.speed_mps,
+        GaitQuantity::StrideTime => stride_s,
+        GaitQuantity::StrideLength => scene.speed_mps * stride_s,
+        GaitQuantity::StepTime => line.side.map_or(0.5 * stride_s, |side| step(side).1),
+        GaitQuantity::StepLength => line.side.map_or(0.5 * scene.speed_mps * stride_s, |side| step(side).0),
+        GaitQuantity::StepTimeSymmetry => difference(right_s, left_s),
+        GaitQuantity::StepLengthSymmetry => difference(right_m, left_m),
+        GaitQuantity::Stance | GaitQuantity::DoubleSupport => return None,
+    })
+}
+
+#[test]
+fn intervals_of_parameters_hold_most_of_the_time_and_are_not_endless() {
+    let (mut held, mut all) = (0, 0);
+    let mut half = Vec::new();
+    for person in FOLLOWED.iter() {
+        for line in person.walks[0].gait_parameters() {
+            let (Some(truth), Some([low, high])) = (truth(&person.scene, &line), line.interval) else {
+                continue;
+            };
+            all += 1;
+            held += usize::from((low..=high).contains(&truth));
+            if matches!(line.quantity, GaitQuantity::Speed | GaitQuantity::Cadence) {
+                half.push(0.5 * (high - low) / truth);
+            }
+        }
+    }
+    let widest = half.iter().copied().fold(0.0, f64::max);
+    println!("{held} of {all} held; speed and cadence to at most {:.0} %", 100.0 * widest);
+    assert!(all >= 11 * FOLLOWED.len() && 100 * held >= 75 * all, "{held} of {all}");
+    assert!(widest < 0.15, "{widest}");
+}
+
+#[test]
+fn a_marked_limp_has_its_sign() {
+    for (seed, late_left) in [(3, 0.05), (4, -0.05)] {
+        let scene = scene(ClothedOptions { seed, late_left: Some(late_left), ..ClothedOptions::default() });
+        let walks = tracked(&scene, 0..scene.len(), true);
+        let table = walks[0].gait_parameters();
+        let symmetry = table.iter().find(|line| line.quantity == GaitQuantity::StepTimeSymmetry).unwrap();
+        let [low, high] = symmetry.interval.expect("the sides are sure");
+        let truth = truth(&scene, symmetry).unwrap();
+        assert!(symmetry.value.unwrap() * truth > 0.0, "seed {seed}: {symmetry:?} of {truth}");
+        assert!(low < truth && truth < high, "seed {seed}: {symmetry:?} of {truth}");
+    }
+}
+
+#[test]
+fn without_a_camera_speed_and_cadence_are_nearly_as_good() {
+    for seed in 0..many(3) {
+        let scene = scene(ClothedOptions { seed, ..ClothedOptions::default() });
+        let walk = &tracked(&scene, 0..scene.len(), false)[0];
+        for line in walk.gait_parameters() {
+            if matches!(line.quantity, GaitQuantity::Speed | GaitQuantity::Cadence) {
+                let (value, truth) = (line.value.unwrap(), truth(&scene, &line).unwrap());
+                assert!((value / truth - 1.0).abs() < 0.12, "seed {seed}: {line:?} of {truth}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_film_played_backwards_shows_somebody_walking_backwards() {
+    for seed in 0..many(3) {
+        let scene = scene(ClothedOptions { seed, ..ClothedOptions::default() });
+        let walks = tracked(&scene, (0..scene.len()).rev(), true);
+        let longest = walks.iter().max_by_key(|walk| walk.steps().len()).expect("somebody walks");
+        assert_eq!(longest.direction(), Direction::Backward, "seed {seed}");
+        assert!(longest.steps().len() >= 60 && longest.events().is_empty(), "seed {seed}");
+    }
+}
+
+#[test]
+fn what_is_carried_stands_or_rolls_is_no_walk() {
+    for mover in [Mover::Rider, Mover::Waver, Mover::Trolley] {
+        for seed in 0..many(5) {
+            let scene = scene(ClothedOptions { seed, mover, frames: 60, ..ClothedOptions::default() });
+            let walks = tracked(&scene, 0..scene.len(), true);
+            let frames: Vec<usize> = walks.iter().map(|walk| walk.steps().len()).collect();
+            assert!(walks.is_empty(), "{mover:?}, seed {seed}: walks of {frames:?} frames");
+        }
+    }
+}
