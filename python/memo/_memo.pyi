@@ -128,8 +128,39 @@ def _camera(
 ) -> Camera: ...
 
 @final
+class ClothedScene:
+    """A person in clothes who walks through a room; `memo.demo_scene` wraps it."""
+
+    def __new__(
+        cls,
+        seed: int = 0,
+        *,
+        frames: int = 80,
+        noise_sd: float | None = None,
+        leftward: bool | None = None,
+        late_left: float | None = None,
+        slant_rad: float | None = None,
+        mover: str = "walker",
+    ) -> Self: ...
+    def frame(self, index: int) -> npt.NDArray[np.uint8]: ...
+    def time_s(self, index: int) -> float: ...
+    def truth(
+        self, index: int
+    ) -> tuple[tuple[float, float, float], float, tuple[npt.NDArray[np.float64], list[float]]] | None: ...
+    def contacts(self) -> list[tuple[float, str, str]]: ...
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def height_m(self) -> float: ...
+    @property
+    def speed_mps(self) -> float: ...
+    @property
+    def heading_rad(self) -> float: ...
+    def __len__(self) -> int: ...
+
+@final
 class Scene:
-    """A synthetic walker before a wall; `memo.demo_scene` wraps it."""
+    """The model as a walker before a wall; `memo.scene.model_scene` wraps it."""
 
     def __new__(
         cls,

@@ -1,10 +1,10 @@
-"""The synthetic scene of `memo demo`: a walker whose motion is known exactly."""
+"""Drawn scenes with ground truth: a person in clothes (`memo demo`), and the model itself."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,11 @@ from memo.table import data_frame
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["DemoScene", "demo_scene"]
+__all__ = ["DemoScene", "demo_scene", "model_scene"]
+
+#: Called with the number of frames drawn and of all.
+Progress = Callable[[int, int], object]
+Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -31,10 +35,13 @@ class DemoScene:
     #: Body height of the walker, metres.
     height_m: float
     #: Columns of `track.csv` that have a truth, one row per frame with the walker in it.
-    truth: dict[str, npt.NDArray[Any]]
+    truth: Columns
+    #: Columns `time_s`, `event` and `side` of `events.csv`: when the drawn feet touch and leave the floor; empty for
+    #: a scene drawn from the model, which has no floor to touch.
+    events: Columns = field(default_factory=dict)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The truth as a `pandas.DataFrame`, a row a frame with the walker in it."""
+        """The truth as a `pandas.DataFrame`, one row per frame with the walker in it."""
         return data_frame(self.truth)
 
     def __repr__(self) -> str:
@@ -46,40 +53,80 @@ def demo_scene(
     seed: int = 0,
     *,
     frames: int = 80,
+    noise_sd: float | None = None,
+    leftward: bool | None = None,
+    late_left: float | None = None,
+    mover: Literal["walker", "rider", "waver", "trolley"] = "walker",
+    progress: Progress | None = None,
+) -> DemoScene:
+    """Draws a person in clothes who walks through a room, 25 frames a second.
+
+    Body, gait and picture share nothing with the model that tracks: round limbs in clothes, joint curves with
+    deviations of 5 to 10 degrees from the average, uneven sides, a textured wall and a contact shadow. Proportions,
+    clothes, gait, heading, camera, room and all that is None follow from the seed.
+
+    `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle by which
+    the left foot strikes late (-0.1 to 0.1). Other movers than a walker are there to be refused: a `rider` carried
+    along in one posture, a `waver` who stands and swings the arms, a `trolley`; they have no truth. `progress` is
+    called with the number of frames drawn and of all.
+    """
+    scene = _memo.ClothedScene(
+        seed, frames=frames, noise_sd=noise_sd, leftward=leftward, late_left=late_left, mover=mover
+    )
+    rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
+    truth = _truth(scene, [(index, centre, phase, *pose) for index, centre, phase, pose in rows])
+    times_s, kinds, sides = zip(*scene.contacts(), strict=True) if rows else ((), (), ())
+    events: Columns = {"time_s": np.array(times_s, float), "event": np.array(kinds), "side": np.array(sides)}
+    return _drawn(scene, truth, events, progress)
+
+
+def model_scene(
+    seed: int = 0,
+    *,
+    frames: int = 80,
     noise_sd: float = 5.0,
     leftward: bool | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
 ) -> DemoScene:
-    """Draws a scene: camera, walker, clothes and wall follow from the seed; `noise_sd` in grey levels.
-    `progress` is called with the frames drawn and in all.
+    """Draws the model itself as a walker before a wall, like the synthetic sequence of Rohr 1994 (Figs. 23, 26, 27).
 
-    The walker is the model itself, so what tracking reaches here is bounded by the method alone.
+    What tracking reaches here is bounded by the method alone, not by how people differ from the model. Options as
+    for `demo_scene`.
     """
     scene = _memo.Scene(seed, frames=frames, noise_sd=noise_sd, leftward=leftward)
+    rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
+    posed = [(index, centre, phase, joints, scene.angles_deg(phase)) for index, centre, phase, joints in rows]
+    return _drawn(scene, _truth(scene, posed), {}, progress)
+
+
+def _drawn(
+    scene: _memo.Scene | _memo.ClothedScene, truth: Columns, events: Columns, progress: Progress | None
+) -> DemoScene:
     images = []
     for index in range(len(scene)):
         images.append(scene.frame(index))
         if progress is not None:
             progress(index + 1, len(scene))
-    drawn = np.stack(images)
     times_s = np.array([scene.time_s(index) for index in range(len(scene))])
-    return DemoScene(drawn, times_s, scene.camera, scene.height_m, _truth(scene))
+    return DemoScene(np.stack(images), times_s, scene.camera, scene.height_m, truth, events)
 
 
-def _truth(scene: _memo.Scene) -> dict[str, npt.NDArray[Any]]:
-    rows = [(index, known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
-    phases = np.array([phase for _, (_, phase, _) in rows])
-    joints = np.array([points.reshape(12, 3) for _, (_, _, points) in rows])
-    pixels = np.array([scene.camera.project(np.ascontiguousarray(points)) for points in joints])
-    angles = np.array([scene.angles_deg(phase) for phase in phases])
-    columns: dict[str, npt.NDArray[Any]] = {
-        "frame": np.array([index for index, _ in rows]),
-        "time_s": np.array([scene.time_s(index) for index, _ in rows]),
-        "phase": phases,
+def _truth(
+    scene: _memo.Scene | _memo.ClothedScene,
+    rows: list[tuple[int, tuple[float, float, float], float, npt.NDArray[np.float64], list[float]]],
+) -> Columns:
+    """Columns of rows of frame, torso centre, phase, joints (2, 6, 3) and angles in degrees."""
+    joints = np.array([points for _, _, _, points, _ in rows]).reshape(-1, 12, 3)
+    pixels = np.array([scene.camera.project(np.ascontiguousarray(points)) for points in joints]).reshape(-1, 12, 2)
+    angles = np.array([angles for *_, angles in rows]).reshape(-1, 8)
+    torso = np.array([centre for _, centre, *_ in rows]).reshape(-1, 3)
+    columns: Columns = {
+        "frame": np.array([index for index, *_ in rows], int),
+        "time_s": np.array([scene.time_s(index) for index, *_ in rows]),
+        "phase": np.array([phase for _, _, phase, *_ in rows]),
         "heading_rad": np.full(len(rows), scene.heading_rad),
         "speed_mps": np.full(len(rows), scene.speed_mps),
     }
-    torso = np.array([centre for _, (centre, _, _) in rows])
     columns |= {f"{axis}_m": torso[:, k] for k, axis in enumerate("xyz")}
     names = [f"{side}_{angle}_deg" for side in SIDES for angle in ANGLES]
     columns |= {name: angles[:, k] for k, name in enumerate(names)}

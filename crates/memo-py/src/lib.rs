@@ -61,7 +61,7 @@ mod _memo {
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
-    use super::synth::PyScene;
+    use super::synth::{PyClothedScene, PyScene};
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
     #[pymodule_export]

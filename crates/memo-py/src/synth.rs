@@ -3,12 +3,140 @@
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use memo_core::synth::{SceneOptions, SynthScene};
+use memo_core::image::Image;
+use memo_core::model::{SideAngles, SideJoints};
+use memo_core::synth::{ClothedOptions, ClothedScene, Mover, SceneOptions, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-/// A walker before a wall with everything known; frames are drawn when asked for.
+/// Centre of the torso, phase, and joints (2, 6, 3) or joint angles.
+type Truth<T> = ((f64, f64, f64), f64, T);
+
+fn grey_frame(
+    py: Python<'_>,
+    index: usize,
+    count: usize,
+    draw: impl FnOnce() -> Image<u8> + Send,
+) -> PyResult<Bound<'_, PyArray2<u8>>> {
+    if index >= count {
+        return Err(PyIndexError::new_err(format!("frame {index} of a scene with {count} frames")));
+    }
+    numpy_from_image(py, py.detach(draw))
+}
+
+fn joints_array(py: Python<'_>, sides: [SideJoints; 2]) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    let joints = sides.iter().flat_map(|side| side.to_array()).flat_map(|joint| joint.to_array()).collect();
+    numpy::PyArray1::from_vec(py, joints).reshape([2, 6, 3])
+}
+
+/// Right hip, knee, shoulder, elbow, then left, degrees.
+fn angles_deg(sides: [SideAngles; 2]) -> [f64; 8] {
+    let [[a, b, c, d], [e, f, g, h]] = sides.map(|s| [s.hip, s.knee, s.shoulder, s.elbow]);
+    [a, b, c, d, e, f, g, h].map(f64::to_degrees)
+}
+
+/// A person in clothes who walks through a room, whose body and gait are not the model's.
+#[pyclass(name = "ClothedScene", module = "memo._memo", frozen)]
+pub struct PyClothedScene(ClothedScene);
+
+#[pymethods]
+impl PyClothedScene {
+    #[new]
+    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, mover="walker"))]
+    fn new(
+        seed: u64,
+        frames: usize,
+        noise_sd: Option<f32>,
+        leftward: Option<bool>,
+        late_left: Option<f64>,
+        slant_rad: Option<f64>,
+        mover: &str,
+    ) -> PyResult<Self> {
+        let mover = match mover {
+            "walker" => Mover::Walker,
+            "rider" => Mover::Rider,
+            "waver" => Mover::Waver,
+            "trolley" => Mover::Trolley,
+            _ => {
+                let message = format!("mover must be walker, rider, waver or trolley, got {mover:?}");
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        if frames == 0 {
+            return Err(PyValueError::new_err("frames must be at least 1, got 0"));
+        }
+        let options = ClothedOptions {
+            seed,
+            frames,
+            noise_sd,
+            leftward,
+            late_left,
+            slant_rad,
+            mover,
+            ..ClothedOptions::default()
+        };
+        ClothedScene::new(options).map(Self).map_err(value_error)
+    }
+
+    /// One grey frame, (H, W) uint8.
+    fn frame<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        grey_frame(py, index, self.0.len(), || self.0.frame(index))
+    }
+
+    /// Time of a frame, seconds.
+    fn time_s(&self, index: usize) -> f64 {
+        self.0.time_s(index)
+    }
+
+    /// The truth of a frame: torso centre (x, y, z), phase, the 12 joints as (2, 6, 3) in the order right then
+    /// left shoulder, elbow, wrist, hip, knee, ankle, and the eight joint angles, degrees; None unless somebody walks.
+    #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
+    fn truth<'py>(
+        &self,
+        py: Python<'py>,
+        index: usize,
+    ) -> PyResult<Option<Truth<(Bound<'py, PyArray3<f64>>, [f64; 8])>>> {
+        let Some(truth) = self.0.truth(index) else { return Ok(None) };
+        let joints = joints_array(py, [truth.right, truth.left])?;
+        Ok(Some((truth.torso_centre.into(), truth.phase, (joints, angles_deg(truth.angles)))))
+    }
+
+    /// Initial contacts and toe-offs: time in seconds, kind and side.
+    fn contacts(&self) -> Vec<(f64, &'static str, &'static str)> {
+        self.0.contacts().iter().map(|c| (c.time_s, c.kind.name(), c.side.name())).collect()
+    }
+
+    /// The camera.
+    #[getter]
+    fn camera(&self) -> PyCamera {
+        PyCamera(self.0.camera.clone())
+    }
+
+    /// Body height of the person, metres.
+    #[getter]
+    fn height_m(&self) -> f64 {
+        self.0.height_m
+    }
+
+    /// Mean speed, metres a second.
+    #[getter]
+    fn speed_mps(&self) -> f64 {
+        self.0.speed_mps
+    }
+
+    /// Direction faced, radians.
+    #[getter]
+    fn heading_rad(&self) -> f64 {
+        self.0.heading_rad
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// The model as a walker before a wall with everything known; frames are drawn when asked for.
 #[pyclass(name = "Scene", module = "memo._memo", frozen)]
 pub struct PyScene(SynthScene);
 
@@ -33,14 +161,7 @@ impl PyScene {
 
     /// One grey frame, (H, W) uint8.
     fn frame<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        if index >= self.0.len() {
-            return Err(PyIndexError::new_err(format!(
-                "frame {index} of a scene with {} frames",
-                self.0.len()
-            )));
-        }
-        let image = py.detach(|| self.0.frame(index));
-        numpy_from_image(py, image)
+        grey_frame(py, index, self.0.len(), || self.0.frame(index))
     }
 
     /// Time of a frame, seconds.
@@ -55,23 +176,16 @@ impl PyScene {
         &self,
         py: Python<'py>,
         index: usize,
-    ) -> PyResult<Option<((f64, f64, f64), f64, Bound<'py, PyArray3<f64>>)>> {
+    ) -> PyResult<Option<Truth<Bound<'py, PyArray3<f64>>>>> {
         let Some(truth) = self.0.truth(index) else { return Ok(None) };
-        let joints: Vec<f64> = [truth.posed.right, truth.posed.left]
-            .iter()
-            .flat_map(|side| side.to_array())
-            .flat_map(|joint| joint.to_array())
-            .collect();
-        let joints = numpy::PyArray1::from_vec(py, joints).reshape([2, 6, 3])?;
+        let joints = joints_array(py, [truth.posed.right, truth.posed.left])?;
         Ok(Some((truth.posed.torso_centre.into(), truth.hypothesis.phase, joints)))
     }
 
     /// Joint angles of a phase, degrees: right hip, knee, shoulder, elbow, then left.
     fn angles_deg(&self, phase: f64) -> [f64; 8] {
         let p = self.0.walker.gait.posture(phase, &self.0.walker.style);
-        let side = |s: memo_core::model::SideAngles| [s.hip, s.knee, s.shoulder, s.elbow];
-        let ([a, b, c, d], [e, f, g, h]) = (side(p.right), side(p.left));
-        [a, b, c, d, e, f, g, h].map(f64::to_degrees)
+        angles_deg([p.right, p.left])
     }
 
     /// The camera.

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.reproduce.result import Progress
-from memo.scene import demo_scene
+from memo.scene import model_scene
 from memo.tracking import Track, Tracker
 
 __all__ = ["Clip", "Look", "NobodyTracked", "Sequence", "clip_sequence", "scene_sequence"]
@@ -98,7 +98,7 @@ class Sequence:
 
 def scene_sequence(progress: Progress) -> Sequence:
     """The synthetic scene, tracked with the model it was drawn with, as the paper's was."""
-    scene = demo_scene(SEED)
+    scene = model_scene(SEED)
 
     def frames() -> Frames:
         yield from (
