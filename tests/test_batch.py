@@ -23,6 +23,7 @@ from memo import batch
 from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
 from memo.cli.batch import _line
+from memo.files import read_text_columns
 
 FULL = bool(os.environ.get("MEMO_FULL"))
 KILLS = 60 if FULL else 4
@@ -182,6 +183,25 @@ def problems_of(manifest):
 
 
 # Manifests.
+
+
+def test_names_of_videos_are_no_formulas_in_the_tables(lab):
+    names = ["=HYPERLINK(1)", "+1", "-2+cmd", "@SUM(A1)", "x;=1"]
+    rows = []
+    for name in names:
+        (lab.folder / f"{name}.mp4").write_text("ok")
+        rows.append({"video": lab.folder / f"{name}.mp4", "name": name, "height_m": 1.7})
+    batch.run(rows, lab.out, command=lab.command)
+    for file in ("status.csv", "gait_parameters.csv"):
+        assert read_text_columns(lab.out / file)["name"] == names
+        with open(lab.out / file, newline="") as opened:
+            cells = [cell for row in csv.reader(opened) for part in [*row] for cell in part.split(";")]
+        assert [cell for cell in cells if cell[:1] in ("=", "@") or cell == "-2+cmd"] == []
+    with open(lab.manifest, "w", newline="") as file:  # the cells as they stand
+        csv.writer(file).writerows(
+            [["video", "name"], *([row["video"], row["name"]] for row in lab.status())]
+        )
+    assert [row.name for row in batch.read_manifest(lab.manifest).rows] == names
 
 
 def test_csv_and_toml_say_the_same(tmp_path):

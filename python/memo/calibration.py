@@ -5,11 +5,10 @@ Needs the `app` extra; looking for checkerboards needs the `checkerboard` extra.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 import memo
-from memo.files import complete_file
+from memo.spreadsheet import CsvRows, Error
+from memo.unfinished import complete_file
 
 __all__ = [
     "BoardLens",
@@ -64,19 +64,19 @@ def read_points_csv(path: str | PathLike[str]) -> PointTable:
     lines: list[int] = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            table = csv.DictReader(file, skipinitialspace=True)
-            header = [name.strip() for name in table.fieldnames or ()]
+            table = CsvRows(file, strip=True)
+            header = next(table, [])
             absent = [name for name in POINT_COLUMNS if name not in header]
             if absent:
                 hint = "" if len(header) > 1 else "; commas are wanted between columns"
                 raise ValueError(f"{path}: line 1: missing columns {', '.join(absent)}{hint}")
-            table.fieldnames = header
-            for row in table:
-                if not any((value or "") if isinstance(value, str) else value for value in row.values()):
+            for cells in table:
+                if not any(cells):
                     continue
+                row = dict(zip_longest(header, cells[: len(header)]))
                 rows.append([_number(path, table.line_num, name, row[name]) for name in POINT_COLUMNS])
                 lines.append(table.line_num)
-    except (csv.Error, UnicodeDecodeError) as error:
+    except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table of points: {error}") from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}") from None

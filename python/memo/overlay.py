@@ -20,7 +20,7 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import complete_file
+from memo.unfinished import complete_file
 from memo.video import Frame, Luma
 
 __all__ = ["draw_row", "draw_segments", "draw_text", "write_overlay"]

@@ -18,8 +18,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from memo import _memo
-from memo.files import complete_file
 from memo.plot import LEFT, NEUTRAL, RIGHT
+from memo.unfinished import complete_file
 
 if TYPE_CHECKING:
     from memo.postures import Postures

@@ -8,7 +8,6 @@ What it cannot do: measure sizes without a scale. Without lengths, height, groun
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import logging
@@ -25,6 +24,7 @@ import numpy.typing as npt
 from memo import _memo, sides
 from memo.files import write_columns_csv, write_json
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+from memo.spreadsheet import CsvRows, Error
 from memo.table import data_frame
 
 if TYPE_CHECKING:
@@ -579,8 +579,11 @@ def _json_lengths(path: Path, text: str) -> dict[str, Any]:
 def _csv_lengths(path: Path, text: str) -> dict[str, Any]:
     named: dict[str, Any] = {}
     known = set(_memo.segment_names())
-    for line, row in enumerate(csv.reader(io.StringIO(text, newline="")), start=1):
-        cells = [cell.strip() for cell in row]
+    try:
+        rows = list(CsvRows(io.StringIO(text, newline=""), strip=True))
+    except Error as error:
+        raise ValueError(f"{path}: not a table: {error}") from None
+    for line, cells in enumerate(rows, start=1):
         if not any(cells) or (line == 1 and cells[0] not in known):  # blank, or the header
             continue
         if len(cells) < 2:

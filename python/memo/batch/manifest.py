@@ -8,7 +8,6 @@ are relative to the manifest; an empty cell is an option not given.
 from __future__ import annotations
 
 import contextlib
-import csv
 import difflib
 import hashlib
 import math
@@ -22,6 +21,8 @@ from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from memo.spreadsheet import CsvRows, Error
 
 __all__ = ["OPTIONS", "Manifest", "ManifestError", "Row", "read_manifest"]
 
@@ -164,8 +165,8 @@ def _read_csv(path: Path) -> list[_Given]:
     lines = text.splitlines() or [""]
     delimiter = max(",;\t", key=lines[0].count)
     try:
-        table = csv.reader(text.splitlines(keepends=True), delimiter=delimiter, strict=True)
-        header = [name.strip() for name in next(table, [])]
+        table = CsvRows(text.splitlines(keepends=True), delimiter=delimiter, strict=True, strip=True)
+        header = next(table, [])
         problems = [
             f"{path}, line 1: unknown column {_suggested(name)}" for name in header if name not in _KNOWN
         ]
@@ -177,14 +178,13 @@ def _read_csv(path: Path) -> list[_Given]:
         for cells in table:
             here = f"{path}, line {line}"
             line = table.line_num + 1
-            cells = [cell.strip() for cell in cells]
             if not any(cells):
                 continue
             if len(cells) > len(header):
                 problems.append(f"{here}: {len(cells)} cells under {len(header)} columns")
             pairs = zip(header, cells, strict=False)
             given.append(_Given(here, {name: cell for name, cell in pairs if cell}))
-    except csv.Error as error:
+    except Error as error:
         raise ManifestError([f"{path}, line {table.line_num}: {error}"]) from None
     if problems:
         raise ManifestError(problems)

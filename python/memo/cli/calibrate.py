@@ -20,6 +20,7 @@ from memo.cli.given import (
     load_camera,
     two_sides,
 )
+from memo.unfinished import write_complete
 
 if TYPE_CHECKING:
     import typer
@@ -327,8 +328,7 @@ def _checkerboard(
         "focal_sd_px": lens.focal_sd_px,
     }
     lens_file = delivery.out / "lens.toml"
-    with _complete(lens_file) as temporary:
-        temporary.write_text(lens.text, encoding="utf-8")
+    write_complete(lens_file, lens.text)
     known = memo.Camera.from_file(lens_file, lens_only=True)
     if floor is None:
         lines.append("Without --floor it is not known where the camera stands: give lens.toml as --lens.")
@@ -411,9 +411,3 @@ def _rounded(value: float, sd: float) -> str:
         return f"{value:.6g} (no deviation known)"
     digits = max(0, 1 - math.floor(math.log10(sd)))
     return f"{value:.{min(digits, 9)}f} ± {sd:.{min(digits, 9)}f}"
-
-
-def _complete(path: Path) -> Any:
-    from memo.files import complete_file
-
-    return complete_file(path)

@@ -3,7 +3,6 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
-import csv
 import math
 import shlex
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ import numpy as np
 import memo
 from memo.cli.delivery import Delivery, Exit, InputError, guarded
 from memo.cli.given import check_writable
-from memo.files import complete_file
+from memo.files import write_table
 
 if TYPE_CHECKING:
     import typer
@@ -162,15 +161,14 @@ def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
 
 def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
     """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
-    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["frame", "dot", "shows", "limb_end", "fraction", "visible"])
-        for frame, row in enumerate(display["labels"]):
-            for dot, label in enumerate(row):
-                end = int(display["limb_ends"][frame, dot])
-                shows = names[label] if label >= 0 else "noise"
-                limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
-                table.writerow([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
+    rows = []
+    for frame, row in enumerate(display["labels"]):
+        for dot, label in enumerate(row):
+            end = int(display["limb_ends"][frame, dot])
+            shows = names[label] if label >= 0 else "noise"
+            limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
+            rows.append([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
+    write_table(path, ["frame", "dot", "shows", "limb_end", "fraction", "visible"], rows)
 
 
 def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:

@@ -37,11 +37,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
 from memo.formats.reading import METRIC_M, Given, unit_of_legs
 from memo.formats.text import number, numbers, read_lines, whole_number
+from memo.unfinished import complete_file
 
 __all__ = ["read_bvh", "write_bvh"]
 

@@ -31,10 +31,10 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
-from memo.files import complete_file
 from memo.formats.motion import MAX_FRAMES, FormatError, GaitEvent, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
+from memo.unfinished import complete_file
 
 __all__ = ["read_c3d", "write_c3d"]
 

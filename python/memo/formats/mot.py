@@ -31,11 +31,11 @@ from pathlib import Path
 
 import numpy as np
 
-from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found
 from memo.formats.reading import Given, chosen_up
 from memo.formats.text import numbers, read_lines, whole_number
+from memo.unfinished import complete_file
 
 __all__ = ["read_mot", "write_mot"]
 

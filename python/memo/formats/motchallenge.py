@@ -21,9 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file, read_text, read_track
+from memo.files import read_text, read_track
 from memo.formats.motion import FormatError
 from memo.run import contours_of_run
+from memo.unfinished import complete_file
 
 if TYPE_CHECKING:
     from memo.tracking import Track

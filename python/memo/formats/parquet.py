@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from memo._memo import __version__
-from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
 from memo.table import NumberTable, column_unit
+from memo.unfinished import complete_file
 
 __all__ = ["read_parquet", "read_parquet_motion", "write_parquet", "write_parquet_motion"]
 

@@ -12,11 +12,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from memo.files import complete_file
 from memo.report.choice import Choice
 from memo.report.planar import planar_page
 from memo.report.posture import posture_page
 from memo.report.track import track_page
+from memo.unfinished import complete_file
 
 __all__ = ["KINDS", "Report", "write_report"]
 
