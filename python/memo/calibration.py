@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 import memo
+from memo.extras import install
 from memo.spreadsheet import CsvRows, Error
 from memo.unfinished import complete_file
 
@@ -269,7 +270,8 @@ def _cv2() -> Any:
     try:
         import cv2
     except ImportError:
-        raise ValueError('checkerboards need OpenCV: pip install "memo-motion[checkerboard]"') from None
+        packages = install("checkerboard", "opencv-python-headless")
+        raise ValueError(f"checkerboards need OpenCV: {packages}") from None
     return cv2
 
 

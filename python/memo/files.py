@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from memo.pixels import columns_of_video, shrink_of_table
 from memo.spreadsheet import CsvRows, Error, write_rows
 from memo.unfinished import complete_file
 
@@ -142,8 +143,13 @@ def plain(value: Any) -> Any:
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN."""
-    return read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
+    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN.
+
+    Pixels are those of the video, also where an older version of memo wrote those of shrunk pictures and
+    `run.json` beside the table says so.
+    """
+    columns = read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
+    return columns_of_video(columns, shrink_of_table(path))
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
@@ -168,7 +174,7 @@ def read_track(path: str | PathLike[str]) -> dict[str, Column]:
     texts = [name for name in TRACK_COLUMNS if columns[name].dtype.kind not in "iuf"]
     if texts:
         raise ValueError(f"{path}: column {texts[0]} holds no numbers")
-    return {name: columns[name] for name in TRACK_COLUMNS}
+    return columns_of_video({name: columns[name] for name in TRACK_COLUMNS}, shrink_of_table(path))
 
 
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:

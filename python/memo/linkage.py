@@ -18,8 +18,11 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, read_text, write_table
+from memo.given import absent
 from memo.keypoints import read_keypoints
+from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -75,7 +78,7 @@ class Points:
 
     def __repr__(self) -> str:
         frames, count, dimensions = self.positions.shape
-        return f"Points({count} points in {dimensions}D, {frames} frames)"
+        return f"Points({counted(count, 'point')} in {dimensions}D, {counted(frames, 'frame')})"
 
     def at_one_scale(self) -> Points:
         """The same points with the scales divided out, as depths are."""
@@ -165,8 +168,9 @@ class PlanarFigure:
 
     def __repr__(self) -> str:
         return (
-            f"PlanarFigure({len(self.links())} links of {self.depth.shape[1]} points, "
-            f"{len(self.interpreted)} of {len(self.windows)} windows interpreted)"
+            f"PlanarFigure({counted(len(self.links()), 'link')} of "
+            f"{counted(self.depth.shape[1], 'point')}, "
+            f"{len(self.interpreted)} of {counted(len(self.windows), 'window')} interpreted)"
         )
 
     def _judged(self) -> list[tuple[dict[str, Any], str]]:
@@ -225,9 +229,11 @@ def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Poin
     """
     path = Path(path)
     if not path.exists():
-        raise ValueError(f"{path}: no such file or folder")
+        raise ValueError(absent(path, "file or folder"))
     if not _holds_keypoints(path):
-        return read_points_csv(path, 2, rate_hz)
+        points = read_points_csv(path, 2, rate_hz)
+        shrink = shrink_of_table(path) if path.name == "track.csv" else 1
+        return replace(points, positions=of_video(points.positions, shrink))
     keypoints = read_keypoints(path, fps=rate_hz)
     limbs = [name for name in keypoints.names if name in _SHORT]
     if len(limbs) < 2:

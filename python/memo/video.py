@@ -22,6 +22,9 @@ import av
 import numpy as np
 import numpy.typing as npt
 
+from memo.given import absent
+from memo.pixels import averaged
+
 __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 
 Luma = npt.NDArray[np.uint8]
@@ -163,7 +166,7 @@ class VideoReader:
             raise VideoError(
                 f"{self.path}: frame {index} is {now_width}x{now_height}, those before it {width}x{height}"
             )
-        return luma if self.shrink == 1 else _shrunk(luma, self.shrink)
+        return luma if self.shrink == 1 else averaged(luma, self.shrink)
 
     def _report_damage(self, read: int) -> None:
         announced, undecodable = self._source.announced, self._source.undecodable
@@ -264,7 +267,7 @@ def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
     if path.is_dir():
         return _Folder(path, rate_hz)
     if not path.exists():
-        raise VideoError(f"{path}: no such file")
+        raise VideoError(absent(path))
     if path.stat().st_size == 0:
         raise VideoError(f"{path}: the file is empty")
     return _File(path)
@@ -308,17 +311,6 @@ def _upright(luma: Luma, decoded: av.VideoFrame) -> Luma:
     if max(abs(a), abs(d)) < 0.01 * min(abs(b), abs(c)):
         return luma.T[:: 1 if b > 0 else -1, :: 1 if c > 0 else -1]
     raise VideoError(f"the video is turned by {decoded.rotation} degrees; only quarter turns can be read")
-
-
-def _shrunk(luma: Luma, n: int) -> Luma:
-    """Means of n by n pixels, rounded."""
-    height, width = luma.shape[0] // n, luma.shape[1] // n
-    total = np.zeros((height, width), np.uint32 if n > 16 else np.uint16)
-    for row in range(n):
-        for column in range(n):
-            total += luma[row : height * n : n, column : width * n : n]
-    means: Luma = ((total + n * n // 2) // (n * n)).astype(np.uint8)
-    return means
 
 
 def _display_matrix(decoded: av.VideoFrame) -> tuple[int, int, int, int] | None:

@@ -15,13 +15,14 @@ import os
 import re
 import tomllib
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from memo.given import absent, frame_range, is_url, load_camera, tracker_options
 from memo.spreadsheet import CsvRows, Error
 
 __all__ = ["OPTIONS", "Manifest", "ManifestError", "Row", "read_manifest"]
@@ -95,6 +96,30 @@ class Row:
             else:
                 arguments += [flag, str(value)]
         return arguments
+
+    @staticmethod
+    def of_arguments(arguments: Sequence[str]) -> tuple[Path, dict[str, Value]]:
+        """The video and the options that became these `arguments`."""
+        switches = {option.flag: (name, True) for name, option in OPTIONS.items() if option.kind is bool}
+        switches |= {
+            option.off or option.flag.replace("--", "--no-", 1): (name, False)
+            for name, option in OPTIONS.items()
+            if option.kind is bool
+        }
+        valued = {option.flag: (name, option.kind) for name, option in OPTIONS.items()}
+        video, *rest = arguments
+        options: dict[str, Value] = {}
+        words = iter(rest)
+        for word in words:
+            if word in switches:
+                name, value = switches[word]
+                options[name] = value
+            elif word in valued:
+                name, kind = valued[word]
+                options[name] = kind(next(words))
+            else:
+                raise ValueError(f"{word} is no option of a row")
+        return Path(video), options
 
     @property
     def fingerprint(self) -> dict[str, Any]:
@@ -267,7 +292,7 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
         problems.append(f"{given.place}: name {name!r} is not text")
         name = ""
     # a missing video has the path of the folder's parent, which `_checked` does not look at again
-    path = base / os.path.expanduser(video) if video is not None else base
+    path = base if video is None else _located(video, base)
     return Row(name, path, options, given.place, tuple(problems))
 
 
@@ -292,7 +317,12 @@ def _converted(value: Any, kind: type, base: Path) -> Value:
         return int(value)
     if not isinstance(value, str | PathLike):
         raise ValueError(f"{value!r} is not text")
-    return base / os.path.expanduser(value) if kind is Path else str(value)
+    return _located(value, base) if kind is Path else str(value)
+
+
+def _located(path: str | PathLike[str], base: Path) -> Path:
+    """The path, relative ones from `base`; an address stays one."""
+    return Path(path) if is_url(path) else base / os.path.expanduser(path)
 
 
 def _named(rows: list[Row]) -> list[Row]:
@@ -362,7 +392,7 @@ def _checked(row: Row) -> Row:
 
 def _check_video(row: Row) -> None:
     if not row.video.exists():
-        raise ValueError(f"{row.video}: no such video")
+        raise ValueError(absent(row.video, "video"))
     if row.video.is_dir() and "fps" not in row.options:
         raise ValueError(f"{row.video}: a folder of images has no time stamps; give fps")
     if row.video.is_file():
@@ -373,9 +403,6 @@ def _check_video(row: Row) -> None:
 
 
 def _check_options(row: Row) -> None:
-    from memo.cli.given import frame_range
-    from memo.cli.track import checked_options
-
     options: dict[str, Any] = dict(row.options)
     fps = options.get("fps")
     if fps is not None and not (math.isfinite(fps) and fps > 0):
@@ -385,9 +412,9 @@ def _check_options(row: Row) -> None:
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
     height = options.get("height_m", 1.75)
     if camera is None or options.get("fov_deg") is not None:
-        checked_options(height, camera, reading, options.get("fov_deg"))
+        tracker_options(height, camera, reading, options.get("fov_deg"))
     else:
-        checked_options(height, None, {}, None)
+        tracker_options(height, None, {}, None)
         _check_camera(camera, *reading.values(), camera.stat().st_mtime_ns if camera.is_file() else 0)
 
 
@@ -396,8 +423,6 @@ def _check_camera(
     camera: Path, name: str | None, unit: str | None, size: str | None, v_up: bool | None, modified_ns: int
 ) -> None:
     """Reads a camera once for all the rows that share it."""
-    from memo.cli.given import load_camera
-
     load_camera(camera, name, unit, size, v_up)
 
 

@@ -13,7 +13,7 @@ import memo
 from memo.cli.batch import add_batch
 from memo.cli.calibrate import add_calibrate
 from memo.cli.convert import add_convert
-from memo.cli.delivery import Exit, complain
+from memo.cli.delivery import complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
 from memo.cli.pointlight import add_pointlight
@@ -22,6 +22,8 @@ from memo.cli.report import add_report
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import add_track
 from memo.cli.unswap import add_unswap
+from memo.exits import Exit
+from memo.extras import install
 
 if TYPE_CHECKING:
     import typer
@@ -40,7 +42,7 @@ def main() -> None:
     """Entry point of the `memo` command."""
     absent = [name for name in EXTRA if find_spec(name) is None]
     if absent:
-        complain(f'the command line needs {", ".join(absent)}: pip install "memo-motion[app]"')
+        complain(f"the command line needs {', '.join(absent)}: {install('app', *absent)}")
         raise SystemExit(Exit.NO_EXTRA)
     try:
         _app()()

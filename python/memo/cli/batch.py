@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.batch import BatchResult, ManifestError, Progress, RayExecutor, Record, run
 from memo.batch.engine import check_folder, default_out, described, notes_on, prepared
-from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, terminal
+from memo.cli.delivery import Delivery, complain, guarded, terminal
+from memo.exits import Exit
+from memo.given import InputError
 
 if TYPE_CHECKING:
     import typer

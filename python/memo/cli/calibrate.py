@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count, with_elapsed, with_progress
-from memo.cli.given import (
+from memo.cli.delivery import Delivery, guarded, with_count, with_elapsed, with_progress
+from memo.exits import Exit
+from memo.given import (
+    InputError,
     check_apart,
     check_writable,
     checked_fov,

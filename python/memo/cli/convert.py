@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_apart, check_writable
+from memo.cli.delivery import Delivery, guarded, with_elapsed
+from memo.exits import Exit
 from memo.files import plain
+from memo.given import InputError, check_apart, check_writable
 
 if TYPE_CHECKING:
     import typer

@@ -13,32 +13,16 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from memo.exits import Exit
 from memo.files import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from memo.video import Frame
-
-
-class Exit(IntEnum):
-    """What the exit codes mean."""
-
-    TRACKED = 0
-    DONE = 0  # where nobody is to be tracked
-    BAD_INPUT = 1
-    NOBODY = 3  # or no posture of anybody
-    NO_EXTRA = 4
-    SOME_FAILED = 5  # of many videos
-    INTERRUPTED = 130
-
-
-class InputError(ValueError):
-    """A mistake in what the user gave; the message is one line."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
-from memo.cli.given import check_writable
+from memo.cli.delivery import Delivery, guarded, with_count
+from memo.exits import Exit
+from memo.given import InputError, check_writable
 
 if TYPE_CHECKING:
     import typer

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded
-from memo.cli.given import check_writable
+from memo.cli.delivery import Delivery, guarded
+from memo.exits import Exit
 from memo.files import write_table
+from memo.given import InputError, check_writable
 
 if TYPE_CHECKING:
     import typer

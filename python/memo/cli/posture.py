@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
-from memo.cli.given import check_apart, check_writable, checked_height, load_camera
+from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import exchanges, one_of_several
+from memo.exits import Exit
+from memo.given import InputError, check_apart, check_writable, checked_height, load_camera
 from memo.postures import WRITTEN, write_postures
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_steps
-from memo.cli.given import frame_range
+from memo.cli.delivery import Delivery, guarded, with_steps
+from memo.exits import Exit
+from memo.given import InputError, frame_range
 
 if TYPE_CHECKING:
     import typer

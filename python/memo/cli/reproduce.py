@@ -7,8 +7,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, with_steps
-from memo.cli.given import check_apart, check_writable, checked_height, load_camera
+from memo.cli.delivery import Delivery, complain, guarded, with_steps
+from memo.exits import Exit
+from memo.given import InputError, check_apart, check_writable, checked_height, load_camera
 
 if TYPE_CHECKING:
     import typer

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_apart, check_writable
+from memo.cli.delivery import Delivery, guarded, with_elapsed
+from memo.exits import Exit
 from memo.files import write_flips_csv
+from memo.given import InputError, check_apart, check_writable
 from memo.keypoints import write_keypoints
 
 if TYPE_CHECKING:

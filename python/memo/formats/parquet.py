@@ -20,9 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from memo._memo import __version__
+from memo.extras import install
 from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
+from memo.given import absent
 from memo.table import NumberTable, column_unit
 from memo.unfinished import complete_file
 
@@ -75,7 +77,7 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         table.validate(full=True)
         return {name: _values(pa, table.column(index)) for index, name in enumerate(schema.names)}
     except FileNotFoundError:
-        raise FormatError(f"{path}: no such file") from None
+        raise FormatError(absent(path)) from None
     except (pa.ArrowException, OSError, UnicodeDecodeError, MemoryError, OverflowError) as error:
         raise FormatError(f"{path}: not Parquet that can be read: {error}") from None
 
@@ -117,7 +119,7 @@ def _arrow() -> tuple[ModuleType, ModuleType]:
     try:
         return import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError:
-        raise FormatError('Parquet needs pyarrow: pip install "memo-motion[parquet]"') from None
+        raise FormatError(f"Parquet needs pyarrow: {install('parquet', 'pyarrow')}") from None
 
 
 def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
+from memo.given import absent
 from memo.keypoints.coco import read_coco
 from memo.keypoints.found import Found, Person
 from memo.keypoints.openpose import read_openpose
@@ -20,6 +21,7 @@ from memo.keypoints.points import Array, Keypoints, KeypointsError, frame_range
 from memo.keypoints.table import read_csv, read_parquet_table
 from memo.keypoints.text import content_of, parsed
 from memo.keypoints.trc import is_trc, read_trc
+from memo.pixels import of_video, shrink_of_table
 
 __all__ = ["read_keypoints"]
 
@@ -50,11 +52,13 @@ def read_keypoints(
         raise KeypointsError(f"person {person!r} is not a place in the list of people: 0, 1, ...")
     try:
         if not path.exists():
-            raise KeypointsError(f"{path}: no such file or folder")
+            raise KeypointsError(absent(path, "file or folder"))
         found = _found(path)
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return _assembled(found, person, fps, layout)
+    keypoints = _assembled(found, person, fps, layout)
+    shrink = shrink_of_table(found.source.path) if found.source.path.name in _OF_A_TRACK else 1
+    return keypoints if shrink == 1 else replace(keypoints, points=of_video(keypoints.points, shrink))
 
 
 def _found(path: Path) -> Found:
