@@ -18,8 +18,10 @@ import numpy.typing as npt
 
 import memo
 from memo.extras import install
+from memo.given import nothing_at
 from memo.spreadsheet import CsvRows, Error
 from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "BoardLens",
@@ -79,6 +81,8 @@ def read_points_csv(path: str | PathLike[str]) -> PointTable:
                 lines.append(table.line_num)
     except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table of points: {error}") from None
+    except FileNotFoundError:
+        raise ValueError(nothing_at(path)) from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
     numbers = np.array(rows, np.float64).reshape(-1, 5)
@@ -103,8 +107,10 @@ def read_picture(path: str | PathLike[str]) -> Luma:
 
     from memo.video import VideoError
 
+    if not Path(path).exists():
+        raise VideoError(nothing_at(path, "picture"))
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(Path(path).absolute())) as container:
             for frame in container.decode(video=0):
                 return np.asarray(frame.to_ndarray(format="gray"), np.uint8)
     except (av.FFmpegError, IndexError, OSError) as error:
@@ -347,7 +353,7 @@ def lens_from_boards(boards: Boards, square_m: float) -> BoardLens:
     cv2 = _cv2()
     if len(boards.found) < 3:
         raise ValueError(
-            f"the board was found in {len(boards.found)} pictures:"
+            f"the board was found in {counted(len(boards.found), 'picture')}:"
             " 3 are needed, in which it is tilted differently"
         )
     places = board_places(boards.corners, square_m).astype(np.float32)

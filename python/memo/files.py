@@ -21,6 +21,7 @@ import numpy.typing as npt
 from memo.pixels import columns_of_video, shrink_of_table
 from memo.spreadsheet import CsvRows, Error, write_rows
 from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "EVENT_COLUMNS",
@@ -232,7 +233,7 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
         raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
     for line, row in enumerate(rows, start=2):
         if row and len(row) != len(header):
-            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
+            raise ValueError(f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(header)}")
     place = {name: index for index, name in enumerate(header)}
     return {name: [row[place[name]] for row in rows if row] for name in names or header}
 

@@ -19,7 +19,6 @@ import memo
 
 __all__ = [
     "InputError",
-    "absent",
     "check_apart",
     "check_writable",
     "checked_fov",
@@ -27,6 +26,7 @@ __all__ = [
     "frame_range",
     "is_url",
     "load_camera",
+    "nothing_at",
     "tracker_options",
     "two_sides",
 ]
@@ -45,7 +45,7 @@ def is_url(path: str | PathLike[str]) -> bool:
     return _URL.fullmatch(os.fspath(path)) is not None
 
 
-def absent(path: str | PathLike[str], what: str = "file") -> str:
+def nothing_at(path: str | PathLike[str], what: str = "file") -> str:
     """What is said of a path where nothing is: of an address, that it must be downloaded first."""
     address = _URL.fullmatch(os.fspath(path))
     if address is None:
@@ -64,7 +64,7 @@ def load_camera(
 ) -> Any:
     """The camera of a calibration file."""
     if not path.is_file():
-        raise InputError(absent(path, "camera file"))
+        raise InputError(nothing_at(path, "camera file"))
     sides = None if size is None else two_sides(size, "--camera-size")
     return memo.Camera.from_file(path, name, unit, size=sides, v_up=v_up, lens_only=lens_only)
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, read_text, write_table
-from memo.given import absent
+from memo.given import nothing_at
 from memo.keypoints import read_keypoints
 from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
@@ -229,7 +229,7 @@ def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Poin
     """
     path = Path(path)
     if not path.exists():
-        raise ValueError(absent(path, "file or folder"))
+        raise ValueError(nothing_at(path, "file or folder"))
     if not _holds_keypoints(path):
         points = read_points_csv(path, 2, rate_hz)
         shrink = shrink_of_table(path) if path.name == "track.csv" else 1

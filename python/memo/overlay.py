@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import av
@@ -239,7 +240,7 @@ def _behind(write: Callable[..., None]) -> Iterator[Callable[..., None]]:
 @contextmanager
 def _h264(path: str, rate_hz: float) -> Iterator[Any]:
     """Gives a function (rgb, time_s) that appends a frame; the video is complete when the block ends."""
-    with av.open(path, "w", format="mp4") as container:
+    with av.open(str(Path(path).absolute()), "w", format="mp4") as container:
         rate = Fraction(rate_hz).limit_denominator(1001)
         stream = container.add_stream("libx264", rate=rate, options=_ENCODER)
         stream.pix_fmt = "yuv420p"

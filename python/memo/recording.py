@@ -21,7 +21,7 @@ import memo
 from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
-from memo.given import InputError, absent, check_writable
+from memo.given import InputError, check_writable, nothing_at
 from memo.run import Source, write_run
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def _track_recording(
 
     video = recording.video
     if not video.exists():
-        raise InputError(absent(video))
+        raise InputError(nothing_at(video))
     check_writable(out)
 
     def opened() -> VideoReader:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from memo.files import read_text
 from memo.spreadsheet import CsvRows, Error
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -114,10 +115,12 @@ def read_number_table(path: str | PathLike[str]) -> NumberTable:
     header, body = rows[0], rows[1:]
     twice = next((name for name, count in Counter(header).items() if count > 1), None)
     if twice is not None:
-        raise ValueError(f"{path}: column {twice} occurs {header.count(twice)} times")
+        raise ValueError(f"{path}: column {twice} occurs {counted(header.count(twice), 'time')}")
     for number, row in enumerate(body):
         if len(row) != len(header):
-            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
+            raise ValueError(
+                f"{path}: row {number} has {counted(len(row), 'cell')}, the header {len(header)}"
+            )
     table = np.full((len(body), len(header)), np.nan)
     for number, row in enumerate(body):
         for index, cell in enumerate(row):

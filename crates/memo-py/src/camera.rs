@@ -8,6 +8,7 @@ use memo_core::model::{
     Camera, CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints,
     PositionError, PositionOptions, TsaiParameters,
 };
+use memo_core::wording::counted;
 use numpy::PyArray2;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -37,7 +38,7 @@ pub fn camera_of_parameters(
         ("brown", &[k1, k2, p1, p2, k3]) => Distortion::Brown { k1, k2, p1, p2, k3 },
         ("tsai", &[kappa]) => Distortion::Tsai { kappa },
         (name, coefficients) => {
-            let message = format!("no lens {name:?} with {} coefficients", coefficients.len());
+            let message = format!("no lens {name:?} with {}", counted(coefficients.len(), "coefficient"));
             return Err(PyValueError::new_err(message));
         }
     };

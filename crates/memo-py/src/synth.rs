@@ -4,6 +4,7 @@ use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use memo_core::synth::{SceneOptions, SynthScene};
+use memo_core::wording::counted;
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -35,8 +36,8 @@ impl PyScene {
     fn frame<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
         if index >= self.0.len() {
             return Err(PyIndexError::new_err(format!(
-                "frame {index} of a scene with {} frames",
-                self.0.len()
+                "frame {index} of a scene with {}",
+                counted(self.0.len(), "frame")
             )));
         }
         let image = py.detach(|| self.0.frame(index));

@@ -22,8 +22,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from memo.given import absent, frame_range, is_url, load_camera, tracker_options
+from memo.given import frame_range, is_url, load_camera, nothing_at, tracker_options
 from memo.spreadsheet import CsvRows, Error
+from memo.wording import counted
 
 __all__ = ["OPTIONS", "Manifest", "ManifestError", "Row", "read_manifest"]
 
@@ -206,7 +207,9 @@ def _read_csv(path: Path) -> list[_Given]:
             if not any(cells):
                 continue
             if len(cells) > len(header):
-                problems.append(f"{here}: {len(cells)} cells under {len(header)} columns")
+                problems.append(
+                    f"{here}: {counted(len(cells), 'cell')} under {counted(len(header), 'column')}"
+                )
             pairs = zip(header, cells, strict=False)
             given.append(_Given(here, {name: cell for name, cell in pairs if cell}))
     except Error as error:
@@ -252,6 +255,8 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ManifestError([f"{path}: not text in UTF-8"]) from None
+    except FileNotFoundError:
+        raise ManifestError([nothing_at(path)]) from None
     except OSError as error:
         raise ManifestError([f"{path}: cannot be read: {error.strerror}"]) from None
 
@@ -392,7 +397,7 @@ def _checked(row: Row) -> Row:
 
 def _check_video(row: Row) -> None:
     if not row.video.exists():
-        raise ValueError(absent(row.video, "video"))
+        raise ValueError(nothing_at(row.video, "video"))
     if row.video.is_dir() and "fps" not in row.options:
         raise ValueError(f"{row.video}: a folder of images has no time stamps; give fps")
     if row.video.is_file():

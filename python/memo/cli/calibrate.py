@@ -20,9 +20,11 @@ from memo.given import (
     checked_fov,
     checked_height,
     load_camera,
+    nothing_at,
     two_sides,
 )
 from memo.unfinished import write_complete
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -182,7 +184,7 @@ def _check_inside(source: Path, pixels: Any, size: tuple[int, int]) -> None:
     if outside.mean() > 0.1:
         u, v = pixels[outside][0]
         raise InputError(
-            f"{source}: {outside.sum()} of {len(pixels)} points are outside a picture of"
+            f"{source}: {outside.sum()} of {counted(len(pixels), 'point')} outside a picture of"
             f" {size[0]}x{size[1]} pixels, the first at ({u:.0f}, {v:.0f}): is that its size?"
         )
 
@@ -206,11 +208,11 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
                 table.places, table.pixels, view["size"], focal_px=view["focal_px"], lens=view["lens"]
             )
         except ValueError as error:
-            counted = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
-            raise InputError(f"{path}: {error}{counted}") from None
+            from_0 = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
+            raise InputError(f"{path}: {error}{from_0}") from None
     off = np.hypot(*found["residuals_px"].T)
     kept = len(off) - len(found["outliers"])
-    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {kept} points."]
+    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {counted(kept, 'point')}."]
     if found["outliers"]:
         left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found["outliers"])
         lines.append(f"Left out, as chance would not put them there: {left_out}.")
@@ -232,7 +234,7 @@ def _walker(
 ) -> Exit:
     check_writable(delivery.out)
     if not source.exists():
-        raise InputError(f"{source}: no such file or folder")
+        raise InputError(nothing_at(source, "file or folder"))
     is_keypoints = source.suffix.lower() in _KEYPOINT_SUFFIXES or (
         source.is_dir() and any(source.glob("*.json"))
     )
@@ -266,7 +268,7 @@ def _walker(
     lines = [
         f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
         f" {found['rms_px'] / found['person_px']:.1%}"
-        f" of the person's height, over {kept} of {len(feet)} sightings.",
+        f" of the person's height, over {kept} of {counted(len(feet), 'sighting')}.",
         f"All lengths rest on the person's height of {height_m:g} m.",
     ]
     if view["focal_px"] is not None:
@@ -301,7 +303,7 @@ def _checkerboard(
 
     check_writable(delivery.out)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder of pictures")
+        raise InputError(nothing_at(folder, "folder of pictures"))
     if not (math.isfinite(square_mm) and 1 <= square_mm <= 1000):
         raise InputError(f"--square-mm {square_mm:g} is not the side of a square in millimetres (1 to 1000)")
     suffixes = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -315,7 +317,8 @@ def _checkerboard(
     columns, rows = boards.corners
     lines = [
         f"Board of {columns + 1}x{rows + 1} squares ({columns}x{rows} inner corners)"
-        f" in {len(boards.found)} of {len(paths)} pictures; reprojection error {lens.rms_px:.2f} px RMS."
+        f" in {len(boards.found)} of {counted(len(paths), 'picture')};"
+        f" reprojection error {lens.rms_px:.2f} px RMS."
     ]
     if not boards.are_squares:
         lines.append(f"--squares {squares[0]}x{squares[1]} are inner corners, not squares, of this board.")

@@ -18,6 +18,7 @@ from memo.files import JOINTS
 from memo.given import check_writable
 from memo.recording import follow, write_results, write_tables
 from memo.run import Source
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -109,7 +110,7 @@ def _described(differences: dict[str, float]) -> list[str]:
     torso = ", ".join(f"{axis} {100 * differences[f'{axis}_m']:.1f} cm" for axis in "xyz")
     phase, angles = differences["phase"], differences["hips_and_knees_deg"]
     return [
-        f"Against the drawn truth, root mean square over {differences['frames']} frames:",
+        f"Against the drawn truth, root mean square over {counted(differences['frames'], 'frame')}:",
         f"  torso {torso}",
         f"  phase {phase:.3f} of a cycle, hips and knees {angles:.1f} degrees",
         f"  joints {100 * differences['joints_m']:.1f} cm in space",

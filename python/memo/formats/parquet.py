@@ -24,9 +24,10 @@ from memo.extras import install
 from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
-from memo.given import absent
+from memo.given import nothing_at
 from memo.table import NumberTable, column_unit
 from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_parquet", "read_parquet_motion", "write_parquet", "write_parquet_motion"]
 
@@ -70,14 +71,14 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         with pq.ParquetFile(path, memory_map=False) as file:
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= _MAX_CELLS:
-                raise FormatError(f"{path}: {cells} cells; at most {_MAX_CELLS} are read")
+                raise FormatError(f"{path}: {counted(cells, 'cell')}; at most {_MAX_CELLS} are read")
             schema = file.schema_arrow
             _check_flat(pa, path, schema)
             table = file.read(use_threads=False)
         table.validate(full=True)
         return {name: _values(pa, table.column(index)) for index, name in enumerate(schema.names)}
     except FileNotFoundError:
-        raise FormatError(absent(path)) from None
+        raise FormatError(nothing_at(path)) from None
     except (pa.ArrowException, OSError, UnicodeDecodeError, MemoryError, OverflowError) as error:
         raise FormatError(f"{path}: not Parquet that can be read: {error}") from None
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
-from memo.given import absent
+from memo.given import nothing_at
 from memo.keypoints.coco import read_coco
 from memo.keypoints.found import Found, Person
 from memo.keypoints.openpose import read_openpose
@@ -22,6 +22,7 @@ from memo.keypoints.table import read_csv, read_parquet_table
 from memo.keypoints.text import content_of, parsed
 from memo.keypoints.trc import is_trc, read_trc
 from memo.pixels import of_video, shrink_of_table
+from memo.wording import counted
 
 __all__ = ["read_keypoints"]
 
@@ -52,7 +53,7 @@ def read_keypoints(
         raise KeypointsError(f"person {person!r} is not a place in the list of people: 0, 1, ...")
     try:
         if not path.exists():
-            raise KeypointsError(absent(path, "file or folder"))
+            raise KeypointsError(nothing_at(path, "file or folder"))
         found = _found(path)
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
@@ -125,7 +126,9 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
     except ValueError as error:
         raise KeypointsError(f"{path}: {error}") from None
     if len(names) != points.shape[1]:
-        raise KeypointsError(f"{path}: has {points.shape[1]} points a person, {name} has {len(names)}")
+        raise KeypointsError(
+            f"{path}: has {counted(points.shape[1], 'point')} a person, {name} has {len(names)}"
+        )
     return name, tuple(names)
 
 

@@ -23,6 +23,7 @@ from memo.keypoints.found import Found, Person, check_all_placed, different, wit
 from memo.keypoints.points import MAX_FRAME, Array, Keypoints, KeypointsError, Source, check_finite
 from memo.keypoints.text import LONGEST_NAME, content_of, short, write_text
 from memo.spreadsheet import CsvRows, Error, write_rows
+from memo.wording import counted
 
 __all__ = ["read_csv", "read_parquet_table", "write_csv"]
 
@@ -117,7 +118,9 @@ def _rows(path: Path, content: str) -> tuple[list[list[str]], str]:
         raise KeypointsError(f"{path}: not a table: {error}") from None
     for line, row in enumerate(rows, start=1):
         if row and len(row) != len(rows[0]):
-            raise KeypointsError(f"{path}: row {line} has {len(row)} cells, the header {len(rows[0])}")
+            raise KeypointsError(
+                f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(rows[0])}"
+            )
     return rows, delimiter
 
 

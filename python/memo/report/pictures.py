@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import av
@@ -106,7 +107,7 @@ def packed(points_px: npt.ArrayLike, shrink: int = 1) -> str:
 def colour_frames(path: str | PathLike[str]) -> Iterator[tuple[int, float, npt.NDArray[np.uint8]]]:
     """Number, seconds since the first and (H, W, 3) RGB pixels of the frames of a video memo wrote."""
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(Path(path).absolute())) as container:
             first_s: float | None = None
             for index, frame in enumerate(container.decode(video=0)):
                 first_s = (frame.time or 0.0) if first_s is None else first_s

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 
 from memo.files import read_text_columns, write_table
 from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "EQUAL",
@@ -182,7 +183,7 @@ class Reproduction:
     def markdown(self) -> str:
         """The rows as a table and the figures with their captions."""
         counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
-        lines = [f"# {self.title}", "", self.note, "", f"{len(self.rows)} rows: {counts}.", ""]
+        lines = [f"# {self.title}", "", self.note, "", f"{counted(len(self.rows), 'row')}: {counts}.", ""]
         lines += [f"| {' | '.join(ROW_COLUMNS)} |", "|---|---|---|---|---|---|"]
         for row in self.rows:
             cells = (getattr(row, name).replace("|", "\\|").replace("\n", " ") for name in ROW_COLUMNS)
@@ -219,7 +220,9 @@ def compared(
     found = list(_NUMBER.finditer(printed))
     values = np.atleast_1d(np.asarray(ours, dtype=float)).ravel()
     if len(found) != len(values):
-        raise ValueError(f"{item}, {quantity}: {len(found)} numbers printed, {len(values)} of ours")
+        raise ValueError(
+            f"{item}, {quantity}: {counted(len(found), 'number')} printed, {len(values)} of ours"
+        )
     digits = [len(number.group(1) or "") for number in found]
     allowed = [0.5 * 10.0**-d if within is None else within for d in digits]
     wanted = [float(number.group()) for number in found]

@@ -58,7 +58,7 @@ pub enum SequenceError {
     #[error("there are no frames")]
     Empty,
     /// Lists do not go together.
-    #[error("{frames} times need as many {what}, got {got}")]
+    #[error("as many {what} as times ({frames}) are needed, got {got}")]
     Counts {
         /// Number of times.
         frames: usize,
@@ -588,7 +588,7 @@ mod tests {
         assert_eq!(refused(&|walk, _| walk.times_s.clear()), "there are no frames");
         assert_eq!(
             refused(&|walk, _| walk.points_px.truncate(3)),
-            "6 times need as many frames of points, got 3"
+            "as many frames of points as times (6) are needed, got 3"
         );
         assert_eq!(
             refused(&|walk, _| walk.times_s[3] = walk.times_s[2]),
