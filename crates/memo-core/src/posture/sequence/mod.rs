@@ -605,7 +605,7 @@ mod tests {
         assert!(refused(&|_, o| o.anchor = AnchorChoice::Source(AnchorSource::Head)).contains("six points"));
         assert!(
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0, 5.0], sd_m: 0.1 })
-                .contains("distances (or one), got 2")
+                .contains("as many distances (or one) as times (6) are needed, got 2")
         );
         assert!(
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![-4.0], sd_m: 0.1 })
