@@ -218,7 +218,7 @@ except FormatError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == 'Parquet needs pyarrow: pip install "memo-motion[parquet]"\n'
+    assert done.stdout == 'Parquet needs pyarrow: pip install "pyarrow>=17"\n'
 
 
 def test_units_of_names():
