@@ -1,6 +1,7 @@
 """`memo ... | head`: where nobody reads any more, every command ends silently, with its results written."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -64,11 +65,14 @@ COMMANDS = (
 )
 
 
-def ended(commands, outputs=(1, 2)):
+def ended(commands, outputs=(1, 2), unbuffered=False):
     """Command, which output was closed (1 or 2), exit code, and what was said to the other."""
     driver = [sys.executable, "-c", DRIVER, json.dumps([list(map(str, command)) for command in commands])]
     driver.append(json.dumps(outputs))
-    return json.loads(subprocess.run(driver, capture_output=True, text=True, check=True).stdout)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    environment |= {"PYTHONUNBUFFERED": "1"} if unbuffered else {}
+    done = subprocess.run(driver, capture_output=True, text=True, check=True, env=environment)
+    return json.loads(done.stdout)
 
 
 def test_help_of_every_command_may_be_read_in_part():
@@ -107,7 +111,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_commands_end_silently_with_their_results_written(folder):
+@pytest.mark.parametrize("unbuffered", [False, True])
+def test_commands_end_silently_with_their_results_written(folder, unbuffered):
+    """A pipe is found closed at the end, or, where nothing is held back, with the first line printed."""
     commands = [
         ["convert", folder / "a.trc", folder / "a.csv"],
         ["convert", folder / "a.trc", folder / "b.csv", "--json"],
@@ -117,7 +123,7 @@ def test_commands_end_silently_with_their_results_written(folder):
         ["pointlight", "--seconds", "0.2", "--out", folder / "light"],
         ["batch", folder / "m.csv", "--check", "--out", folder / "batch"],
     ]
-    for command, closed, code, said in ended(commands):
+    for command, closed, code, said in ended(commands, unbuffered=unbuffered):
         as_wanted = (code, said) == (141, "") if closed == 1 else code in (0, 3) and bool(said)
         assert as_wanted, (command, code, said)
     written = ("a.csv", "b.csv", "planar/links.csv", "unswap/json", "camera/camera.toml", "light/display.mp4")
