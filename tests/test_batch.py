@@ -22,6 +22,7 @@ import pytest
 from memo import batch
 from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
+from memo.batch.manifest import Row
 from memo.cli.batch import _line
 from memo.files import read_text_columns
 from memo.unfinished import is_unfinished
@@ -247,6 +248,22 @@ def test_every_option_of_track_is_a_column():
         "--json",
         "--quiet",
         "--help",
+    }
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_the_child_reads_a_row_as_it_was_given(tmp_path, truth):
+    options = {
+        **{"camera": tmp_path / "-c.toml", "camera_name": "-1", "camera_unit": "mm", "camera_size": "4x3"},
+        **{"camera_v_up": truth, "height_m": 1.7, "fov_deg": 59.125, "frames": "-5:", "fps": 1e-3},
+        **{"shrink": 3, "overlay": truth, "plots": truth, "report": truth},
+    }
+    assert set(options) == set(batch.OPTIONS)
+    row = Row("name", tmp_path / "--out", options, "here")
+    video, again = Row.of_arguments(row.arguments)
+    assert video == row.video and again == options
+    assert {name: type(value) for name, value in again.items()} == {
+        name: type(value) for name, value in options.items()
     }
 
 
