@@ -34,7 +34,7 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:.*",
-        r"(av|collections|concurrent|datetime|matplotlib|np|npt|numpy|os|pandas|pathlib|typing|Axes|Figure)(\..*)?",
+        r"(av|collections|concurrent|contextlib|datetime|matplotlib|np|npt|numpy|os|pandas|pathlib|typing|Axes|Figure)(\..*)?",
     ),
     (r"py:.*", r"(Array|Whole|Column|Columns|Luma|NDArray|float64|uint8|bool_|int64|optional|TypeAlias)"),
 ]

@@ -55,8 +55,11 @@ class Camera:
 class Track:
     """A walk from left to right through the middle of the picture."""
 
+    shrink = 1
+
     def __init__(self, times_s, camera, status):
         times_s = np.asarray(times_s, float)
+        self._given = (times_s, status)
         self.camera = camera
         self.columns = walk(times_s, camera)
         self.events = [
@@ -91,6 +94,12 @@ class Track:
             key: self.columns[name] + extra
             for key, name, extra in zip(("x", "z", "phase"), ("x_m", "z_m", "phase"), noise, strict=True)
         }
+
+    def of_video(self, shrink, size=None):
+        times_s, status = self._given
+        track = Track(times_s, Camera(size), status)
+        track.shrink = shrink
+        return track
 
     def contours(self, row):
         u, v = self.columns["left_hip_u_px"][row], self.columns["left_hip_v_px"][row]

@@ -31,4 +31,5 @@ def explain(run_folder, frames=None, progress=None, *, video=None):
             phase_grid=np.linspace(0, 1, 20, endpoint=False),
             similarity=np.cos(np.linspace(0, 6, 20)) ** 2,
             phase=0.3,
+            shrink=1,
         )

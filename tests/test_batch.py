@@ -1,7 +1,7 @@
 """Many videos: what a manifest may hold, and that no kill, crash or second run loses or changes a result.
 
 Most runs have a stand-in for `memo` as child, which does what its "video", a text file, tells it to.
-`MEMO_FULL=1` repeats the kills many times.
+`MEMO_FULL=1` repeats the kills many times, with more videos.
 """
 
 import csv
@@ -22,7 +22,10 @@ import pytest
 from memo import batch
 from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
+from memo.batch.manifest import Row
 from memo.cli.batch import _line
+from memo.files import read_text_columns
+from memo.unfinished import is_unfinished
 
 FULL = bool(os.environ.get("MEMO_FULL"))
 KILLS = 60 if FULL else 4
@@ -184,6 +187,25 @@ def problems_of(manifest):
 # Manifests.
 
 
+def test_names_of_videos_are_no_formulas_in_the_tables(lab):
+    names = ["=HYPERLINK(1)", "+1", "-2+cmd", "@SUM(A1)", "x;=1"]
+    rows = []
+    for name in names:
+        (lab.folder / f"{name}.mp4").write_text("ok")
+        rows.append({"video": lab.folder / f"{name}.mp4", "name": name, "height_m": 1.7})
+    batch.run(rows, lab.out, command=lab.command)
+    for file in ("status.csv", "gait_parameters.csv"):
+        assert read_text_columns(lab.out / file)["name"] == names
+        with open(lab.out / file, newline="") as opened:
+            cells = [cell for row in csv.reader(opened) for part in [*row] for cell in part.split(";")]
+        assert [cell for cell in cells if cell[:1] in ("=", "@") or cell == "-2+cmd"] == []
+    with open(lab.manifest, "w", newline="") as file:  # the cells as they stand
+        csv.writer(file).writerows(
+            [["video", "name"], *([row["video"], row["name"]] for row in lab.status())]
+        )
+    assert [row.name for row in batch.read_manifest(lab.manifest).rows] == names
+
+
 def test_csv_and_toml_say_the_same(tmp_path):
     for name in ("a.mp4", "b.mp4", "side.toml"):
         (tmp_path / name).write_text("x")
@@ -226,6 +248,22 @@ def test_every_option_of_track_is_a_column():
         "--json",
         "--quiet",
         "--help",
+    }
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_the_child_reads_a_row_as_it_was_given(tmp_path, truth):
+    options = {
+        **{"camera": tmp_path / "-c.toml", "camera_name": "-1", "camera_unit": "mm", "camera_size": "4x3"},
+        **{"camera_v_up": truth, "height_m": 1.7, "fov_deg": 59.125, "frames": "-5:", "fps": 1e-3},
+        **{"shrink": 3, "overlay": truth, "plots": truth, "report": truth},
+    }
+    assert set(options) == set(batch.OPTIONS)
+    row = Row("name", tmp_path / "--out", options, "here")
+    video, again = Row.of_arguments(row.arguments)
+    assert video == row.video and again == options
+    assert {name: type(value) for name, value in again.items()} == {
+        name: type(value) for name, value in options.items()
     }
 
 
@@ -275,7 +313,7 @@ def test_all_problems_are_told_together_with_their_lines(tmp_path):
             ["'vidoe' (is it 'video'?)", "'subject' (known: video,", "no column 'video'"],
         ),
         ("video,video\na,b\n", ["column 'video' twice"]),
-        ("video\na,b\n", ["line 2: 2 cells under 1 columns"]),
+        ("video\na,b\n", ["line 2: 2 cells under 1 column"]),
         ('video\n"a\n', ["line 2: "]),
         ("", ["no column 'video'"]),
         ("video\n", ["holds no video"]),
@@ -311,7 +349,7 @@ def test_what_is_no_toml_manifest(tmp_path, text, expected):
 def test_files_that_are_no_manifest(tmp_path):
     (tmp_path / "latin.csv").write_bytes("video\nG\xe4nge.mp4\n".encode("latin-1"))
     assert "not text in UTF-8" in problems_of(tmp_path / "latin.csv")[0]
-    assert "No such file" in problems_of(tmp_path / "none.csv")[0]
+    assert "no such file" in problems_of(tmp_path / "none.csv")[0]
     assert "unknown key 'vdeo'" in problems_of([{"vdeo": "a"}])[0]
 
 
@@ -468,7 +506,7 @@ def test_a_second_run_goes_on_only_when_told(lab):
     lab.videos("ok", "fails", "ok")
     lab.run()
     before = lab.results()
-    with pytest.raises(batch.BatchError, match="3 of the 3 videos have been run here"):
+    with pytest.raises(batch.BatchError, match=r"videos have been run here \(3 of 3\)"):
         lab.run()
     assert lab.run(resume=True).done_now == 0
     assert lab.results() == before
@@ -559,26 +597,49 @@ def test_killed_at_any_moment_it_resumes_to_the_same_results(lab):
     lab.videos(*["sleeps 0.05", "ok", "nobody", "fails", "SIGSEGV"] * 3)
     lab.run(lab.folder / "undisturbed")
     expected = lab.results(lab.folder / "undisturbed")
-    chance = random.Random(1)
-    kills = while_running = 0
-    while kills < KILLS:
+    kill_and_resume(lab, lab.start, expected, KILLS, longest_s=1.3)
+
+
+def kill_and_resume(lab, start, expected, kills, longest_s):
+    """Kills runs, every second one while files are unfinished, the others at random moments, and resumes
+    them; in the end every result must be as expected, and nothing else be there."""
+    chance, count, amid = random.Random(1), 0, 0
+    while count < kills:
         shutil.rmtree(lab.out, ignore_errors=True)
-        for attempt in range(5):
-            run = lab.start()
-            try:
-                _, complaints = run.communicate(timeout=chance.uniform(0.05, 1.3) if attempt < 4 else None)
-                assert run.returncode == 0, complaints.decode()
+        for _ in range(4):
+            killed = kill(start(), lab.out, chance, longest_s, amid_files=count % 2 == 0)
+            if killed is None:
                 break
-            except subprocess.TimeoutExpired:
-                kills += 1
-                while_running += bool(list((lab.out / ".batch").glob("1-of-1.work/*")))
-                (os.kill if chance.random() < 0.5 else os.killpg)(run.pid, signal.SIGKILL)
-                run.communicate()
+            count, amid = count + 1, amid + killed
+        else:
+            last = start()
+            _, complaints = last.communicate()
+            assert last.returncode == 0, complaints
         assert lab.results() == expected
         assert not lab.strays()
+        assert not [path for path in lab.out.rglob("*") if is_unfinished(path.name)]
         wait_for(lambda: not lab.processes())
-    assert while_running or not FULL  # the moments were not all before the work or after it
-    print(f"{kills} kills, {while_running} of them with unfinished files")
+    assert amid >= (kills - 3) // 2
+    print(f"{count} kills, {amid} of them with unfinished files")
+
+
+def kill(run, out, chance, longest_s, amid_files):
+    """Kills a run or all its processes; whether files were unfinished, or None if it had ended by itself."""
+    end = time.monotonic() + (LONGEST_S if amid_files else chance.uniform(0.05, longest_s))
+    while time.monotonic() < end and not (amid_files and unfinished(out)):
+        if run.poll() is not None:
+            assert run.returncode == 0
+            return None
+        time.sleep(0.001)
+    time.sleep(chance.uniform(0, 0.1))
+    found = unfinished(out)
+    (os.kill if chance.random() < 0.5 else os.killpg)(run.pid, signal.SIGKILL)
+    run.communicate()
+    return found
+
+
+def unfinished(out):
+    return bool(list((out / ".batch").glob("1-of-1.work/*")))
 
 
 def wait_for(condition, seconds=LONGEST_S):
@@ -802,28 +863,20 @@ def test_the_command_line_interrupted(clip, tmp_path, signal_):
     assert not list((out / ".batch").glob("*.work/*"))
 
 
-@pytest.mark.skipif(not FULL, reason="takes minutes")
 def test_memo_killed_at_any_moment_resumes_to_the_same_results(clip, tmp_path):
-    manifest, out = tmp_path / "walks.csv", tmp_path / "out"
-    manifest.write_text("video,name\n" + "".join(f"clip.mp4,v{k}\n" for k in range(6)))
     lab = Lab(tmp_path)
-    batch.run(manifest, tmp_path / "undisturbed")
-    expected = lab.results(tmp_path / "undisturbed")
-    chance, kills, while_running = random.Random(2), 0, 0
-    while kills < 50:
-        shutil.rmtree(out, ignore_errors=True)
-        for attempt in range(9):
-            run = subprocess.Popen(
-                memo_command(manifest, "--out", out, "--resume", "--quiet"), process_group=0
-            )
-            try:
-                assert run.wait(chance.uniform(0.5, 5.0) if attempt < 8 else None) == 0
-                break
-            except subprocess.TimeoutExpired:
-                kills += 1
-                while_running += bool(list((out / ".batch").glob("1-of-1.work/*")))
-                (os.kill if chance.random() < 0.5 else os.killpg)(run.pid, signal.SIGKILL)
-                run.wait()
-        assert lab.results() == expected and not lab.strays()
-        wait_for(lambda: not lab.processes())
-    print(f"{kills} kills, {while_running} of them with unfinished files")
+    names = [f"v{k}" for k in range(6 if FULL else 3)]
+    lab.manifest.write_text("video,name\n" + "".join(f"clip.mp4,{name}\n" for name in names))
+    batch.run(lab.manifest, tmp_path / "undisturbed")
+    command = memo_command(lab.manifest, "--out", lab.out, "--resume", "--quiet")
+
+    def start():
+        return subprocess.Popen(command, process_group=0, stderr=subprocess.PIPE)
+
+    kill_and_resume(
+        lab,
+        start,
+        lab.results(tmp_path / "undisturbed"),
+        kills=50 if FULL else 2,
+        longest_s=4.0 if FULL else 1.0,
+    )

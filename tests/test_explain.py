@@ -14,7 +14,7 @@ from conftest import shared_video
 from memo import _memo, cli
 from memo.explain import Why, explain
 from memo.files import read_track_csv
-from memo.run import RunError, contours_of_run, read_run
+from memo.run import RunError, read_run
 
 FIRST, STOP = 10, 60
 GRID_STEP = 0.02  # the tracker's, cycles
@@ -276,44 +276,3 @@ def test_parameters_of_a_tsai_camera_lose_nothing():
     np.testing.assert_allclose(near.project(ground), camera.project(ground), atol=0.11)
     with pytest.raises(ValueError, match="camera: matrix is missing"):
         memo.Camera.from_parameters({"size": [640, 480]})
-
-
-def test_a_video_shrunk_to_another_is_tracked_explained_and_boxed_like_it(tmp_path, write_video, monkeypatch):
-    """Each pixel of the large video stands twice each way, so that shrunk by two it is the small one."""
-    scene = memo.demo_scene(3)
-    seen = scene.camera.parameters()
-    (fx, _, cx), (_, fy, cy), last = seen["matrix"]
-    matrix = [[2 * fx, 0, 2 * cx + 0.5], [0, 2 * fy, 2 * cy + 0.5], last]
-    twice = {"size": [2 * side for side in seen["size"]], "matrix": matrix}
-    cameras = {1: scene.camera, 2: memo.Camera.from_parameters(seen | twice)}
-    for n, camera in cameras.items():
-        pictures = np.kron(scene.frames[10:60], np.ones((1, n, n), np.uint8))
-        path = write_video(f"{n}.mp4", pictures)
-        camera.to_toml(tmp_path / f"{n}.toml")
-        given = ["--height", scene.height_m, "--camera", tmp_path / f"{n}.toml", "--shrink", n]
-        arguments = [
-            "track",
-            path,
-            *given,
-            "--out",
-            tmp_path / str(n),
-            "--no-overlay",
-            "--no-plots",
-            "--quiet",
-        ]
-        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        assert not exited.value.code
-    assert [read_run(tmp_path / str(n))["shrink"] for n in cameras] == [1, 2]
-    small, large = (read_track_csv(tmp_path / str(n) / "track.csv") for n in cameras)
-    assert len(small["frame"]) > 30
-    for name, values in small.items():
-        np.testing.assert_allclose(large[name], values, atol=1e-3, err_msg=name)
-    in_small, in_large = (
-        contours_of_run(tmp_path / str(n), table) for n, table in zip(cameras, (small, large), strict=True)
-    )
-    np.testing.assert_allclose(in_large[9], 2 * in_small[9] + 0.5, atol=0.2)
-    why_small, why_large = (next(explain(tmp_path / str(n))) for n in cameras)
-    np.testing.assert_array_equal(why_large.luma, why_small.luma)
-    np.testing.assert_allclose(why_large.similarity, why_small.similarity, atol=1e-3)

@@ -140,7 +140,7 @@ def test_empty_frames_at_the_ends_are_left_out(tmp_path):
     points[25, 2] = np.nan
     notes = write_motion(tmp_path / "cut.bvh", Motion(JOINTS, times_s, points))
     assert notes == [
-        "9 frames at the ends, in which a joint is missing, were left out.",
+        "Left out: 9 frames at the ends, in which a joint is missing.",
         "A BVH file begins at 0 s; this motion began at 0.08 s.",
     ]
     _, names, read = by_pybvh(tmp_path / "cut.bvh")
@@ -206,7 +206,7 @@ def test_hand_written_grammar_and_rotation_order(tmp_path):
         ("CHANNELS 6", "CHANNELS 7", "line 5, CHANNELS: wanted a whole number from 0 to 6, got '7'"),
         ("CHANNELS 1 Xrotation", "CHANNELS 1 Wrotation", "line 6: CHANNELS 1 Wrotation: wanted 1 of Xpos"),
         ("      OFFSET 0 -40 0\n", "      JOINT x {", "line 9: JOINT inside an End Site"),
-        ("}\nMOTION", "MOTION", "line 12: MOTION, but 1 joints are still open"),
+        ("}\nMOTION", "MOTION", "line 12: MOTION, but 1 joint still open"),
         ("MOTION", "motion", "line 13: 'motion' is not part of a hierarchy"),
         ("Frames: 2", "Frames: 3", "Frames: 3, but there are 2 lines of 7 numbers"),
         ("Frames: 2", "Frames: 1e12", "line 14, Frames: wanted a whole number"),
@@ -309,7 +309,7 @@ def test_positions_below_the_root_stand_in_the_place_of_the_offset(tmp_path):
     motion = read_motion(path)
     wanted = [[0, 90], [10, 91], [10, 50], [10, 10], [10, 5]]
     assert motion.points[1][:, [0, 2]] == pytest.approx(np.array(wanted) / 100)
-    assert motion.notes[-1].startswith("2 joints below the root have positions, the first LeftUpLeg: they")
+    assert motion.notes[-1].startswith("Positions below the root, of 2 joints, the first LeftUpLeg: they")
     # Programs that add write what is left of the offset, nearly nothing.
     path.write_text(
         MOVING + "0 90 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n0 90 0 0 0 0 0 1 0 0 0 0 0 -1 0 0 0 0 0 0 0\n"

@@ -218,7 +218,7 @@ def wrong(data, at, replacement):
         (lambda data: wrong(data, 0, b"\xff"), "byte 0: the parameters begin at block 255"),
         (lambda data: wrong(data, 515, b"\x57"), "byte 515: processor 87"),
         (lambda data: wrong(data, 2, b"\xff\xff"), "65535 points in the header, parameter POINT:USED has 15"),
-        (lambda data: data[:-600], "20 frames of 240 bytes begin here"),
+        (lambda data: data[:-600], "room for 20 frames of 240 bytes is wanted"),
         (lambda data: data.replace(b"mm", b"ly"), "parameter POINT:UNITS: 'ly', wanted m, cm or mm"),
         (lambda data: data.replace(b"+Z", b"+X"), r"the up axis is '\+X'"),
         (lambda data: wrong(data, 523, b"\xff\x7f"), "byte 516, parameter TRIAL: .* outside the section"),

@@ -205,6 +205,18 @@ def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
     assert a.read_bytes() == before
 
 
+@pytest.mark.parametrize("folder", ["file", "file/below", "/proc", "/proc/self/below"])
+def test_a_folder_that_cannot_be_is_told_before_the_source_is_read(tmp_path, memo_command, folder):
+    """Not even root can write into a file, or make one in /proc."""
+    if folder.startswith("/proc") and not Path("/proc/self").is_dir():
+        pytest.skip("no /proc here")
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "a.trc").write_text("broken")
+    code, said, err = memo_command("convert", tmp_path / "a.trc", tmp_path / folder / "a.c3d")
+    assert (code, said) == (1, "") and f"{tmp_path / folder}: cannot be written to" in err
+    assert (tmp_path / "file").read_text() == "mine"
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unwritable to root")
 def test_an_unwritable_folder_is_told_before_the_source_is_read(tmp_path, memo_command):
     (tmp_path / "sealed").mkdir(mode=0o500)

@@ -69,7 +69,7 @@ def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
     for name in ("walk.mot", "walk.sto"):
         left_out = write_motion(tmp_path / name, motion)
         assert left_out == [
-            "1 instants at which an angle or the pelvis is missing were left out.",
+            "Left out: 1 instant at which an angle or the pelvis is missing.",
             "A MOT or STO file has no place for events: left out.",
             "A MOT or STO file has no place for points but the pelvis: left out.",
         ]
@@ -248,7 +248,7 @@ def test_the_older_header_radians_and_forces_of_mot(tmp_path):
     )
     motion = read_motion(path)
     assert motion.angles["lumbar"] == pytest.approx([180 / np.pi])
-    assert motion.notes == ("Left out, no angles: 1 columns, the first ground_force_vx.",)
+    assert motion.notes == ("Left out, no angles: 1 column, the first ground_force_vx.",)
 
 
 def edited(text, line, edit):

@@ -107,7 +107,7 @@ def test_every_table_of_a_run_goes_to_parquet(tmp_path):
     for text, message in (
         ("", "a header"),
         ("a,a\n", "a header"),
-        ("a,b\n1\n", "row 2 has 1 cells, the header 2"),
+        ("a,b\n1\n", "row 2 has 1 cell, the header 2"),
         (b"\xff\n", "not a table"),
     ):
         (tmp_path / "b.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -218,7 +218,7 @@ except FormatError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == 'Parquet needs pyarrow: pip install "memo-motion[parquet]"\n'
+    assert done.stdout == 'Parquet needs pyarrow: pip install "pyarrow>=17"\n'
 
 
 def test_units_of_names():

@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import memo
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from conftest import SHARED_DATA
 from memo import cli
+from memo.report import write_report
 from scipy.spatial.transform import Rotation
 
 SIDES = ("right", "left")
@@ -239,6 +241,50 @@ def test_the_command_says_what_the_call_says(found, scene, tmp_path, memo_postur
     assert [int(n) for n in columns["survivors"]] == called.survivors.tolist()
 
 
+@pytest.fixture(scope="module")
+def backwards(scene, tmp_path_factory):
+    """The walk played backwards: every joint bends as none of a person's who walks on does."""
+    _, truth = scene
+    return write_table(tmp_path_factory.mktemp("backwards") / "back.csv", truth[::-1])
+
+
+def test_a_motion_that_breaks_a_constraint_in_every_frame_is_no_possible_sequence(
+    scene, backwards, tmp_path, memo_posture, monkeypatch
+):
+    folder, _ = scene
+    arguments = (backwards, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv")
+    arguments += ("--fps", RATE_HZ, "--strength", "paper", "--out", tmp_path)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    code, said, _ = memo_posture(*arguments)
+    document = json.loads((tmp_path / "postures.json").read_text())
+    assert all(frame["linked_breaks"] for frame in document["per_frame"])
+    assert document["frames_with_survivors"] > 0  # in single frames something is left
+    assert code == 6 and document["possible"] is False
+    alarm = said.splitlines()[0]
+    assert alarm.startswith("\x1b[1;31mNo possible sequence (--rules walking): in every frame")
+    assert "40 frames" in alarm
+    report = write_report(tmp_path)
+    page = report.path.read_text()
+    assert '<span class="status bad">no possible sequence</span>' in page
+    assert "is no possible sequence by these rules" in page
+    code, said, _ = memo_posture(*arguments, "--json", "--no-plots")
+    assert code == 6 and json.loads(said)["possible"] is False
+    monkeypatch.delenv("FORCE_COLOR")
+    _, said, _ = memo_posture(*arguments, "--no-plots")
+    assert said.startswith("No possible sequence") and "\x1b" not in said
+
+
+def test_one_posture_that_breaks_nothing_makes_a_motion_possible(found):
+    broken = (("left_leg_not_upright",),) * len(found)
+    assert found.is_possible and found.summary["possible"]
+    assert not replace(found, linked_breaks=broken).is_possible
+    assert "breaks a constraint in each" in repr(replace(found, linked_breaks=broken))
+    assert replace(found, linked_breaks=((), *broken[1:])).is_possible
+    nowhere = found.smoothed_m.copy()
+    nowhere[0] = np.nan  # the frame without a break is none of the motion
+    assert not replace(found, linked_breaks=((), *broken[1:]), smoothed_m=nowhere).is_possible
+
+
 def test_tables_and_document_agree(scene, tmp_path, memo_posture):
     folder, _ = scene
     arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--height", "1.75", "--no-plots")
@@ -353,7 +399,7 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["walk.csv", "--height", "175"], "looks like centimetres: give --height 1.75"),
         (["walk.csv", "--height", "-1"], "not the height of a person"),
         (["walk.csv", "--height", "nan"], "not the height of a person"),
-        (["walk.csv", "--lengths", "absent.csv"], "absent.csv: cannot be read: No such file"),
+        (["walk.csv", "--lengths", "absent.csv"], "absent.csv: no such file"),
         (["walk.csv", "--lengths", "."], "cannot be read"),
         (["walk.csv", "--lengths", "negative.csv"], "neck_to_pelvis is -0.4, not a length in metres"),
         (["walk.csv", "--lengths", "missing.csv"], "1 of 17 lengths missing: neck_to_pelvis"),
@@ -427,7 +473,7 @@ def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
         ({"noise_px": -1.0}, "noise_px"),
         ({"group_m": math.nan}, "group_m"),
         ({"moving_direction": (0.0, 0.0, 1.0)}, "moving_direction"),
-        ({"distance_m": [4.0, 5.0]}, "40 times need as many distances"),
+        ({"distance_m": [4.0, 5.0]}, r"as many distances \(or one\) as times \(40\)"),
         ({"distance_m": 1e300}, "distance_m must be 0.1 to 1000 m"),
         ({"distance_m": 1e-300}, "distance_m must be 0.1 to 1000 m"),
         ({"distance_m": math.nan}, "distance_m must be a distance"),

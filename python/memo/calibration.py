@@ -5,11 +5,10 @@ Needs the `app` extra; looking for checkerboards needs the `checkerboard` extra.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 import memo
-from memo.files import complete_file
+from memo.extras import install
+from memo.given import nothing_at
+from memo.spreadsheet import CsvRows, Error
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "BoardLens",
@@ -64,20 +67,22 @@ def read_points_csv(path: str | PathLike[str]) -> PointTable:
     lines: list[int] = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            table = csv.DictReader(file, skipinitialspace=True)
-            header = [name.strip() for name in table.fieldnames or ()]
+            table = CsvRows(file, strip=True)
+            header = next(table, [])
             absent = [name for name in POINT_COLUMNS if name not in header]
             if absent:
                 hint = "" if len(header) > 1 else "; commas are wanted between columns"
                 raise ValueError(f"{path}: line 1: missing columns {', '.join(absent)}{hint}")
-            table.fieldnames = header
-            for row in table:
-                if not any((value or "") if isinstance(value, str) else value for value in row.values()):
+            for cells in table:
+                if not any(cells):
                     continue
+                row = dict(zip_longest(header, cells[: len(header)]))
                 rows.append([_number(path, table.line_num, name, row[name]) for name in POINT_COLUMNS])
                 lines.append(table.line_num)
-    except (csv.Error, UnicodeDecodeError) as error:
+    except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table of points: {error}") from None
+    except FileNotFoundError:
+        raise ValueError(nothing_at(path)) from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
     numbers = np.array(rows, np.float64).reshape(-1, 5)
@@ -102,8 +107,10 @@ def read_picture(path: str | PathLike[str]) -> Luma:
 
     from memo.video import VideoError
 
+    if not Path(path).exists():
+        raise VideoError(nothing_at(path, "picture"))
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(Path(path).absolute())) as container:
             for frame in container.decode(video=0):
                 return np.asarray(frame.to_ndarray(format="gray"), np.uint8)
     except (av.FFmpegError, IndexError, OSError) as error:
@@ -269,7 +276,8 @@ def _cv2() -> Any:
     try:
         import cv2
     except ImportError:
-        raise ValueError('checkerboards need OpenCV: pip install "memo-motion[checkerboard]"') from None
+        packages = install("checkerboard", "opencv-python-headless")
+        raise ValueError(f"checkerboards need OpenCV: {packages}") from None
     return cv2
 
 
@@ -345,7 +353,7 @@ def lens_from_boards(boards: Boards, square_m: float) -> BoardLens:
     cv2 = _cv2()
     if len(boards.found) < 3:
         raise ValueError(
-            f"the board was found in {len(boards.found)} pictures:"
+            f"the board was found in {counted(len(boards.found), 'picture')}:"
             " 3 are needed, in which it is tilted differently"
         )
     places = board_places(boards.corners, square_m).astype(np.float32)

@@ -4,7 +4,8 @@ A run's folder keeps where the tracker looked in every frame and with which pers
 With the video, the change mask, the edges, the model's contours, the terms of Rohr's eqs. (7)-(11) and the
 similarity over the whole gait cycle come out again as they were: by the same code, at the best point of the
 tracker's grid. The phase in `track.csv` lies near that point, not on it: it is refined between grid points
-and smoothed over all frames. The similarity is the one in `track.csv`.
+and smoothed over all frames. The similarity is the one in `track.csv`. Pixels and lengths in pixels are those
+of the video, also where the tracker was given pictures averaged down.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.extras import install
+from memo.pixels import averaged, of_video
 from memo.run import NAME, RunError, read_run
 
 if TYPE_CHECKING:
@@ -34,7 +37,7 @@ _SAME_SIMILARITY = 0.01
 
 @dataclass(frozen=True)
 class Why:
-    """The evidence of one frame and how the model fits it; pixels have their centre at whole numbers."""
+    """The evidence of one frame and how the model fits it, in pixels of the video."""
 
     frame: int
     """Number of the frame in the video."""
@@ -57,7 +60,7 @@ class Why:
     model_part: npt.NDArray[np.uint8]
     """(K,) their body parts, as in `Track.contour_parts`."""
     model_px: Floats
-    """(K,) their lengths l_M, undistorted pixels; lines below 1 px are left out of the sums."""
+    """(K,) their lengths l_M, undistorted pixels; lines below 1 px (`shrink` px) are left out of the sums."""
     model_edge: npt.NDArray[np.int64]
     """(K,) the image edge of `segments` that answers each, -1 where none does."""
     overlap_px: Floats
@@ -80,6 +83,8 @@ class Why:
     """The phase chosen: of the tracker's grid, in [0, 1)."""
     chosen_similarity: float
     """Similarity there, that of `track.csv`."""
+    shrink: int = 1
+    """How many pixels of the video, each way, made one of the picture in which all this was found."""
 
     @property
     def twin_phase(self) -> float:
@@ -109,7 +114,7 @@ def explain(
     try:
         from memo.video import VideoReader
     except ModuleNotFoundError as error:
-        raise ImportError(f'reading the video needs {error.name}: pip install "memo-motion[app]"') from None
+        raise ImportError(f"reading the video needs {error.name}: {install('app', 'av')}") from None
     run = read_run(run_folder)
     file = Path(run_folder) / NAME
     first = run["frames"][0]
@@ -132,7 +137,7 @@ def explain(
     stop = min(first + count, max(wanted, default=first - 2) + 2)
     if stop <= first:
         return iter(())
-    reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"], shrink=run["shrink"])
+    reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"])
     return _explained(run, file, reader, stop - first, wanted, explainer, progress)
 
 
@@ -164,8 +169,8 @@ def _explained(
     }
     left = set(wanted)
     with reader:
-        for found in _found(reader, explainer, count, progress):
-            why = _why(found, first)
+        for found, luma in _found(reader, explainer, run["shrink"], count, progress):
+            why = _why(found, luma, first, run["shrink"])
             tracked = similarities.get(why.frame, why.chosen_similarity)
             if abs(why.chosen_similarity - tracked) > _SAME_SIMILARITY:
                 raise RunError(
@@ -181,26 +186,49 @@ def _explained(
 def _found(
     reader: VideoReader,
     explainer: _memo.Explainer,
+    shrink: int,
     total: int,
     progress: Callable[[int, int], object] | None,
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.uint8]]]:
+    """What was found in the pictures, averaged as the tracker had them, each with its frame of the video."""
+    before = np.empty((0, 0), np.uint8)
     for done, frame in enumerate(reader, 1):
-        found = explainer.update(frame.luma, frame.time_s)
+        whole = frame.luma if shrink == 1 else np.array(frame.luma)
+        found = explainer.update(whole if shrink == 1 else averaged(whole, shrink), frame.time_s)
         if progress is not None:
             progress(done, total)
-        if found is not None:
-            yield found
+        if found is not None:  # of the frame before
+            yield found, found["luma"] if shrink == 1 else before
+        before = whole
     found = explainer.finish()
     if found is not None:
-        yield found
+        yield found, found["luma"] if shrink == 1 else before
 
 
-def _why(found: dict[str, Any], first: int) -> Why:
+_PLACES = ("edge_points", "segments", "model")
+_LENGTHS = ("model_px", "overlap_px", "distance_px", "similarity_px")
+
+
+def _why(found: dict[str, Any], luma: npt.NDArray[np.uint8], first: int, shrink: int) -> Why:
     with np.errstate(divide="ignore", invalid="ignore"):
         matched = np.where(found["model_px"] > 0, found["similarity_px"] / found["model_px"], 0.0)
     edges = np.unique(found["model_edge"][found["model_edge"] >= 0])
+    if shrink > 1:
+        left, top, right, bottom = found["window_px"]
+        mask = np.zeros(luma.shape, bool)
+        changed = np.kron(found["change_mask"], np.ones((shrink, shrink), bool))
+        mask[: changed.shape[0], : changed.shape[1]] = changed
+        found = {
+            **found,
+            **{name: of_video(found[name], shrink) for name in _PLACES},
+            **{name: shrink * found[name] for name in _LENGTHS},
+            "window_px": (left * shrink, top * shrink, (right + 1) * shrink - 1, (bottom + 1) * shrink - 1),
+            "change_mask": mask,
+            "luma": luma,
+        }
     return Why(
         **{**found, "frame": found["frame"] + first},
         matched=np.clip(matched, 0.0, 1.0),
         matched_edges=found["segments"][edges],
+        shrink=shrink,
     )

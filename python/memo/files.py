@@ -1,23 +1,27 @@
 """The files of results, among them `track.csv`, `events.csv` and `flips.csv`.
 
 The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
-it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete.
+it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete,
+and its texts are no formulas to a spreadsheet (`memo.spreadsheet`).
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from memo.pixels import columns_of_video, shrink_of_table
+from memo.spreadsheet import CsvRows, Error, write_rows
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "EVENT_COLUMNS",
@@ -38,6 +42,7 @@ __all__ = [
     "write_events_csv",
     "write_flips_csv",
     "write_json",
+    "write_table",
     "write_track_csv",
 ]
 
@@ -97,13 +102,13 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
     lengths = {name: len(text) for name, text in zip(TRACK_COLUMNS, texts, strict=True)}
     if len(set(lengths.values())) > 1:
         raise ValueError(f"track columns of different lengths: {lengths}")
-    _write_rows(path, TRACK_COLUMNS, zip(*texts, strict=True))
+    write_table(path, TRACK_COLUMNS, zip(*texts, strict=True))
 
 
 def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
     """Writes columns of one length in their order; the end of a name says how many digits are written."""
     texts = [_texts(name, np.asarray(values)) for name, values in columns.items()]
-    _write_rows(path, columns, zip(*texts, strict=True))
+    write_table(path, columns, zip(*texts, strict=True))
 
 
 def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
@@ -139,8 +144,13 @@ def plain(value: Any) -> Any:
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN."""
-    return read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
+    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN.
+
+    Pixels are those of the video, also where an older version of memo wrote those of shrunk pictures and
+    `run.json` beside the table says so.
+    """
+    columns = read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
+    return columns_of_video(columns, shrink_of_table(path))
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
@@ -165,19 +175,19 @@ def read_track(path: str | PathLike[str]) -> dict[str, Column]:
     texts = [name for name in TRACK_COLUMNS if columns[name].dtype.kind not in "iuf"]
     if texts:
         raise ValueError(f"{path}: column {texts[0]} holds no numbers")
-    return {name: columns[name] for name in TRACK_COLUMNS}
+    return columns_of_video({name: columns[name] for name in TRACK_COLUMNS}, shrink_of_table(path))
 
 
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:
     """Writes gait events: dicts with the keys of `EVENT_COLUMNS`."""
     rows = ([_texts(name, np.asarray([event[name]]))[0] for name in EVENT_COLUMNS] for event in events)
-    _write_rows(path, EVENT_COLUMNS, rows)
+    write_table(path, EVENT_COLUMNS, rows)
 
 
 def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]]) -> None:
     """Writes what was done to right and left: dicts with the keys of `FLIP_COLUMNS`."""
     rows = ([_texts(name, np.asarray([flip[name]]))[0] for name in FLIP_COLUMNS] for flip in flips)
-    _write_rows(path, FLIP_COLUMNS, rows)
+    write_table(path, FLIP_COLUMNS, rows)
 
 
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
@@ -213,8 +223,8 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
     """
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-    except (csv.Error, UnicodeDecodeError) as error:
+            header, *rows = list(CsvRows(file)) or [[]]
+    except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table: {error}") from None
     absent = set(names) - set(header)
     if absent:
@@ -223,7 +233,7 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
         raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
     for line, row in enumerate(rows, start=2):
         if row and len(row) != len(header):
-            raise ValueError(f"{path}: row {line} has {len(row)} cells, the header {len(header)}")
+            raise ValueError(f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(header)}")
     place = {name: index for index, name in enumerate(header)}
     return {name: [row[place[name]] for row in rows if row] for name in names or header}
 
@@ -242,19 +252,6 @@ def read_text(
         raise error(f"{path}: not text in UTF-8 (byte {wrong.start})") from None
 
 
-@contextmanager
-def complete_file(path: str | PathLike[str]) -> Iterator[Path]:
-    """Gives a temporary name beside `path`; on success the file written there takes the name `path`."""
-    path = Path(path)
-    temporary = path.with_name(f".{os.getpid()}-{path.name}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
 def _texts(name: str, values: Column) -> list[str]:
     if values.dtype.kind in "iuUO":
         return [str(value) for value in values]
@@ -262,8 +259,7 @@ def _texts(name: str, values: Column) -> list[str]:
     return [f"{value:.{digits}f}" if np.isfinite(value) else "" for value in values]
 
 
-def _write_rows(path: str | PathLike[str], header: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+def write_table(path: str | PathLike[str], header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Writes a table of texts and numbers."""
     with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(header)
-        table.writerows(rows)
+        write_rows(file, chain([header], rows))

@@ -5,7 +5,6 @@ Arrays in, arrays out; the numbers come from the core. Tracks are (T, K, 2) pixe
 
 from __future__ import annotations
 
-import csv
 import logging
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -18,9 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
-from memo.files import JOINTS, complete_file, read_text
+from memo.files import JOINTS, read_text, write_table
+from memo.given import nothing_at
 from memo.keypoints import read_keypoints
+from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -76,7 +78,7 @@ class Points:
 
     def __repr__(self) -> str:
         frames, count, dimensions = self.positions.shape
-        return f"Points({count} points in {dimensions}D, {frames} frames)"
+        return f"Points({counted(count, 'point')} in {dimensions}D, {counted(frames, 'frame')})"
 
     def at_one_scale(self) -> Points:
         """The same points with the scales divided out, as depths are."""
@@ -166,8 +168,9 @@ class PlanarFigure:
 
     def __repr__(self) -> str:
         return (
-            f"PlanarFigure({len(self.links())} links of {self.depth.shape[1]} points, "
-            f"{len(self.interpreted)} of {len(self.windows)} windows interpreted)"
+            f"PlanarFigure({counted(len(self.links()), 'link')} of "
+            f"{counted(self.depth.shape[1], 'point')}, "
+            f"{len(self.interpreted)} of {counted(len(self.windows), 'window')} interpreted)"
         )
 
     def _judged(self) -> list[tuple[dict[str, Any], str]]:
@@ -226,9 +229,11 @@ def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Poin
     """
     path = Path(path)
     if not path.exists():
-        raise ValueError(f"{path}: no such file or folder")
+        raise ValueError(nothing_at(path, "file or folder"))
     if not _holds_keypoints(path):
-        return read_points_csv(path, 2, rate_hz)
+        points = read_points_csv(path, 2, rate_hz)
+        shrink = shrink_of_table(path) if path.name == "track.csv" else 1
+        return replace(points, positions=of_video(points.positions, shrink))
     keypoints = read_keypoints(path, fps=rate_hz)
     limbs = [name for name in keypoints.names if name in _SHORT]
     if len(limbs) < 2:
@@ -265,7 +270,7 @@ def write_points_csv(path: str | PathLike[str], points: Points) -> None:
         header.append("scale")
         for row, scale in zip(rows, points.scales, strict=True):
             row.append(f"{scale:.9g}" if np.isfinite(scale) else "")
-    _write(path, header, rows)
+    write_table(path, header, rows)
 
 
 def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Path]:
@@ -293,29 +298,22 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
                 links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
     window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]
-    _write(written[0], window_header, windows)
+    write_table(written[0], window_header, windows)
     link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
-    _write(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)
+    write_table(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)
     chain_numbers = ["p", "q", "tilt_deg", "residual_px", "motion_px", "statistic", "threshold"]
     chain_header = ["window", "chain", "verdict", *chain_numbers, "least_angle_deg", "most_angle_deg"]
     chain_header.append("reflection_margin_deg")
-    _write(written[2], chain_header, chains)
+    write_table(written[2], chain_header, chains)
     space = np.concatenate([points.positions, figure.depth[..., None]], axis=2)
     header = ["frame", "time_s", "source", *(f"{n}_{axis}_px" for n in points.names for axis in "uvz")]
     rows = (
         [str(frame), f"{points.times_s[frame]:.6f}", figure.sources[frame], *_cells(space[frame].ravel())]
         for frame in range(len(space))
     )
-    _write(written[3], header, rows)
+    write_table(written[3], header, rows)
     return written
 
 
 def _cells(values: Any) -> list[str]:
     return [f"{value:.4f}" if np.isfinite(value) else "" for value in values]
-
-
-def _write(path: str | PathLike[str], header: Sequence[str], rows: Any) -> None:
-    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(header)
-        table.writerows(rows)

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import complete_file
 from memo.linkage import PlanarFigure, Points
 from memo.overlay import _h264
+from memo.unfinished import complete_file
 
 __all__ = [
     "plot_linkage",

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import av
@@ -20,7 +21,8 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import complete_file
+from memo.pixels import of_averaged, of_video
+from memo.unfinished import complete_file
 from memo.video import Frame, Luma
 
 __all__ = ["draw_row", "draw_segments", "draw_text", "write_overlay"]
@@ -45,18 +47,24 @@ _TIME_BASE = Fraction(1, 90000)  # finer than any video clock, so variable frame
 
 
 def write_overlay(
-    path: str | PathLike[str], frames: Iterable[Frame], track: Any, *, rate_hz: float = 25.0
+    path: str | PathLike[str],
+    frames: Iterable[Frame],
+    track: Any,
+    *,
+    rate_hz: float = 25.0,
+    shrink: int = 1,
 ) -> int:
     """Writes an H.264 MP4 of `frames`, the track drawn on those it covers; returns how many frames it has.
 
-    The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate.
+    The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate. `shrink`: how many pixels
+    of the track, each way, are one of the frames; the overlay is as large as the frames.
     """
     rows = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
     written = 0
     with complete_file(path) as temporary, _h264(str(temporary), rate_hz) as write, _behind(write) as encode:
         for frame in frames:
             if frame.index in rows:
-                rgb = draw_row(frame.luma, track, rows[frame.index])
+                rgb = draw_row(frame.luma, track, rows[frame.index], shrink=shrink)
             else:
                 rgb = _enlarged(frame.luma, _scale(frame.luma))
                 draw_text(rgb, f"frame {frame.index} at {frame.time_s:.2f} s")
@@ -67,17 +75,18 @@ def write_overlay(
     return written
 
 
-def draw_row(luma: Luma, track: Any, row: int) -> Rgb:
+def draw_row(luma: Luma, track: Any, row: int, *, shrink: int = 1) -> Rgb:
     """The frame of one row of the track with model contours, limbs, ankle trails and legend on it.
 
-    A small frame comes out enlarged by a whole number, so that lines and letters stay fine.
+    A small frame comes out enlarged by a whole number, so that lines and letters stay fine. `shrink`: how
+    many pixels of the track, each way, are one of `luma`.
     """
     scale = _scale(luma)
     rgb = _enlarged(luma, scale)
     width_px = max(1.0, rgb.shape[0] / 360)
 
     def draw(segments: Segments, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
-        enlarged = (segments + 0.5) * scale - 0.5  # the centre of a pixel is its whole number
+        enlarged = of_video(of_averaged(segments, shrink), scale)
         draw_segments(rgb, enlarged, colour, width_px, opacity=opacity)
 
     contours = track.contours(row)
@@ -231,7 +240,7 @@ def _behind(write: Callable[..., None]) -> Iterator[Callable[..., None]]:
 @contextmanager
 def _h264(path: str, rate_hz: float) -> Iterator[Any]:
     """Gives a function (rgb, time_s) that appends a frame; the video is complete when the block ends."""
-    with av.open(path, "w", format="mp4") as container:
+    with av.open(str(Path(path).absolute()), "w", format="mp4") as container:
         rate = Fraction(rate_hz).limit_denominator(1001)
         stream = container.add_stream("libx264", rate=rate, options=_ENCODER)
         stream.pix_fmt = "yuv420p"

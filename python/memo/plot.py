@@ -17,7 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import ANGLES, complete_file
+from memo.files import ANGLES
+from memo.unfinished import complete_file
 
 __all__ = [
     "new_axes",

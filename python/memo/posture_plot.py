@@ -18,8 +18,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from memo import _memo
-from memo.files import complete_file
 from memo.plot import LEFT, NEUTRAL, RIGHT
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 if TYPE_CHECKING:
     from memo.postures import Postures
@@ -120,10 +121,10 @@ def write_posture_plot(postures: Postures, path: str | PathLike[str], row: int |
 
 def _headline(postures: Postures, row: int) -> str:
     survivors, drawn = int(postures.survivors[row]), len(postures.group_sizes[row])
-    groups = "one group" if drawn == 1 else f"{drawn} groups"
+    groups = counted(drawn, "group")
     if not postures.all_groups_given[row]:
-        groups = f"the {drawn} largest groups"
-    left = f"{survivors} postures left, {groups} drawn thin" if survivors else "no posture left"
+        groups = f"the largest {groups}"
+    left = f"{counted(survivors, 'posture')} left, {groups} drawn thin" if survivors else "no posture left"
     return f"frame {postures.frames[row]}, {postures.times_s[row]:.2f} s: {left}; strong: the motion"
 
 

@@ -8,7 +8,6 @@ What it cannot do: measure sizes without a scale. Without lengths, height, groun
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import logging
@@ -24,8 +23,11 @@ import numpy.typing as npt
 
 from memo import _memo, sides
 from memo.files import write_columns_csv, write_json
+from memo.given import nothing_at
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+from memo.spreadsheet import CsvRows, Error
 from memo.table import data_frame
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -183,6 +185,12 @@ class Postures:
         return np.asarray(np.any(known, axis=1), np.bool_)
 
     @property
+    def is_possible(self) -> bool:
+        """Whether any posture in the motion breaks no constraint. If none is so, it is no sequence that the
+        rules and the limits of bodies allow, whatever postures are left in single frames."""
+        return any(there and not breaks for there, breaks in zip(self.found, self.linked_breaks, strict=True))
+
+    @property
     def all_groups_given(self) -> npt.NDArray[np.bool_]:
         """(T,) whether there are no more groups than those given."""
         given = [len(sizes) for sizes in self.group_sizes]
@@ -228,7 +236,7 @@ class Postures:
         if row is None:
             return plot_strip(ax, self)
         if not 0 <= row < len(self.frames):
-            raise IndexError(f"row {row} of postures with {len(self.frames)} rows")
+            raise IndexError(f"row {row} of postures with {counted(len(self.frames), 'row')}")
         return plot_from_the_side(ax, self, row)
 
     def __len__(self) -> int:
@@ -236,9 +244,10 @@ class Postures:
 
     def __repr__(self) -> str:
         left = self.summary["survivors_median"]
-        found = f"{self.found.sum()} of {len(self)} frames"
+        found = f"{self.found.sum()} of {counted(len(self), 'frame')}"
         sure = f"{self.undecided.sum()} undecided"
-        return f"Postures({found} in the motion, {sure}, median of {left:g} postures left, {self.scale_from})"
+        way = "in the motion" if self.is_possible else "in a motion that breaks a constraint in each"
+        return f"Postures({found} {way}, {sure}, median of {left:g} postures left, {self.scale_from})"
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -250,6 +259,7 @@ class Postures:
             "frames": len(self.frames),
             "frames_with_survivors": len(left),
             "frames_in_motion": int(self.found.sum()),
+            "possible": self.is_possible,
             "survivors_median": float(np.median(left)) if len(left) else 0.0,
             "scale_from": self.scale_from,
             "heading_source": self.heading_source,
@@ -465,7 +475,7 @@ def _head_down(linked_m: Array) -> list[str]:
     if 2 * upside_down <= known.sum():
         return []
     return [
-        f"the neck is below the pelvis in {upside_down} of {int(known.sum())} frames: "
+        f"the neck is below the pelvis in {upside_down} of {counted(int(known.sum()), 'frame')}: "
         "v of the keypoints must be counted downwards"
     ]
 
@@ -557,6 +567,8 @@ def read_lengths(path: str | PathLike[str]) -> dict[str, float]:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ValueError(f"{path}: not a text file") from None
+    except FileNotFoundError:
+        raise ValueError(nothing_at(path)) from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     named = _json_lengths(path, text) if text.lstrip()[:1] == "{" else _csv_lengths(path, text)
@@ -579,8 +591,11 @@ def _json_lengths(path: Path, text: str) -> dict[str, Any]:
 def _csv_lengths(path: Path, text: str) -> dict[str, Any]:
     named: dict[str, Any] = {}
     known = set(_memo.segment_names())
-    for line, row in enumerate(csv.reader(io.StringIO(text, newline="")), start=1):
-        cells = [cell.strip() for cell in row]
+    try:
+        rows = list(CsvRows(io.StringIO(text, newline=""), strip=True))
+    except Error as error:
+        raise ValueError(f"{path}: not a table: {error}") from None
+    for line, cells in enumerate(rows, start=1):
         if not any(cells) or (line == 1 and cells[0] not in known):  # blank, or the header
             continue
         if len(cells) < 2:

@@ -3,12 +3,16 @@
 Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
 stop], stop null for the end), `frames_read`, `interrupted` (whether frames that were asked for were left
 unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `shrink` (how many pixels of the video,
-each way, made one of the pictures that were tracked; camera and options are those of the pictures),
-`camera_given`, `camera` (the camera given, or the one guessed for the longest walk; the keys of a Pose2Sim
-TOML, and for Tsai's lens `tsai_kappa` beside the distortions nearest to it; null where nobody was tracked
-without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk
-`message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and what `memo.explain` and `contours_of_run`
-need; frames there are counted from the first one read).
+each way, made one of the pictures that were tracked), `pixels_of` ("video": to what the pixels of `track.csv`
+and of `camera` belong), `camera_given`, `camera` (of the video: the camera given, or the one guessed for the
+longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` beside the distortions nearest to
+it; null where nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of
+`Track`), `walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and what
+`memo.explain` and `contours_of_run` need: pixels there are those of the pictures that were tracked, frames
+are counted from the first one read).
+
+Without `pixels_of`, as older versions of memo wrote it, table and camera are those of the pictures that were
+tracked; `read_run`, `read_track_csv` and `read_keypoints` make them those of the video.
 """
 
 from __future__ import annotations
@@ -26,6 +30,8 @@ import numpy.typing as npt
 from memo import _memo
 from memo._memo import __version__
 from memo.files import write_json
+from memo.pixels import camera_of_video, of_video
+from memo.wording import counted
 
 __all__ = ["RunError", "Source", "contours_of_run", "read_run", "write_run"]
 
@@ -52,6 +58,8 @@ class Source:
     """Whether a calibration was given."""
     shrink: int = 1
     """How many pixels of the video, each way, made one of a frame."""
+    size: tuple[int, int] | None = None
+    """Width and height of the video, pixels, where it is known."""
 
 
 def write_run(
@@ -62,8 +70,16 @@ def write_run(
     frames_read: int,
     interrupted: bool = False,
 ) -> Path:
-    """Writes `run.json` of a `Track` into a folder; returns its path."""
+    """Writes `run.json` of a `Track` into a folder; returns its path.
+
+    The track, and the `track.csv` beside it, are in pixels of the video (`Track.of_video`).
+    """
     path = Path(folder) / NAME
+    if track.shrink != source.shrink:
+        raise RunError(
+            f"the pictures were shrunk by {source.shrink}, the pixels of the track are those of pictures "
+            f"shrunk by {track.shrink}: give track.of_video({source.shrink})"
+        )
     camera = None if track.camera is None else {"name": "camera", **track.camera.parameters()}
     write_json(
         path,
@@ -77,6 +93,7 @@ def write_run(
             "rate_hz": source.rate_hz,
             "fps_given": source.fps_given,
             "shrink": source.shrink,
+            "pixels_of": "video",
             "camera_given": source.camera_given,
             "camera": camera,
             "options": dict(options),
@@ -98,6 +115,7 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "rate_hz": (int, float),
     "fps_given": (int, float, type(None)),
     "shrink": (int,),
+    "pixels_of": (str,),
     "camera_given": (bool,),
     "camera": (dict, type(None)),
     "options": (dict,),
@@ -110,7 +128,8 @@ _KINDS: dict[str, tuple[type, ...]] = {
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     """Reads `run.json` of a folder; its keys are all there and of their kind.
 
-    `interrupted` and `shrink` may be missing, as in older folders, and are then `False` and 1.
+    `interrupted`, `shrink` and `pixels_of` may be missing, as in older folders; they are then `False`, 1 and
+    "video", with the camera made that of the video.
     """
     path = Path(folder) / NAME
     try:
@@ -125,6 +144,8 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         raise RunError(f"{path}: an object was wanted, got {type(run).__name__}")
     run.setdefault("interrupted", False)
     run.setdefault("shrink", 1)
+    of_pictures = "pixels_of" not in run
+    run.setdefault("pixels_of", "video")
     for key, kinds in _KINDS.items():
         if key not in run:
             raise RunError(f"{path}: {key} is missing")
@@ -140,6 +161,11 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         raise RunError(f"{path}: frames_read must not be negative, got {run['frames_read']}")
     if not all(isinstance(walk, dict) for walk in run["walks"]):
         raise RunError(f"{path}: walks must be objects")
+    if of_pictures and run["shrink"] > 1 and run["camera"] is not None:
+        try:
+            run["camera"] = camera_of_video(run["camera"], run["shrink"])
+        except (KeyError, TypeError, ValueError):
+            raise RunError(f"{path}: camera is none of a run") from None
     return run
 
 
@@ -158,7 +184,9 @@ def contours_of_run(
     phase = np.asarray(columns["phase"], np.float64)
     for walk in np.unique(columns["walk"]).tolist():
         if not 0 <= walk < len(run["walks"]):
-            raise RunError(f"{folder / NAME}: has {len(run['walks'])} walks, the table a walk {walk}")
+            raise RunError(
+                f"{folder / NAME}: has {counted(len(run['walks']), 'walk')}, the table a walk {walk}"
+            )
         rows = np.flatnonzero(columns["walk"] == walk)
         try:
             tracker = _memo.Tracker(**run["options"])
@@ -166,5 +194,5 @@ def contours_of_run(
         except (TypeError, ValueError, OverflowError) as error:
             raise RunError(f"{folder / NAME}: {error}") from None
         for row, (segments, _) in zip(rows.tolist(), found, strict=True):
-            contours[row] = (segments + 0.5) * run["shrink"] - 0.5
+            contours[row] = of_video(segments, run["shrink"])
     return contours

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from memo import _memo
 from memo.files import ANGLES, JOINTS, SIDES
 from memo.table import data_frame
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -46,7 +47,7 @@ class DemoScene:
 
     def __repr__(self) -> str:
         frames, height, width = self.frames.shape
-        return f"DemoScene({frames} frames of {width}x{height}, walker of {self.height_m:.2f} m)"
+        return f"DemoScene({counted(frames, 'frame')} of {width}x{height}, walker of {self.height_m:.2f} m)"
 
 
 def demo_scene(

@@ -16,6 +16,7 @@ from memo import _memo
 from memo.files import FLIP_COLUMNS
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
 from memo.table import data_frame
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -64,7 +65,7 @@ class SideRepair:
             f"{group}: {count} exchanged, {self.guessed[group]} guessed, {self.undecided[group]} undecided"
             for group, count in self.exchanged.items()
         )
-        return f"SideRepair({groups}; of {len(self.keypoints.frames)} frames)"
+        return f"SideRepair({groups}; of {counted(len(self.keypoints.frames), 'frame')})"
 
 
 def unswap(

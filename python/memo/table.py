@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -14,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.files import read_text
+from memo.spreadsheet import CsvRows, Error
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -105,18 +106,21 @@ def read_number_table(path: str | PathLike[str]) -> NumberTable:
     lines = read_text(path).splitlines()
     comments = [line for line in lines if line.startswith("#")]
     try:
-        rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
-    except csv.Error as error:
+        told = (line for line in lines if line.strip() and not line.startswith("#"))
+        rows = list(CsvRows(told, strip=True))
+    except Error as error:
         raise ValueError(f"{path}: no CSV file: {error}") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: no header and rows of numbers")
-    header, body = [name.strip() for name in rows[0]], rows[1:]
+    header, body = rows[0], rows[1:]
     twice = next((name for name, count in Counter(header).items() if count > 1), None)
     if twice is not None:
-        raise ValueError(f"{path}: column {twice} occurs {header.count(twice)} times")
+        raise ValueError(f"{path}: column {twice} occurs {counted(header.count(twice), 'time')}")
     for number, row in enumerate(body):
         if len(row) != len(header):
-            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(header)}")
+            raise ValueError(
+                f"{path}: row {number} has {counted(len(row), 'cell')}, the header {len(header)}"
+            )
     table = np.full((len(body), len(header)), np.nan)
     for number, row in enumerate(body):
         for index, cell in enumerate(row):

@@ -13,7 +13,9 @@ import numpy.typing as npt
 from memo import _memo
 from memo.files import TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
+from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.table import data_frame
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -104,7 +106,8 @@ class Tracker:
     def __repr__(self) -> str:
         seen = self._core.seek_report()["frames"]
         return (
-            f"Tracker({'following' if self._core.current() else 'seeking'}, {seen} frames without a walker)"
+            f"Tracker({'following' if self._core.current() else 'seeking'}, "
+            f"{counted(seen, 'frame')} without a walker)"
         )
 
 
@@ -121,8 +124,8 @@ def track(
     """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
     `progress` is called with the number of frames done and that of all, None where `frames` has no length;
-    `options` are those of `Tracker`. An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was
-    tracked until then.
+    `options` are those of `Tracker`. Pixels in the answer are those of the frames given. An interrupt
+    (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):
         raise ValueError("give either times_s or fps")
@@ -137,14 +140,16 @@ def track(
             try:
                 time_s = float(next(times))
             except StopIteration:
-                raise ValueError(f"times_s has {index} values, but there are more frames") from None
+                raise ValueError(
+                    f"times_s has {counted(index, 'value')}, but there are more frames"
+                ) from None
         else:
             time_s = index / float(fps or 1)
         tracker.update(frame, time_s)
         if progress is not None:
             progress(index + 1, count)
     if times is not None and next(times, None) is not None:
-        raise ValueError(f"times_s has more values than the {index + 1} frames")
+        raise ValueError(f"times_s has more values than the {counted(index + 1, 'frame')}")
     return tracker.finish()
 
 
@@ -192,7 +197,7 @@ class StoredWalk:
         return len(self.tables["measured"])
 
     def __repr__(self) -> str:
-        return f"StoredWalk({len(self)} rows, {self.direction})"
+        return f"StoredWalk({counted(len(self), 'row')}, {self.direction})"
 
 
 _TABLES = ("columns", "events", "measured", "start", "gait_parameters", "record")
@@ -201,7 +206,8 @@ _TABLES = ("columns", "events", "measured", "start", "gait_parameters", "record"
 class Track:
     """All walks of a video: what `track.csv` and `events.csv` hold, and everything that led there.
 
-    It can be pickled, and then holds what its walks say instead of the walks themselves.
+    Pixels are those of the frames that were given to the tracker, or those of the video they were made of
+    (`of_video`). It can be pickled, and then holds what its walks say instead of the walks themselves.
     """
 
     def __init__(
@@ -209,10 +215,24 @@ class Track:
         walks: Sequence[_memo.Walk | StoredWalk],
         seek_report: dict[str, int],
         camera: _memo.Camera | None = None,
+        *,
+        shrink: int = 1,
+        video_size: tuple[int, int] | None = None,
     ) -> None:
         self.walks: list[_memo.Walk | StoredWalk] = list(walks)
         self.seek_report: dict[str, int] = seek_report
+        self.shrink: int = shrink
+        """How many of its pixels, each way, make one of a frame that was given: 1 unless `of_video` says."""
         self._camera = camera
+        self._video_size = video_size
+
+    def of_video(self, shrink: int, size: tuple[int, int] | None = None) -> Track:
+        """The same track in pixels of the video whose frames were averaged `shrink` by `shrink`, as
+        `VideoReader` with `shrink` does; `size`: width and height of the video, pixels.
+
+        It changes the columns in pixels, the contours and the camera.
+        """
+        return Track(self.walks, self.seek_report, self._camera, shrink=shrink, video_size=size)
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -220,7 +240,8 @@ class Track:
         if not self.walks:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
         tables = [{**walk.columns(), "walk": np.full(len(walk), k)} for k, walk in enumerate(self.walks)]
-        return {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
+        columns = {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
+        return columns_of_video(columns, self.shrink)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -269,7 +290,12 @@ class Track:
     def camera(self) -> _memo.Camera | None:
         """The camera given, or the one guessed for the longest walk."""
         main = self._main
-        return main.camera if main is not None else self._camera
+        camera = main.camera if main is not None else self._camera
+        if camera is None or self.shrink == 1:
+            return camera
+        return _memo.Camera.from_parameters(
+            camera_of_video(camera.parameters(), self.shrink, self._video_size)
+        )
 
     @property
     def start(self) -> dict[str, Any]:
@@ -284,8 +310,9 @@ class Track:
         return {"x": x, "z": z, "phase": phase}
 
     def contours(self, row: int) -> npt.NDArray[np.float64]:
-        """Visible model contours of a row in image pixels, (segments, 2, 2)."""
-        return self._located(row)[0]
+        """Visible model contours of a row, (segments, 2, 2) pixels."""
+        contours = self._located(row)[0]
+        return contours if self.shrink == 1 else of_video(contours, self.shrink)
 
     def contour_parts(self, row: int) -> npt.NDArray[np.uint8]:
         """The body part of each segment of `contours`: 0 head, 1 torso, 2-4 right arm, 5-7 left arm,
@@ -298,7 +325,7 @@ class Track:
             if 0 <= left < len(walk):
                 return walk.contours(left)
             left -= len(walk)
-        raise IndexError(f"row {row} of a track with {sum(map(len, self.walks))} rows")
+        raise IndexError(f"row {row} of a track with {counted(len(self), 'row')}")
 
     @property
     def _main(self) -> _memo.Walk | StoredWalk | None:
@@ -382,7 +409,8 @@ class Track:
         return {**self.__dict__, "walks": [StoredWalk.of(walk) for walk in self.walks]}
 
     def __repr__(self) -> str:
-        return f"Track({len(self)} rows, {len(self.walks)} walks: {self.summary['message']})"
+        walks = counted(len(self.walks), "walk")
+        return f"Track({counted(len(self), 'row')}, {walks}: {self.summary['message']})"
 
 
 _NOBODY = {

@@ -22,6 +22,10 @@ import av
 import numpy as np
 import numpy.typing as npt
 
+from memo.given import nothing_at
+from memo.pixels import averaged
+from memo.wording import counted
+
 __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 
 Luma = npt.NDArray[np.uint8]
@@ -136,7 +140,9 @@ class VideoReader:
             if index >= self._start:
                 yield Frame(index, time_s, self._checked(index, decoded))
         if index < self._start:
-            raise VideoError(f"{self.path}: frame {self._start} was asked for, it has {index + 1} frames")
+            raise VideoError(
+                f"{self.path}: frame {self._start} was asked for, it has {counted(index + 1, 'frame')}"
+            )
         self._report_damage(index + 1)
 
     def _timed(self) -> Iterator[tuple[float, av.VideoFrame]]:
@@ -163,15 +169,17 @@ class VideoReader:
             raise VideoError(
                 f"{self.path}: frame {index} is {now_width}x{now_height}, those before it {width}x{height}"
             )
-        return luma if self.shrink == 1 else _shrunk(luma, self.shrink)
+        return luma if self.shrink == 1 else averaged(luma, self.shrink)
 
     def _report_damage(self, read: int) -> None:
         announced, undecodable = self._source.announced, self._source.undecodable
         missing = 0 if announced is None else announced - read
         if undecodable:
-            self.damage = f"{undecodable} pieces could not be decoded; {read} frames could"
+            self.damage = (
+                f"{counted(undecodable, 'piece')} could not be decoded; {counted(read, 'frame')} could"
+            )
         elif self._source.counted and missing > _MISSING_FRAMES_TOLERATED:
-            self.damage = f"cut off: it announces {announced} frames, {read} could be read"
+            self.damage = f"cut off: it announces {counted(announced or 0, 'frame')}, {read} could be read"
         if self.damage:
             warnings.warn(f"{self.path}: {self.damage}", VideoDamageWarning, stacklevel=3)
 
@@ -181,7 +189,8 @@ class _File:
 
     def __init__(self, path: Path) -> None:
         try:
-            self._container = av.open(str(path), metadata_errors="replace")
+            # A relative path with a colon in it would be taken for a protocol.
+            self._container = av.open(str(path.absolute()), metadata_errors="replace")
         except av.error.InvalidDataError:
             raise VideoError(f"{path}: not a video, or its index is missing (recording cut off)") from None
         except (av.error.FFmpegError, OSError) as error:
@@ -264,7 +273,7 @@ def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
     if path.is_dir():
         return _Folder(path, rate_hz)
     if not path.exists():
-        raise VideoError(f"{path}: no such file")
+        raise VideoError(nothing_at(path))
     if path.stat().st_size == 0:
         raise VideoError(f"{path}: the file is empty")
     return _File(path)
@@ -308,17 +317,6 @@ def _upright(luma: Luma, decoded: av.VideoFrame) -> Luma:
     if max(abs(a), abs(d)) < 0.01 * min(abs(b), abs(c)):
         return luma.T[:: 1 if b > 0 else -1, :: 1 if c > 0 else -1]
     raise VideoError(f"the video is turned by {decoded.rotation} degrees; only quarter turns can be read")
-
-
-def _shrunk(luma: Luma, n: int) -> Luma:
-    """Means of n by n pixels, rounded."""
-    height, width = luma.shape[0] // n, luma.shape[1] // n
-    total = np.zeros((height, width), np.uint32 if n > 16 else np.uint16)
-    for row in range(n):
-        for column in range(n):
-            total += luma[row : height * n : n, column : width * n : n]
-    means: Luma = ((total + n * n // 2) // (n * n)).astype(np.uint8)
-    return means
 
 
 def _display_matrix(decoded: av.VideoFrame) -> tuple[int, int, int, int] | None:

@@ -133,6 +133,7 @@ pub mod posture;
 pub mod progress;
 pub mod synth;
 pub mod track;
+pub mod wording;
 
 #[cfg(test)]
 mod tests {

@@ -10,6 +10,7 @@ use memo_core::calibrate::{
     Estimate, KnownLens, PointOptions, Sighting, WalkerOptions, camera_from_points, camera_from_walker,
     sightings_from_joints,
 };
+use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -66,7 +67,10 @@ pub fn calibrate_walker<'py>(
     let (foot_share, head_share) = (shares(foot_share, 0.0), shares(head_share, 1.0));
     let lengths = [heads.len(), foot_share.len(), head_share.len()];
     if lengths != [feet.len(); 3] {
-        let message = format!("{} feet, but {lengths:?} heads, foot_share and head_share", feet.len());
+        let message = format!(
+            "heads, foot_share and head_share must be as many as feet ({}), got {lengths:?}",
+            feet.len()
+        );
         return Err(PyValueError::new_err(message));
     }
     let sighting = |i: usize| Sighting {
@@ -106,7 +110,11 @@ pub fn walker_sightings<'py>(
 )> {
     let (flat, _, joints) = motion_from_numpy::<2>(points)?;
     if joints != names.len() {
-        return Err(PyValueError::new_err(format!("{} names for {joints} joints", names.len())));
+        return Err(PyValueError::new_err(format!(
+            "{} for {}",
+            counted(names.len(), "name"),
+            counted(joints, "joint")
+        )));
     }
     let rows: Vec<Vec<DVec2>> =
         flat.chunks(joints.max(1)).map(|row| row.iter().copied().map(DVec2::from).collect()).collect();

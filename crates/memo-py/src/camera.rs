@@ -8,6 +8,7 @@ use memo_core::model::{
     Camera, CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints,
     PositionError, PositionOptions, TsaiParameters,
 };
+use memo_core::wording::counted;
 use numpy::PyArray2;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -37,7 +38,7 @@ pub fn camera_of_parameters(
         ("brown", &[k1, k2, p1, p2, k3]) => Distortion::Brown { k1, k2, p1, p2, k3 },
         ("tsai", &[kappa]) => Distortion::Tsai { kappa },
         (name, coefficients) => {
-            let message = format!("no lens {name:?} with {} coefficients", coefficients.len());
+            let message = format!("no lens {name:?} with {}", counted(coefficients.len(), "coefficient"));
             return Err(PyValueError::new_err(message));
         }
     };
@@ -99,14 +100,10 @@ impl PyCamera {
 
     /// Writes the camera as a section `[name]` of a TOML file, as Pose2Sim and anipose do.
     #[pyo3(signature = (path, name="cam"))]
-    fn to_toml(&self, path: std::path::PathBuf, name: &str) -> PyResult<()> {
+    fn to_toml(&self, py: Python<'_>, path: std::path::PathBuf, name: &str) -> PyResult<()> {
         let text = self.0.to_toml_string(name).map_err(value_error)?;
-        let mut part = path.clone();
-        part.as_mut_os_string().push(format!(".{}.part", std::process::id()));
-        std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path)).map_err(|error| {
-            let _ = std::fs::remove_file(&part);
-            PyOSError::new_err(format!("{}: {error}", path.display()))
-        })
+        py.import("memo.unfinished")?.getattr("write_complete")?.call1((path, text))?;
+        Ok(())
     }
 
     /// Distance in pixels between a point (x, y, z) and that `height_m` above it, without distortion; NaN if the

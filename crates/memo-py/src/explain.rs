@@ -17,6 +17,7 @@ use memo_core::track::result::TrackedWalk;
 use memo_core::track::search::{Axis, Hypothesis, POSITION_STEP_M, Path, Scene};
 use memo_core::track::tracker::TrackerOptions;
 use memo_core::track::walk::Look;
+use memo_core::wording::counted;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -93,7 +94,8 @@ pub fn recorded_contours<'py>(
     let walk = Recorded::read(record, tracker.borrow().locked().options())?;
     let torso_m = points_from_numpy(torso_m)?;
     if torso_m.len() != phases.len() {
-        let message = format!("{} torso centres for {} phases", torso_m.len(), phases.len());
+        let message =
+            format!("{} for {}", counted(torso_m.len(), "torso centre"), counted(phases.len(), "phase"));
         return Err(PyValueError::new_err(message));
     }
     let scene = walk.scene();
@@ -123,7 +125,7 @@ fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
             return Err(refused("window_px", format!("{:?} is no rectangle", windows[k])));
         }
         if !(1..=MOST_HEIGHTS).contains(&counts[k]) {
-            return Err(refused("heights", format!("{} heights are not searched", counts[k])));
+            return Err(refused("heights", format!("must be 1 to {MOST_HEIGHTS}, got {}", counts[k])));
         }
         let heights_of = Axis { centre: middles[k], step: POSITION_STEP_M, count: counts[k] };
         let best = Hypothesis { along_m: alongs[k], height_m: heights[k], phase: phases[k].rem_euclid(1.0) };
@@ -147,7 +149,10 @@ fn column<'py, T: FromPyObjectOwned<'py>>(
 ) -> PyResult<Vec<T>> {
     let values: Vec<T> = value(record, key)?;
     if values.len() != wanted {
-        return Err(refused(key, format!("has {} values for {wanted} frames", values.len())));
+        return Err(refused(
+            key,
+            format!("has {} for {}", counted(values.len(), "value"), counted(wanted, "frame")),
+        ));
     }
     Ok(values)
 }

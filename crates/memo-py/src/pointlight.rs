@@ -9,6 +9,7 @@ use memo_core::synth::{
     DotSource, LifeSites, LimitedLife, Locomotion, Motion, NoiseDots, NoiseKind, PhaseScramble,
     PointLightOptions, View, WalkOptions, point_light_display, sampled_walk,
 };
+use memo_core::wording::counted;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -83,7 +84,7 @@ pub fn pointlight<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (points, frames, count) = motion_from_numpy::<3>(positions)?;
     if times_s.len() != frames || names.len() != count {
-        let given = format!("{} times and {} names", times_s.len(), names.len());
+        let given = format!("{} and {}", counted(times_s.len(), "time"), counted(names.len(), "name"));
         return Err(PyValueError::new_err(format!(
             "positions are ({frames}, {count}, 3), but there are {given}"
         )));

@@ -6,6 +6,7 @@ use crate::error::value_error;
 use memo_core::image::Image;
 use memo_core::model::{SideAngles, SideJoints};
 use memo_core::synth::{ClothedOptions, ClothedScene, Mover, SceneOptions, SynthScene};
+use memo_core::wording::counted;
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -20,7 +21,7 @@ fn grey_frame(
     draw: impl FnOnce() -> Image<u8> + Send,
 ) -> PyResult<Bound<'_, PyArray2<u8>>> {
     if index >= count {
-        return Err(PyIndexError::new_err(format!("frame {index} of a scene with {count} frames")));
+        return Err(PyIndexError::new_err(format!("frame {index} of a scene with {}", counted(count, "frame"))));
     }
     numpy_from_image(py, py.detach(draw))
 }

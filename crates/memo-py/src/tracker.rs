@@ -16,6 +16,7 @@ use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
 use memo_core::track::tracker::{GaitChoice, Tracker, TrackerOptions};
+use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -268,7 +269,7 @@ impl PyWalk {
     /// segment.
     fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
         let Some(row) = self.rows.get(row) else {
-            let message = format!("row {row} of a walk with {} rows", self.rows.len());
+            let message = format!("row {row} of a walk with {}", counted(self.rows.len(), "row"));
             return Err(PyIndexError::new_err(message));
         };
         segments_with_parts(

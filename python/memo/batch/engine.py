@@ -20,6 +20,7 @@ from memo.batch.folder import STATES, BatchError, OutFolder, Record, check_ours
 from memo.batch.manifest import Manifest, ManifestError, Row, read_manifest
 from memo.batch.tables import write_status, write_table
 from memo.batch.task import Task, perform
+from memo.wording import counted
 
 __all__ = ["BatchResult", "Progress", "prepared", "run"]
 
@@ -137,7 +138,7 @@ def run(
         known = {row.name: folder.record(row.name) for row in mine}
         if not resume and any(known.values()):
             done = sum(record is not None for record in known.values())
-            raise BatchError(f"{out}: {done} of the {len(mine)} videos have been run here; resume to go on")
+            raise BatchError(f"{out}: videos have been run here ({done} of {len(mine)}); resume to go on")
         fingerprints = {row.name: row.fingerprint for row in mine}
         to_do = [row for row in mine if _is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
         notes = _notes(read, folder, known, to_do, fingerprints)
@@ -213,7 +214,7 @@ def _check_numbers(
     jobs: int | None, shard: tuple[int, int], timeout_s: float | None, memory_mb: int | None
 ) -> None:
     if jobs is not None and jobs < 1:
-        raise BatchError(f"{jobs} videos at a time are too few")
+        raise BatchError(f"at least one video at a time is wanted, got {jobs}")
     if not 1 <= shard[0] <= shard[1]:
         raise BatchError(f"shard {shard[0]}/{shard[1]} is not one of 1/{shard[1]} to {shard[1]}/{shard[1]}")
     if timeout_s is not None and not timeout_s > 0:
@@ -237,7 +238,7 @@ def _attempt(record: Record | None, fingerprint: dict[str, Any]) -> int:
 def notes_on(rows: Sequence[Row]) -> list[str]:
     """What the user should know of the manifest."""
     without = sum("height_m" not in row.options for row in rows)
-    return [f"{_videos(without)} without height_m: 1.75 m is taken."] if without else []
+    return [f"{counted(without, 'video')} without height_m: 1.75 m is taken."] if without else []
 
 
 def _notes(
@@ -258,19 +259,17 @@ def _notes(
             if fingerprints[row.name].get(key) != known[row.name].fingerprint.get(key)  # type: ignore[union-attr]
         )
         told = ", ".join(f"{key} of {count}" for key, count in what.most_common())
-        notes.append(f"{_videos(len(changed))} changed since the last run and done again ({told}).")
+        notes.append(f"{counted(len(changed), 'video')} changed since the last run and done again ({told}).")
     strange = set(folder.names()) - {row.name for row in manifest.rows}
     if strange:
         example = min(strange)
-        notes.append(f"{_videos(len(strange))} no longer in the manifest ({example}, ...): left as they are.")
+        notes.append(
+            f"{counted(len(strange), 'video')} no longer in the manifest ({example}, ...): left as they are."
+        )
     older = {record.memo for record in known.values() if record is not None} - {__version__}
     if older:
         notes.append(f"Some videos were tracked by memo {', '.join(sorted(older))}, not {__version__}.")
     return notes
-
-
-def _videos(count: int) -> str:
-    return "1 video" if count == 1 else f"{count} videos"
 
 
 def check_folder(out: Path, to_do: Sequence[Row]) -> None:
@@ -387,7 +386,9 @@ def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: 
     if broken is not None:
         notes.append(f"The executor broke: {broken} What is left can be resumed.")
     if losses:
-        notes.append(f"Workers were lost {losses.total()} times; their videos were given to others.")
+        notes.append(
+            f"Workers were lost {counted(losses.total(), 'time')}; their videos were given to others."
+        )
     return notes
 
 
@@ -439,7 +440,7 @@ def described(result: BatchResult) -> Iterator[str]:
     if result.left:
         parts.append(f"{len(result.left)} left")
     total = len(result.records) + len(result.left)
-    yield f"{_videos(total)}: {', '.join(parts) or 'nothing done'}."
+    yield f"{counted(total, 'video')}: {', '.join(parts) or 'nothing done'}."
     yield from _of_walks(result.records)
     if result.done_now:
         each = result.seconds / result.done_now
@@ -453,12 +454,12 @@ def _of_walks(records: Sequence[Record]) -> Iterator[str]:
     if several:
         walks = sum(record.walks or 0 for record in records)
         yield (
-            f"{walks} walks; several in {_videos(len(several))} ({_named(several)}): "
+            f"{counted(walks, 'walk')}; several in {counted(len(several), 'video')} ({_named(several)}): "
             "gait_parameters.csv has a row for each, whoever walks."
         )
     remarked = [record for record in records if record.remarks]
     if remarked:
-        yield f"Remarks on {_videos(len(remarked))} ({_named(remarked)}): see status.csv."
+        yield f"Remarks on {counted(len(remarked), 'video')} ({_named(remarked)}): see status.csv."
 
 
 def _named(records: Sequence[Record]) -> str:

@@ -20,13 +20,14 @@ import json
 import os
 import re
 import shutil
-import tempfile
 import time
 import uuid
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+from memo.unfinished import complete_file, new_folder
 
 __all__ = ["STATES", "BatchError", "OutFolder", "Record", "check_ours"]
 
@@ -135,17 +136,13 @@ class OutFolder:
     @contextlib.contextmanager
     def replaced(self, path: Path) -> Iterator[Path]:
         """Gives a name among the unfinished files; what is written there takes the name `path`."""
-        temporary = self.work / f"{uuid.uuid4().hex}-{path.name}"
-        try:
+        with complete_file(path, within=self.work) as temporary:
             yield temporary
             _settle(temporary)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
 
-    def unfinished(self, name: str) -> Path:
+    def unfinished(self) -> Path:
         """A new empty folder among the unfinished files."""
-        return Path(tempfile.mkdtemp(prefix=f"{name}-", dir=self.work))
+        return new_folder(self.work)
 
     def running(self) -> int:
         """How many videos this shard is at, on whatever machine."""

@@ -1,36 +1,81 @@
-"""The child's side of a run: `python -m memo.batch.leash ARGUMENTS OF memo`.
+"""The child's side of a run: `python -m memo.batch.leash track ARGUMENTS --out FOLDER --json`.
 
-Runs `memo` so that it ends with the process that started it, however that ended: the kernel kills it where it
-knows how (Linux), and everywhere its standard input, a pipe, reports the other end closed. What is no mistake
-in the input ends with an exit code of its own.
+Tracks one video as `memo track` does, but ends with the process that started it, however that ended: the
+kernel kills it where it knows how (Linux), and everywhere its standard input, a pipe, reports the other end
+closed. It needs nothing of the command line's: `av`, and matplotlib for what is drawn. What is no mistake in
+the input ends with an exit code of its own.
 """
 
 import contextlib
+import json
 import os
 import signal
 import sys
 import threading
 import traceback
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
+from memo.batch.manifest import Row
 from memo.batch.task import DEFECT, OUT_OF_MEMORY
+from memo.exits import Exit
+from memo.extras import install
+from memo.files import plain
+from memo.given import frame_range, tracker_options
+
+_READING = ("name", "unit", "size", "v_up")
 
 
 def main() -> None:
-    """Runs `memo` with the arguments of this process."""
+    """Does what the arguments of this process say."""
     _hold_on_to_parent()
     _go_first_when_memory_ends()
-    sys.argv = ["memo", *sys.argv[1:]]
     try:
-        from memo.cli import main as memo
-
-        memo()
+        raise SystemExit(_track(sys.argv[1:]))
     except MemoryError:
-        print("memo: out of memory", file=sys.stderr)
+        _complain("out of memory")
         raise SystemExit(OUT_OF_MEMORY) from None
     except Exception:
         traceback.print_exc()
         raise SystemExit(DEFECT) from None
+
+
+def _track(arguments: Sequence[str]) -> Exit:
+    """Tracks a video; prints what was found as JSON, and remarks and mistakes of the input as lines."""
+    if absent := [name for name in ("av", "matplotlib") if find_spec(name) is None]:
+        _complain(f"a video needs {', '.join(absent)}: {install('app', *absent)}")
+        return Exit.NO_EXTRA
+    from memo.recording import Recording, track_recording
+
+    command, *given, flag, out, as_json = arguments
+    if (command, flag, as_json) != ("track", "--out", "--json"):
+        raise RuntimeError(f"wanted track ARGUMENTS --out FOLDER --json, got {arguments}")
+    video, found = Row.of_arguments(given)
+    options: dict[str, Any] = dict(found)
+    try:
+        reading = {name: options.pop(f"camera_{name}", None) for name in _READING}
+        height_m, camera = options.pop("height_m", 1.75), options.pop("camera", None)
+        recording = Recording(
+            video,
+            tracker_options(height_m, camera, reading, options.pop("fov_deg", None)),
+            frame_range(options.pop("frames", ":")),
+            page=options.pop("report", False),
+            **options,
+        )
+        recorded = track_recording(recording, Path(out), remark=_complain)
+    except (ValueError, TypeError, OSError, OverflowError) as error:
+        if os.environ.get("MEMO_DEBUG"):
+            raise
+        _complain(" ".join(str(error).split()))
+        return Exit.BAD_INPUT
+    print(json.dumps(plain({**recorded.document, "files": [str(path) for path in recorded.written]})))
+    return recorded.exit
+
+
+def _complain(message: str) -> None:
+    print(f"memo: {message}", file=sys.stderr)
 
 
 def _hold_on_to_parent() -> None:

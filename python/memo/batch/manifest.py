@@ -8,7 +8,6 @@ are relative to the manifest; an empty cell is an option not given.
 from __future__ import annotations
 
 import contextlib
-import csv
 import difflib
 import hashlib
 import math
@@ -16,12 +15,16 @@ import os
 import re
 import tomllib
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from memo.given import frame_range, is_url, load_camera, nothing_at, tracker_options
+from memo.spreadsheet import CsvRows, Error
+from memo.wording import counted
 
 __all__ = ["OPTIONS", "Manifest", "ManifestError", "Row", "read_manifest"]
 
@@ -95,6 +98,30 @@ class Row:
                 arguments += [flag, str(value)]
         return arguments
 
+    @staticmethod
+    def of_arguments(arguments: Sequence[str]) -> tuple[Path, dict[str, Value]]:
+        """The video and the options that became these `arguments`."""
+        switches = {option.flag: (name, True) for name, option in OPTIONS.items() if option.kind is bool}
+        switches |= {
+            option.off or option.flag.replace("--", "--no-", 1): (name, False)
+            for name, option in OPTIONS.items()
+            if option.kind is bool
+        }
+        valued = {option.flag: (name, option.kind) for name, option in OPTIONS.items()}
+        video, *rest = arguments
+        options: dict[str, Value] = {}
+        words = iter(rest)
+        for word in words:
+            if word in switches:
+                name, value = switches[word]
+                options[name] = value
+            elif word in valued:
+                name, kind = valued[word]
+                options[name] = kind(next(words))
+            else:
+                raise ValueError(f"{word} is no option of a row")
+        return Path(video), options
+
     @property
     def fingerprint(self) -> dict[str, Any]:
         """What the result depends on: options, size and time of the video, content of the camera file."""
@@ -164,8 +191,8 @@ def _read_csv(path: Path) -> list[_Given]:
     lines = text.splitlines() or [""]
     delimiter = max(",;\t", key=lines[0].count)
     try:
-        table = csv.reader(text.splitlines(keepends=True), delimiter=delimiter, strict=True)
-        header = [name.strip() for name in next(table, [])]
+        table = CsvRows(text.splitlines(keepends=True), delimiter=delimiter, strict=True, strip=True)
+        header = next(table, [])
         problems = [
             f"{path}, line 1: unknown column {_suggested(name)}" for name in header if name not in _KNOWN
         ]
@@ -177,14 +204,15 @@ def _read_csv(path: Path) -> list[_Given]:
         for cells in table:
             here = f"{path}, line {line}"
             line = table.line_num + 1
-            cells = [cell.strip() for cell in cells]
             if not any(cells):
                 continue
             if len(cells) > len(header):
-                problems.append(f"{here}: {len(cells)} cells under {len(header)} columns")
+                problems.append(
+                    f"{here}: {counted(len(cells), 'cell')} under {counted(len(header), 'column')}"
+                )
             pairs = zip(header, cells, strict=False)
             given.append(_Given(here, {name: cell for name, cell in pairs if cell}))
-    except csv.Error as error:
+    except Error as error:
         raise ManifestError([f"{path}, line {table.line_num}: {error}"]) from None
     if problems:
         raise ManifestError(problems)
@@ -227,6 +255,8 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ManifestError([f"{path}: not text in UTF-8"]) from None
+    except FileNotFoundError:
+        raise ManifestError([nothing_at(path)]) from None
     except OSError as error:
         raise ManifestError([f"{path}: cannot be read: {error.strerror}"]) from None
 
@@ -267,7 +297,7 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
         problems.append(f"{given.place}: name {name!r} is not text")
         name = ""
     # a missing video has the path of the folder's parent, which `_checked` does not look at again
-    path = base / os.path.expanduser(video) if video is not None else base
+    path = base if video is None else _located(video, base)
     return Row(name, path, options, given.place, tuple(problems))
 
 
@@ -292,7 +322,12 @@ def _converted(value: Any, kind: type, base: Path) -> Value:
         return int(value)
     if not isinstance(value, str | PathLike):
         raise ValueError(f"{value!r} is not text")
-    return base / os.path.expanduser(value) if kind is Path else str(value)
+    return _located(value, base) if kind is Path else str(value)
+
+
+def _located(path: str | PathLike[str], base: Path) -> Path:
+    """The path, relative ones from `base`; an address stays one."""
+    return Path(path) if is_url(path) else base / os.path.expanduser(path)
 
 
 def _named(rows: list[Row]) -> list[Row]:
@@ -362,7 +397,7 @@ def _checked(row: Row) -> Row:
 
 def _check_video(row: Row) -> None:
     if not row.video.exists():
-        raise ValueError(f"{row.video}: no such video")
+        raise ValueError(nothing_at(row.video, "video"))
     if row.video.is_dir() and "fps" not in row.options:
         raise ValueError(f"{row.video}: a folder of images has no time stamps; give fps")
     if row.video.is_file():
@@ -373,9 +408,6 @@ def _check_video(row: Row) -> None:
 
 
 def _check_options(row: Row) -> None:
-    from memo.cli.given import frame_range
-    from memo.cli.track import checked_options
-
     options: dict[str, Any] = dict(row.options)
     fps = options.get("fps")
     if fps is not None and not (math.isfinite(fps) and fps > 0):
@@ -385,9 +417,9 @@ def _check_options(row: Row) -> None:
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
     height = options.get("height_m", 1.75)
     if camera is None or options.get("fov_deg") is not None:
-        checked_options(height, camera, reading, options.get("fov_deg"))
+        tracker_options(height, camera, reading, options.get("fov_deg"))
     else:
-        checked_options(height, None, {}, None)
+        tracker_options(height, None, {}, None)
         _check_camera(camera, *reading.values(), camera.stat().st_mtime_ns if camera.is_file() else 0)
 
 
@@ -396,8 +428,6 @@ def _check_camera(
     camera: Path, name: str | None, unit: str | None, size: str | None, v_up: bool | None, modified_ns: int
 ) -> None:
     """Reads a camera once for all the rows that share it."""
-    from memo.cli.given import load_camera
-
     load_camera(camera, name, unit, size, v_up)
 
 

@@ -11,6 +11,7 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 from memo.batch.folder import BatchError
+from memo.extras import install
 
 __all__ = ["RayExecutor"]
 
@@ -22,7 +23,7 @@ class RayExecutor(Executor):
         try:
             import ray
         except ImportError:
-            raise ModuleNotFoundError('Ray is not installed: pip install "memo-motion[ray]"') from None
+            raise ModuleNotFoundError(f"Ray is not installed: {install('ray', 'ray')}") from None
         self._ray = ray
         self._processors = processors_per_video
         self._connected_here = not ray.is_initialized()

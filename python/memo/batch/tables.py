@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from memo.batch.folder import BatchError, OutFolder
 from memo.batch.manifest import Row
 from memo.files import read_text_columns
 from memo.gait import GAIT_COLUMNS
+from memo.spreadsheet import write_rows
 
 __all__ = ["STATUS_COLUMNS", "write_status", "write_table"]
 
@@ -96,6 +97,4 @@ def _seconds(value: float | None) -> str:
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
     with open(path, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(header)
-        table.writerows(rows)
+        write_rows(file, chain([header], rows))

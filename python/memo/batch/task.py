@@ -70,7 +70,7 @@ def _perform(task: Task) -> Record | None:
     if not task.folder.is_current(task.run):
         return None
     task.folder.forget(task.name)
-    unfinished = task.folder.unfinished(task.name)
+    unfinished = task.folder.unfinished()
     try:
         return _tracked(task, unfinished / "results")
     finally:  # also where the run has ended meanwhile, and has swept up before this folder was there

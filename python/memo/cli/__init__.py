@@ -6,14 +6,17 @@ from the `app` extra is imported inside functions, after `main` has looked for i
 where they stand, hence no `from __future__ import annotations` in the commands.)
 """
 
+import contextlib
+import os
+import sys
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import memo
 from memo.cli.batch import add_batch
 from memo.cli.calibrate import add_calibrate
 from memo.cli.convert import add_convert
-from memo.cli.delivery import Exit, complain
+from memo.cli.delivery import complain
 from memo.cli.demo import add_demo
 from memo.cli.planar import add_planar
 from memo.cli.pointlight import add_pointlight
@@ -22,6 +25,8 @@ from memo.cli.report import add_report
 from memo.cli.reproduce import add_reproduce
 from memo.cli.track import add_track
 from memo.cli.unswap import add_unswap
+from memo.exits import Exit
+from memo.extras import install
 
 if TYPE_CHECKING:
     import typer
@@ -31,21 +36,45 @@ EPILOG = """Examples:
   memo track walk.mp4 --height 1.68
   memo report memo-out/walk
 
-Exit codes of every command: its own --help."""
+Exit codes of every command: its own --help; and 141 where the reader of what is printed has ended, as in
+memo ... | head."""
 
 EXTRA = ("av", "matplotlib", "rich", "typer")
 
 
 def main() -> None:
     """Entry point of the `memo` command."""
+    try:
+        try:
+            _run()
+        finally:
+            sys.stdout.flush()  # what is still held back may meet a closed pipe, too
+    except BrokenPipeError:
+        _end_unread()
+    except SystemExit as ended:  # click and rich make one of it
+        if isinstance(ended.__context__, BrokenPipeError):
+            _end_unread()
+        raise
+
+
+def _run() -> None:
     absent = [name for name in EXTRA if find_spec(name) is None]
     if absent:
-        complain(f'the command line needs {", ".join(absent)}: pip install "memo-motion[app]"')
+        complain(f"the command line needs {', '.join(absent)}: {install('app', *absent)}")
         raise SystemExit(Exit.NO_EXTRA)
     try:
         _app()()
     except KeyboardInterrupt:  # while the extra is still being imported
         raise SystemExit(Exit.INTERRUPTED) from None
+
+
+def _end_unread() -> NoReturn:
+    """Ends as a program does whose reader has gone, as in `memo ... | head`: silently."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(nowhere, stream.fileno())
+    raise SystemExit(Exit.PIPE_CLOSED)
 
 
 def _app() -> "typer.Typer":

@@ -15,9 +15,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.batch import BatchResult, ManifestError, Progress, RayExecutor, Record, run
+from memo.batch import OPTIONS, BatchResult, ManifestError, Progress, RayExecutor, Record, run
 from memo.batch.engine import check_folder, default_out, described, notes_on, prepared
-from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, terminal
+from memo.cli.delivery import Delivery, complain, guarded, terminal
+from memo.exits import Exit
+from memo.given import InputError
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -52,8 +55,7 @@ def add_batch(app: "typer.Typer") -> None:
             Path,
             typer.Argument(
                 metavar="MANIFEST",
-                help="CSV or TOML, a row a video: video, name, camera, camera_name, height_m, fov_deg, "
-                "frames, fps, overlay, plots, report.",
+                help=f"CSV or TOML, one row per video: video, name, {', '.join(OPTIONS)}.",
             ),
         ],
         jobs: Annotated[
@@ -139,7 +141,7 @@ def _check(manifest: Path, delivery: Delivery) -> Exit:
     elif delivery.talks:
         names = [row.name for row in read.rows]
         more = ", ..." if len(names) > _FEW else ""
-        print(f"{len(names)} videos can be run; their folders: {', '.join(names[:_FEW])}{more}")
+        print(f"{counted(len(names), 'video')} can be run; their folders: {', '.join(names[:_FEW])}{more}")
         for note in notes_on(read.rows):
             print(note)
     return Exit.DONE
@@ -215,7 +217,7 @@ def _failures(result: BatchResult) -> Iterator[str]:
 
 
 def _line(record: Record) -> str:
-    walks = f"{record.walks} walks, " if (record.walks or 0) > 1 else ""
+    walks = f"{counted(record.walks, 'walk')}, " if record.walks is not None and record.walks > 1 else ""
     remarks = " (remarks: status.csv)" if record.remarks else ""
     message = record.message
     if len(message) > _LONGEST_LINE:

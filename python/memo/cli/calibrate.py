@@ -11,15 +11,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count, with_elapsed, with_progress
-from memo.cli.given import (
+from memo.cli.delivery import Delivery, guarded, with_count, with_elapsed, with_progress
+from memo.exits import Exit
+from memo.given import (
+    InputError,
     check_apart,
     check_writable,
     checked_fov,
     checked_height,
     load_camera,
+    nothing_at,
     two_sides,
 )
+from memo.unfinished import write_complete
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -179,7 +184,7 @@ def _check_inside(source: Path, pixels: Any, size: tuple[int, int]) -> None:
     if outside.mean() > 0.1:
         u, v = pixels[outside][0]
         raise InputError(
-            f"{source}: {outside.sum()} of {len(pixels)} points are outside a picture of"
+            f"{source}: {outside.sum()} of {counted(len(pixels), 'point')} outside a picture of"
             f" {size[0]}x{size[1]} pixels, the first at ({u:.0f}, {v:.0f}): is that its size?"
         )
 
@@ -203,11 +208,11 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
                 table.places, table.pixels, view["size"], focal_px=view["focal_px"], lens=view["lens"]
             )
         except ValueError as error:
-            counted = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
-            raise InputError(f"{path}: {error}{counted}") from None
+            from_0 = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
+            raise InputError(f"{path}: {error}{from_0}") from None
     off = np.hypot(*found["residuals_px"].T)
     kept = len(off) - len(found["outliers"])
-    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {kept} points."]
+    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {counted(kept, 'point')}."]
     if found["outliers"]:
         left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found["outliers"])
         lines.append(f"Left out, as chance would not put them there: {left_out}.")
@@ -229,7 +234,7 @@ def _walker(
 ) -> Exit:
     check_writable(delivery.out)
     if not source.exists():
-        raise InputError(f"{source}: no such file or folder")
+        raise InputError(nothing_at(source, "file or folder"))
     is_keypoints = source.suffix.lower() in _KEYPOINT_SUFFIXES or (
         source.is_dir() and any(source.glob("*.json"))
     )
@@ -263,7 +268,7 @@ def _walker(
     lines = [
         f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
         f" {found['rms_px'] / found['person_px']:.1%}"
-        f" of the person's height, over {kept} of {len(feet)} sightings.",
+        f" of the person's height, over {kept} of {counted(len(feet), 'sighting')}.",
         f"All lengths rest on the person's height of {height_m:g} m.",
     ]
     if view["focal_px"] is not None:
@@ -298,7 +303,7 @@ def _checkerboard(
 
     check_writable(delivery.out)
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder of pictures")
+        raise InputError(nothing_at(folder, "folder of pictures"))
     if not (math.isfinite(square_mm) and 1 <= square_mm <= 1000):
         raise InputError(f"--square-mm {square_mm:g} is not the side of a square in millimetres (1 to 1000)")
     suffixes = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -312,7 +317,8 @@ def _checkerboard(
     columns, rows = boards.corners
     lines = [
         f"Board of {columns + 1}x{rows + 1} squares ({columns}x{rows} inner corners)"
-        f" in {len(boards.found)} of {len(paths)} pictures; reprojection error {lens.rms_px:.2f} px RMS."
+        f" in {len(boards.found)} of {counted(len(paths), 'picture')};"
+        f" reprojection error {lens.rms_px:.2f} px RMS."
     ]
     if not boards.are_squares:
         lines.append(f"--squares {squares[0]}x{squares[1]} are inner corners, not squares, of this board.")
@@ -327,8 +333,7 @@ def _checkerboard(
         "focal_sd_px": lens.focal_sd_px,
     }
     lens_file = delivery.out / "lens.toml"
-    with _complete(lens_file) as temporary:
-        temporary.write_text(lens.text, encoding="utf-8")
+    write_complete(lens_file, lens.text)
     known = memo.Camera.from_file(lens_file, lens_only=True)
     if floor is None:
         lines.append("Without --floor it is not known where the camera stands: give lens.toml as --lens.")
@@ -411,9 +416,3 @@ def _rounded(value: float, sd: float) -> str:
         return f"{value:.6g} (no deviation known)"
     digits = max(0, 1 - math.floor(math.log10(sd)))
     return f"{value:.{min(digits, 9)}f} ± {sd:.{min(digits, 9)}f}"
-
-
-def _complete(path: Path) -> Any:
-    from memo.files import complete_file
-
-    return complete_file(path)

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_apart, check_writable
+from memo.cli.delivery import Delivery, guarded, with_elapsed
+from memo.exits import Exit
 from memo.files import plain
+from memo.given import InputError, check_apart, check_writable, nothing_at
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -107,7 +109,7 @@ def _convert(
     if target.is_dir():
         raise InputError(f"{target}: is a folder")
     if not source.exists():
-        raise InputError(f"{source}: no such file or folder")
+        raise InputError(nothing_at(source, "file or folder"))
     check_writable(target.parent)
     check_apart(sources(source) if source.is_dir() else [source], [target])
     with with_elapsed("converting", delivery):
@@ -115,7 +117,7 @@ def _convert(
         notes = [*motion.notes]
         if fill_s is not None:
             motion, filled = motion.filled(fill_s)
-            notes.append(f"Filled by straight lines: {filled} missing values.")
+            notes.append(f"Filled by straight lines: {counted(filled, 'missing value')}.")
         if rate_hz is not None:
             motion = motion.resampled(rate_hz)
         target_up = usual_up(target) if up is None else up.value
@@ -154,7 +156,7 @@ def _convert_picture(
     if unused:
         raise InputError(f"{', '.join(unused)}: means nothing for {kind}")
     if not source.exists():
-        raise InputError(f"{source}: no such file or folder")
+        raise InputError(nothing_at(source, "file or folder"))
     check_writable(target.parent)
     check_apart([source], [target])
     if target.suffix.lower() == ".txt":
@@ -165,7 +167,7 @@ def _convert_picture(
         except UnicodeDecodeError:
             raise InputError(f"{source}: not a track of `memo track` (no text in UTF-8)") from None
         summary: dict[str, Any] = {"rows": rows, "notes": []}
-        told = f"{summary['rows']} rows of the track"
+        told = f"{counted(summary['rows'], 'row')} of the track"
     else:
         from memo.keypoints import read_keypoints
         from memo.keypoints.writing import write_keypoints
@@ -174,7 +176,7 @@ def _convert_picture(
         left_out = write_keypoints(target, keypoints, "coco" if target.suffix else "openpose")
         notes = [f"No place for {', '.join(left_out)}: left out."] if left_out else []
         summary = {"frames": len(keypoints.frames), "points": list(keypoints.names), "notes": notes}
-        told = f"{len(keypoints.frames)} frames, {len(keypoints.names)} points"
+        told = f"{counted(len(keypoints.frames), 'frame')}, {counted(len(keypoints.names), 'point')}"
     summary = {"source": str(source), "target": str(target), **summary}
     if delivery.as_json:
         print(json.dumps(plain({**summary, "files": [str(target)]})))
@@ -188,9 +190,9 @@ def _tell(summary: dict[str, Any], target: Path, delivery: Delivery) -> None:
         print(json.dumps(plain({**summary, "files": [str(target)]})))
     elif delivery.talks:
         span = f"{summary['first_s']:.2f} to {summary['last_s']:.2f} s"
-        held = [f"{summary['frames']} frames", f"{len(summary['points'])} points"]
-        held += [f"{len(summary['angles'])} joint angles"] * bool(summary["angles"])
-        held += [f"{summary['events']} events"] * bool(summary["events"])
+        held = [counted(summary["frames"], "frame"), counted(len(summary["points"]), "point")]
+        held += [counted(len(summary["angles"]), "joint angle")] * bool(summary["angles"])
+        held += [counted(summary["events"], "event")] * bool(summary["events"])
         missing = f"; {summary['missing']:.1%} of the points missing" if summary["missing"] else ""
         print(f"Read {', '.join(held)}, {span}{missing}.")
         for note in summary["notes"]:

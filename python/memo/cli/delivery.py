@@ -13,32 +13,16 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from memo.exits import Exit
 from memo.files import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from memo.video import Frame
-
-
-class Exit(IntEnum):
-    """What the exit codes mean."""
-
-    TRACKED = 0
-    DONE = 0  # where nobody is to be tracked
-    BAD_INPUT = 1
-    NOBODY = 3  # or no posture of anybody
-    NO_EXTRA = 4
-    SOME_FAILED = 5  # of many videos
-    INTERRUPTED = 130
-
-
-class InputError(ValueError):
-    """A mistake in what the user gave; the message is one line."""
 
 
 @dataclass(frozen=True)
@@ -56,24 +40,46 @@ class Delivery:
         """Whether results are told in sentences."""
         return not (self.quiet or self.as_json)
 
-    def tell(self, summary: Mapping[str, Any], lines: Iterable[str], written: Sequence[Path]) -> None:
-        """Says what was found and written: as JSON, in `lines` and the names of the files, or not at all."""
+    def tell(
+        self,
+        summary: Mapping[str, Any],
+        lines: Iterable[str],
+        written: Sequence[Path],
+        alarm: str | None = None,
+    ) -> None:
+        """Says what was found and written: as JSON, in `lines` and the names of the files, or not at all.
+
+        An `alarm` comes before the lines, in red on a terminal.
+        """
         if self.as_json:
             print(json.dumps(plain({**summary, "files": [str(path) for path in written]})))
         elif self.talks:
+            if alarm is not None:
+                _print_red(alarm)
             for line in lines:
                 print(line)
             print(f"Written to {self.out}: {', '.join(path.name for path in written)}.")
 
 
+def _print_red(line: str) -> None:
+    from rich.console import Console
+
+    Console(soft_wrap=True).print(line, style="bold red", markup=False, highlight=False)
+
+
 def guarded(work: Callable[[], Exit]) -> Exit:
-    """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept."""
+    """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept.
+
+    A closed pipe passes through: `main` knows what to do.
+    """
     from memo.video import VideoDamageWarning
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", VideoDamageWarning)  # damage is told in one line instead
             return work()
+    except BrokenPipeError:
+        raise
     except (ValueError, TypeError, OSError, OverflowError) as error:
         if os.environ.get("MEMO_DEBUG"):
             raise

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, guarded
-from memo.cli.given import check_writable
-from memo.cli.track import deliver_interrupted, exit_code, follow, new_tracker, report, write_all
+from memo.cli.delivery import Delivery, Interrupt, guarded, with_steps
+from memo.cli.track import deliver_interrupted, report
+from memo.exits import Exit
 from memo.files import JOINTS
+from memo.given import check_writable
+from memo.recording import follow, write_results, write_tables
 from memo.run import Source
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -50,21 +53,25 @@ def add_demo(app: "typer.Typer") -> None:
 def _demo(delivery: Delivery, seed: int) -> Exit:
     check_writable(delivery.out)
     scene, frames = _draw_scene(seed)
-    tracker = new_tracker({"height_m": scene.height_m, "camera": scene.camera})
+    tracker = memo.Tracker(height_m=scene.height_m, camera=scene.camera)
     rate_hz = 1 / float(np.median(np.diff(scene.times_s)))
     source = Source(None, (0, None), rate_hz, camera_given=True)
-    track, interrupted = follow(frames, tracker, len(frames), source, delivery)
-    if interrupted:
-        return deliver_interrupted(track, delivery)
-    written = write_all(track, frames, len(frames), rate_hz, delivery)
-    differences = from_truth(track.columns, scene.truth)
-    report(track, written, delivery, {"rms_from_truth": differences})
+    with with_steps(delivery) as progress:
+        recorded = follow(frames, tracker, source, delivery.out, len(frames), progress, Interrupt())
+        if recorded.interrupted:
+            write_tables(recorded, delivery.out)
+        else:
+            write_results(recorded, delivery.out, frames, len(frames), progress=progress)
+    if recorded.interrupted:
+        return deliver_interrupted(recorded, delivery)
+    differences = from_truth(recorded.columns, scene.truth)
+    report(recorded, delivery, {"rms_from_truth": differences})
     if delivery.talks:
         for line in _described(differences):
             print(line)
         print("Next, your own video of one person walking across the picture, camera on a tripod:")
         print("  memo track VIDEO --height 1.75")
-    return exit_code(track)
+    return recorded.exit
 
 
 def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
@@ -103,7 +110,7 @@ def _described(differences: dict[str, float]) -> list[str]:
     torso = ", ".join(f"{axis} {100 * differences[f'{axis}_m']:.1f} cm" for axis in "xyz")
     phase, angles = differences["phase"], differences["hips_and_knees_deg"]
     return [
-        f"Against the drawn truth, root mean square over {differences['frames']} frames:",
+        f"Against the drawn truth, root mean square over {counted(differences['frames'], 'frame')}:",
         f"  torso {torso}",
         f"  phase {phase:.3f} of a cycle, hips and knees {angles:.1f} degrees",
         f"  joints {100 * differences['joints_m']:.1f} cm in space",

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
-from memo.cli.given import check_writable
+from memo.cli.delivery import Delivery, guarded, with_count
+from memo.exits import Exit
+from memo.given import InputError, check_writable
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -134,7 +136,7 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     lines = [f"Windows: {', '.join(told)}."]
     if any(window.get("method") == "forest" and window["chains"] for window in figure.windows):
         lines.append(
-            f"{len(points.names)} points are too many to be weighed against each other (at most 16): "
+            f"{len(points.names)} are too many points to be weighed against each other (at most 16): "
             "a spanning tree links them, without confidences, and false links are likely."
         )
     if not figure.interpreted:
@@ -149,7 +151,9 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     chains = [chain for window in figure.interpreted for chain in window["chains"]]
     fixed = sum(chain["reflection_margin_deg"] is not None for chain in chains)
     if fixed:
-        lines.append(f"Front and back told by what joints can do in {fixed} of {len(chains)} chains.")
+        lines.append(
+            f"Front and back told by what joints can do in {fixed} of {counted(len(chains), 'chain')}."
+        )
     if fixed < len(chains):
         lines.append(
             "Every other chain may also be its mirror image in depth."
@@ -171,10 +175,10 @@ def _about_links(figure: Any, names: list[str]) -> list[str]:
             judged = next(iter(kept))
         else:
             judged = ", ".join(f"{verdict} in {number}" for verdict, number in kept.items())
-            judged += f" of {windows} windows"
+            judged += f" of {counted(windows, 'window')}"
         lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}")
     refuted = [
-        f"{names[a]} - {names[b]} (in {counts[REFUTED]} of {windows} windows)"
+        f"{names[a]} - {names[b]} (in {counts[REFUTED]} of {counted(windows, 'window')})"
         for (a, b), counts in verdicts.items()
         if REFUTED in counts
     ]

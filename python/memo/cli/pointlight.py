@@ -3,7 +3,6 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
-import csv
 import math
 import shlex
 from collections.abc import Sequence
@@ -13,9 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded
-from memo.cli.given import check_writable
-from memo.files import complete_file
+from memo.cli.delivery import Delivery, guarded
+from memo.exits import Exit
+from memo.files import write_table
+from memo.given import InputError, check_writable, nothing_at
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -64,14 +65,18 @@ def add_pointlight(app: "typer.Typer") -> None:
             float | None, typer.Option(help="Period of the motion, seconds; else its whole length.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
-        dots: Annotated[int, typer.Option(help="With --lifetime: dots shown.")] = 8,
-        on: Annotated[str, typer.Option(help="With --lifetime: limbs or joints.")] = "limbs",
+        dots: Annotated[int | None, typer.Option(help="With --lifetime: dots shown; 8.")] = None,
+        on: Annotated[
+            str | None, typer.Option(help="With --lifetime: limbs or joints; limbs.", metavar="TEXT")
+        ] = None,
         noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
-        noise_kind: Annotated[str, typer.Option(help="scrambled, linear or flicker.")] = "scrambled",
+        noise_kind: Annotated[
+            str | None, typer.Option(help="With --noise-dots: scrambled, linear or flicker; scrambled.")
+        ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of the noise of dots, pixels.")
         ] = 0.0,
-        seconds: Annotated[float, typer.Option(help="Without MOTION: duration, seconds.")] = 2.4,
+        seconds: Annotated[float | None, typer.Option(help="Without MOTION: duration, seconds; 2.4.")] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
         seed: Annotated[int, typer.Option(help="Of all that is random.", min=0)] = 0,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
@@ -91,15 +96,28 @@ def add_pointlight(app: "typer.Typer") -> None:
             "scramble_phase": "periodic" if scramble_phase else None,
             "period_s": period,
             "lifetime_frames": lifetime,
-            "life_dots": dots,
-            "life_sites": on,
+            "life_dots": 8 if dots is None else dots,
+            "life_sites": "limbs" if on is None else on,
             "noise_dots": noise_dots,
-            "noise_kind": noise_kind,
+            "noise_kind": "scrambled" if noise_kind is None else noise_kind,
             "noise_sd_px": noise_px,
             "seed": seed,
         }
         delivery = Delivery(out, as_json=as_json, quiet=quiet)
-        raise typer.Exit(guarded(lambda: _pointlight(motion, seconds, fps, options, delivery)))
+        idle = {
+            "--dots is used with --lifetime only": dots is not None and lifetime is None,
+            "--on is used with --lifetime only": on is not None and lifetime is None,
+            "--noise-kind is used with --noise-dots only": noise_kind is not None and not noise_dots,
+            "--seconds is used without MOTION only": seconds is not None and motion is not None,
+        }
+
+        def work() -> Exit:
+            for says, is_so in idle.items():
+                if is_so:
+                    raise InputError(says)
+            return _pointlight(motion, 2.4 if seconds is None else seconds, fps, options, delivery)
+
+        raise typer.Exit(guarded(work))
 
 
 def _pointlight(
@@ -125,7 +143,9 @@ def _pointlight(
     write_display_video(out / "display.mp4", display["times_s"], shown)
     written = [out / "dots.csv", out / "labels.csv", out / "display.mp4"]
     summary = {"dots": shown.shape[1], "frames": shown.shape[0], "notes": list(notes)}
-    delivery.tell(summary, [*notes, f"{shown.shape[1]} dots in {shown.shape[0]} frames."], written)
+    delivery.tell(
+        summary, [*notes, f"{counted(shown.shape[1], 'dot')} in {counted(shown.shape[0], 'frame')}."], written
+    )
     scrambled = options["scramble_position"] or options["scramble_phase"]
     if delivery.talks and stays and not scrambled and len(shown) >= FEWEST_FRAMES:
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
@@ -139,6 +159,8 @@ def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
     from memo.formats.names import joint_points
     from memo.linkage import Points, read_points_csv
 
+    if not path.exists():
+        raise InputError(nothing_at(path, "file or folder"))
     if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
         return read_points_csv(path, 3, fps), ()
     motion = read_motion(path)
@@ -162,15 +184,14 @@ def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
 
 def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
     """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
-    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["frame", "dot", "shows", "limb_end", "fraction", "visible"])
-        for frame, row in enumerate(display["labels"]):
-            for dot, label in enumerate(row):
-                end = int(display["limb_ends"][frame, dot])
-                shows = names[label] if label >= 0 else "noise"
-                limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
-                table.writerow([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
+    rows = []
+    for frame, row in enumerate(display["labels"]):
+        for dot, label in enumerate(row):
+            end = int(display["limb_ends"][frame, dot])
+            shows = names[label] if label >= 0 else "noise"
+            limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
+            rows.append([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
+    write_table(path, ["frame", "dot", "shows", "limb_end", "fraction", "visible"], rows)
 
 
 def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:

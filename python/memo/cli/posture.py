@@ -3,6 +3,7 @@
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
 
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_count
-from memo.cli.given import check_apart, check_writable, checked_height, load_camera
+from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import exchanges, one_of_several
+from memo.exits import Exit
+from memo.given import InputError, check_apart, check_writable, checked_height, load_camera
 from memo.postures import WRITTEN, write_postures
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -24,9 +27,11 @@ EPILOG = """Examples:
 
 Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage; \
 3 no posture is left in any frame (the tables say why); 4 the app extra is not installed; \
-130 interrupted (no file is left half written)."""
+6 postures are left, but every one in the motion breaks a constraint: no possible sequence by these \
+rules (all is written); 130 interrupted (no file is left half written)."""
 
 _DRAWN = "postures.png"
+_MOST_BREAKS = 3
 
 _SCALES = {
     "lengths": "the lengths given",
@@ -164,8 +169,11 @@ def _posture(
             written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
     first, *others = _lines(postures)
     lines = [first + one_of_several(keypoints, reading["person"]), *others]
-    delivery.tell(postures.summary, lines, written)
-    return Exit.DONE if (postures.survivors > 0).any() else Exit.NOBODY
+    alarm = None if postures.is_possible else _impossible(postures, options["rules"])
+    delivery.tell(postures.summary, lines, written, alarm=alarm)
+    if not (postures.survivors > 0).any():
+        return Exit.NOBODY
+    return Exit.DONE if postures.is_possible else Exit.IMPOSSIBLE
 
 
 # What the user gave, checked before any work.
@@ -195,22 +203,36 @@ def _row(keypoints: memo.Keypoints, frame: int) -> int:
 # What is said.
 
 
+def _impossible(postures: memo.Postures, rules: str) -> str | None:
+    """That the motion is no possible one, and what it breaks most; None where there is no motion."""
+    breaks = Counter(name for names in postures.linked_breaks for name in names)
+    if not breaks:
+        return None
+    often = ((name.replace("_", " "), count) for name, count in breaks.most_common(_MOST_BREAKS))
+    most = ", ".join(f"{name} in {count}" for name, count in often)
+    frames = counted(postures.found.sum(), "frame")
+    return (
+        f"No possible sequence (--rules {rules}): in every frame of the motion, {frames}, the posture breaks "
+        f"a constraint; most often {most}."
+    )
+
+
 def _lines(postures: memo.Postures) -> list[str]:
-    """At most five lines; that of the files comes sixth."""
+    """At most five lines; before them stands that the motion is impossible, after them the files."""
     lines = [_frames_line(postures), *_reason_line(postures), _scale_line(postures), _second_line(postures)]
     return lines + [f"Look before use: {'; '.join(postures.warnings)}"] * bool(postures.warnings)
 
 
 def _frames_line(postures: memo.Postures) -> str:
     left = postures.survivors > 0
-    line = f"{_counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
+    line = f"{counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
     if left.any():
         counts = [
             (len(sizes), True) if count is None else (count, False)
             for count, sizes in zip(postures.group_counts, postures.group_sizes, strict=True)
         ]
         middle, is_more = sorted(counts[row] for row in np.flatnonzero(left))[left.sum() // 2]
-        groups = _counted(middle, "group") + " or more" * is_more
+        groups = counted(middle, "group") + " or more" * is_more
         line += f", median {np.median(postures.survivors[left]):.0f} in {groups}"
     line += _why_none(postures)
     breaking = sum(map(bool, postures.linked_breaks))
@@ -237,7 +259,7 @@ def _reason_line(postures: memo.Postures) -> list[str]:
     if most is None:
         return []
     name, sentence = most.constraint.replace("_", " "), most.sentence.rstrip(".")
-    cut = f"{_counted(most.branches, 'branch', 'branches')} in {_counted(most.frames, 'frame')}"
+    cut = f"{counted(most.branches, 'branch', 'branches')} in {counted(most.frames, 'frame')}"
     return [f"Most is cut by {name}: {cut} ({sentence})."]
 
 
@@ -259,7 +281,7 @@ def _second_line(postures: memo.Postures) -> str:
     if second is None:
         return "No other motion is there: which way the limbs point in depth is decided."
     joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
-    undecided = f"{postures.undecided.sum()} of {_counted(len(postures.frames), 'frame')}"
+    undecided = f"{postures.undecided.sum()} of {counted(len(postures.frames), 'frame')}"
     where = f"frames {second.first_frame} to {second.last_frame}"
     if second.first_frame == second.last_frame:
         where = f"frame {second.first_frame}"
@@ -268,7 +290,3 @@ def _second_line(postures: memo.Postures) -> str:
         f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
         f" at this noise some joint is undecided in {undecided}."
     )
-
-
-def _counted(count: int, one: str, several: str | None = None) -> str:
-    return f"{count} {one if count == 1 else several or one + 's'}"

@@ -7,8 +7,10 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_steps
-from memo.cli.given import frame_range
+from memo.cli.delivery import Delivery, guarded, with_steps
+from memo.exits import Exit
+from memo.given import InputError, frame_range, nothing_at
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -48,7 +50,7 @@ def add_report(app: "typer.Typer") -> None:
             path = folder / "report.html" if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
             if video is not None and not video.exists():
-                raise InputError(f"{video}: no such video")
+                raise InputError(nothing_at(video, "video"))
             options = {"frames": frame_range(frames), "every": every, "why": why, "video": video}
             report = write_page(folder, path, delivery, **options)
             told = {"kind": report.kind, "bytes": report.bytes, **report.contents}
@@ -72,9 +74,9 @@ def _lines(report: "Report") -> list[str]:
     """What is in the page, in sentences."""
     contents = report.contents
     if report.kind == "memo track":
-        line = f"{contents['pictures']} frames with pictures, {contents['explained']} explained"
+        line = f"{counted(contents['pictures'], 'frame')} with pictures, {contents['explained']} explained"
     else:
-        line = f"{contents['frames']} frames"
+        line = counted(contents["frames"], "frame")
     return [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
 
 

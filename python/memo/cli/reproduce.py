@@ -7,8 +7,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from memo.cli.delivery import Delivery, Exit, InputError, complain, guarded, with_steps
-from memo.cli.given import check_apart, check_writable, checked_height, load_camera
+from memo.cli.delivery import Delivery, complain, guarded, with_steps
+from memo.exits import Exit
+from memo.given import InputError, check_apart, check_writable, checked_height, load_camera
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -129,7 +131,8 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
         for reproduction in made:
             _print(reproduction)
         figures = sum(path.suffix == ".png" for path in written)
-        print(f"Written to {delivery.out}: reproduction.md and .csv, {figures} figures and the tables.")
+        files = f"reproduction.md and .csv, {counted(figures, 'figure')} and the tables"
+        print(f"Written to {delivery.out}: {files}.")
     return Exit.DONE
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
-from memo.cli.delivery import Delivery, Exit, InputError, guarded, with_elapsed
-from memo.cli.given import check_apart, check_writable
+from memo.cli.delivery import Delivery, guarded, with_elapsed
+from memo.exits import Exit
 from memo.files import write_flips_csv
+from memo.given import InputError, check_apart, check_writable
 from memo.keypoints import write_keypoints
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import typer
@@ -97,7 +99,9 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
         "p_global": repair.p_global,
         "left_out": left_out,
     }
-    lines = [f"Right and left exchanged, of {frames} frames: {exchanges(repair)}; {_majority(repair)}."]
+    lines = [
+        f"Right and left exchanged, of {counted(frames, 'frame')}: {exchanges(repair)}; {_majority(repair)}."
+    ]
     lines[0] += one_of_several(keypoints, options["person"])
     if left_out:
         lines.append(f"{as_format.value} has no place for {', '.join(left_out)}.")
@@ -110,8 +114,9 @@ def one_of_several(keypoints: memo.Keypoints, person: int | None) -> str:
     crowded = int((keypoints.people > 1).sum())
     if person is not None or not crowded:
         return ""
-    frames = f"{crowded} of {len(keypoints.frames)} frames"
-    return f" Up to {keypoints.people.max()} people in {frames}: one was followed; --person takes another."
+    frames = f"{crowded} of {counted(len(keypoints.frames), 'frame')}"
+    people = counted(keypoints.people.max(), "person", "people")
+    return f" Up to {people} in {frames}: one was followed; --person takes another."
 
 
 def exchanges(repair: memo.SideRepair) -> str:

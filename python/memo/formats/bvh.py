@@ -37,11 +37,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
 from memo.formats.reading import METRIC_M, Given, unit_of_legs
 from memo.formats.text import number, numbers, read_lines, whole_number
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_bvh", "write_bvh"]
 
@@ -79,13 +80,15 @@ def read_bvh(path: Path, given: Given) -> Motion:
     if twice:
         raise FormatError(f"joint {twice[0]} occurs twice")
     if len(values) * len(kept) > MAX_POINTS:
-        raise FormatError(f"{len(values)} frames of {len(kept)} joints are more than is read")
+        raise FormatError(
+            f"{counted(len(values), 'frame')} of {counted(len(kept), 'joint')} are more than is read"
+        )
     up, unit_m, notes = _conventions(nodes, given)
     moving = [node.name for node in nodes if node.parent >= 0 and _has_place(node)]
     if moving:
         notes.append(
-            f"{len(moving)} joints below the root have positions, the first {moving[0]}: they stand in the"
-            " place of the offsets, but are added where they are near 0."
+            f"Positions below the root, of {counted(len(moving), 'joint')}, the first {moving[0]}: they stand"
+            " in the place of the offsets, but are added where they are near 0."
         )
     with np.errstate(over="ignore", invalid="ignore"):
         points = unit_m * np.stack([*_positions(nodes, values, kept)], axis=1)
@@ -121,7 +124,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                 raise FormatError(f"{where}: wanted {{ after the name of a joint, got {word[:40]!r}")
             if word == "MOTION":
                 if open_nodes or not nodes:
-                    raise FormatError(f"{where}: MOTION, but {len(open_nodes)} joints are still open")
+                    raise FormatError(f"{where}: MOTION, but {counted(len(open_nodes), 'joint')} still open")
                 for node in nodes:
                     if not node.is_end and not np.isfinite(node.offset).all():
                         raise FormatError(f"joint {node.name}: no OFFSET")
@@ -153,7 +156,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
             elif word == "OFFSET" and open_nodes:
                 cells, words = words[:3], words[3:]
                 if len(cells) < 3:
-                    raise FormatError(f"{where}: OFFSET has {len(cells)} numbers, wanted 3")
+                    raise FormatError(f"{where}: OFFSET has {counted(len(cells), 'number')}, wanted 3")
                 place = [number(cell, f"{where}, OFFSET") for cell in cells]
                 if not all(abs(x) < 1e9 for x in place):
                     raise FormatError(f"{where}: OFFSET {' '.join(cells)[:60]} is beyond reason")
@@ -208,13 +211,18 @@ def _frames(lines: list[str], motion: int, channels: int) -> tuple[Array, float]
         if not cells:
             continue
         if len(cells) != channels:
-            raise FormatError(f"line {line_index}: {len(cells)} numbers, the joints have {channels} channels")
+            raise FormatError(
+                f"line {line_index}: {counted(len(cells), 'number')},"
+                f" the joints have {counted(channels, 'channel')}"
+            )
         row = numbers(cells, line_index, columns)
         if any(x != x or abs(x) > 1e12 for x in row):
             raise FormatError(f"line {line_index}: a channel is no number or beyond reason")
         rows.append(row)
     if len(rows) != frames or not rows or not channels:
-        raise FormatError(f"Frames: {frames}, but there are {len(rows)} lines of {channels} numbers")
+        raise FormatError(
+            f"Frames: {frames}, but there are {counted(len(rows), 'line')} of {counted(channels, 'number')}"
+        )
     return np.array(rows), frame_s
 
 
@@ -380,13 +388,13 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
         if len(missing):
             time_s = motion.times_s[first + missing[0]]
             raise FormatError(
-                f"{joint} is missing in {len(missing)} frames, the first at {time_s:g} s, and BVH has no"
-                " place for missing joints: give --fill, --walk, or another format"
+                f"{joint} is missing in {counted(len(missing), 'frame')}, the first at {time_s:g} s, and BVH"
+                " has no place for missing joints: give --fill, --walk, or another format"
             )
     notes = []
     if last - first + 1 < len(there):
         cut = len(there) - (last - first + 1)
-        notes.append(f"{cut} frames at the ends, in which a joint is missing, were left out.")
+        notes.append(f"Left out: {counted(cut, 'frame')} at the ends, in which a joint is missing.")
     if motion.times_s[first] > 0:
         notes.append(f"A BVH file begins at 0 s; this motion began at {motion.times_s[first]:g} s.")
     places = {found[joint] for joint in known}

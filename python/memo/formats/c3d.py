@@ -31,10 +31,11 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
-from memo.files import complete_file
 from memo.formats.motion import MAX_FRAMES, FormatError, GaitEvent, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_c3d", "write_c3d"]
 
@@ -98,9 +99,17 @@ def read_c3d(path: Path, given: Given) -> Motion:
     notes += [
         *up_note,
         *(["Labels that were empty or occurred twice were numbered."] if renamed else []),
-        *([f"Left out: {len(others)} forces, moments or powers."] if others else []),
-        *([f"Left out: {file.analog_words} analog values a frame."] if file.analog_words else []),
-        *([f"Left out: {other_events} events that are no heel strike or toe off."] if other_events else []),
+        *(
+            [f"Left out: {counted(len(others), 'force, moment or power', 'forces, moments or powers')}."]
+            if others
+            else []
+        ),
+        *([f"Left out: {counted(file.analog_words, 'analog value')} a frame."] if file.analog_words else []),
+        *(
+            [f"Left out: {counted(other_events, 'event')}, neither heel strike nor toe off."]
+            if other_events
+            else []
+        ),
     ]
     metadata = {"format": "c3d", "up": up, "unit": unit, "rate_hz": rate_hz, "first_frame": first}
     return Motion(tuple(names), times_s, points, tuple(events), angles, metadata, tuple(notes))
@@ -153,7 +162,9 @@ def _open(data: bytes) -> _File:
         raise FormatError("byte 1: no C3D file (its second byte is 0x50, and it has two blocks of 512 bytes)")
     start = (data[0] - 1) * _BLOCK
     if data[0] < 2 or start + 4 > len(data):
-        raise FormatError(f"byte 0: the parameters begin at block {data[0]}, the file has {len(data)} bytes")
+        raise FormatError(
+            f"byte 0: the parameters begin at block {data[0]}, the file has {counted(len(data), 'byte')}"
+        )
     processor = data[start + 3]
     if processor not in (_INTEL, _DEC, _MIPS):
         raise FormatError(
@@ -187,7 +198,8 @@ def _parameters(data: bytes, at: int, stop: int, file: _File) -> dict[tuple[str,
         (offset,) = struct.unpack_from(file.order + "h", data, after_name)
         if offset < 0 or (offset and after_name + offset > stop):
             raise FormatError(
-                f"{where}, parameter {name}: the next one is {offset} bytes on, outside the section"
+                f"{where}, parameter {name}: the next one is {counted(offset, 'byte')} on,"
+                " outside the section"
             )
         if group < 0:
             groups[-group] = name
@@ -214,7 +226,7 @@ def _value(data: bytes, at: int, stop: int, file: _File, where: str) -> list[str
     count = math.prod(shape)
     begin = at + 2 + rank
     if begin + count * abs(kind) > stop:
-        raise FormatError(f"{where}: {shape} elements run beyond the parameter section")
+        raise FormatError(f"{where}: elements of shape {shape} run beyond the parameter section")
     raw = data[begin : begin + count * abs(kind)]
     if kind == -1:
         width = shape[0] if shape else 1
@@ -245,9 +257,11 @@ def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
     used = file.number("POINT", "USED")
     file.points = points if used is None else int(used) % 65536
     if file.points != points:
-        raise FormatError(f"bytes 2-3: {points} points in the header, parameter POINT:USED has {file.points}")
+        raise FormatError(
+            f"bytes 2-3: {counted(points, 'point')} in the header, parameter POINT:USED has {file.points}"
+        )
     if not 1 <= points <= _MOST_POINTS:
-        raise FormatError(f"parameter POINT:USED: {points} points, wanted 1 to {_MOST_POINTS}")
+        raise FormatError(f"parameter POINT:USED: {counted(points, 'point')}, wanted 1 to {_MOST_POINTS}")
     named = file.number("POINT", "SCALE")
     file.scale = scale if named is None else named
     if not (math.isfinite(file.scale) and 0 < abs(file.scale) < 1e6):
@@ -264,8 +278,9 @@ def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
     room = (len(data) - file.start) // frame_bytes if 0 < file.start <= len(data) else 0
     if room < file.frames:
         raise FormatError(
-            f"byte {max(file.start, 0)}: {file.frames} frames of {frame_bytes} bytes begin here, the"
-            f" file ends at byte {len(data)}, after {room}"
+            f"byte {max(file.start, 0)}: room for {counted(file.frames, 'frame')} of"
+            f" {counted(frame_bytes, 'byte')} is wanted from here on,"
+            f" the file ends at byte {len(data)}, after {room}"
         )
 
 
@@ -396,7 +411,7 @@ def write_c3d(path: Path, motion: Motion, up: Up) -> list[str]:
     labels, values = _columns(motion, up)
     if len(labels) > _MOST_POINTS:
         raise FormatError(
-            f"{len(labels)} points and angles, a C3D file is written with at most {_MOST_POINTS}"
+            f"a C3D file is written with at most {_MOST_POINTS} points and angles, got {len(labels)}"
         )
     if not (np.isnan(values) | (np.abs(values) < _FARTHEST)).all():
         raise FormatError(f"a point or an angle is beyond {_FARTHEST:g} mm or degrees")
@@ -507,7 +522,9 @@ def _parameter_section(
             content += parameter[:1] + bytes([number]) + parameter[2:]
     blocks = -(-(4 + len(content) + 2) // _BLOCK)
     if blocks > 255:
-        raise FormatError(f"labels and events fill {blocks} blocks, the parameters of a C3D file at most 255")
+        raise FormatError(
+            f"labels and events fill {counted(blocks, 'block')}, the parameters of a C3D file at most 255"
+        )
     content = bytearray(struct.pack("<BBBB", 1, _KEY, blocks, _INTEL)) + content
     # Where the data begin is known only now.
     content = content.replace(data_start[2:], _integers("DATA_START", [2 + blocks], ())[2:], 1)
@@ -564,5 +581,5 @@ def _parameter(name: str, kind: int, shape: tuple[int, ...], value: bytes) -> by
     """A parameter without description; its second byte, the group, is filled in by the caller."""
     body = struct.pack("<bB", kind, len(shape)) + bytes(shape) + value + b"\0"
     if len(body) + 2 > 32767:
-        raise FormatError(f"parameter {name}: {len(body)} bytes, a C3D file holds at most 32765")
+        raise FormatError(f"parameter {name}: {counted(len(body), 'byte')}, a C3D file holds at most 32765")
     return struct.pack("<bb", len(name), 0) + name.encode() + struct.pack("<h", len(body) + 2) + body

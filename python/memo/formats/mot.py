@@ -31,11 +31,12 @@ from pathlib import Path
 
 import numpy as np
 
-from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found
 from memo.formats.reading import Given, chosen_up
 from memo.formats.text import numbers, read_lines, whole_number
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_mot", "write_mot"]
 
@@ -115,7 +116,7 @@ def read_mot(path: Path, given: Given) -> Motion:
     if in_degrees is None:
         notes.append("The file does not say whether angles are in degrees: they were taken to be.")
     if others:
-        notes.append(f"Left out, no angles: {len(others)} columns, the first {others[0]}.")
+        notes.append(f"Left out, no angles: {counted(len(others), 'column')}, the first {others[0]}.")
     if not names and not angles:
         raise FormatError(f"line {start + 1}: no column of an angle or a position")
     metadata = {"format": "mot", "up": up}
@@ -161,7 +162,9 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
         file.writelines(line + "\n" for line in head)
         for row in table.tolist():
             file.write("\t".join(f"{x:.7f}" for x in row) + "\n")
-    notes = [f"{gaps} instants at which an angle or the pelvis is missing were left out."] if gaps else []
+    notes = (
+        [f"Left out: {counted(gaps, 'instant')} at which an angle or the pelvis is missing."] if gaps else []
+    )
     if pelvis_angles and up != "y":
         notes.append("OpenSim's pelvis angles are those of a world with Y up: left out.")
     if origin is None and motion.names:
@@ -204,7 +207,7 @@ def _rows(lines: list[str], start: int, labels: list[str]) -> np.ndarray:
         if not cells:
             continue
         if len(cells) != len(labels):
-            raise FormatError(f"line {index}: {len(cells)} cells, wanted {len(labels)}")
+            raise FormatError(f"line {index}: {counted(len(cells), 'cell')}, wanted {len(labels)}")
         rows.append(numbers(cells, index, labels))
         if len(rows) > 1 and not rows[-1][0] > rows[-2][0]:
             raise FormatError(f"line {index}, column time: {cells[0]} does not come after {rows[-2][0]:g}")

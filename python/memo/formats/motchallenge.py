@@ -21,9 +21,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file, read_text, read_track
+from memo.files import read_text, read_track
 from memo.formats.motion import FormatError
 from memo.run import contours_of_run
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 if TYPE_CHECKING:
     from memo.tracking import Track
@@ -118,7 +120,7 @@ def _row(line: str, where: str) -> list[float]:
     """The ten numbers of a row, NaN for those it has not."""
     cells = line.split(",") if "," in line else line.split()
     if len(cells) not in (6, 7, 9, 10):
-        raise FormatError(f"{where}: {len(cells)} numbers; MOTChallenge rows have 6, 7, 9 or 10")
+        raise FormatError(f"{where}: {counted(len(cells), 'number')}; MOTChallenge rows have 6, 7, 9 or 10")
     values = []
     for cell in cells:
         try:

@@ -19,6 +19,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from memo.wording import counted
+
 __all__ = ["FormatError", "GaitEvent", "Motion", "Up", "from_z_up", "to_z_up"]
 
 Array = npt.NDArray[np.float64]
@@ -134,7 +136,7 @@ class Motion:
         span_s = float(self.times_s[-1] - self.times_s[0])
         most = min(MAX_FRAMES, MAX_POINTS // max(1, len(self.names)))
         if span_s * rate_hz > most:
-            raise FormatError(f"{span_s:g} s at {rate_hz:g} Hz are more than {most} frames")
+            raise FormatError(f"{span_s:g} s at {rate_hz:g} Hz are more than {counted(most, 'frame')}")
         count = int(span_s * rate_hz + 1e-6) + 1
         times_s = self.times_s[0] + np.arange(count) / rate_hz
         if len(self.times_s) == 1:

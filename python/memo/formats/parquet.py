@@ -20,11 +20,14 @@ import numpy as np
 import numpy.typing as npt
 
 from memo._memo import __version__
-from memo.files import complete_file
+from memo.extras import install
 from memo.formats.motion import FormatError, Motion, Up
 from memo.formats.reading import Given
 from memo.formats.table import motion_columns, motion_of_table
+from memo.given import nothing_at
 from memo.table import NumberTable, column_unit
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_parquet", "read_parquet_motion", "write_parquet", "write_parquet_motion"]
 
@@ -68,14 +71,14 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         with pq.ParquetFile(path, memory_map=False) as file:
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= _MAX_CELLS:
-                raise FormatError(f"{path}: {cells} cells; at most {_MAX_CELLS} are read")
+                raise FormatError(f"{path}: {counted(cells, 'cell')}; at most {_MAX_CELLS} are read")
             schema = file.schema_arrow
             _check_flat(pa, path, schema)
             table = file.read(use_threads=False)
         table.validate(full=True)
         return {name: _values(pa, table.column(index)) for index, name in enumerate(schema.names)}
     except FileNotFoundError:
-        raise FormatError(f"{path}: no such file") from None
+        raise FormatError(nothing_at(path)) from None
     except (pa.ArrowException, OSError, UnicodeDecodeError, MemoryError, OverflowError) as error:
         raise FormatError(f"{path}: not Parquet that can be read: {error}") from None
 
@@ -117,7 +120,7 @@ def _arrow() -> tuple[ModuleType, ModuleType]:
     try:
         return import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError:
-        raise FormatError('Parquet needs pyarrow: pip install "memo-motion[parquet]"') from None
+        raise FormatError(f"Parquet needs pyarrow: {install('parquet', 'pyarrow')}") from None
 
 
 def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:

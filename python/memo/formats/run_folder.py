@@ -16,6 +16,7 @@ from memo.files import ANGLES, JOINTS, SIDES, read_events_csv, read_track_csv
 from memo.formats.motion import FormatError, GaitEvent, Motion
 from memo.formats.reading import Given
 from memo.formats.table import read_table
+from memo.wording import counted
 
 __all__ = ["read_run_folder", "sources"]
 
@@ -63,7 +64,9 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     )
     angles = {f"{side}_{angle}": columns[f"{side}_{angle}_deg"][chosen] for side in SIDES for angle in ANGLES}
     walks = len(np.unique(columns["walk"]))
-    notes = [f"{walks} walks: between them nobody was tracked."] if walk is None and walks > 1 else []
+    notes = (
+        [f"{counted(walks, 'walk')}: between them nobody was tracked."] if walk is None and walks > 1 else []
+    )
     kept = [
         GaitEvent(event["time_s"], event["event"], event["side"])
         for event in events

@@ -11,18 +11,19 @@ else Z. Both are told.
 
 from __future__ import annotations
 
-import csv
 import re
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, standing_up
 from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
+from memo.spreadsheet import write_rows
 from memo.table import NumberTable, read_number_table
+from memo.unfinished import complete_file
 
 __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 
@@ -95,11 +96,11 @@ def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
     with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         if up != "z":
             file.write("# metres, Y up\n")
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["frame", *columns])
-        for frame in range(len(table)):
-            cells = ("" if x != x else f"{x:.6f}" for x in table[frame].tolist())
-            rows.writerow([frame, f"{motion.times_s[frame]:.6f}", *cells])
+        rows = (
+            [frame, f"{motion.times_s[frame]:.6f}", *("" if x != x else f"{x:.6f}" for x in row)]
+            for frame, row in enumerate(table.tolist())
+        )
+        write_rows(file, chain([["frame", *columns]], rows))
     return ["A table of joints has no place for events: left out."] if motion.events else []
 
 

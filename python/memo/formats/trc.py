@@ -17,11 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from memo.files import complete_file
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
 from memo.formats.text import number, numbers, read_lines, whole_number
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = ["read_trc", "write_trc"]
 
@@ -111,13 +112,13 @@ def _cells(line: str) -> list[str]:
 def _names(labels: str, axes: str, markers: int) -> list[str]:
     cells = _cells(labels)
     if [cell.lower() for cell in cells[:2]] != ["frame#", "time"]:
-        raise FormatError(f"line 4: wanted Frame#, Time and {markers} labels, got {cells[:3]}")
+        raise FormatError(f"line 4: wanted Frame#, Time and {counted(markers, 'label')}, got {cells[:3]}")
     names = cells[2:]
     if len(names) != markers:
-        raise FormatError(f"line 4: {len(names)} labels, NumMarkers is {markers}")
+        raise FormatError(f"line 4: {counted(len(names), 'label')}, NumMarkers is {markers}")
     given = [axis[:1].upper() for axis in _cells(axes)]
     if given != ["X", "Y", "Z"] * markers:
-        raise FormatError(f"line 5: wanted X1 Y1 Z1 ... Z{markers}, got {len(given)} cells")
+        raise FormatError(f"line 5: wanted X1 Y1 Z1 ... Z{markers}, got {counted(len(given), 'cell')}")
     return names
 
 
@@ -132,14 +133,16 @@ def _rows(lines: list[str], names: list[str], frames: int) -> np.ndarray:
         while len(cells) > len(columns) and not cells[-1].strip():
             cells.pop()
         if len(cells) != len(columns):
-            raise FormatError(f"line {index}: {len(cells)} cells, wanted {len(columns)}")
+            raise FormatError(f"line {index}: {counted(len(cells), 'cell')}, wanted {len(columns)}")
         rows.append(numbers([cell.strip() for cell in cells], index, columns))
         if not rows[-1][1] == rows[-1][1]:
             raise FormatError(f"line {index}, column Time: empty")
         if len(rows) > 1 and not rows[-1][1] > rows[-2][1]:
             raise FormatError(f"line {index}, column Time: {cells[1]} does not come after {rows[-2][1]:g}")
     if len(rows) != frames:
-        raise FormatError(f"line 3, field NumFrames: {frames}, but there are {len(rows)} rows of numbers")
+        raise FormatError(
+            f"line 3, field NumFrames: {frames}, but there are {counted(len(rows), 'row')} of numbers"
+        )
     return np.array(rows).reshape(len(rows), len(columns))
 
 

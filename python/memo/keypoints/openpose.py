@@ -7,7 +7,6 @@ AlphaPose's `sep-json` in CMU's form is the same with `bodies` and `joints`.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Iterator, Mapping
 from os import PathLike
@@ -18,6 +17,7 @@ from memo.keypoints.found import Found, Person, check_all_placed, triples, with_
 from memo.keypoints.layout import in_layout
 from memo.keypoints.points import Array, Keypoints, KeypointsError, Source
 from memo.keypoints.text import MAX_FRAME_FILE_BYTES, content_of, json_text, last_number, parsed
+from memo.unfinished import complete_folder
 
 __all__ = ["frame_people", "read_openpose", "write_openpose"]
 
@@ -148,27 +148,16 @@ def _write_like(out: Path, keypoints: Keypoints) -> None:
 def _write_folder(out: Path, contents: Mapping[str, str | Path]) -> None:
     """Writes files, each a text or a copy of another file, as a folder, complete or not at all."""
     _check_replaceable(out, contents.keys())
-    temporary = out.with_name(f".{os.getpid()}-{out.name}")
-    before = out.with_name(f".{os.getpid()}-before-{out.name}")
     try:
-        temporary.mkdir(parents=True)
-        for name, content in contents.items():
-            if isinstance(content, Path):
-                shutil.copyfile(content, temporary / name)
-            else:
-                (temporary / name).write_text(content, encoding="utf-8")
-        if out.exists():
-            out.rename(before)
-        temporary.rename(out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with complete_folder(out) as temporary:
+            for name, content in contents.items():
+                if isinstance(content, Path):
+                    shutil.copyfile(content, temporary / name)
+                else:
+                    (temporary / name).write_text(content, encoding="utf-8")
     except OSError as error:
         raise KeypointsError(f"{out}: cannot be written: {error.strerror or error}") from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if before.exists():
-            if out.exists():
-                shutil.rmtree(before, ignore_errors=True)
-            else:
-                before.rename(out)
 
 
 def _check_replaceable(out: Path, names: Any) -> None:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.table import data_frame
+from memo.wording import counted
 
 if TYPE_CHECKING:
     import pandas
@@ -148,9 +149,9 @@ class Keypoints:
 
     def __repr__(self) -> str:
         seen = np.isfinite(self.points).all(axis=2).mean()
-        crowd = f", up to {self.people.max()} people" if self.people.max() > 1 else ""
+        crowd = f", up to {counted(self.people.max(), 'person', 'people')}" if self.people.max() > 1 else ""
         return (
-            f"Keypoints({len(self.names)} points{f' of {self.layout}' if self.layout else ''}, "
+            f"Keypoints({counted(len(self.names), 'point')}{f' of {self.layout}' if self.layout else ''}, "
             f"frames {self.frames[0]} to {self.frames[-1]}, {seen:.0%} seen{crowd})"
         )
 

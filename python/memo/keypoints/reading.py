@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
+from memo.given import nothing_at
 from memo.keypoints.coco import read_coco
 from memo.keypoints.found import Found, Person
 from memo.keypoints.openpose import read_openpose
@@ -20,6 +21,8 @@ from memo.keypoints.points import Array, Keypoints, KeypointsError, frame_range
 from memo.keypoints.table import read_csv, read_parquet_table
 from memo.keypoints.text import content_of, parsed
 from memo.keypoints.trc import is_trc, read_trc
+from memo.pixels import of_video, shrink_of_table
+from memo.wording import counted
 
 __all__ = ["read_keypoints"]
 
@@ -50,11 +53,13 @@ def read_keypoints(
         raise KeypointsError(f"person {person!r} is not a place in the list of people: 0, 1, ...")
     try:
         if not path.exists():
-            raise KeypointsError(f"{path}: no such file or folder")
+            raise KeypointsError(nothing_at(path, "file or folder"))
         found = _found(path)
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
-    return _assembled(found, person, fps, layout)
+    keypoints = _assembled(found, person, fps, layout)
+    shrink = shrink_of_table(found.source.path) if found.source.path.name in _OF_A_TRACK else 1
+    return keypoints if shrink == 1 else replace(keypoints, points=of_video(keypoints.points, shrink))
 
 
 def _found(path: Path) -> Found:
@@ -121,7 +126,9 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
     except ValueError as error:
         raise KeypointsError(f"{path}: {error}") from None
     if len(names) != points.shape[1]:
-        raise KeypointsError(f"{path}: has {points.shape[1]} points a person, {name} has {len(names)}")
+        raise KeypointsError(
+            f"{path}: has {counted(points.shape[1], 'point')} a person, {name} has {len(names)}"
+        )
     return name, tuple(names)
 
 

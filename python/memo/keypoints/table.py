@@ -7,7 +7,6 @@ Coordinates may also end on `_x_px` and `_y_px` or `_u_px` and `_v_px`, as in `t
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from collections.abc import Iterable
@@ -23,6 +22,8 @@ from memo import _memo
 from memo.keypoints.found import Found, Person, check_all_placed, different, with_missing
 from memo.keypoints.points import MAX_FRAME, Array, Keypoints, KeypointsError, Source, check_finite
 from memo.keypoints.text import LONGEST_NAME, content_of, short, write_text
+from memo.spreadsheet import CsvRows, Error, write_rows
+from memo.wording import counted
 
 __all__ = ["read_csv", "read_parquet_table", "write_csv"]
 
@@ -39,9 +40,9 @@ def write_csv(path: str | PathLike[str], keypoints: Keypoints) -> tuple[str, ...
     """
     check_finite(keypoints)
     suffixes = ("_u_px", "_v_px", "_score")
-    text = io.StringIO(newline="")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["frame", "time_s", *(name + end for name in keypoints.names for end in suffixes)])
+    table: list[list[Any]] = [
+        ["frame", "time_s", *(name + end for name in keypoints.names for end in suffixes)]
+    ]
     for row, frame in enumerate(keypoints.frames.tolist()):
         values = np.column_stack([keypoints.points[row], keypoints.scores[row]])
         missing = np.isnan(values[:, :2]).any(axis=1)
@@ -49,7 +50,9 @@ def write_csv(path: str | PathLike[str], keypoints: Keypoints) -> tuple[str, ...
             ["", "", ""] if gone else map(repr, own)
             for gone, own in zip(missing, values.tolist(), strict=True)
         ]
-        table.writerow([frame, repr(float(keypoints.times_s[row])), *(cell for own in cells for cell in own)])
+        table.append([frame, repr(float(keypoints.times_s[row])), *(cell for own in cells for cell in own)])
+    text = io.StringIO(newline="")
+    write_rows(text, table)
     write_text(Path(path), text.getvalue())
     return ()
 
@@ -110,12 +113,14 @@ def _rows(path: Path, content: str) -> tuple[list[list[str]], str]:
     header = content.split("\n", 1)[0]
     delimiter = max(",;\t", key=header.count)
     try:
-        rows = list(csv.reader(io.StringIO(content, newline=""), delimiter=delimiter))
-    except csv.Error as error:
+        rows = list(CsvRows(io.StringIO(content, newline=""), delimiter=delimiter))
+    except Error as error:
         raise KeypointsError(f"{path}: not a table: {error}") from None
     for line, row in enumerate(rows, start=1):
         if row and len(row) != len(rows[0]):
-            raise KeypointsError(f"{path}: row {line} has {len(row)} cells, the header {len(rows[0])}")
+            raise KeypointsError(
+                f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(rows[0])}"
+            )
     return rows, delimiter
 
 
@@ -264,10 +269,8 @@ def _write_like(out: Path, keypoints: Keypoints) -> None:
         if place is not None:
             set_cells(rows, columns, keypoints, row, place, added)
     text = io.StringIO(newline="")
-    table = csv.writer(text, delimiter=delimiter, lineterminator="\r\n" if "\r\n" in content else "\n")
-    for line, cells in enumerate(rows):
-        table.writerow(cells)
-        table.writerows(added.get(line, ()))
+    table = (cells for line, row in enumerate(rows) for cells in [row, *added.get(line, ())])
+    write_rows(text, table, delimiter=delimiter, line_end="\r\n" if "\r\n" in content else "\n")
     write_text(out, text.getvalue())
 
 

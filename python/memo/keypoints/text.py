@@ -7,8 +7,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from memo.files import complete_file, read_text
+from memo.files import read_text
 from memo.keypoints.points import MAX_FRAME, KeypointsError
+from memo.unfinished import write_complete
 
 __all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_text"]
 
@@ -46,8 +47,7 @@ def write_text(out: Path, text: str) -> None:
     """Writes a file that appears complete or not at all."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        with complete_file(out) as temporary:
-            temporary.write_bytes(text.encode("utf-8"))
+        write_complete(out, text)
     except OSError as error:
         raise KeypointsError(f"{out}: cannot be written: {error.strerror or error}") from None
 

@@ -13,6 +13,7 @@ from memo.keypoints.found import Found, check_all_placed
 from memo.keypoints.points import Keypoints, KeypointsError, Source
 from memo.keypoints.table import Columns, joint_of, number_of, row_frames, set_cells, wide_people
 from memo.keypoints.text import content_of, short, write_text
+from memo.wording import counted
 
 __all__ = ["is_trc", "read_trc"]
 
@@ -38,7 +39,9 @@ def _table(path: Path, content: str) -> tuple[list[list[str]], Columns]:
     """The rows by line, empty where the header is, and where what is; refused if not image points."""
     lines = [line.rstrip("\r").split("\t") for line in content.split("\n")]
     if len(lines) < _HEADER_LINES:
-        raise KeypointsError(f"{path}: a TRC of {len(lines)} lines; its header has {_HEADER_LINES}")
+        raise KeypointsError(
+            f"{path}: a TRC of {counted(len(lines), 'line')}; its header has {_HEADER_LINES}"
+        )
     facts = {name.strip(): value.strip() for name, value in zip(lines[1], lines[2], strict=False)}
     markers = lines[3][2::3]
     while markers and not markers[-1].strip():
@@ -53,7 +56,10 @@ def _table(path: Path, content: str) -> tuple[list[list[str]], Columns]:
             continue
         where = f"{path}: line {number}"
         if len(cells) < width or any(cell.strip() for cell in cells[width:]):
-            raise KeypointsError(f"{where} has {len(cells)} cells; {len(markers)} points need {width}")
+            raise KeypointsError(
+                f"{where} has {counted(len(cells), 'cell')};"
+                f" {width} for {counted(len(markers), 'point')} are wanted"
+            )
         depths = {number_of(cell, where) for cell in cells[4:width:3] if cell.strip()}
         if depths - {0.0} and not all(map(math.isnan, depths - {0.0})):
             raise KeypointsError(f"{where}: these are points in space, image points are needed")

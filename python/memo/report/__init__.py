@@ -12,11 +12,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from memo.files import complete_file
+from memo.given import nothing_at
 from memo.report.choice import Choice
 from memo.report.planar import planar_page
 from memo.report.posture import posture_page
 from memo.report.track import track_page
+from memo.unfinished import complete_file
 
 __all__ = ["KINDS", "Report", "write_report"]
 
@@ -77,7 +78,7 @@ def _kind(folder: Path) -> str:
     if folder.is_file():
         raise ValueError(f"{folder}: is a file; give the folder it is in")
     if not folder.is_dir():
-        raise ValueError(f"{folder}: no such folder")
+        raise ValueError(nothing_at(folder, "folder"))
     found = [command for name, command in KINDS.items() if (folder / name).is_file()]
     if len(found) == 1:
         return found[0]

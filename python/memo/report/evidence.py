@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from memo.explain import Why
+from memo.pixels import of_averaged
 from memo.report.page import columns
 from memo.report.pictures import LONGEST_PX, jpeg_uri, mask_uri, packed
 
@@ -18,13 +19,17 @@ _CROP_MARGIN = 0.25
 
 
 def evidence(why: Why) -> dict[str, Any]:
-    """What was seen around the walker in one frame; pixels count from the corner of the part shown."""
+    """What was seen around the walker in one frame; pixels count from the corner of the part shown.
+
+    Masks have a pixel for each of the picture in which it was seen.
+    """
+    n = why.shrink
     left, top, right, bottom = _around(why)
     corner = np.array([left, top], np.float64)
-    part = np.s_[top:bottom, left:right]
-    edges = np.zeros(why.luma.shape, bool)
-    places = np.round(why.edge_points).astype(int)
-    inside = places[((places >= 0) & (places < why.luma.shape[::-1])).all(axis=1)]
+    part, seen = np.s_[top:bottom, left:right], np.s_[top:bottom:n, left:right:n]
+    edges = np.zeros(why.luma.shape, bool)[::n, ::n]
+    places = np.round(of_averaged(why.edge_points, n)).astype(int)
+    inside = places[((places >= 0) & (places < edges.shape[::-1])).all(axis=1)]
     edges[inside[:, 1], inside[:, 0]] = True
 
     def lines(segments: Any, clipped: bool = False) -> str:
@@ -32,15 +37,16 @@ def evidence(why: Why) -> dict[str, Any]:
         if clipped:
             near = (segments.max(axis=1) >= corner) & (segments.min(axis=1) <= (right, bottom))
             segments = segments[near.all(axis=1)]
-        return packed(segments - corner)
+        return packed(segments - corner, n)
 
     return {
         "frame": int(why.frame),
         "corner": [left, top],
         "size": [right - left, bottom - top],
+        "step_px": n / 16,
         "luma": jpeg_uri(why.luma[part], LONGEST_PX),
-        "change": mask_uri(why.change_mask[part], CHANGED),
-        "edges": mask_uri(edges[part], _EDGE),
+        "change": mask_uri(why.change_mask[seen], CHANGED),
+        "edges": mask_uri(edges[top // n : bottom // n, left // n : right // n], _EDGE),
         "segments": lines(why.segments, clipped=True),
         "model": lines(why.model),
         "part": [int(number) for number in why.model_part],
@@ -53,14 +59,20 @@ def evidence(why: Why) -> dict[str, Any]:
 
 
 def _around(why: Why) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom of the part of the frame with the model and a margin; all without a model."""
-    height, width = why.luma.shape
+    """Left, top, right, bottom of the part of the frame with the model and a margin; all without a model.
+
+    They are multiples of `why.shrink`.
+    """
+    n = why.shrink
+    height, width = (side // n * n for side in why.luma.shape)
     points = np.asarray(why.model, np.float64).reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return 0, 0, width, height
     (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
     margin = _CROP_MARGIN * max(right - left, bottom - top)
-    left, top = max(0, int(left - margin)), max(0, int(top - margin))
-    right, bottom = min(width, int(right + margin) + 1), min(height, int(bottom + margin) + 1)
+    left, top = (max(0, int((low - margin) / n) * n) for low in (left, top))
+    right, bottom = (
+        min(side, (int((high + margin) / n) + 1) * n) for high, side in ((right, width), (bottom, height))
+    )
     return (left, top, right, bottom) if left < right and top < bottom else (0, 0, width, height)

@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import av
@@ -37,9 +38,9 @@ class Picture:
     uri: str
     """The JPEG as a data URI."""
     moved: str | None = None
-    """What changed since the frame before, as a PNG of the video's size; None where nobody asked."""
+    """What changed since the frame before, as a PNG of the tracked picture; None where nobody asked."""
     regions: tuple[tuple[int, ...], ...] = ()
-    """Left, top, right and bottom of what moved, largest first, pixels."""
+    """Left, top, right and bottom of what moved, largest first, pixels of the video."""
 
     @property
     def size_bytes(self) -> int:
@@ -96,9 +97,9 @@ def mask_uri(mask: npt.NDArray[np.bool_], colour: tuple[int, int, int]) -> str:
     return _uri("png", image, transparency=0, bits=1)
 
 
-def packed(points_px: npt.ArrayLike) -> str:
-    """Pixel coordinates of any shape, flat, as base64 of 16-bit integers in sixteenths of a pixel."""
-    finite = np.nan_to_num(np.asarray(points_px, np.float64), posinf=_REACH_PX, neginf=-_REACH_PX)
+def packed(points_px: npt.ArrayLike, shrink: int = 1) -> str:
+    """Pixel coordinates of any shape, flat, as base64 of 16-bit integers in sixteenths of `shrink` pixels."""
+    finite = np.nan_to_num(np.asarray(points_px, np.float64) / shrink, posinf=_REACH_PX, neginf=-_REACH_PX)
     sixteenths = np.round(np.clip(finite, -_REACH_PX, _REACH_PX) * _SIXTEENTH_PX)
     return base64.b64encode(sixteenths.astype("<i2").tobytes()).decode("ascii")
 
@@ -106,7 +107,7 @@ def packed(points_px: npt.ArrayLike) -> str:
 def colour_frames(path: str | PathLike[str]) -> Iterator[tuple[int, float, npt.NDArray[np.uint8]]]:
     """Number, seconds since the first and (H, W, 3) RGB pixels of the frames of a video memo wrote."""
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(Path(path).absolute())) as container:
             first_s: float | None = None
             for index, frame in enumerate(container.decode(video=0)):
                 first_s = (frame.time or 0.0) if first_s is None else first_s

@@ -12,6 +12,7 @@ from memo.files import read_text_columns
 from memo.report.choice import Choice
 from memo.report.page import Page, number, rows_table, text
 from memo.report.pictures import Thinned
+from memo.wording import counted
 
 __all__ = ["planar_page"]
 
@@ -120,7 +121,8 @@ def _sentences(windows: list[Row], links: list[Row], interpreted: int) -> list[s
         return ["No window shows planar motion: nothing is claimed."]
     found = {(link["a"], link["b"]) for link in links if link["verdict"] == "planar"}
     return [
-        f"{len(found)} links swing in planes, in {interpreted} of {len(windows)} windows.",
+        f"{counted(len(found), 'link swings', 'links swing')} in planes, in {interpreted} of "
+        f"{counted(len(windows), 'window')}.",
         "Each chain may also be its mirror image in depth; depths of chains against each other are open.",
     ]
 

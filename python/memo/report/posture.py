@@ -11,11 +11,15 @@ from memo.report.choice import Choice
 from memo.report.page import UNKNOWN, Page, number, rows_table, text
 from memo.report.pictures import Thinned
 from memo.report.posture_file import FRAME_SHAPES, read_postures_json
+from memo.wording import counted
 
 __all__ = ["posture_page"]
 
 _BYTES = 20_000_000
 _MOST_GROUPS = 12
+
+
+_IMPOSSIBLE = "no possible sequence"
 
 
 def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
@@ -54,12 +58,13 @@ def _second(second: dict[str, Any], frames: list[dict[str, Any]]) -> dict[str, A
 
 def _filled(document: dict[str, Any], name: str, notes: list[str]) -> dict[str, str]:
     left = document.get("frames_with_survivors") or 0
+    status = "no posture left" if not left else "postures left" if _is_possible(document) else _IMPOSSIBLE
     warnings = [*document.get("warnings", ()), *document.get("anchor_conflicts", ()), *notes]
     return {
         "version": text(memo.__version__),
         "name": text(name),
-        "status": text("postures left" if left else "no posture left"),
-        "tone": "good" if left else "bad",
+        "status": text(status),
+        "tone": "good" if status == "postures left" else "bad",
         "sentences": "".join(f"<p>{text(sentence)}</p>" for sentence in _sentences(document)),
         "warnings": "".join(f"<li>{text(warning)}</li>" for warning in warnings),
         "reasons": _reasons(document),
@@ -67,16 +72,26 @@ def _filled(document: dict[str, Any], name: str, notes: list[str]) -> dict[str, 
     }
 
 
+def _is_possible(document: dict[str, Any]) -> bool:
+    """Whether any posture in the motion breaks no constraint; older documents do not say it themselves."""
+    frames = document["per_frame"]
+    found = [frame for frame in frames if any(None not in joint for joint in frame["smoothed_m"])]
+    return not found or not all(frame.get("linked_breaks") for frame in found)
+
+
 def _sentences(document: dict[str, Any]) -> list[str]:
-    count = document.get("frames", len(document["per_frame"]))
+    count = len(document["per_frame"])
+    left = f"{document.get('frames_with_survivors', UNKNOWN)} of {counted(count, 'frame')}"
     told = [
-        f"In {document.get('frames_with_survivors', UNKNOWN)} of {count} frames postures are left, "
+        f"Postures are left in {left}, "
         f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest "
         f"motion breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
     ]
+    if not _is_possible(document):
+        told.insert(0, "The motion is no possible sequence by these rules: every posture in it breaks one.")
     most = document.get("most_cut")
     if most:
-        often = f"{most['branches']} branches in {most['frames']} frames"
+        often = f"{counted(most['branches'], 'branch', 'branches')} in {counted(most['frames'], 'frame')}"
         told.append(f"Most is cut by: {most.get('sentence')} ({often}).")
     second = document.get("second")
     if second:
@@ -85,7 +100,7 @@ def _sentences(document: dict[str, Any]) -> list[str]:
             f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
             f"{second['last_frame']}; its probability is {number(second.get('p'))}, its margin over the "
             f"whole sequence {number(second.get('margin_nats'))} nats. Some joint is undecided in "
-            f"{document.get('undecided_frames', UNKNOWN)} of {count} frames."
+            f"{document.get('undecided_frames', UNKNOWN)} of {counted(count, 'frame')}."
         )
     return told
 

@@ -14,6 +14,7 @@ from typing import Any
 from memo.files import read_events_csv, read_track_csv
 from memo.gait import read_gait_parameters_csv
 from memo.run import read_run
+from memo.wording import counted
 
 __all__ = ["RunFolder", "read_run_folder"]
 
@@ -102,5 +103,7 @@ def _checked(path: Path, run: dict[str, Any]) -> dict[str, Any]:
         values = camera.get(name, [0] * count)
         numbers = isinstance(values, list) and all(isinstance(value, int | float) for value in values)
         if not numbers or len(values) != count:
-            raise ValueError(f"{path}: camera {name} must be {count} numbers, got {str(values)[:60]}")
+            raise ValueError(
+                f"{path}: camera {name} must be {counted(count, 'number')}, got {str(values)[:60]}"
+            )
     return run

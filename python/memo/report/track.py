@@ -148,12 +148,13 @@ def _video_pictures(
     rate_hz, shrink = run.run.get("fps_given"), run.run.get("shrink", 1)
     with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=rate_hz, shrink=shrink) as reader:
         size = run.size
-        if size is not None and tuple(size) != reader.size:
-            raise ValueError(f"it has {reader.size[0]}x{reader.size[1]} pixels, the run {size[0]}x{size[1]}")
+        if size is not None and tuple(side // shrink for side in size) != reader.size:
+            width, height = reader.full_size
+            raise ValueError(f"it has {width}x{height} pixels, the run {size[0]}x{size[1]}")
         before = None
         for frame in _counted(progress, "reading the video", reader, reader.frame_count):
             if choice.takes(frame.index) and thinned.wants_next():
-                moved = _moved(before, frame.luma) if nobody else (None, ())
+                moved = _moved(before, frame.luma, shrink) if nobody else (None, ())
                 picture = Picture(frame.index, frame.time_s, jpeg_uri(frame.luma, LONGEST_PX), *moved)
                 thinned.keep(picture, picture.size_bytes)
             before = frame.luma.copy() if nobody else None
@@ -161,7 +162,8 @@ def _video_pictures(
             raise _NoFrames(f"{video}: no frame of the run is among those asked for; {_read(run)}")
         if reader.damage:
             notes.append(f"The video: {reader.damage}.")
-    return thinned.items, thinned.every, reader.size
+    # Of the video all but what is left over at the right and at the bottom, as averaged pictures show it.
+    return thinned.items, thinned.every, (shrink * reader.size[0], shrink * reader.size[1])
 
 
 def _read(run: RunFolder) -> str:
@@ -183,13 +185,15 @@ def _overlay_pictures(
     return thinned.items, thinned.every
 
 
-def _moved(before: Any, now: Any) -> tuple[str | None, tuple[tuple[int, ...], ...]]:
-    """What changed between two frames, and the regions of it in which a walker is looked for."""
+def _moved(before: Any, now: Any, shrink: int) -> tuple[str | None, tuple[tuple[int, ...], ...]]:
+    """What changed between two frames, and the regions of it in which a walker is looked for, in pixels of
+    the video."""
     if before is None:
         return None, ()
     changed = memo.change_mask(before, now)
-    regions = memo.moving_regions(changed)[:, :4].astype(int).tolist()
-    return mask_uri(changed, CHANGED), tuple(tuple(region) for region in regions[:_MOST_REGIONS])
+    found = memo.moving_regions(changed)[:_MOST_REGIONS, :4].astype(int)
+    regions = np.hstack([found[:, :2] * shrink, (found[:, 2:] + 1) * shrink - 1]).tolist()
+    return mask_uri(changed, CHANGED), tuple(tuple(region) for region in regions)
 
 
 def _explained(

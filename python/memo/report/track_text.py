@@ -12,6 +12,7 @@ from memo.report import normative
 from memo.report.page import UNKNOWN, number, rows_table, text
 from memo.report.pictures import Picture
 from memo.report.run_folder import RunFolder
+from memo.wording import counted
 
 __all__ = ["track_text"]
 
@@ -86,13 +87,13 @@ def _sentences(run: RunFolder) -> list[str]:
     if not frames:
         return ["Nobody was tracked in this video."]
     walks = len(set(run.columns["walk"].tolist()))
-    return [f"{_counted(walks, 'walk')} in {_counted(len(frames), 'frame')}, {frames[0]} to {frames[-1]}."]
+    return [f"{counted(walks, 'walk')} in {counted(len(frames), 'frame')}, {frames[0]} to {frames[-1]}."]
 
 
 def _warnings(run: RunFolder, notes: list[str]) -> str:
     told = []
     if run.run.get("interrupted"):
-        count = _counted(run.run["frames_read"], "frame")
+        count = counted(run.run["frames_read"], "frame")
         told.append(f"The run was interrupted after {count}: what came later was not looked at.")
     swapped = {walk: p_swapped for walk, p_swapped in _swapped(run) if p_swapped > _LIKELY_SWAPPED}
     if swapped and (not run.run or len(_sentences(run)) > _MOST_SENTENCES):  # else sentences in sight say so
@@ -152,9 +153,9 @@ def _moved_sentence(pictures: list[Picture]) -> str:
         return ""
     heights = [bottom - top + 1 for picture in looked for _, top, _, bottom in picture.regions[:1]]
     if not heights:
-        return f"Nothing moves in the {_counted(len(looked), 'frame')} of this page."
+        return f"Nothing moves in the {counted(len(looked), 'frame')} of this page."
     return (
-        f"Something moves in {len(heights)} of the {_counted(len(looked), 'frame')} of this page; the "
+        f"Something moves in {len(heights)} of the {counted(len(looked), 'frame')} of this page; the "
         f"largest thing that does is up to {max(heights)} px high. What changed since the frame before is "
         "green, with a box around each moving region."
     )
@@ -285,7 +286,3 @@ def _value(value: Any, depth: int = 0) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{name} {_value(item, depth + 1)}" for name, item in value.items())
     return str(value)
-
-
-def _counted(count: int, one: str) -> str:
-    return f"{count} {one}{'' if count == 1 else 's'}"

@@ -31,6 +31,7 @@ from memo.reproduce.result import (
     in_kind,
     unseen,
 )
+from memo.wording import counted
 
 __all__ = ["hoffman_flinchbaugh"]
 
@@ -131,7 +132,10 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
         ),
         compared(
             *(f"{where}, eq. (6)", "[a1 a2 a3] less k3 z1 + k4 z2 + k5 z3, largest", EQUAL),
-            *(rods["triple_product_error"], f"{trials} triples of vectors with the k's of footnote 11"),
+            *(
+                rods["triple_product_error"],
+                f"{counted(trials, 'triple')} of vectors with the k's of footnote 11",
+            ),
             within=1e-12,
         ),
         compared(
@@ -479,7 +483,9 @@ def _draw_scrambled(figure: Figure, walker: _Walker) -> None:
         places = tracks[len(walker.times_s) // 3]
         _dots(ax, places)
         _linked(ax, walker, places, walker.found[name])
-        ax.set_title(f"{name}: {len(walker.links(walker.found[name]))} links", loc="left", fontsize=9)
+        ax.set_title(
+            f"{name}: {counted(len(walker.links(walker.found[name])), 'link')}", loc="left", fontsize=9
+        )
     axes[0].invert_yaxis()
     axes[0].margins(x=0.3)
 

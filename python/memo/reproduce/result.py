@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -18,7 +17,9 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from memo.files import complete_file
+from memo.files import read_text_columns, write_table
+from memo.unfinished import complete_file
+from memo.wording import counted
 
 __all__ = [
     "EQUAL",
@@ -123,7 +124,7 @@ class Table:
     def write(self, folder: Path) -> Path:
         """Writes `folder`/name.csv; its path."""
         path = folder / f"{self.name}.csv"
-        _write_csv(path, self.header, self.rows)
+        write_table(path, self.header, self.rows)
         return path
 
 
@@ -162,7 +163,7 @@ class Reproduction:
             progress(f"{self.name}: drawing {drawing.item}", done, len(self.figures))
             written.append(drawing.write(folder))
         written += [table.write(folder) for table in self.tables]
-        _write_csv(
+        write_table(
             written[1], ROW_COLUMNS, ([getattr(row, name) for name in ROW_COLUMNS] for row in self.rows)
         )
         with complete_file(written[0]) as temporary:
@@ -171,11 +172,10 @@ class Reproduction:
 
     def _remove_others(self, folder: Path) -> None:
         """Figures of an earlier run that this one does not draw: they would stand beside other rows."""
-        with (
-            contextlib.suppress(OSError),
-            open(folder / "reproduction.csv", newline="", encoding="utf-8") as file,
-        ):
-            earlier = {row["ours"] for row in csv.DictReader(file) if row.get("printed") == "figure"}
+        with contextlib.suppress(OSError, ValueError):
+            columns = read_text_columns(folder / "reproduction.csv", ("printed", "ours"))
+            rows = zip(*columns.values(), strict=True)
+            earlier = {ours for printed, ours in rows if printed == "figure"}
             for name in earlier - {f"{drawing.name}.png" for drawing in self.figures}:
                 if Path(name).name == name:
                     (folder / name).unlink(missing_ok=True)
@@ -183,7 +183,7 @@ class Reproduction:
     def markdown(self) -> str:
         """The rows as a table and the figures with their captions."""
         counts = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
-        lines = [f"# {self.title}", "", self.note, "", f"{len(self.rows)} rows: {counts}.", ""]
+        lines = [f"# {self.title}", "", self.note, "", f"{counted(len(self.rows), 'row')}: {counts}.", ""]
         lines += [f"| {' | '.join(ROW_COLUMNS)} |", "|---|---|---|---|---|---|"]
         for row in self.rows:
             cells = (getattr(row, name).replace("|", "\\|").replace("\n", " ") for name in ROW_COLUMNS)
@@ -220,7 +220,9 @@ def compared(
     found = list(_NUMBER.finditer(printed))
     values = np.atleast_1d(np.asarray(ours, dtype=float)).ravel()
     if len(found) != len(values):
-        raise ValueError(f"{item}, {quantity}: {len(found)} numbers printed, {len(values)} of ours")
+        raise ValueError(
+            f"{item}, {quantity}: {counted(len(found), 'number')} printed, {len(values)} of ours"
+        )
     digits = [len(number.group(1) or "") for number in found]
     allowed = [0.5 * 10.0**-d if within is None else within for d in digits]
     wanted = [float(number.group()) for number in found]
@@ -251,10 +253,3 @@ def in_kind(item: str, quantity: str, printed: str, ours: str, why: str) -> Row:
 def cannot(item: str, quantity: str, printed: str, why: str) -> Row:
     """A row that was not made."""
     return Row(item, quantity, printed, "not made", Verdict.CANNOT, why)
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Any) -> None:
-    with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(header)
-        table.writerows(rows)

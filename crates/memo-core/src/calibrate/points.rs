@@ -14,6 +14,7 @@
 //! Points in one plane do not tell the focal length if the plane is seen head on. Which of the parameters the
 //! points do not tell is an error that says so, not a number with a large deviation.
 
+use crate::wording::counted;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -47,7 +48,7 @@ const MAX_COORDINATE: f64 = 1e6;
 #[non_exhaustive]
 pub enum PointError {
     /// Places and pixels are not paired.
-    #[error("{world} places but {image} pixels")]
+    #[error("{} but {}", counted(*world, "place"), counted(*image, "pixel"))]
     Unpaired {
         /// Number of places.
         world: usize,
@@ -65,7 +66,7 @@ pub enum PointError {
         value: f64,
     },
     /// Not enough points.
-    #[error("{count} points: {NEEDED} are needed, or {NEEDED_IN_PLANE} if all lie in one plane")]
+    #[error("{}: {NEEDED} are needed, or {NEEDED_IN_PLANE} if all lie in one plane", counted(*count, "point"))]
     TooFew {
         /// Points given.
         count: usize,

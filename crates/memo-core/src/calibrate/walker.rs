@@ -23,6 +23,7 @@
 //! walker bends and sways by a hundredth of the height, more than a detector errs; that is averaged, not modelled.
 //! Leaning forwards averages out only if the person also comes back: the deviations of a walk one way allow for it.
 
+use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::DVector;
 use thiserror::Error;
@@ -71,13 +72,13 @@ pub enum WalkerError {
         index: usize,
     },
     /// Not enough sightings.
-    #[error("{count} sightings of the whole person from head to feet: {NEEDED} are needed")]
+    #[error("{} of the whole person from head to feet: {NEEDED} are needed", counted(*count, "sighting"))]
     TooFew {
         /// Sightings given.
         count: usize,
     },
     /// The person is upside down.
-    #[error("in {count} of {total} sightings the head is not above the feet: v counts downwards")]
+    #[error("in {count} of {} the head is not above the feet: v counts downwards", counted(*total, "sighting"))]
     UpsideDown {
         /// Sightings in which the head is below the feet.
         count: usize,

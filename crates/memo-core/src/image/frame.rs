@@ -4,6 +4,7 @@
 //! because change detection is exact in integers. Derived quantities are `Image<f32>`: seven digits are more
 //! than a grey value has, and half the memory traffic of `f64`.
 
+use crate::wording::counted;
 use thiserror::Error;
 
 /// Why a frame was refused.
@@ -11,7 +12,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FrameError {
     /// The buffer is shorter than the image it should hold; for an owned image, of another length.
-    #[error("a {width}x{height} frame with rows {stride} apart needs {needed} bytes, got {got}")]
+    #[error("a {width}x{height} frame with rows {stride} apart needs {}, got {got}", counted(*needed, "byte"))]
     TooShort {
         /// Width in pixels.
         width: usize,

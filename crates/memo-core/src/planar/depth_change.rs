@@ -8,6 +8,7 @@
 //! What it cannot do: perspective within the figure. [`perspective_error_px`] says what that costs.
 
 use super::{FitError, FitOptions, HingeFit, fit_hinge};
+use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;
 
@@ -16,7 +17,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ScaleError {
     /// Every view needs one.
-    #[error("{points} views of the points, {given} scales or times")]
+    #[error("{} of the points, scales or times of {given}", counted(*points, "view"))]
     Lengths {
         /// Views.
         points: usize,

@@ -39,7 +39,7 @@ pub enum MotionRefusal {
     #[error("a position or velocity is not a usable number")]
     NotFinite,
     /// Fewer than two rods or instants that move.
-    #[error("{found} motions give an equation, 2 are needed")]
+    #[error("2 motions that give an equation are needed, got {found}")]
     TooFew {
         /// Motions that are not at rest.
         found: usize,

@@ -28,6 +28,7 @@
 mod layout;
 mod name;
 
+use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;
 
@@ -104,7 +105,7 @@ pub enum DetectorError {
         got: usize,
     },
     /// No layout has so many points.
-    #[error("no keypoint layout has {count} points; known are {}", layout_counts().join(", "))]
+    #[error("no keypoint layout has {}; known are {}", counted(*count, "point"), layout_counts().join(", "))]
     UnknownCount {
         /// The number of points.
         count: usize,

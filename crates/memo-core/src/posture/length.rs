@@ -10,6 +10,7 @@
 //! side, forearms from the front) stay with the prior, and the result says so. The overall scale cannot be seen
 //! in one view: it comes from body height, from the ground or a given distance, or is assumed ([`ScaleFrom`]).
 
+use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
@@ -113,7 +114,7 @@ pub enum LengthFitError {
         frames: usize,
     },
     /// Frames and anchors do not go together.
-    #[error("{frames} frames but {anchors} anchors")]
+    #[error("{} but {}", counted(*frames, "frame"), counted(*anchors, "anchor"))]
     Counts {
         /// Number of frames.
         frames: usize,

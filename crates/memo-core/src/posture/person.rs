@@ -9,6 +9,7 @@
 //! confused, as no motion is predicted.
 
 use super::detector::size_px;
+use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;
 
@@ -36,7 +37,9 @@ impl Default for FollowOptions {
 pub enum FollowError {
     /// The lists do not belong together.
     #[error(
-        "{people} people with {joints} points each need {} points and scores, got {points} and {scores}",
+        "points and scores of {} with {} each: {} wanted, got {points} and {scores}",
+        if *people == 1 { "1 person".to_owned() } else { format!("{people} people") },
+        counted(*joints, "point"),
         people.saturating_mul(*joints)
     )]
     Count {
@@ -220,7 +223,7 @@ mod tests {
         assert_eq!(follow_person(&[0, 0], 0, &[], &[], &options), Ok(vec![false; 2]));
         assert_eq!(follow_person(&[], 3, &[], &[], &options), Ok(vec![]));
         let message = follow_person(&[0, 1], 2, &points[..3], &[1.0; 4], &options).unwrap_err().to_string();
-        assert_eq!(message, "2 people with 2 points each need 4 points and scores, got 3 and 4");
+        assert_eq!(message, "points and scores of 2 people with 2 points each: 4 wanted, got 3 and 4");
         let message = follow_person(&[4, 1], 2, &points, &[1.0; 4], &options).unwrap_err().to_string();
         assert!(message.starts_with("frame 1 follows frame 4"), "{message}");
     }

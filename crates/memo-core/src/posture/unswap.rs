@@ -21,6 +21,7 @@
 mod chain;
 mod relative;
 
+use crate::wording::counted;
 use chain::{Chain, Posterior, Prior, Step};
 use relative::{Sample, Scale, Track};
 
@@ -97,7 +98,7 @@ impl Default for UnswapOptions {
 #[non_exhaustive]
 pub enum UnswapError {
     /// Counts of points and frames disagree.
-    #[error("wanted {frames} frames x {joints} joints = {wanted} points, got {got}")]
+    #[error("wanted {} x {} = {}, got {got}", counted(*frames, "frame"), counted(*joints, "joint"), counted(*wanted, "point"))]
     Points {
         /// Number of times.
         frames: usize,
@@ -109,7 +110,7 @@ pub enum UnswapError {
         got: usize,
     },
     /// Counts of scores and points disagree.
-    #[error("wanted a score for each of {wanted} points, got {got}")]
+    #[error("wanted a score for each of {}, got {got}", counted(*wanted, "point"))]
     Scores {
         /// Points given.
         wanted: usize,

@@ -5,6 +5,7 @@
 use super::scene::stride_length_m;
 use crate::model::body::Part;
 use crate::model::{PosedBody, Walker};
+use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
@@ -31,7 +32,7 @@ pub const WALKER_LIMBS: [[&str; 2]; 8] = [
 #[non_exhaustive]
 pub enum MotionError {
     /// No frame or no point.
-    #[error("a motion needs frames and points, got {frames} frames of {points} points")]
+    #[error("a motion needs frames and points, got {} of {}", counted(*frames, "frame"), counted(*points, "point"))]
     Empty {
         /// Frames given.
         frames: usize,
@@ -39,7 +40,7 @@ pub enum MotionError {
         points: usize,
     },
     /// Lengths disagree.
-    #[error("{positions} positions do not fit {frames} times and {points} names")]
+    #[error("wanted a position for each of {} and {}, got {positions}", counted(*frames, "time"), counted(*points, "name"))]
     Shape {
         /// Positions given, frames times points wanted.
         positions: usize,

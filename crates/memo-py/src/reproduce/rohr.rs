@@ -16,6 +16,7 @@ use memo_core::track::experiment;
 use memo_core::track::score::EdgeLine;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::search::{Axis, Grid, search};
+use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -275,7 +276,7 @@ pub fn walk_similarity<'py>(
 
 fn hypothesis(walk: &PyWalk, row: usize) -> PyResult<Hypothesis> {
     let rows = &walk.rows;
-    rows.get(row)
-        .map(|row| row.hypothesis)
-        .ok_or_else(|| PyIndexError::new_err(format!("row {row} of a walk with {} rows", rows.len())))
+    rows.get(row).map(|row| row.hypothesis).ok_or_else(|| {
+        PyIndexError::new_err(format!("row {row} of a walk with {}", counted(rows.len(), "row")))
+    })
 }

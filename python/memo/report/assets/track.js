@@ -23,13 +23,13 @@ const movedPictures = new Pictures(pictures.moved);
 
 /** Segments out of base64: [[u, v], [u, v]] each, in pixels of the part shown. */
 const unpackedOf = new Map();
-function unpacked(text) {
+function unpacked(text, stepPx) {
   if (!unpackedOf.has(text)) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     const values = new DataView(bytes.buffer);
     const segments = [];
     for (let at = 0; at + 8 <= bytes.length; at += 8) {
-      const [a, b, c, d] = [0, 2, 4, 6].map((next) => values.getInt16(at + next, true) / 16);
+      const [a, b, c, d] = [0, 2, 4, 6].map((next) => values.getInt16(at + next, true) * stepPx);
       segments.push([[a, b], [c, d]]);
     }
     if (unpackedOf.size > 64) unpackedOf.clear();
@@ -81,8 +81,8 @@ const drawStage = drawnCanvas($("stage"), () => stageSize()[0] / stageSize()[1],
   const thick = Math.max(1.5, width / 300);
   const explained = whyOf.get(frames[player.at]);
   if ($("show-contours").checked && explained !== undefined) {
-    const { model, corner } = why[explained];
-    strokes(context, unpacked(model), "#f0e442", thick * 0.7, ([u, v]) => place([u + corner[0], v + corner[1]]));
+    const { model, corner, step_px } = why[explained];
+    strokes(context, unpacked(model, step_px), "#f0e442", thick * 0.7, ([u, v]) => place([u + corner[0], v + corner[1]]));
   }
   for (const [side, chain] of CHAINS) {
     const colour = DARK[side]; // a picture is as bright on any theme
@@ -179,16 +179,16 @@ const WHY = {
     context.fillStyle = "rgba(0,0,0,.5)";
     context.fillRect(0, 0, ...size);
     context.drawImage(images.edges, 0, 0, ...size);
-    strokes(context, unpacked(item.segments), "#56b4e9", 1.3, place);
+    strokes(context, unpacked(item.segments, item.step_px), "#56b4e9", 1.3, place);
   },
   "why-model": (context, item, images, place) => {
-    unpacked(item.model).forEach((segment, k) => strokes(context, [segment], partColour(item.part[k]), 2, place));
+    unpacked(item.model, item.step_px).forEach((segment, k) => strokes(context, [segment], partColour(item.part[k]), 2, place));
   },
   "why-match": (context, item, images, place, size) => {
     context.fillStyle = "rgba(0,0,0,.5)";
     context.fillRect(0, 0, ...size);
-    unpacked(item.model).forEach((segment, k) => strokes(context, [segment], matchColour(item.matched[k]), 3, place));
-    strokes(context, unpacked(item.matched_edges), "#ffffff", 1.2, place);
+    unpacked(item.model, item.step_px).forEach((segment, k) => strokes(context, [segment], matchColour(item.matched[k]), 3, place));
+    strokes(context, unpacked(item.matched_edges, item.step_px), "#ffffff", 1.2, place);
   },
 };
 const whyDraws = Object.entries(WHY).map(([id, paint]) =>
@@ -239,7 +239,7 @@ function showWhy() {
   similarity.show(item.phase, [item.similarity[peak]], `best at ${told(item.phase, 2)}; dotted: half a cycle away`);
   const rows = PARTS.map(([name, from, to]) => {
     let [visible, found] = [0, 0];
-    unpacked(item.model).forEach(([[a, b], [c, d]], k) => {
+    unpacked(item.model, item.step_px).forEach(([[a, b], [c, d]], k) => {
       if (item.part[k] < from || item.part[k] > to || !isNumber(item.matched[k])) return;
       const length = Math.hypot(c - a, d - b);
       visible += length;

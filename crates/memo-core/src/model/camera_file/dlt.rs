@@ -13,6 +13,7 @@
 //! refused if it is more than a hundredth of the focal length. If the matrix mirrors, either v is counted
 //! upwards, as DLTdv does, or the origin lies behind the camera; only the caller knows which.
 
+use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{CameraFileError, CameraFileOptions, FileFormat};
@@ -70,7 +71,10 @@ fn table(text: &str) -> Result<(Option<Vec<String>>, Vec<Vec<f64>>), CameraFileE
             }
             Some(row) if rows.first().is_some_and(|first: &Vec<f64>| first.len() != row.len()) => {
                 let expected = rows[0].len();
-                return Err(syntax(index + 1, format!("{} numbers, {expected} in the first row", row.len())));
+                return Err(syntax(
+                    index + 1,
+                    format!("{}, {expected} in the first row", counted(row.len(), "number")),
+                ));
             }
             Some(row) => rows.push(row),
             None if rows.is_empty() && names.is_none() => {
@@ -90,7 +94,7 @@ fn table(text: &str) -> Result<(Option<Vec<String>>, Vec<Vec<f64>>), CameraFileE
         let got = (rows.len(), rows.first().map_or(0, Vec::len));
         return Err(syntax(
             0,
-            format!("expected 11 rows, a column a camera; got {} rows of {}", got.0, got.1),
+            format!("expected 11 rows, a column a camera; got {} of {}", counted(got.0, "row"), got.1),
         ));
     }
     Ok((names, rows))

@@ -34,6 +34,7 @@ pub use reflection::joint_of;
 use super::{EvidenceOptions, FitOptions, Verdict};
 use crate::posture::skeleton::Joint;
 use crate::progress::{Progress, Stopped};
+use crate::wording::counted;
 use depth::depth_over_time;
 use glam::DVec2;
 use group::best_figure;
@@ -50,13 +51,13 @@ pub const MOST_TRACKS: usize = 200;
 #[non_exhaustive]
 pub enum FigureError {
     /// Fewer than two points, or too many.
-    #[error("{points} points: between 2 and {MOST_TRACKS} can be linked")]
+    #[error("{}: between 2 and {MOST_TRACKS} can be linked", counted(*points, "point"))]
     Points {
         /// Points given.
         points: usize,
     },
     /// A track does not have one position a time.
-    #[error("track {track} has {positions} positions for {times} times")]
+    #[error("track {track} has {} for {}", counted(*positions, "position"), counted(*times, "time"))]
     Lengths {
         /// The track.
         track: usize,
@@ -66,7 +67,7 @@ pub enum FigureError {
         times: usize,
     },
     /// Not one name a track.
-    #[error("{names} names for {tracks} tracks")]
+    #[error("{} for {}", counted(*names, "name"), counted(*tracks, "track"))]
     Names {
         /// Names given.
         names: usize,
@@ -74,7 +75,7 @@ pub enum FigureError {
         tracks: usize,
     },
     /// Too few frames for any test.
-    #[error("{frames} frames are too few: at least {FEWEST_FRAMES} wanted")]
+    #[error("too few frames: {frames}, at least {FEWEST_FRAMES} wanted")]
     Frames {
         /// Frames given.
         frames: usize,

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FitError {
     /// Every point needs one position a view.
-    #[error("the points have {pivot} and {end} views; they must be as many")]
+    #[error("the points must have as many views as each other, got {pivot} and {end}")]
     Lengths {
         /// Views of the pivot.
         pivot: usize,
@@ -27,7 +27,7 @@ pub enum FitError {
         largest: f64,
     },
     /// Too few views show a rod.
-    #[error("{found} views show a rod's points, {needed} are needed")]
+    #[error("{needed} views of a rod's points are needed, got {found}")]
     TooFewViews {
         /// Views found.
         found: usize,

@@ -19,6 +19,7 @@ pub mod ground;
 pub mod track;
 pub mod trunk;
 
+use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
@@ -154,7 +155,7 @@ pub enum AnchorError {
         angle_deg: f64,
     },
     /// Times and anchors do not go together.
-    #[error("{times} times but {anchors} anchors")]
+    #[error("{} but {}", counted(*times, "time"), counted(*anchors, "anchor"))]
     Counts {
         /// Number of times.
         times: usize,

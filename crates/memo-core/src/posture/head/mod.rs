@@ -43,6 +43,7 @@ pub use table::{HeadTable, HeadTableColumn, exact_projections, table_2};
 
 use crate::model::body::BodyError;
 use crate::model::camera::CameraError;
+use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3};
 use thiserror::Error;
@@ -68,7 +69,7 @@ pub enum HeadError {
         needed: usize,
     },
     /// Points are not paired.
-    #[error("{head} head points but {image} image points")]
+    #[error("{} but {}", counted(*head, "head point"), counted(*image, "image point"))]
     Unpaired {
         /// Number of head points.
         head: usize,

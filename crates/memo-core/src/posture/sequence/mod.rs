@@ -58,7 +58,7 @@ pub enum SequenceError {
     #[error("there are no frames")]
     Empty,
     /// Lists do not go together.
-    #[error("{frames} times need as many {what}, got {got}")]
+    #[error("as many {what} as times ({frames}) are needed, got {got}")]
     Counts {
         /// Number of times.
         frames: usize,
@@ -588,7 +588,7 @@ mod tests {
         assert_eq!(refused(&|walk, _| walk.times_s.clear()), "there are no frames");
         assert_eq!(
             refused(&|walk, _| walk.points_px.truncate(3)),
-            "6 times need as many frames of points, got 3"
+            "as many frames of points as times (6) are needed, got 3"
         );
         assert_eq!(
             refused(&|walk, _| walk.times_s[3] = walk.times_s[2]),
@@ -605,7 +605,7 @@ mod tests {
         assert!(refused(&|_, o| o.anchor = AnchorChoice::Source(AnchorSource::Head)).contains("six points"));
         assert!(
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![4.0, 5.0], sd_m: 0.1 })
-                .contains("distances (or one), got 2")
+                .contains("as many distances (or one) as times (6) are needed, got 2")
         );
         assert!(
             refused(&|_, o| o.anchor = AnchorChoice::Given { distance_m: vec![-4.0], sd_m: 0.1 })

@@ -1,5 +1,6 @@
 //! Distance of the neck in every frame, from the sources that were asked for, followed over time.
 
+use crate::wording::counted;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -92,8 +93,10 @@ impl fmt::Display for SourceConflict {
         write!(
             f,
             "the neck's distance is {a_m:.2} m by the {a} but {b_m:.2} m by the {b} ({:.1} standard deviations, \
-             {} of {} frames)",
-            self.sigmas, self.frames, self.of
+             {} of {})",
+            self.sigmas,
+            self.frames,
+            counted(self.of, "frame")
         )
     }
 }

@@ -1,5 +1,6 @@
 //! What a reader should know before trusting the postures of a sequence.
 
+use crate::wording::counted;
 use std::fmt;
 
 use glam::DVec2;
@@ -151,15 +152,18 @@ impl fmt::Display for Warning {
         let percent = |part: usize, of: usize| 100.0 * part as f64 / of.max(1) as f64;
         match self {
             Self::LightJoints { light, all, min_weight } => {
-                write!(f, "{light} of {all} points count as missing, for their weight is below {min_weight}")
+                let all = counted(*all, "point");
+                write!(f, "{light} of {all} taken as missing, for weights below {min_weight}")
             }
             Self::OutsideLens { outside, all } => {
-                write!(f, "{outside} of {all} points lie where this lens shows nothing and count as missing")
+                let all = counted(*all, "point");
+                write!(f, "{outside} of {all} outside what this lens shows, taken as missing")
             }
             Self::OutsidePicture { beyond, all, size: [width, height], farthest_px } => write!(
                 f,
-                "{beyond} of {all} points ({:.0} %) lie outside the camera's picture of {width}x{height} pixels \
-                 (they go to {:.0}, {:.0}): the calibration may be of another picture size",
+                "{beyond} of {} ({:.0} %) outside the camera's picture of {width}x{height} pixels \
+                 (up to {:.0}, {:.0}): the calibration may be of another picture size",
+                counted(*all, "point"),
                 percent(*beyond, *all),
                 farthest_px.x,
                 farthest_px.y
@@ -179,8 +183,9 @@ impl fmt::Display for Warning {
             ),
             Self::SegmentTooShort { segment, length_m, seen_m, frames, of } => write!(
                 f,
-                "{segment} is taken as {length_m:.3} m, but in {frames} of {of} frames it looks at least \
-                 {seen_m:.3} m long: a wrong length or wrong points"
+                "{segment} is taken as {length_m:.3} m, but in {frames} of {} it looks at least \
+                 {seen_m:.3} m long: a wrong length or wrong points",
+                counted(*of, "frame")
             ),
             Self::Conflict(conflict) => conflict.fmt(f),
             Self::NoTravel { travelled_m, from } if travelled_m.is_nan() => write!(
@@ -200,11 +205,13 @@ impl fmt::Display for Warning {
             }
             Self::Backwards { frames, of } => write!(
                 f,
-                "in {frames} of {of} frames the trunk faces against the way: the person walks backwards, or \
-                 right and left are exchanged in all frames"
+                "in {frames} of {} the trunk faces against the way: the person walks backwards, or \
+                 right and left are exchanged in all frames",
+                counted(*of, "frame")
             ),
             Self::SilentFrames { silent, of, reason } => {
-                write!(f, "{silent} of {of} frames say nothing; in the first of them {reason}")
+                let of = counted(*of, "frame");
+                write!(f, "no posture from {silent} of {of}; in the first of them {reason}")
             }
             Self::WithoutRoot { share, usual } => write!(
                 f,
@@ -219,20 +226,23 @@ impl fmt::Display for Warning {
             ),
             Self::NothingPossible { frames, of } => write!(
                 f,
-                "in {frames} of {of} frames ({:.0} %) no posture is possible for a body: look at the violations",
+                "in {frames} of {} ({:.0} %) no posture is possible for a body: look at the violations",
+                counted(*of, "frame"),
                 percent(*frames, *of)
             ),
             Self::LinkedBreaks { frames, of } => write!(
                 f,
-                "in {frames} of {of} frames ({:.0} %) the linked posture breaks a limit of bodies",
+                "in {frames} of {} ({:.0} %) the linked posture breaks a limit of bodies",
+                counted(*of, "frame"),
                 percent(*frames, *of)
             ),
             Self::AgainstRules { motion, strength, frames, of, linked } => write!(
                 f,
-                "the rules of {} ({}) leave no posture in {frames} of {of} frames and {:.0} % of the linked \
+                "the rules of {} ({}) leave no posture in {frames} of {} and {:.0} % of the linked \
                  postures break one: this does not look like {}",
                 motion.name(),
                 strength.name(),
+                counted(*of, "frame"),
                 100.0 * linked,
                 motion.noun()
             ),

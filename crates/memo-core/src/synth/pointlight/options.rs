@@ -1,6 +1,7 @@
 //! Which display is made, and why one could not be.
 
 use crate::model::Camera;
+use crate::wording::counted;
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
@@ -29,7 +30,7 @@ pub enum PointLightError {
         available_s: f64,
     },
     /// Dots on joints with a limited lifetime, and no free joint to jump to.
-    #[error("{dots} dots on {points} joints have nowhere to jump: fewer dots than joints wanted")]
+    #[error("nowhere to jump for {} on {}: fewer dots than joints wanted", counted(*dots, "dot"), counted(*points, "joint"))]
     NoFreeJoint {
         /// Dots asked for.
         dots: usize,
@@ -40,7 +41,7 @@ pub enum PointLightError {
     #[error("dots on limbs need limbs: none given and none of the usual joint names (RSH, REL, ...) found")]
     NoLimbs,
     /// A limb names a point that does not exist.
-    #[error("limb ({}, {}) of a motion with {points} points", limb[0], limb[1])]
+    #[error("limb ({}, {}) of a motion with {}", limb[0], limb[1], counted(*points, "point"))]
     Limb {
         /// The two indices.
         limb: [usize; 2],
@@ -48,7 +49,7 @@ pub enum PointLightError {
         points: usize,
     },
     /// More dots than can be held.
-    #[error("{dots} dots in {frames} frames are too many")]
+    #[error("too many dots to be held: {} in {}", counted(*dots, "dot"), counted(*frames, "frame"))]
     TooMany {
         /// Dots a frame.
         dots: usize,

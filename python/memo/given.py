@@ -1,16 +1,56 @@
-"""What several commands are given, checked before any work."""
+"""What is given to commands and manifests, checked before any work.
+
+Messages name the options of the command line; a manifest puts its columns in their place.
+"""
 
 from __future__ import annotations
 
 import math
+import os
+import re
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import memo
-from memo.cli.delivery import InputError
+
+__all__ = [
+    "InputError",
+    "check_apart",
+    "check_writable",
+    "checked_fov",
+    "checked_height",
+    "frame_range",
+    "is_url",
+    "load_camera",
+    "nothing_at",
+    "tracker_options",
+    "two_sides",
+]
+
+
+class InputError(ValueError):
+    """A mistake in what the user gave; the message is one line."""
+
+
+# Two letters at least: one is a drive of Windows. `Path` leaves one of the two slashes.
+_URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
+
+
+def is_url(path: str | PathLike[str]) -> bool:
+    """Whether a path is written like the address of something elsewhere."""
+    return _URL.fullmatch(os.fspath(path)) is not None
+
+
+def nothing_at(path: str | PathLike[str], what: str = "file") -> str:
+    """What is said of a path where nothing is: of an address, that it must be downloaded first."""
+    address = _URL.fullmatch(os.fspath(path))
+    if address is None:
+        return f"{path}: no such {what}"
+    return f"{address[1]}://{address[2]}: is a URL: download it first and give the path of the file"
 
 
 def load_camera(
@@ -22,8 +62,9 @@ def load_camera(
     *,
     lens_only: bool = False,
 ) -> Any:
+    """The camera of a calibration file."""
     if not path.is_file():
-        raise InputError(f"{path}: no such camera file")
+        raise InputError(nothing_at(path, "camera file"))
     sides = None if size is None else two_sides(size, "--camera-size")
     return memo.Camera.from_file(path, name, unit, size=sides, v_up=v_up, lens_only=lens_only)
 
@@ -37,17 +78,36 @@ def two_sides(text: str, option: str, example: str = "1280x720") -> tuple[int, i
 
 
 def checked_fov(fov_deg: float) -> float:
+    """A field of view, degrees."""
     if not 5 <= fov_deg <= 170:
         raise InputError(f"--fov-deg {fov_deg:g} is not a field of view in degrees (5 to 170)")
     return fov_deg
 
 
 def checked_height(height_m: float) -> float:
+    """The height of a person, metres."""
     if 50 <= height_m <= 250:
         raise InputError(f"--height {height_m:g} looks like centimetres: give --height {height_m / 100:g}")
     if not (math.isfinite(height_m) and 0.5 <= height_m <= 2.5):
         raise InputError(f"--height {height_m:g} is not the height of a person in metres (0.5 to 2.5)")
     return height_m
+
+
+def tracker_options(
+    height_m: float, camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None
+) -> dict[str, Any]:
+    """Options of `Tracker`; `reading` says how the camera's file is read: `name`, `unit`, `size`, `v_up`."""
+    options: dict[str, Any] = {"height_m": checked_height(height_m)}
+    if camera is not None and fov_deg is not None:
+        raise InputError("--camera already holds the field of view: leave --fov-deg out")
+    for name, value in reading.items():
+        if camera is None and value is not None:
+            raise InputError(f"--camera-{name.replace('_', '-')} needs --camera")
+    if camera is not None:
+        options["camera"] = load_camera(camera, **reading)
+    if fov_deg is not None:
+        options["fov_deg"] = checked_fov(fov_deg)
+    return options
 
 
 def frame_range(text: str) -> tuple[int, int | None]:

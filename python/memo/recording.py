@@ -1,0 +1,314 @@
+"""A video tracked into a folder of results: what `memo track` and the processes of `memo batch` do.
+
+Frames go to the tracker; tables, overlay, plots and page are written. What is doubtful about the video goes
+to `remark`, how far the work is to `progress`; nothing is printed. Results are in pixels of the video, also
+where its pictures were averaged down. Needs `av`, and matplotlib for what is drawn.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import memo
+from memo.exits import Exit
+from memo.files import write_events_csv, write_track_csv
+from memo.gait import write_gait_parameters_csv
+from memo.given import InputError, check_writable, nothing_at
+from memo.run import Source, write_run
+
+if TYPE_CHECKING:
+    from memo.tracking import Track
+    from memo.video import Frame, VideoReader
+
+__all__ = ["Recorded", "Recording", "Stop", "follow", "track_recording", "write_results", "write_tables"]
+
+_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
+_LARGEST_PX = 1920  # of a side; a walk enlarged to 2560 and more lost the way it faces
+_OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
+
+Progress = Callable[[str, int, "int | None"], object]
+"""Is called with the step, and how much of it is done and of how much."""
+
+Stop = AbstractContextManager[Any]
+"""Gives an object with `requested`: whether the frame that was taken last shall be the last."""
+
+
+def _unseen(step: str, done: int, total: int | None) -> None:
+    """The progress of one who does not ask."""
+
+
+def _never() -> Stop:
+    return nullcontext(SimpleNamespace(requested=False))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A video, what is known of it, and what is to be written."""
+
+    video: Path
+    options: Mapping[str, Any]
+    """Of `Tracker`; the camera is that of the whole picture."""
+    frames: tuple[int, int | None] = (0, None)
+    """First frame and the one after the last; None for the end."""
+    fps: float | None = None
+    """The rate in place of the time stamps."""
+    shrink: int | None = None
+    """How many pixels, each way, are averaged to one; None for what `VideoReader` chooses."""
+    overlay: bool = True
+    plots: bool = True
+    page: bool = False
+
+
+@dataclass
+class Recorded:
+    """A track with its tables read once, frames numbered as in the video, and what was written of it."""
+
+    columns: dict[str, Any]
+    events: list[dict[str, Any]]
+    start: dict[str, Any]
+    measured: dict[str, Any]
+    contours: Callable[[int], Any] = field(repr=False)
+    summary: dict[str, Any]
+    sentences: list[str]
+    gait_parameters: dict[str, Any]
+    camera: Any
+    shrink: int
+    records: list[dict[str, Any]]
+    run: tuple[Mapping[str, Any], Source, int, bool]
+    """Options, source, frames read and whether frames were left: what `write_run` is given."""
+    written: list[Path] = field(default_factory=list)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether frames that were asked for were left unread."""
+        return self.run[3]
+
+    @property
+    def source(self) -> Source:
+        """Where the frames came from."""
+        return self.run[1]
+
+    @property
+    def exit(self) -> Exit:
+        """The exit code that tells whether anybody was tracked."""
+        return Exit.TRACKED if len(self.columns["frame"]) else Exit.NOBODY
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What was found, for JSON: the figures of the longest walk, and each walk."""
+        return {
+            **self.summary,
+            "rows": len(self.columns["frame"]),
+            "each_walk": [{name: walk[name] for name in _OF_A_WALK} for walk in self.records],
+            "sentences": self.sentences,
+        }
+
+
+def track_recording(
+    recording: Recording,
+    out: Path,
+    *,
+    progress: Progress = _unseen,
+    remark: Callable[[str], object] = lambda sentence: None,
+    stop: Stop | None = None,
+) -> Recorded:
+    """Tracks a video and writes the results into the folder `out`.
+
+    Stopped after a frame, it writes the tables of what was tracked until then, and draws nothing.
+    """
+    from memo.video import VideoDamageWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", VideoDamageWarning)  # damage is a remark
+        return _track_recording(recording, out, progress, remark, stop)
+
+
+def _track_recording(
+    recording: Recording,
+    out: Path,
+    progress: Progress,
+    remark: Callable[[str], object],
+    stop: Stop | None,
+) -> Recorded:
+    from memo.video import VideoReader
+
+    video = recording.video
+    if not video.exists():
+        raise InputError(nothing_at(video))
+    check_writable(out)
+
+    def opened() -> VideoReader:
+        start, end = recording.frames
+        return VideoReader(video, start=start, stop=end, rate_hz=recording.fps, shrink=recording.shrink)
+
+    with opened() as reader:
+        options = _fitted(recording.options, reader)
+        for doubt in _doubts(reader, "camera" in options):
+            remark(f"{video}: {doubt}")
+        source = Source(
+            video=video,
+            frames=recording.frames,
+            rate_hz=reader.rate_hz,
+            fps_given=recording.fps,
+            camera_given="camera" in options,
+            shrink=reader.shrink,
+            size=reader.full_size,
+        )
+        recorded = follow(reader, memo.Tracker(**options), source, out, reader.frame_count, progress, stop)
+        if reader.damage:
+            remark(f"{video}: {reader.damage}")
+    if recorded.interrupted:
+        write_tables(recorded, out)
+        return recorded
+    with opened() as reader:
+        write_results(
+            recorded,
+            out,
+            reader,
+            reader.frame_count,
+            overlay=recording.overlay,
+            plots=recording.plots,
+            progress=progress,
+        )
+    if recording.page:
+        from memo.report import write_report
+
+        recorded.written.append(write_report(out, out / "report.html", progress=progress).path)
+    return recorded
+
+
+def follow(
+    frames: Iterable[Frame],
+    tracker: Any,
+    source: Source,
+    out: Path,
+    count: int | None = None,
+    progress: Progress = _unseen,
+    stop: Stop | None = None,
+) -> Recorded:
+    """Gives all frames to the tracker; a stop ends it after the current frame.
+
+    An error in the middle is raised again once the tables hold what was tracked until then.
+    """
+    frames_read = 0
+    try:
+        with _never() if stop is None else stop as asked:
+            for frame in _told(frames, "tracking", count, progress):
+                tracker.update(frame.luma, frame.time_s)
+                frames_read += 1
+                if asked.requested:
+                    break
+    except ValueError as error:
+        recorded = _recorded(tracker, source, frames_read, interrupted=True)
+        if not len(recorded.columns["frame"]):
+            raise
+        write_tables(recorded, out)
+        raise InputError(f"{error}; the tables hold what was tracked until then") from error
+    return _recorded(tracker, source, frames_read, asked.requested)
+
+
+def write_results(
+    recorded: Recorded,
+    out: Path,
+    frames: Iterable[Frame],
+    count: int | None = None,
+    *,
+    overlay: bool = True,
+    plots: bool = True,
+    progress: Progress = _unseen,
+) -> None:
+    """Writes the tables and, where anybody was tracked, what is drawn; the frames are those tracked."""
+    write_tables(recorded, out)
+    if not len(recorded.columns["frame"]):
+        return
+    if overlay:
+        from memo.overlay import write_overlay
+
+        path, source = out / "overlay.mp4", recorded.source
+        drawn_on = _told(frames, "drawing", count, progress)
+        write_overlay(path, drawn_on, recorded, rate_hz=source.rate_hz, shrink=source.shrink)
+        recorded.written.append(path)
+    if plots:
+        from memo.plot import write_plots
+
+        recorded.written += write_plots(recorded, out)
+
+
+def _told(frames: Iterable[Frame], step: str, count: int | None, progress: Progress) -> Iterator[Frame]:
+    """The same frames, each told when it is done with."""
+    progress(step, 0, count)
+    for done, frame in enumerate(frames, 1):
+        yield frame
+        progress(step, done, count)
+
+
+def _fitted(options: Mapping[str, Any], reader: VideoReader) -> dict[str, Any]:
+    """The options with the camera of the frames as they are read."""
+    camera = options.get("camera")
+    if camera is None:
+        return dict(options)
+    if tuple(camera.size) == reader.full_size:
+        return {**options, "camera": camera.shrunk(reader.shrink)}
+    (width, height), (video_width, video_height) = camera.size, reader.full_size
+    turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
+    raise InputError(
+        f"{reader.path}: the camera is for {width}x{height} pixels, the video has "
+        f"{video_width}x{video_height}{turned}"
+    )
+
+
+def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:
+    """What may make the results wrong, in sentences."""
+    if max(reader.size) > _LARGEST_PX:
+        width, height = reader.size
+        yield (
+            f"{width}x{height} pixels are more than memo was tested on: which way the person faces and "
+            "which leg is which may be wrong; leave --shrink out"
+        )
+    if not camera_given and reader.pixel_aspect != 1:
+        yield f"pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera"
+
+
+def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool) -> Recorded:
+    """The track in pixels of the video, frames numbered as in the video (the tracker counts from 0)."""
+    track: Track = tracker.finish()
+    if source.shrink > 1:
+        track = track.of_video(source.shrink, source.size)
+    first_frame = source.frames[0]
+
+    def renumbered(table: Mapping[str, Any]) -> dict[str, Any]:
+        return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else {**table}
+
+    return Recorded(
+        columns=renumbered(track.columns),
+        events=[{**event, "frame": event["frame"] + first_frame} for event in track.events],
+        start=renumbered(track.start),
+        measured=renumbered(track.measured),
+        contours=track.contours,
+        summary=dict(track.summary),
+        sentences=list(track.sentences),
+        gait_parameters=dict(track.gait_parameters),
+        camera=track.camera,
+        shrink=source.shrink,
+        records=track.records,
+        run=(tracker.options, source, frames_read, interrupted),
+    )
+
+
+def write_tables(recorded: Recorded, out: Path) -> None:
+    """Writes track.csv, events.csv, gait_parameters.csv and run.json; removes what an earlier run drew."""
+    for stale in _DRAWN:  # of an earlier run: they would stand beside tables they do not belong to
+        (out / stale).unlink(missing_ok=True)
+    table, events, gait = (out / name for name in ("track.csv", "events.csv", "gait_parameters.csv"))
+    write_track_csv(table, recorded.columns)
+    write_events_csv(events, recorded.events)
+    write_gait_parameters_csv(gait, recorded.gait_parameters)
+    recorded.written = [table, events, gait, write_run(out, recorded, *recorded.run)]

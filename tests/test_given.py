@@ -1,0 +1,127 @@
+"""What is given to commands: what is not there, lies elsewhere or would have no effect is refused."""
+
+import re
+import shlex
+import sys
+
+import pytest
+from memo import batch, cli
+from memo.given import is_url, nothing_at
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """Runs a command in an empty folder; exit code and what is said."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(line):
+        monkeypatch.setattr(sys, "argv", ["memo", *shlex.split(line)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out + said.err
+
+    return run
+
+
+URLS = (
+    "track {}.mp4",
+    "posture k.json --camera {}.toml",
+    "posture k.json --camera c.toml --lengths {}.csv",
+    "planar {}.csv",
+    "unswap {}.json",
+    "pointlight {}.c3d",
+    "convert {}.c3d b.trc",
+    "convert {}.csv b.json",
+    "report {}",
+    "report memo-out/x --video {}.mp4",
+    "batch {}.csv",
+    "batch {}.toml",
+    "calibrate points {}.csv --size 640x480",
+    "calibrate points p.csv --picture {}.png",
+    "calibrate walker {}.mp4 --height 1.7",
+    "calibrate checkerboard {} --squares 9x6 --square-mm 30",
+    "reproduce rohr --video {}.mp4",
+)
+
+
+@pytest.mark.parametrize("line", URLS)
+def test_a_url_must_be_downloaded_first(command, tmp_path, line):
+    url = "https://example.org/a/b"
+    code, said = command(line.format(url))
+    assert code == 1 and re.fullmatch(rf"memo: {url}[.\w]*: is a URL: download it first and .*\n", said), said
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_a_url_in_a_manifest_is_told_with_its_line(command, tmp_path):
+    (tmp_path / "m.csv").write_text(
+        "video,camera\nhttps://example.org/a.mp4,\nb.mp4,https://example.org/c.toml\n"
+    )
+    (tmp_path / "b.mp4").write_text("x")
+    code, said = command("batch m.csv --check")
+    assert code == 1
+    first, second = said.splitlines()
+    assert first.startswith("memo: m.csv, line 2: https://example.org/a.mp4: is a URL: download it first")
+    assert second.startswith("memo: m.csv, line 3: https://example.org/c.toml: is a URL")
+
+
+@pytest.mark.parametrize(
+    ("path", "yes"),
+    [
+        ("https://x.org/a", True),
+        ("https:/x.org/a", True),  # as a Path has it
+        ("s3://bucket/a.mp4", True),
+        ("rtsp://10.0.0.1/", True),
+        ("C:/videos/a.mp4", False),
+        ("a:b.mp4", False),
+        ("walk.mp4", False),
+        ("/https/a.mp4", False),
+    ],
+)
+def test_urls_are_told_from_paths(path, yes):
+    assert is_url(path) is yes
+    assert ("URL" in nothing_at(path)) is yes
+
+
+def test_a_file_called_like_a_url_is_read(command, tmp_path, write_video, luma_frames):
+    (tmp_path / "https:" / "x.org").mkdir(parents=True)
+    write_video("https:/x.org/a.mp4", luma_frames(count=3))
+    code, said = command("track https://x.org/a.mp4 --no-overlay --no-plots --out o")
+    assert code == 3 and "URL" not in said, said
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("pointlight nothere.c3d", "nothere.c3d: no such file or folder"),
+        ("pointlight nothere.csv", "nothere.csv: no such file or folder"),
+        ("pointlight nothere", "nothere: no such file or folder"),
+        ("convert nothere.c3d a.trc", "nothere.c3d: no such file or folder"),
+        ("planar nothere.csv", "nothere.csv: no such file or folder"),
+        ("posture nothere.json --camera c.toml", "c.toml: no such camera file"),
+        ("track nothere.mp4", "nothere.mp4: no such file"),
+        ("batch nothere.csv", "nothere.csv: no such file"),
+        ("report nothere", "nothere: no such folder"),
+        ("calibrate points nothere.csv --size 640x480", "nothere.csv: no such file"),
+        ("pointlight --dots 3", "--dots is used with --lifetime only"),
+        ("pointlight --on joints", "--on is used with --lifetime only"),
+        ("pointlight --noise-kind linear", "--noise-kind is used with --noise-dots only"),
+        ("pointlight a.csv --seconds 2", "--seconds is used without MOTION only"),
+    ],
+)
+def test_what_is_not_there_or_has_no_effect_is_refused(command, tmp_path, line, says):
+    assert command(line) == (1, f"memo: {says}\n")
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_dots_with_a_lifetime_are_shown(command, tmp_path):
+    for options, count in (("", 8), ("--dots 5 --on joints", 5)):
+        code, said = command(f"pointlight --lifetime 3 {options} --seconds 0.2 --out o")
+        assert code == 0 and said.startswith(f"{count} dots in 12 frames.")
+
+
+def test_the_help_of_the_manifest_names_every_column(command):
+    _, said = command("batch --help")
+    words = set(re.findall(r"[a-z_]+", said))
+    assert {"video", "name", *batch.OPTIONS} <= words
