@@ -7,6 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyTracker, SegmentsWithParts, segments_with_parts};
+use crate::wait::{detached, pooled};
 use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::{Camera, VisibilityOptions, Walker};
@@ -90,7 +91,7 @@ pub fn recorded_contours<'py>(
     torso_m: &Bound<'py, PyAny>,
     phases: Vec<f64>,
 ) -> PyResult<Vec<SegmentsWithParts<'py>>> {
-    let walk = Recorded::read(record, tracker.borrow().locked().options())?;
+    let walk = Recorded::read(record, &options_of(tracker)?)?;
     let torso_m = points_from_numpy(torso_m)?;
     if torso_m.len() != phases.len() {
         let message = format!("{} torso centres for {} phases", torso_m.len(), phases.len());
@@ -105,6 +106,11 @@ pub fn recorded_contours<'py>(
         segments_with_parts(py, &scene.visible(&at, &VisibilityOptions::DRAWN), scene.camera)
     };
     torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
+}
+
+/// The options a tracker works with.
+fn options_of(tracker: &Bound<'_, PyTracker>) -> PyResult<TrackerOptions> {
+    tracker.get().read(|tracker| tracker.options().clone())
 }
 
 fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
@@ -196,7 +202,7 @@ impl PyExplainer {
         records: Vec<Bound<'_, PyDict>>,
         wanted: HashSet<usize>,
     ) -> PyResult<Self> {
-        let options = tracker.borrow().locked().options().clone();
+        let options = options_of(tracker)?;
         let walks = records.iter().map(|r| Recorded::read(r, &options)).collect::<PyResult<_>>()?;
         let stream = Some(EvidenceStream::new(options.evidence));
         Ok(Self { options, walks, wanted, stream })
@@ -215,14 +221,14 @@ impl PyExplainer {
         let Some(stream) = &mut self.stream else {
             return Err(PyValueError::new_err("the frames have ended"));
         };
-        let evidence = py.detach(|| stream.push(&frame, time_s)).map_err(value_error)?;
+        let evidence = detached(py, || stream.push(&frame, time_s))?.map_err(value_error)?;
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }
 
     /// Gives the last frame.
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(stream) = self.stream.take() else { return Ok(None) };
-        let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
+        let evidence = detached(py, || stream.finish())?.map_err(value_error)?;
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }
 }
@@ -242,9 +248,9 @@ impl PyExplainer {
             return Err(refused("window_px", message));
         }
         let scene = self.walks[index].scene();
-        let why = py
-            .detach(|| explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))
-            .map_err(value_error)?;
+        let why =
+            pooled(py, || explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))?
+                .map_err(value_error)?;
         dict_of(py, evidence, index, &look, &why, scene.camera).map(Some)
     }
 }

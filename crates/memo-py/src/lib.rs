@@ -9,6 +9,7 @@ mod image;
 mod keypoints;
 mod planar;
 mod pointlight;
+mod pool;
 mod posture;
 mod reproduce;
 mod score;
@@ -28,6 +29,8 @@ mod _memo {
     use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
+    #[pymodule_export]
+    use super::error::InternalError;
     #[pymodule_export]
     use super::explain::{PyExplainer, recorded_contours};
     #[pymodule_export]
@@ -66,9 +69,12 @@ mod _memo {
     use super::tracker::{PyTracker, PyWalk};
     #[pymodule_export]
     use super::unswap::unswap;
+    #[pymodule_export]
+    use super::wait::panic_on_purpose;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::error::note_panics();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -3,6 +3,7 @@
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::wait::detached;
 use memo_core::synth::{SceneOptions, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -39,7 +40,7 @@ impl PyScene {
                 self.0.len()
             )));
         }
-        let image = py.detach(|| self.0.frame(index));
+        let image = detached(py, || self.0.frame(index))?;
         numpy_from_image(py, image)
     }
 

@@ -1,35 +1,78 @@
-//! Waiting for the core: Ctrl-C is heard, and progress told, while another thread computes.
+//! Running the core without the interpreter lock: Ctrl-C is heard, progress is reported, and a fault of the core
+//! becomes an exception.
 
+use crate::error::internal_error;
+use crate::pool::pool;
 use memo_core::progress::Progress;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// So often signals are looked for.
+/// Signals are checked this often.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Runs what may last longer than a moment. On Ctrl-C it is left to end by itself, unheard.
+/// Runs what is short and does not use several threads.
+pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| caught(work)).map_err(internal_error)
+}
+
+/// Runs what is short and may use several threads.
+pub fn pooled<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let pool = pool(py)?;
+    detached(py, || pool.install(work))
+}
+
+/// Runs what may last longer than a moment and does not use several threads. After Ctrl-C it keeps running in the
+/// background; its result is discarded.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    watched(py, None, |_| work())
+    on_a_thread(py, None, |_| work())
 }
 
-/// Runs what may last for seconds, and calls `callback` with the units done and their number as they change.
-/// On Ctrl-C, or when the callback raises, the work is asked to stop and left to do so by itself.
+/// Runs what may last for seconds and may use several threads, and calls `callback` with the units done and their
+/// number as they change. After Ctrl-C, or when the callback raises, the work is cancelled; it ends in the background.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
+    let pool = pool(py)?;
+    on_a_thread(py, callback, move |progress| pool.install(|| work(progress)))
+}
+
+/// Panics as a bug in the core would; for tests.
+#[pyfunction(name = "_panic")]
+pub fn panic_on_purpose(py: Python<'_>, message: String, is_long: bool) -> PyResult<()> {
+    if is_long {
+        return watched(py, None, move |_| panic!("{message}"));
+    }
+    pooled(py, || panic!("{message}"))
+}
+
+/// `work`, or what it said when it panicked.
+fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
+        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
+        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
+    })
+}
+
+fn on_a_thread<T: Send + 'static>(
+    py: Python<'_>,
+    callback: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Progress) -> T + Send + 'static,
+) -> PyResult<T> {
+    let process = std::process::id();
     let progress = Arc::new(Progress::new());
     let (sender, mut receiver) = channel();
     let of_worker = Arc::clone(&progress);
     // Nobody listens any more after an interrupt: sending may fail.
-    let start = move || drop(sender.send(work(&of_worker)));
+    let start = move || drop(sender.send(caught(|| work(&of_worker))));
     std::thread::Builder::new().name("memo".into()).spawn(start)?;
     let mut told = 0;
     loop {
@@ -41,15 +84,21 @@ pub fn watched<T: Send + 'static>(
         match result {
             Ok(result) => {
                 tell(callback, &progress, &mut told)?;
-                return Ok(result);
+                return result.map_err(internal_error);
             }
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py.check_signals().and_then(|()| tell(callback, &progress, &mut told));
+                if std::process::id() != process {
+                    // Forked by the callback or a signal handler. The thread that computes is the parent's, and
+                    // dropping the receiver might wait for it.
+                    std::mem::forget(receiver);
+                    heard?;
+                    let message = "the process was forked during this call: the parent has its result";
+                    return Err(PyRuntimeError::new_err(message));
+                }
                 heard.inspect_err(|_| progress.stop())?;
             }
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("the computation broke off; this is a fault of memo"));
-            }
+            Err(RecvTimeoutError::Disconnected) => return Err(internal_error(String::new())),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Hoffman and Flinchbaugh (1982): the propositions on random problems.
 
 use crate::array::rows_from_numpy;
+use crate::wait::detached;
 use glam::DVec2;
 use memo_core::planar::experiment::{
     DEGENERATE, PrintedRod, degenerate_refusals, false_targets, hinge_trials, rod_trials,
@@ -16,7 +17,7 @@ pub fn hoffman_flinchbaugh_rods<'py>(
     trials: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = py.detach(|| rod_trials(trials, seed));
+    let t = detached(py, || rod_trials(trials, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -47,7 +48,7 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
     searched: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = py.detach(|| hinge_trials(trials, searched, seed));
+    let t = detached(py, || hinge_trials(trials, searched, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -66,8 +67,8 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
 
 /// How many of `trials` unrelated pairs in three views, and triples in two, are read as planar.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> [usize; 2] {
-    py.detach(|| false_targets(trials, seed))
+pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> PyResult<[usize; 2]> {
+    detached(py, || false_targets(trials, seed))
 }
 
 /// How many of `trials` degenerate problems are refused, by kind.
@@ -76,8 +77,9 @@ pub fn hoffman_flinchbaugh_degenerate(
     py: Python<'_>,
     trials: usize,
     seed: u64,
-) -> Vec<(&'static str, usize)> {
-    DEGENERATE.into_iter().zip(py.detach(|| degenerate_refusals(trials, seed))).collect()
+) -> PyResult<Vec<(&'static str, usize)>> {
+    let refused = detached(py, || degenerate_refusals(trials, seed))?;
+    Ok(DEGENERATE.into_iter().zip(refused).collect())
 }
 
 /// Eqs. (4)-(14) on three views (1, 3, 2) from pivot to end: `k` (5), `roots` (2) or None, `z3_sq` (2),

@@ -7,6 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
+use crate::wait::{detached, pooled};
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
 use memo_core::model::body::Part;
@@ -30,8 +31,8 @@ pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
 /// By how much the two sides of each equation differ, computed in two ways, by name.
 #[pyfunction]
 #[pyo3(signature = (seed=0))]
-pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
-    py.detach(|| experiment::deviations(seed))
+pub fn rohr_deviations(py: Python<'_>, seed: u64) -> PyResult<Vec<(&'static str, f64)>> {
+    detached(py, || experiment::deviations(seed))
 }
 
 fn gait_of(name: &str) -> PyResult<Gait> {
@@ -257,10 +258,10 @@ pub fn walk_similarity<'py>(
         })
         .collect::<PyResult<_>>()?;
     let grid = Grid::whole_cycle_within(at.along_m, at.height_m, [along_m, height_m]);
-    let found = py.detach(|| {
+    let found = pooled(py, || {
         let options = &tracked.options;
         search(&edges, &tracked.scene(), &grid, &options.similarity, options.hidden_lines)
-    });
+    })?;
     let values = |axis: &Axis, from: f64| (0..axis.count).map(|i| axis.at(i) - from).collect::<Vec<f64>>();
     let shape = vec![grid.phase.count, grid.along.count, grid.height.count];
     let best = found.best();
