@@ -71,9 +71,9 @@ __all__ = [
 __version__: str
 
 class InternalError(RuntimeError):
-    """A bug in memo, not a mistake in what it was given."""
+    """A bug in memo, not a mistake in what it was given; standard error says where it is."""
 
-def _panic(message: str, is_long: bool) -> None: ...
+def _panic(message: str, way: str) -> None: ...
 
 @final
 class Camera:

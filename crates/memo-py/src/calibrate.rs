@@ -5,7 +5,6 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::wait::detached;
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::{
     Estimate, KnownLens, PointOptions, Sighting, WalkerOptions, camera_from_points, camera_from_walker,
@@ -30,7 +29,7 @@ pub fn calibrate_points<'py>(
     let places: Vec<DVec3> = points_from_numpy(places)?.into_iter().map(DVec3::from).collect();
     let pixels = pixels_from_numpy(pixels)?;
     let options = PointOptions { size: size.into(), lens: known_lens(focal_px, lens)? };
-    let found = detached(py, || camera_from_points(&places, &pixels, &options))?.map_err(value_error)?;
+    let found = py.detach(|| camera_from_points(&places, &pixels, &options)).map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("camera", PyCamera(found.camera))?;
     dict.set_item("estimates", estimates(py, &found.estimates)?)?;
@@ -78,7 +77,7 @@ pub fn calibrate_walker<'py>(
     };
     let sightings: Vec<Sighting> = (0..feet.len()).map(sighting).collect();
     let options = WalkerOptions { size: size.into(), height_m, lens: known_lens(focal_px, lens)? };
-    let found = detached(py, || camera_from_walker(&sightings, &options))?.map_err(value_error)?;
+    let found = py.detach(|| camera_from_walker(&sightings, &options)).map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("camera", PyCamera(found.camera))?;
     dict.set_item("estimates", estimates(py, &found.estimates)?)?;

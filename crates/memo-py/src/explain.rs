@@ -7,7 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyTracker, SegmentsWithParts, segments_with_parts};
-use crate::wait::{detached, pooled};
+use crate::wait::pooled;
 use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::{Camera, VisibilityOptions, Walker};
@@ -221,14 +221,14 @@ impl PyExplainer {
         let Some(stream) = &mut self.stream else {
             return Err(PyValueError::new_err("the frames have ended"));
         };
-        let evidence = detached(py, || stream.push(&frame, time_s))?.map_err(value_error)?;
+        let evidence = py.detach(|| stream.push(&frame, time_s)).map_err(value_error)?;
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }
 
     /// Gives the last frame.
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(stream) = self.stream.take() else { return Ok(None) };
-        let evidence = detached(py, || stream.finish())?.map_err(value_error)?;
+        let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
 use crate::error::value_error;
-use crate::wait::{detached, interruptible};
+use crate::wait::interruptible;
 use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
@@ -25,7 +25,7 @@ pub fn change_mask<'py>(
     let (a, b) = (a.as_frame()?, b.as_frame()?);
     let threshold = threshold.map(|t| not_negative("threshold", t)).transpose()?;
     let options = ChangeOptions { threshold, ..ChangeOptions::default() };
-    let mask = detached(py, || pair_changes(&a, &b, &options))?.map_err(value_error)?;
+    let mask = py.detach(|| pair_changes(&a, &b, &options)).map_err(value_error)?;
     numpy_from_image(py, mask)
 }
 
@@ -35,8 +35,8 @@ pub fn change_mask<'py>(
 pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mask = mask_from_numpy(mask)?;
     let group = GroupOptions::default();
-    let cleaned = detached(py, || clean(&mask, &CleanOptions::default()))?.map_err(value_error)?;
-    let found = detached(py, || group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group))?;
+    let cleaned = py.detach(|| clean(&mask, &CleanOptions::default())).map_err(value_error)?;
+    let found = py.detach(|| group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group));
     let row = |r: &memo_core::image::Region| {
         let q = r.rectangle;
         [q.left, q.top, q.right, q.bottom, r.area].map(|v| v as f64)

@@ -2,7 +2,6 @@
 
 use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
 use crate::error::value_error;
-use crate::wait::detached;
 use glam::DVec2;
 use memo_core::posture::detector::{
     Detector, DetectorError, LAYOUTS, Layout, WeightedPoints, joint_name as core_joint_name,
@@ -131,6 +130,6 @@ pub fn follow_person(
     let people = track_from_numpy(points)?;
     let scores = scores_from_numpy(scores, &people)?;
     let options = FollowOptions::default();
-    detached(py, || core_follow_person(&frames, people.joints, &people.points_px, &scores, &options))?
+    py.detach(|| core_follow_person(&frames, people.joints, &people.points_px, &scores, &options))
         .map_err(value_error)
 }

@@ -30,8 +30,6 @@ mod _memo {
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
-    use super::error::InternalError;
-    #[pymodule_export]
     use super::explain::{PyExplainer, recorded_contours};
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
@@ -74,7 +72,7 @@ mod _memo {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        super::error::note_panics();
+        super::error::add_internal_error(module)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat, rows_from_numpy};
 use crate::error::value_error;
-use crate::wait::{detached, watched};
+use crate::wait::watched;
 use glam::DVec2;
 use memo_core::planar::{
     Chain, DepthSource, EvidenceOptions, FalseTargetRate, Figure, FigureOptions, FitOptions, Interpretation,
@@ -24,7 +24,7 @@ pub fn planar_rods<'py>(py: Python<'py>, views: &Bound<'py, PyAny>) -> PyResult<
     let views = views.as_slice()?;
     let (problems, _) = views.as_chunks::<2>().0.as_chunks::<3>();
     let mut depths = vec![[0.0; 3]; problems.len()];
-    detached(py, || rod_depths(problems, &mut depths))?;
+    py.detach(|| rod_depths(problems, &mut depths));
     numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 3])
 }
 
@@ -39,7 +39,7 @@ pub fn planar_hinges<'py>(
     let views = views.as_slice()?;
     let (problems, _) = views.as_chunks::<2>().0.as_chunks::<4>();
     let mut depths = vec![[0.0; 4]; problems.len()];
-    detached(py, || hinge_depths(problems, &mut depths))?;
+    py.detach(|| hinge_depths(problems, &mut depths));
     numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 4])
 }
 

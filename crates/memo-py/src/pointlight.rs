@@ -3,7 +3,6 @@
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat};
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::wait::detached;
 use glam::DVec3;
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::synth::{
@@ -29,7 +28,7 @@ pub fn walker_motion<'py>(
     let body = Body::from_height(height_m).map_err(value_error)?;
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
     let options = WalkOptions { frames, rate_hz, speed_mps, heading_rad: heading_deg.to_radians(), phase };
-    let motion = detached(py, || sampled_walk(&walker, &options))?.map_err(value_error)?;
+    let motion = py.detach(|| sampled_walk(&walker, &options)).map_err(value_error)?;
     let flat = motion.positions().iter().flat_map(|p| p.to_array()).collect();
     let result = PyDict::new(py);
     result.set_item("positions", numpy_from_flat(py, flat, vec![motion.frames(), motion.points(), 3])?)?;
@@ -130,7 +129,7 @@ pub fn pointlight<'py>(
         noise_dots: (noise_dots > 0).then_some(NoiseDots { count: noise_dots, kind, area_scale: noise_area }),
         noise_sd_px,
     };
-    let shown = detached(py, || point_light_display(&motion, &options))?.map_err(value_error)?;
+    let shown = py.detach(|| point_light_display(&motion, &options)).map_err(value_error)?;
     let shape = vec![shown.times_s.len(), shown.dots];
     let (labels, rest): (Vec<i64>, Vec<(i64, f64)>) = shown
         .sources

@@ -6,7 +6,7 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::wait::{detached, watched};
+use crate::wait::watched;
 use glam::{DVec2, DVec3};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
@@ -120,7 +120,7 @@ pub fn posture_tree<'py>(
     let strength = named("strength", strength, Strength::from_name, &["measured", "paper"])?;
     let view = View::new(rays, DVec3::from(neck), lengths_from_names(lengths)?);
     let interpret = || view.interpret(&motion.tree(strength)).map(|found| found.figures());
-    numpy_from_figures(py, &detached(py, interpret)?.map_err(value_error)?)
+    numpy_from_figures(py, &py.detach(interpret).map_err(value_error)?)
 }
 
 fn per_joint<T: Copy>(flat: &[T]) -> Vec<PerJoint<T>> {

@@ -1,7 +1,6 @@
 //! Similarity of model contours and image edges.
 
 use crate::array::{numpy_from_rows, segments_from_numpy};
-use crate::wait::detached;
 use memo_core::track::score::{EdgeLine, ModelLine, SimilarityOptions, similarity as core_similarity};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -28,7 +27,7 @@ pub fn similarity<'py>(
         .map(|[start, end]| EdgeLine { start, end, gradient: 0.0, velocity: 0.0 })
         .collect();
     let options = SimilarityOptions { c_l, c_d, c_r, sigma_phi_rad, ..SimilarityOptions::default() };
-    let found = detached(py, || core_similarity(&lines, &edges, &options))?;
+    let found = py.detach(|| core_similarity(&lines, &edges, &options));
     let row = |m: &memo_core::track::score::Match| {
         [
             m.line as f64,

@@ -3,11 +3,13 @@
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use crate::wait::detached;
 use memo_core::synth::{SceneOptions, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
+
+/// Half a day at 25 frames per second.
+const MOST_FRAMES: usize = 1_000_000;
 
 /// A walker before a wall with everything known; frames are drawn when asked for.
 #[pyclass(name = "Scene", module = "memo._memo", frozen)]
@@ -25,8 +27,9 @@ impl PyScene {
         late_left: f64,
     ) -> PyResult<Self> {
         let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..SceneOptions::default() };
-        if frames <= options.empty_frames {
-            let message = format!("frames must exceed {}, got {frames}", options.empty_frames);
+        let least = options.empty_frames + 1;
+        if !(least..=MOST_FRAMES).contains(&frames) {
+            let message = format!("frames must be between {least} and {MOST_FRAMES}, got {frames}");
             return Err(PyValueError::new_err(message));
         }
         SynthScene::new(options).map(Self).map_err(value_error)
@@ -40,7 +43,7 @@ impl PyScene {
                 self.0.len()
             )));
         }
-        let image = detached(py, || self.0.frame(index))?;
+        let image = py.detach(|| self.0.frame(index));
         numpy_from_image(py, image)
     }
 

@@ -1,12 +1,11 @@
-//! Running the core without the interpreter lock: Ctrl-C is heard, progress is reported, and a fault of the core
-//! becomes an exception.
+//! Running the core without the interpreter lock: on the threads of this process, with Ctrl-C heard and progress
+//! reported.
 
-use crate::error::internal_error;
 use crate::pool::pool;
 use memo_core::progress::Progress;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -14,15 +13,10 @@ use std::time::Duration;
 /// Signals are checked this often.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Runs what is short and does not use several threads.
-pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    py.detach(|| caught(work)).map_err(internal_error)
-}
-
-/// Runs what is short and may use several threads.
+/// Runs what is short and may use several threads. What does not use them needs `Python::detach` alone.
 pub fn pooled<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = pool(py)?;
-    detached(py, || pool.install(work))
+    Ok(py.detach(|| pool.install(work)))
 }
 
 /// Runs what may last longer than a moment and does not use several threads. After Ctrl-C it keeps running in the
@@ -45,21 +39,14 @@ pub fn watched<T: Send + 'static>(
     on_a_thread(py, callback, move |progress| pool.install(|| work(progress)))
 }
 
-/// Panics as a bug in the core would; for tests.
+/// Panics as a bug in the core would, in one of the three ways in which bindings call it; for tests.
 #[pyfunction(name = "_panic")]
-pub fn panic_on_purpose(py: Python<'_>, message: String, is_long: bool) -> PyResult<()> {
-    if is_long {
-        return watched(py, None, move |_| panic!("{message}"));
+pub fn panic_on_purpose(py: Python<'_>, message: String, way: &str) -> PyResult<()> {
+    match way {
+        "watched" => watched(py, None, move |_| panic!("{message}")),
+        "pooled" => pooled(py, || panic!("{message}")),
+        _ => panic!("{message}"),
     }
-    pooled(py, || panic!("{message}"))
-}
-
-/// `work`, or what it said when it panicked.
-fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
-        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
-    })
 }
 
 fn on_a_thread<T: Send + 'static>(
@@ -72,7 +59,7 @@ fn on_a_thread<T: Send + 'static>(
     let (sender, mut receiver) = channel();
     let of_worker = Arc::clone(&progress);
     // Nobody listens any more after an interrupt: sending may fail.
-    let start = move || drop(sender.send(caught(|| work(&of_worker))));
+    let start = move || drop(sender.send(catch_unwind(AssertUnwindSafe(|| work(&of_worker)))));
     std::thread::Builder::new().name("memo".into()).spawn(start)?;
     let mut told = 0;
     loop {
@@ -84,7 +71,7 @@ fn on_a_thread<T: Send + 'static>(
         match result {
             Ok(result) => {
                 tell(callback, &progress, &mut told)?;
-                return result.map_err(internal_error);
+                return Ok(result.unwrap_or_else(|panic| resume_unwind(panic)));
             }
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py.check_signals().and_then(|()| tell(callback, &progress, &mut told));
@@ -98,7 +85,7 @@ fn on_a_thread<T: Send + 'static>(
                 }
                 heard.inspect_err(|_| progress.stop())?;
             }
-            Err(RecvTimeoutError::Disconnected) => return Err(internal_error(String::new())),
+            Err(RecvTimeoutError::Disconnected) => unreachable!("the worker sends a result or its panic"),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Hoffman and Flinchbaugh (1982): the propositions on random problems.
 
 use crate::array::rows_from_numpy;
-use crate::wait::detached;
+use crate::wait::interruptible;
 use glam::DVec2;
 use memo_core::planar::experiment::{
     DEGENERATE, PrintedRod, degenerate_refusals, false_targets, hinge_trials, rod_trials,
@@ -10,6 +10,16 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+/// More problems than this take hours.
+const MOST_TRIALS: usize = 100_000_000;
+
+fn checked(trials: usize) -> PyResult<usize> {
+    if trials > MOST_TRIALS {
+        return Err(PyValueError::new_err(format!("trials must be at most {MOST_TRIALS}, got {trials}")));
+    }
+    Ok(trials)
+}
+
 /// Proposition 1 on random rods seen three times: counts and largest errors by name.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_rods<'py>(
@@ -17,7 +27,8 @@ pub fn hoffman_flinchbaugh_rods<'py>(
     trials: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = detached(py, || rod_trials(trials, seed))?;
+    let trials = checked(trials)?;
+    let t = interruptible(py, move || rod_trials(trials, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -48,7 +59,8 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
     searched: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = detached(py, || hinge_trials(trials, searched, seed))?;
+    let trials = checked(trials)?;
+    let t = interruptible(py, move || hinge_trials(trials, searched, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -68,7 +80,8 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
 /// How many of `trials` unrelated pairs in three views, and triples in two, are read as planar.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> PyResult<[usize; 2]> {
-    detached(py, || false_targets(trials, seed))
+    let trials = checked(trials)?;
+    interruptible(py, move || false_targets(trials, seed))
 }
 
 /// How many of `trials` degenerate problems are refused, by kind.
@@ -78,7 +91,8 @@ pub fn hoffman_flinchbaugh_degenerate(
     trials: usize,
     seed: u64,
 ) -> PyResult<Vec<(&'static str, usize)>> {
-    let refused = detached(py, || degenerate_refusals(trials, seed))?;
+    let trials = checked(trials)?;
+    let refused = interruptible(py, move || degenerate_refusals(trials, seed))?;
     Ok(DEGENERATE.into_iter().zip(refused).collect())
 }
 

@@ -2,7 +2,6 @@
 
 use crate::array::{numpy_from_column, numpy_from_figures, numpy_from_rows};
 use crate::error::value_error;
-use crate::wait::detached;
 use memo_core::posture::experiment::{self, Counts, LevelCounts, Reading, Sequence};
 use memo_core::posture::head::{HeadModel, HeadPoint, HeadTableColumn, exact_projections, table_2};
 use memo_core::posture::limits::{AngleRange, Limits};
@@ -37,7 +36,8 @@ pub fn segment_names() -> Vec<String> {
 #[pyo3(signature = (sequence, merge_m=experiment::MERGE_M))]
 pub fn lee_chen_counts<'py>(py: Python<'py>, sequence: &str, merge_m: f64) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
-    let table = detached(py, || experiment::count_table(sequence, &experiment::table_walker(), merge_m))?
+    let table = py
+        .detach(|| experiment::count_table(sequence, &experiment::table_walker(), merge_m))
         .map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("phases", table.phases)?;
@@ -73,7 +73,7 @@ pub fn lee_chen_last_stage<'py>(
     })?;
     let phases = experiment::LAST_STAGE_PHASES;
     let stages =
-        detached(py, || experiment::last_stage(sequence, reading, &phases, merge_m))?.map_err(value_error)?;
+        py.detach(|| experiment::last_stage(sequence, reading, &phases, merge_m)).map_err(value_error)?;
     let dict_of = |stage: experiment::LastStage| {
         let dict = PyDict::new(py);
         dict.set_item("phase", stage.phase)?;
@@ -93,7 +93,8 @@ pub fn lee_chen_last_stage<'py>(
 #[pyfunction]
 pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
-    let left = detached(py, || experiment::frame_survivors(sequence, &experiment::table_walker(), 0))?
+    let left = py
+        .detach(|| experiment::frame_survivors(sequence, &experiment::table_walker(), 0))
         .map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("figures", numpy_from_figures(py, &left.figures)?)?;
@@ -110,7 +111,7 @@ pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<
 /// `camera_position`, `camera_position_sd` or None, and `points` by name; centimetres, the paper's axes.
 #[pyfunction]
 pub fn lee_chen_head(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
-    let table = detached(py, table_2)?.map_err(value_error)?;
+    let table = py.detach(table_2).map_err(value_error)?;
     let columns = [table.printed, table.linear, table.linear_exact, table.focal_free, table.focal_known];
     let dict_of = |column: HeadTableColumn| {
         let dict = PyDict::new(py);
@@ -175,6 +176,9 @@ pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
+/// More frames than this do not fit in the memory of most machines.
+const MOST_FRAMES: usize = 1_000_000;
+
 /// The walker made anew in frames of a sequence, counted from 0: joints (frames, 14, 3) in camera axes, metres,
 /// and the gait phase of each frame.
 #[pyfunction]
@@ -184,6 +188,9 @@ pub fn lee_chen_walker<'py>(
     sequence: &str,
     frames: usize,
 ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>)> {
+    if frames > MOST_FRAMES {
+        return Err(PyValueError::new_err(format!("frames must be at most {MOST_FRAMES}, got {frames}")));
+    }
     let (camera, walker) = (sequence_of(sequence)?.camera(), experiment::table_walker());
     let figures: Vec<_> = (0..frames).map(|frame| camera.view(&walker, frame).figure).collect();
     let phases = (0..frames).map(|frame| walker.phase(frame)).collect();

@@ -7,7 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
-use crate::wait::{detached, pooled};
+use crate::wait::pooled;
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
 use memo_core::model::body::Part;
@@ -31,8 +31,8 @@ pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
 /// By how much the two sides of each equation differ, computed in two ways, by name.
 #[pyfunction]
 #[pyo3(signature = (seed=0))]
-pub fn rohr_deviations(py: Python<'_>, seed: u64) -> PyResult<Vec<(&'static str, f64)>> {
-    detached(py, || experiment::deviations(seed))
+pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
+    py.detach(|| experiment::deviations(seed))
 }
 
 fn gait_of(name: &str) -> PyResult<Gait> {
