@@ -46,9 +46,12 @@ FRAMES = 12
 def new_tracker():
     return _memo.Tracker(1.75, start_frames=5, adapt=False)
 
-def update(tracker, index):
+def drawn(index):
     scene = _memo.Scene(5, frames=FRAMES)
-    tracker.update(np.ascontiguousarray(scene.frame(index)[::2, ::2]), scene.time_s(index))
+    return np.ascontiguousarray(scene.frame(index)[::2, ::2]), scene.time_s(index)
+
+def update(tracker, index):
+    tracker.update(*drawn(index))
 
 def walks(tracker):
     tracker.finish()
@@ -249,6 +252,44 @@ def test_a_call_whose_callback_forks_ends_in_the_child_with_an_error(tmp_path):
     assert run(tmp_path, body) == ["7"]
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_many_threads_of_python_share_the_threads_of_a_process(tmp_path, threads):
+    body = """
+    from concurrent.futures import ThreadPoolExecutor
+    with ThreadPoolExecutor(6) as crew:
+        print(work(), *crew.map(work, range(6)))
+"""
+    found = run(tmp_path, body, RAYON_NUM_THREADS=str(threads))
+    assert len(found) == 7
+    assert len(set(found)) == 1
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timers that signal")
+def test_a_tracker_goes_on_after_an_interrupt_with_the_frame_that_it_interrupted(tmp_path):
+    body = """
+    import signal
+    class Interrupted(Exception):
+        pass
+    def interrupt(*_):
+        raise Interrupted
+    expected = digest(tracked())
+    tracker, interrupted = new_tracker(), 0
+    signal.signal(signal.SIGALRM, interrupt)
+    for index in range(FRAMES):
+        frame = drawn(index)
+        while tracker.seek_report()["frames"] == index:
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 0.001)
+                tracker.update(*frame)
+            except Interrupted:
+                interrupted += 1
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+    print(interrupted > 0, digest(walks(tracker)) == expected)
+"""
+    assert run(tmp_path, body) == ["True", "True"]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
 @pytest.mark.parametrize("threads", [1, 3])
 def test_the_threads_are_as_many_as_asked_for(tmp_path, threads):
@@ -264,7 +305,7 @@ def test_the_threads_are_as_many_as_asked_for(tmp_path, threads):
     assert found == run(tmp_path, "    print(work())", RAYON_NUM_THREADS="2")[0]
 
 
-@pytest.mark.parametrize("way", ["watched", "pooled", "at once"])
+@pytest.mark.parametrize("way", ["watched", "interruptible", "pooled", "at once"])
 def test_a_bug_in_the_core_is_an_ordinary_exception(capfd, way):
     with pytest.raises(RuntimeError, match="a planted fault") as caught:
         _memo._panic("a planted fault", way)

@@ -110,7 +110,7 @@ pub fn recorded_contours<'py>(
 
 /// The options a tracker works with.
 fn options_of(tracker: &Bound<'_, PyTracker>) -> PyResult<TrackerOptions> {
-    tracker.get().read(|tracker| tracker.options().clone())
+    tracker.get().read(tracker.py(), |tracker| tracker.options().clone())
 }
 
 fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {

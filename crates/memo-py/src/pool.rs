@@ -16,6 +16,9 @@ use std::sync::{Mutex, PoisonError};
 /// thread too, so no child finds it locked.
 static POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
 
+/// A thread that waits for a part of its work takes up that of other calls, on top of its own. Unused, it costs nothing.
+const STACK_BYTES: usize = 16 << 20;
+
 /// The pool of this process; `RAYON_NUM_THREADS` sets its size.
 pub fn pool(_attached: Python<'_>) -> PyResult<&'static ThreadPool> {
     let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -33,6 +36,7 @@ pub fn pool(_attached: Python<'_>) -> PyResult<&'static ThreadPool> {
 fn build() -> PyResult<ThreadPool> {
     let pool = ThreadPoolBuilder::new()
         .thread_name(|index| format!("memo-{index}"))
+        .stack_size(STACK_BYTES)
         .build()
         .map_err(|error| PyRuntimeError::new_err(format!("no threads to compute with: {error}")))?;
     // What the threads initialise once for the whole process is done before anybody can fork.

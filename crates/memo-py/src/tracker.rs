@@ -4,8 +4,7 @@ use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_f
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::explain::record_of;
-use crate::pool::pool;
-use crate::wait::interruptible;
+use crate::wait::{LOOK, watched};
 use glam::DVec2;
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
@@ -22,7 +21,7 @@ use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
 ///
@@ -30,9 +29,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[pyclass(name = "Tracker", module = "memo._memo", frozen)]
 pub struct PyTracker(Arc<Shared>);
 
-/// A tracker that calls of several threads take turns with.
+/// A tracker that calls take turns with.
 struct Shared {
-    tracker: Mutex<Tracker>,
+    /// Not there while a call works with it. No call waits for it on a thread of the pool, which may be the one that
+    /// works with it.
+    tracker: Mutex<Option<Box<Tracker>>>,
+    /// It is there again.
+    returned: Condvar,
     /// Calls under way, in the lower half; the process they run in, in the upper.
     calls: AtomicU64,
 }
@@ -41,8 +44,7 @@ struct Shared {
 struct Call(Arc<Shared>);
 
 impl Call {
-    /// A child forked during a call of its parent has the tracker as the call left it, half changed and locked for
-    /// ever, so it is refused.
+    /// A child forked during a call of its parent would wait for that call for ever, so it is refused.
     fn enter(shared: &Arc<Shared>) -> PyResult<Self> {
         let process = u64::from(std::process::id()) << 32;
         let counted = |calls: u64| {
@@ -57,7 +59,21 @@ impl Call {
         }
     }
 
-    fn locked(&self) -> MutexGuard<'_, Tracker> {
+    /// Takes the tracker once other calls have returned it.
+    fn taken(self, py: Python<'_>) -> PyResult<Taken> {
+        loop {
+            let taken = py.detach(|| {
+                let waited = self.0.returned.wait_timeout_while(self.tracker(), LOOK, |t| t.is_none());
+                waited.unwrap_or_else(PoisonError::into_inner).0.take()
+            });
+            if taken.is_some() {
+                return Ok(Taken { tracker: taken, call: self });
+            }
+            py.check_signals()?;
+        }
+    }
+
+    fn tracker(&self) -> MutexGuard<'_, Option<Box<Tracker>>> {
         self.0.tracker.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -68,27 +84,39 @@ impl Drop for Call {
     }
 }
 
+/// A tracker that is returned when this is dropped.
+struct Taken {
+    tracker: Option<Box<Tracker>>,
+    call: Call,
+}
+
+impl Taken {
+    fn with<T>(mut self, work: impl FnOnce(&mut Tracker) -> T) -> T {
+        work(self.tracker.as_mut().expect("it is returned no sooner"))
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        *self.call.tracker() = self.tracker.take();
+        self.call.0.returned.notify_one();
+    }
+}
+
 impl PyTracker {
     /// Looks at the tracker, once no interrupted call is under way any more.
-    pub fn read<T>(&self, look: impl FnOnce(&mut Tracker) -> T) -> PyResult<T> {
-        Ok(look(&mut Call::enter(&self.0)?.locked()))
+    pub fn read<T>(&self, py: Python<'_>, look: impl FnOnce(&mut Tracker) -> T) -> PyResult<T> {
+        Ok(Call::enter(&self.0)?.taken(py)?.with(look))
     }
 
-    /// Calls the tracker on another thread.
+    /// Calls the tracker on the threads of this process.
     fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut Tracker) -> T + Send + 'static,
     ) -> PyResult<T> {
-        let pool = pool(py)?;
-        let call = Call::enter(&self.0)?;
-        interruptible(py, move || {
-            // Locked outside the pool: a thread of the pool that waits for a part of its work takes up other work,
-            // and must not meet its own lock there.
-            let mut tracker = call.locked();
-            let tracker = &mut *tracker;
-            pool.install(|| work(tracker))
-        })
+        let taken = Call::enter(&self.0)?.taken(py)?;
+        watched(py, None, |_| taken.with(work))
     }
 }
 
@@ -145,8 +173,8 @@ impl PyTracker {
         }
         options.person = adapt.then(PersonOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
-        let tracker = Mutex::new(Tracker::new(options).map_err(value_error)?);
-        Ok(Self(Arc::new(Shared { tracker, calls: AtomicU64::new(0) })))
+        let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
+        Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
     }
 
     /// Takes the next frame, (H, W) uint8, and its time in seconds.
@@ -161,13 +189,13 @@ impl PyTracker {
     }
 
     /// The walks that have ended since this was last asked.
-    fn take_finished(&self) -> PyResult<Vec<PyWalk>> {
-        Ok(self.read(Tracker::take_finished)?.into_iter().map(PyWalk::new).collect())
+    fn take_finished(&self, py: Python<'_>) -> PyResult<Vec<PyWalk>> {
+        Ok(self.read(py, Tracker::take_finished)?.into_iter().map(PyWalk::new).collect())
     }
 
     /// Filtered state of the walk under way: a dict of time, position, phase, speed and `p_swapped`, or None.
     fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(now) = self.read(|tracker| tracker.current())? else { return Ok(None) };
+        let Some(now) = self.read(py, |tracker| tracker.current())? else { return Ok(None) };
         let dict = PyDict::new(py);
         dict.set_item("frame", now.frame)?;
         dict.set_item("time_s", now.time_s)?;
@@ -183,7 +211,7 @@ impl PyTracker {
 
     /// What happened while nobody was followed: numbers of frames.
     fn seek_report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.read(|tracker| tracker.seek_report())?;
+        let report = self.read(py, |tracker| tracker.seek_report())?;
         let dict = PyDict::new(py);
         dict.set_item("frames", report.frames)?;
         dict.set_item("frames_with_candidate", report.frames_with_candidate)?;

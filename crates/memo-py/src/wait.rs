@@ -11,7 +11,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 /// Signals are checked this often.
-const LOOK: Duration = Duration::from_millis(50);
+pub const LOOK: Duration = Duration::from_millis(50);
+
+/// Work to be done on another thread.
+type Job = Box<dyn FnOnce() + Send>;
 
 /// Runs what is short and may use several threads. What does not use them needs `Python::detach` alone.
 pub fn pooled<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
@@ -25,7 +28,8 @@ pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    on_a_thread(py, None, |_| work())
+    let start = |job: Job| Ok(std::thread::Builder::new().name("memo".into()).spawn(job).map(drop)?);
+    awaited(py, None, start, |_| work())
 }
 
 /// Runs what may last for seconds and may use several threads, and calls `callback` with the units done and their
@@ -36,22 +40,29 @@ pub fn watched<T: Send + 'static>(
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
     let pool = pool(py)?;
-    on_a_thread(py, callback, move |progress| pool.install(|| work(progress)))
+    let start = |job: Job| {
+        pool.spawn(job);
+        Ok(())
+    };
+    awaited(py, callback, start, work)
 }
 
-/// Panics as a bug in the core would, in one of the three ways in which bindings call it; for tests.
+/// Panics as a bug in the core would, in one of the ways in which bindings call it; for tests.
 #[pyfunction(name = "_panic")]
 pub fn panic_on_purpose(py: Python<'_>, message: String, way: &str) -> PyResult<()> {
     match way {
         "watched" => watched(py, None, move |_| panic!("{message}")),
+        "interruptible" => interruptible(py, move || panic!("{message}")),
         "pooled" => pooled(py, || panic!("{message}")),
         _ => panic!("{message}"),
     }
 }
 
-fn on_a_thread<T: Send + 'static>(
+/// Starts work on another thread and waits for it.
+fn awaited<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
+    start: impl FnOnce(Job) -> PyResult<()>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
     let process = std::process::id();
@@ -59,8 +70,8 @@ fn on_a_thread<T: Send + 'static>(
     let (sender, mut receiver) = channel();
     let of_worker = Arc::clone(&progress);
     // Nobody listens any more after an interrupt: sending may fail.
-    let start = move || drop(sender.send(catch_unwind(AssertUnwindSafe(|| work(&of_worker)))));
-    std::thread::Builder::new().name("memo".into()).spawn(start)?;
+    let job = move || drop(sender.send(catch_unwind(AssertUnwindSafe(|| work(&of_worker)))));
+    start(Box::new(job))?;
     let mut told = 0;
     loop {
         let (back, result) = py.detach(move || {
