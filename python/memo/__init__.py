@@ -11,6 +11,7 @@ import logging as _logging
 from memo import explain, gait
 from memo._memo import (
     Camera,
+    InternalError,
     __version__,
     calibrate_points,
     calibrate_walker,
@@ -40,6 +41,7 @@ _logging.getLogger("memo").addHandler(_logging.NullHandler())
 __all__ = [
     "Camera",
     "DemoScene",
+    "InternalError",
     "Keypoints",
     "KeypointsError",
     "PlanarFigure",

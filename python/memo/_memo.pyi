@@ -10,11 +10,13 @@ import numpy.typing as npt
 __all__ = [
     "Camera",
     "Explainer",
+    "InternalError",
     "Scene",
     "Tracker",
     "Walk",
     "__version__",
     "_camera",
+    "_panic",
     "body_parts",
     "calibrate_points",
     "calibrate_walker",
@@ -67,6 +69,11 @@ __all__ = [
 ]
 
 __version__: str
+
+class InternalError(RuntimeError):
+    """A bug in memo, not a mistake in what it was given; standard error says where it is."""
+
+def _panic(message: str, way: str) -> None: ...
 
 @final
 class Camera:

@@ -88,7 +88,7 @@ pub fn mask_from_numpy(mask: &Bound<'_, PyAny>) -> PyResult<Mask> {
         let wanted = "wanted a mask: numpy array of shape (H, W), dtype bool";
         return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(mask)?)));
     };
-    let array = array.readonly();
+    let array = array.try_readonly()?;
     let view = array.as_array();
     let (height, width) = view.dim();
     Image::from_vec(width, height, view.iter().copied().collect())
@@ -156,7 +156,7 @@ fn numbers_from_numpy<const N: usize>(object: &Bound<'_, PyAny>, what: &str) -> 
     let Some(rows) = rows else {
         return Err(PyValueError::new_err(format!("{wanted}; got {}", described()?)));
     };
-    let rows = rows.readonly();
+    let rows = rows.try_readonly()?;
     Ok(rows.as_array().rows().into_iter().map(|row| std::array::from_fn(|i| row[i])).collect())
 }
 
@@ -166,7 +166,7 @@ pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2
     let Ok(array) = segments.cast::<PyArray3<f64>>() else {
         return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(segments)?)));
     };
-    let array = array.readonly();
+    let array = array.try_readonly()?;
     let view = array.as_array();
     if view.dim().1 != 2 || view.dim().2 != 2 {
         return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(segments)?)));
@@ -183,7 +183,7 @@ pub fn motion_from_numpy<const D: usize>(
     let Ok(array) = points.cast::<numpy::PyArray3<f64>>() else {
         return Err(PyTypeError::new_err(format!("{wanted}; got {}", describe(points)?)));
     };
-    let array = array.readonly();
+    let array = array.try_readonly()?;
     let view = array.as_array();
     let (frames, count, dimensions) = view.dim();
     if dimensions != D {
@@ -279,7 +279,7 @@ pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let Ok(array) = times.cast::<PyArray1<f64>>() else {
         return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(times)?)));
     };
-    Ok(array.readonly().as_array().iter().copied().collect())
+    Ok(array.try_readonly()?.as_array().iter().copied().collect())
 }
 
 /// The six points of the head over time, of shape (T, 6, 2).

@@ -7,6 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyTracker, SegmentsWithParts, segments_with_parts};
+use crate::wait::pooled;
 use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::{Camera, VisibilityOptions, Walker};
@@ -91,7 +92,7 @@ pub fn recorded_contours<'py>(
     torso_m: &Bound<'py, PyAny>,
     phases: Vec<f64>,
 ) -> PyResult<Vec<SegmentsWithParts<'py>>> {
-    let walk = Recorded::read(record, tracker.borrow().locked().options())?;
+    let walk = Recorded::read(record, &options_of(tracker)?)?;
     let torso_m = points_from_numpy(torso_m)?;
     if torso_m.len() != phases.len() {
         let message =
@@ -107,6 +108,11 @@ pub fn recorded_contours<'py>(
         segments_with_parts(py, &scene.visible(&at, &VisibilityOptions::DRAWN), scene.camera)
     };
     torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
+}
+
+/// The options a tracker works with.
+fn options_of(tracker: &Bound<'_, PyTracker>) -> PyResult<TrackerOptions> {
+    tracker.get().read(tracker.py(), |tracker| tracker.options().clone())
 }
 
 fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
@@ -201,7 +207,7 @@ impl PyExplainer {
         records: Vec<Bound<'_, PyDict>>,
         wanted: HashSet<usize>,
     ) -> PyResult<Self> {
-        let options = tracker.borrow().locked().options().clone();
+        let options = options_of(tracker)?;
         let walks = records.iter().map(|r| Recorded::read(r, &options)).collect::<PyResult<_>>()?;
         let stream = Some(EvidenceStream::new(options.evidence));
         Ok(Self { options, walks, wanted, stream })
@@ -247,9 +253,9 @@ impl PyExplainer {
             return Err(refused("window_px", message));
         }
         let scene = self.walks[index].scene();
-        let why = py
-            .detach(|| explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))
-            .map_err(value_error)?;
+        let why =
+            pooled(py, || explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))?
+                .map_err(value_error)?;
         dict_of(py, evidence, index, &look, &why, scene.camera).map(Some)
     }
 }

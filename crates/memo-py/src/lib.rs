@@ -9,6 +9,7 @@ mod image;
 mod keypoints;
 mod planar;
 mod pointlight;
+mod pool;
 mod posture;
 mod reproduce;
 mod score;
@@ -66,9 +67,12 @@ mod _memo {
     use super::tracker::{PyTracker, PyWalk};
     #[pymodule_export]
     use super::unswap::unswap;
+    #[pymodule_export]
+    use super::wait::panic_on_purpose;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::error::add_internal_error(module)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

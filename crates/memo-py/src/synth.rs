@@ -11,6 +11,9 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
+/// Half a day at 25 frames per second.
+const MOST_FRAMES: usize = 1_000_000;
+
 /// Centre of the torso, phase, and joints (2, 6, 3) or joint angles.
 type Truth<T> = ((f64, f64, f64), f64, T);
 
@@ -64,8 +67,8 @@ impl PyClothedScene {
                 return Err(PyValueError::new_err(message));
             }
         };
-        if frames == 0 {
-            return Err(PyValueError::new_err("frames must be at least 1, got 0"));
+        if !(1..=MOST_FRAMES).contains(&frames) {
+            return Err(PyValueError::new_err(format!("frames must be between 1 and {MOST_FRAMES}, got {frames}")));
         }
         let options = ClothedOptions {
             seed,
@@ -153,8 +156,9 @@ impl PyScene {
         late_left: f64,
     ) -> PyResult<Self> {
         let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..SceneOptions::default() };
-        if frames <= options.empty_frames {
-            let message = format!("frames must exceed {}, got {frames}", options.empty_frames);
+        let least = options.empty_frames + 1;
+        if !(least..=MOST_FRAMES).contains(&frames) {
+            let message = format!("frames must be between {least} and {MOST_FRAMES}, got {frames}");
             return Err(PyValueError::new_err(message));
         }
         SynthScene::new(options).map(Self).map_err(value_error)

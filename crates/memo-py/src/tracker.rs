@@ -4,7 +4,7 @@ use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_f
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::explain::record_of;
-use crate::wait::interruptible;
+use crate::wait::{LOOK, watched};
 use glam::DVec2;
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
@@ -18,31 +18,106 @@ use memo_core::track::start::Direction;
 use memo_core::track::tracker::{GaitChoice, Tracker, TrackerOptions};
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
 ///
-/// An interrupted call goes on by itself: the frame is taken, and the next call waits for it.
-#[pyclass(name = "Tracker", module = "memo._memo")]
-pub struct PyTracker(Arc<Mutex<Tracker>>);
+/// An interrupted call keeps running in the background: the frame is taken, and the next call waits for it.
+#[pyclass(name = "Tracker", module = "memo._memo", frozen)]
+pub struct PyTracker(Arc<Shared>);
 
-impl PyTracker {
-    /// The tracker, once no interrupted call is under way any more.
-    pub fn locked(&self) -> MutexGuard<'_, Tracker> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+/// A tracker that calls take turns with.
+struct Shared {
+    /// Not there while a call works with it. No call waits for it on a thread of the pool, which may be the one that
+    /// works with it.
+    tracker: Mutex<Option<Box<Tracker>>>,
+    /// It is there again.
+    returned: Condvar,
+    /// Calls under way, in the lower half; the process they run in, in the upper.
+    calls: AtomicU64,
+}
+
+/// A call under way, waiting or at work.
+struct Call(Arc<Shared>);
+
+impl Call {
+    /// A child forked during a call of its parent would wait for that call for ever, so it is refused.
+    fn enter(shared: &Arc<Shared>) -> PyResult<Self> {
+        let process = u64::from(std::process::id()) << 32;
+        let counted = |calls: u64| {
+            let count = calls & u64::from(u32::MAX);
+            (count == 0 || calls - count == process).then_some(process | (count + 1))
+        };
+        match shared.calls.fetch_update(Ordering::SeqCst, Ordering::SeqCst, counted) {
+            Ok(_) => Ok(Self(Arc::clone(shared))),
+            Err(_) => Err(PyRuntimeError::new_err(
+                "the process was forked while this Tracker was at work: make a new one in the child",
+            )),
+        }
     }
 
-    /// Calls the tracker on another thread.
+    /// Takes the tracker once other calls have returned it.
+    fn taken(self, py: Python<'_>) -> PyResult<Taken> {
+        loop {
+            let taken = py.detach(|| {
+                let waited = self.0.returned.wait_timeout_while(self.tracker(), LOOK, |t| t.is_none());
+                waited.unwrap_or_else(PoisonError::into_inner).0.take()
+            });
+            if taken.is_some() {
+                return Ok(Taken { tracker: taken, call: self });
+            }
+            py.check_signals()?;
+        }
+    }
+
+    fn tracker(&self) -> MutexGuard<'_, Option<Box<Tracker>>> {
+        self.0.tracker.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        self.0.calls.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// A tracker that is returned when this is dropped.
+struct Taken {
+    tracker: Option<Box<Tracker>>,
+    call: Call,
+}
+
+impl Taken {
+    fn with<T>(mut self, work: impl FnOnce(&mut Tracker) -> T) -> T {
+        work(self.tracker.as_mut().expect("it is returned no sooner"))
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        *self.call.tracker() = self.tracker.take();
+        self.call.0.returned.notify_one();
+    }
+}
+
+impl PyTracker {
+    /// Looks at the tracker, once no interrupted call is under way any more.
+    pub fn read<T>(&self, py: Python<'_>, look: impl FnOnce(&mut Tracker) -> T) -> PyResult<T> {
+        Ok(Call::enter(&self.0)?.taken(py)?.with(look))
+    }
+
+    /// Calls the tracker on the threads of this process.
     fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut Tracker) -> T + Send + 'static,
     ) -> PyResult<T> {
-        let tracker = Arc::clone(&self.0);
-        interruptible(py, move || work(&mut tracker.lock().unwrap_or_else(PoisonError::into_inner)))
+        let taken = Call::enter(&self.0)?.taken(py)?;
+        watched(py, None, |_| taken.with(work))
     }
 }
 
@@ -99,7 +174,8 @@ impl PyTracker {
         }
         options.person = adapt.then(PersonOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
-        Ok(Self(Arc::new(Mutex::new(Tracker::new(options).map_err(value_error)?))))
+        let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
+        Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
     }
 
     /// Takes the next frame, (H, W) uint8, and its time in seconds.
@@ -114,13 +190,13 @@ impl PyTracker {
     }
 
     /// The walks that have ended since this was last asked.
-    fn take_finished(&self) -> Vec<PyWalk> {
-        self.locked().take_finished().into_iter().map(PyWalk::new).collect()
+    fn take_finished(&self, py: Python<'_>) -> PyResult<Vec<PyWalk>> {
+        Ok(self.read(py, Tracker::take_finished)?.into_iter().map(PyWalk::new).collect())
     }
 
     /// Filtered state of the walk under way: a dict of time, position, phase, speed and `p_swapped`, or None.
     fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(now) = self.locked().current() else { return Ok(None) };
+        let Some(now) = self.read(py, |tracker| tracker.current())? else { return Ok(None) };
         let dict = PyDict::new(py);
         dict.set_item("frame", now.frame)?;
         dict.set_item("time_s", now.time_s)?;
@@ -136,7 +212,7 @@ impl PyTracker {
 
     /// What happened while nobody was followed: numbers of frames.
     fn seek_report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.locked().seek_report();
+        let report = self.read(py, |tracker| tracker.seek_report())?;
         let dict = PyDict::new(py);
         dict.set_item("frames", report.frames)?;
         dict.set_item("frames_with_candidate", report.frames_with_candidate)?;

@@ -1,36 +1,77 @@
-//! Waiting for the core: Ctrl-C is heard, and progress told, while another thread computes.
+//! Running the core without the interpreter lock: on the threads of this process, with Ctrl-C heard and progress
+//! reported.
 
+use crate::pool::pool;
 use memo_core::progress::Progress;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// So often signals are looked for.
-const LOOK: Duration = Duration::from_millis(50);
+/// Signals are checked this often.
+pub const LOOK: Duration = Duration::from_millis(50);
 
-/// Runs what may last longer than a moment. On Ctrl-C it is left to end by itself, unheard.
+/// Work to be done on another thread.
+type Job = Box<dyn FnOnce() + Send>;
+
+/// Runs what is short and may use several threads. What does not use them needs `Python::detach` alone.
+pub fn pooled<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let pool = pool(py)?;
+    Ok(py.detach(|| pool.install(work)))
+}
+
+/// Runs what may last longer than a moment and does not use several threads. After Ctrl-C it keeps running in the
+/// background; its result is discarded.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    watched(py, None, |_| work())
+    let start = |job: Job| Ok(std::thread::Builder::new().name("memo".into()).spawn(job).map(drop)?);
+    awaited(py, None, start, |_| work())
 }
 
-/// Runs what may last for seconds, and calls `callback` with the units done and their number as they change.
-/// On Ctrl-C, or when the callback raises, the work is asked to stop and left to do so by itself.
+/// Runs what may last for seconds and may use several threads, and calls `callback` with the units done and their
+/// number as they change. After Ctrl-C, or when the callback raises, the work is cancelled; it ends in the background.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
+    let pool = pool(py)?;
+    let start = |job: Job| {
+        pool.spawn(job);
+        Ok(())
+    };
+    awaited(py, callback, start, work)
+}
+
+/// Panics as a bug in the core would, in one of the ways in which bindings call it; for tests.
+#[pyfunction(name = "_panic")]
+pub fn panic_on_purpose(py: Python<'_>, message: String, way: &str) -> PyResult<()> {
+    match way {
+        "watched" => watched(py, None, move |_| panic!("{message}")),
+        "interruptible" => interruptible(py, move || panic!("{message}")),
+        "pooled" => pooled(py, || panic!("{message}")),
+        _ => panic!("{message}"),
+    }
+}
+
+/// Starts work on another thread and waits for it.
+fn awaited<T: Send + 'static>(
+    py: Python<'_>,
+    callback: Option<&Bound<'_, PyAny>>,
+    start: impl FnOnce(Job) -> PyResult<()>,
+    work: impl FnOnce(&Progress) -> T + Send + 'static,
+) -> PyResult<T> {
+    let process = std::process::id();
     let progress = Arc::new(Progress::new());
     let (sender, mut receiver) = channel();
     let of_worker = Arc::clone(&progress);
     // Nobody listens any more after an interrupt: sending may fail.
-    let start = move || drop(sender.send(work(&of_worker)));
-    std::thread::Builder::new().name("memo".into()).spawn(start)?;
+    let job = move || drop(sender.send(catch_unwind(AssertUnwindSafe(|| work(&of_worker)))));
+    start(Box::new(job))?;
     let mut told = 0;
     loop {
         let (back, result) = py.detach(move || {
@@ -41,15 +82,21 @@ pub fn watched<T: Send + 'static>(
         match result {
             Ok(result) => {
                 tell(callback, &progress, &mut told)?;
-                return Ok(result);
+                return Ok(result.unwrap_or_else(|panic| resume_unwind(panic)));
             }
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py.check_signals().and_then(|()| tell(callback, &progress, &mut told));
+                if std::process::id() != process {
+                    // Forked by the callback or a signal handler. The thread that computes is the parent's, and
+                    // dropping the receiver might wait for it.
+                    std::mem::forget(receiver);
+                    heard?;
+                    let message = "the process was forked during this call: the parent has its result";
+                    return Err(PyRuntimeError::new_err(message));
+                }
                 heard.inspect_err(|_| progress.stop())?;
             }
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("the computation broke off; this is a fault of memo"));
-            }
+            Err(RecvTimeoutError::Disconnected) => unreachable!("the worker sends a result or its panic"),
         }
     }
 }

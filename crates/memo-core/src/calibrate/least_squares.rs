@@ -25,7 +25,7 @@ impl Fit {
         // Scaled to unit diagonal, so that the parameters' units do not decide what is singular.
         let normal = self.jacobian.tr_mul(&self.jacobian);
         let scale: Vec<f64> = normal.diagonal().iter().map(|d| d.sqrt()).collect();
-        if scale.iter().any(|s| s.is_nan() || *s <= 0.0) {
+        if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
             return None;
         }
         let count = scale.len();
@@ -101,4 +101,18 @@ fn derivatives(
         columns.push((at(1.0)? - at(-1.0)?) / (2.0 * step));
     }
     Some(DMatrix::from_columns(&columns))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_that_are_no_numbers_have_no_covariance() {
+        for wrong in [f64::NAN, f64::INFINITY, 1e200, 0.0] {
+            let jacobian = DMatrix::from_row_slice(3, 2, &[1.0, wrong, 2.0, wrong, 3.0, wrong]);
+            let fit = Fit { parameters: DVector::zeros(2), residuals: DVector::zeros(3), jacobian };
+            assert_eq!(fit.unit_covariance(), None, "{wrong}");
+        }
+    }
 }

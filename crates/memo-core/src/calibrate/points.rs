@@ -427,8 +427,10 @@ impl<'a> Problem<'a> {
         best.map(|(_, state)| state).filter(|state| all.iter().any(|&i| self.residual(state, i).is_some()))
     }
 
+    /// Whether no point is much farther off than most, in a picture of any size: a pixel read from it may err by one,
+    /// and a pose that misses most points by a visible share of the picture is not that of the camera.
     fn leaves_none_far(&self, state: &State, middle_px: f64) -> bool {
-        let limit_px = (2.5 * middle_px).clamp(1.0, 0.003 * self.diagonal_px);
+        let limit_px = (2.5 * middle_px).min(0.003 * self.diagonal_px).max(1.0);
         (0..self.places.len()).all(|i| self.residual(state, i).is_some_and(|r| r.length() < limit_px))
     }
 
@@ -684,6 +686,51 @@ mod tests {
         Camera { focal_px: DVec2::splat(focal_px), rotation, translation, ..level }
     }
 
+    /// Ten points on two walls that a camera of 45 degrees sees all over its picture.
+    fn walls(size: [u32; 2]) -> (Camera, Vec<DVec3>, Vec<DVec2>) {
+        let camera = Camera::level(size, 45_f64.to_radians(), 1.5, 5.0).unwrap();
+        let places: Vec<DVec3> = (0..10)
+            .map(|i| {
+                let [row, column] = [i / 5, i % 5].map(f64::from);
+                DVec3::new(0.7 * column - 1.4, 0.4 * column + 1.5 * row, 0.8 + 1.1 * row + 0.1 * column)
+            })
+            .collect();
+        let pixels = places.iter().map(|p| camera.project(*p).unwrap()).collect();
+        (camera, places, pixels)
+    }
+
+    #[test]
+    fn a_planted_camera_is_recovered_in_pictures_of_any_size() {
+        // In the smallest the pixels do not tell the focal length, so it is given.
+        for (size, is_known) in [
+            ([16, 12], true),
+            ([97, 31], true),
+            ([180, 144], false),
+            ([240, 180], false),
+            ([266, 200], false),
+            ([320, 240], false),
+            ([1920, 1080], false),
+            ([8000, 6000], false),
+        ] {
+            let (camera, places, pixels) = walls(size);
+            let focal_px = camera.focal_px.x;
+            let lens = if is_known { KnownLens::Focal(focal_px) } else { KnownLens::Nothing };
+            let found = camera_from_points(&places, &pixels, &PointOptions { size, lens }).unwrap();
+            assert!((found.camera.focal_px.x / focal_px - 1.0).abs() < 1e-5, "{size:?}");
+            assert!((found.camera.position() - camera.position()).length() < 1e-4, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_mistaken_point_of_a_small_picture_is_left_out() {
+        let (camera, places, mut pixels) = walls([180, 144]);
+        pixels[3].x += 25.0;
+        let options = PointOptions { size: camera.size, lens: KnownLens::Nothing };
+        let found = camera_from_points(&places, &pixels, &options).unwrap();
+        assert_eq!(found.outliers, [3]);
+        assert!((found.camera.position() - camera.position()).length() < 1e-3);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
         #[test]
@@ -711,10 +758,11 @@ mod tests {
         fn no_input_makes_it_panic(
             points in prop::collection::vec(prop::array::uniform3(prop::num::f64::ANY), 0..9),
             pixels in prop::collection::vec(prop::array::uniform2(-1e7..1e7_f64), 0..9),
+            size in prop::array::uniform2(0_u32..700),
         ) {
             let places: Vec<DVec3> = points.into_iter().map(DVec3::from).collect();
             let pixels: Vec<DVec2> = pixels.into_iter().map(DVec2::from).collect();
-            let options = PointOptions { size: [640, 480], lens: KnownLens::Nothing };
+            let options = PointOptions { size, lens: KnownLens::Nothing };
             if let Ok(found) = camera_from_points(&places, &pixels, &options) {
                 prop_assert!(found.camera.validated().is_ok());
             }

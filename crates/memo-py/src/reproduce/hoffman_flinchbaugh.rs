@@ -1,6 +1,7 @@
 //! Hoffman and Flinchbaugh (1982): the propositions on random problems.
 
 use crate::array::rows_from_numpy;
+use crate::wait::interruptible;
 use glam::DVec2;
 use memo_core::planar::experiment::{
     DEGENERATE, PrintedRod, degenerate_refusals, false_targets, hinge_trials, rod_trials,
@@ -9,6 +10,16 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+/// More problems than this take hours.
+const MOST_TRIALS: usize = 100_000_000;
+
+fn checked(trials: usize) -> PyResult<usize> {
+    if trials > MOST_TRIALS {
+        return Err(PyValueError::new_err(format!("trials must be at most {MOST_TRIALS}, got {trials}")));
+    }
+    Ok(trials)
+}
+
 /// Proposition 1 on random rods seen three times: counts and largest errors by name.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_rods<'py>(
@@ -16,7 +27,8 @@ pub fn hoffman_flinchbaugh_rods<'py>(
     trials: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = py.detach(|| rod_trials(trials, seed));
+    let trials = checked(trials)?;
+    let t = interruptible(py, move || rod_trials(trials, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -47,7 +59,8 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
     searched: usize,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let t = py.detach(|| hinge_trials(trials, searched, seed));
+    let trials = checked(trials)?;
+    let t = interruptible(py, move || hinge_trials(trials, searched, seed))?;
     let dict = PyDict::new(py);
     for (name, count) in [
         ("trials", t.trials),
@@ -66,8 +79,9 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
 
 /// How many of `trials` unrelated pairs in three views, and triples in two, are read as planar.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> [usize; 2] {
-    py.detach(|| false_targets(trials, seed))
+pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> PyResult<[usize; 2]> {
+    let trials = checked(trials)?;
+    interruptible(py, move || false_targets(trials, seed))
 }
 
 /// How many of `trials` degenerate problems are refused, by kind.
@@ -76,8 +90,10 @@ pub fn hoffman_flinchbaugh_degenerate(
     py: Python<'_>,
     trials: usize,
     seed: u64,
-) -> Vec<(&'static str, usize)> {
-    DEGENERATE.into_iter().zip(py.detach(|| degenerate_refusals(trials, seed))).collect()
+) -> PyResult<Vec<(&'static str, usize)>> {
+    let trials = checked(trials)?;
+    let refused = interruptible(py, move || degenerate_refusals(trials, seed))?;
+    Ok(DEGENERATE.into_iter().zip(refused).collect())
 }
 
 /// Eqs. (4)-(14) on three views (1, 3, 2) from pivot to end: `k` (5), `roots` (2) or None, `z3_sq` (2),

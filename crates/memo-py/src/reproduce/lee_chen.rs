@@ -176,6 +176,9 @@ pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
+/// More frames than this do not fit in the memory of most machines.
+const MOST_FRAMES: usize = 1_000_000;
+
 /// The walker made anew in frames of a sequence, counted from 0: joints (frames, 14, 3) in camera axes, metres,
 /// and the gait phase of each frame.
 #[pyfunction]
@@ -185,6 +188,9 @@ pub fn lee_chen_walker<'py>(
     sequence: &str,
     frames: usize,
 ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>)> {
+    if frames > MOST_FRAMES {
+        return Err(PyValueError::new_err(format!("frames must be at most {MOST_FRAMES}, got {frames}")));
+    }
     let (camera, walker) = (sequence_of(sequence)?.camera(), experiment::table_walker());
     let figures: Vec<_> = (0..frames).map(|frame| camera.view(&walker, frame).figure).collect();
     let phases = (0..frames).map(|frame| walker.phase(frame)).collect();

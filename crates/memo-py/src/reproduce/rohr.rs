@@ -7,6 +7,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
+use crate::wait::pooled;
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
 use memo_core::model::body::Part;
@@ -258,10 +259,10 @@ pub fn walk_similarity<'py>(
         })
         .collect::<PyResult<_>>()?;
     let grid = Grid::whole_cycle_within(at.along_m, at.height_m, [along_m, height_m]);
-    let found = py.detach(|| {
+    let found = pooled(py, || {
         let options = &tracked.options;
         search(&edges, &tracked.scene(), &grid, &options.similarity, options.hidden_lines)
-    });
+    })?;
     let values = |axis: &Axis, from: f64| (0..axis.count).map(|i| axis.at(i) - from).collect::<Vec<f64>>();
     let shape = vec![grid.phase.count, grid.along.count, grid.height.count];
     let best = found.best();

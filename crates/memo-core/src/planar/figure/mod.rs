@@ -120,6 +120,8 @@ pub enum FigureError {
 const MISSED_FRAMES: f64 = 5.0;
 const PAUSE_OF_WINDOW: f64 = 0.25;
 
+/// Sizes of a figure, in the unit of its positions: costs relative to them stay finite.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
 /// Fewest frames of a window.
 const FEWEST_FRAMES: usize = 8;
 
@@ -270,7 +272,7 @@ pub fn interpret_with_progress(
     }
     check(tracks, times_s, options)?;
     let size = options.size.unwrap_or_else(|| size_of(tracks));
-    if !(size > 0.0 && size.is_finite()) {
+    if !SIZES.contains(&size) {
         return Err(FigureError::NoExtent);
     }
     // 1. The tracks without single wrong positions, in windows.
@@ -344,14 +346,13 @@ fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Res
             return Err(FigureError::Option { option, wanted: "between 0 and 1,000,000", value });
         }
     }
-    for (option, value) in [
-        ("temperature", c.temperature),
-        ("window_s", options.window_s),
-        ("size", options.size.unwrap_or(1.0)),
-    ] {
+    for (option, value) in [("temperature", c.temperature), ("window_s", options.window_s)] {
         if !(value > 0.0 && value.is_finite()) {
             return Err(FigureError::Option { option, wanted: "positive and finite", value });
         }
+    }
+    if let Some(value) = options.size.filter(|size| !SIZES.contains(size)) {
+        return Err(FigureError::Option { option: "size", wanted: "between 1e-9 and 1e12", value });
     }
     let f = &options.fit;
     for (option, wanted, value, is_good) in [
@@ -489,5 +490,16 @@ mod tests {
                 FigureOptions { fit: FitOptions { noise_sd: bad, ..FitOptions::default() }, ..fresh() };
             assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
         }
+        // With noise beside so small a size, costs would be infinite.
+        let fit = FitOptions { noise_sd: 3.0, ..FitOptions::default() };
+        for size in [5e-324, 1e-300, 1e-10, 0.0, -1.0, 1e300, f64::NAN, f64::INFINITY] {
+            let options = FigureOptions { size: Some(size), fit, ..fresh() };
+            assert!(matches!(
+                refused(&tracks, &times_s, options),
+                FigureError::Option { option: "size", .. }
+            ));
+        }
+        let tiny: Vec<Vec<DVec2>> = tracks.iter().map(|t| t.iter().map(|p| *p * 1e-310).collect()).collect();
+        assert_eq!(refused(&tiny, &times_s, FigureOptions { fit, ..fresh() }), FigureError::NoExtent);
     }
 }

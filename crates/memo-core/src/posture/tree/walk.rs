@@ -5,8 +5,6 @@
 //! makes, and the verdict goes to all nodes that make the choice. What is left and what was cut is what
 //! a walk down the branches, one by one, leaves and cuts.
 
-use std::sync::LazyLock;
-
 use super::least::least_violating;
 use super::nodes::{Nodes, all_choices};
 use super::places::{CHAINS, Places};
@@ -30,17 +28,20 @@ pub(super) struct Asked {
     pub scope: usize,
 }
 
-/// All constraints by level, those of a level in the order of [`Constraint::ALL`].
-static BY_LEVEL: LazyLock<[Asked; CONSTRAINT_COUNT]> = LazyLock::new(|| {
-    let mut index = 0..CONSTRAINT_COUNT;
-    let mut all = Constraint::ALL.map(|constraint| {
-        let joints = constraint.joints();
-        let scope = joints.iter().fold(0, |scope, joint| scope | CHAINS[joint as usize]);
-        Asked { constraint, index: index.next().unwrap_or(0), level: constraint.level(), joints, scope }
-    });
-    all.sort_by_key(|asked| asked.level);
-    all
-});
+thread_local! {
+    /// All constraints by level, those of a level in the order of [`Constraint::ALL`]. Of each thread, because one
+    /// of all threads could be half made in a process that is forked meanwhile.
+    static BY_LEVEL: [Asked; CONSTRAINT_COUNT] = {
+        let mut index = 0..CONSTRAINT_COUNT;
+        let mut all = Constraint::ALL.map(|constraint| {
+            let joints = constraint.joints();
+            let scope = joints.iter().fold(0, |scope, joint| scope | CHAINS[joint as usize]);
+            Asked { constraint, index: index.next().unwrap_or(0), level: constraint.level(), joints, scope }
+        });
+        all.sort_by_key(|asked| asked.level);
+        all
+    };
+}
 
 const TORSO: usize = CHAINS[Joint::RightShoulder as usize]
     | CHAINS[Joint::LeftShoulder as usize]
@@ -68,7 +69,8 @@ impl<'a> Tree<'a> {
         let out_of_reach =
             |collisions: &Collisions, asked: &Asked| collisions.is_out_of_reach(asked.constraint, &spans);
         let can_break = |asked: &Asked| !options.collisions.as_ref().is_some_and(|c| out_of_reach(c, asked));
-        let wanted = || BY_LEVEL.iter().filter(|asked| options.asks(asked.constraint));
+        let by_level = BY_LEVEL.with(|all| *all);
+        let wanted = || by_level.iter().filter(|asked| options.asks(asked.constraint));
         let mut open: Vec<&Asked> = wanted().filter(|asked| !is_known(asked)).collect();
         open.sort_by_key(|asked| asked.index);
         let mut tree = Self {
