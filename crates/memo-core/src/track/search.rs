@@ -409,4 +409,4 @@ fn inside_image(start: DVec2, end: DVec2, camera: &Camera) -> Option<(f64, f64)>
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

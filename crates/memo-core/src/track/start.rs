@@ -380,4 +380,4 @@ pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapMo
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -260,17 +260,9 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::tests::{camera, edges_of, walker};
     use super::*;
-    use crate::model::{Body, Gait, GaitStyle};
     use glam::DVec2;
-
-    fn walker() -> Walker {
-        Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
-    }
-
-    fn camera() -> Camera {
-        Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
-    }
 
     const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
     const BEGINNING: Beginning =
@@ -295,11 +287,7 @@ mod tests {
     /// The contours of the planted walker as edges.
     fn planted(frame: usize, time_s: f64) -> FrameEdges {
         let (walker, camera) = (walker(), camera());
-        let lines = Scene { walker: &walker, camera: &camera, path: &PATH }.lines(&truth(time_s));
-        let edges = lines
-            .iter()
-            .map(|l| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 })
-            .collect();
+        let edges = edges_of(&Scene { walker: &walker, camera: &camera, path: &PATH }, &truth(time_s));
         FrameEdges { frame, time_s, window: WINDOW, edges }
     }
 

@@ -2,16 +2,16 @@ use super::super::score::{Measure, similarity};
 use super::*;
 use crate::model::{Body, Gait, GaitStyle};
 
-fn walker() -> Walker {
+pub fn walker() -> Walker {
     Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
 }
 
-fn camera() -> Camera {
+pub fn camera() -> Camera {
     Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
 }
 
 /// The image a hypothesis would show, as edges.
-fn edges_of(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
+pub fn edges_of(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
     let edge = |l: ModelLine| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 };
     scene.lines(truth).into_iter().map(edge).collect()
 }

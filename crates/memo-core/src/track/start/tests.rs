@@ -1,7 +1,6 @@
-use super::super::score::{EdgeLine, ModelLine};
+use super::super::search::tests::{camera, edges_of, walker};
 use super::*;
 use crate::image::Rectangle;
-use crate::model::{Body, Gait, GaitStyle};
 use glam::DVec2;
 
 /// A similarity curve with a peak at `phase` and a lower one half a cycle on.
@@ -167,14 +166,27 @@ fn the_swap_probability_is_bayes_rule_on_the_margin() {
     }
 }
 
-fn walker() -> Walker {
-    Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
+/// What a start that found this would have reported, sure of the direction.
+pub fn report(path: Path, beginning: Beginning, direction: Direction) -> StartReport {
+    let line = PhaseLine { phase_at_start: beginning.phase, rate_hz: beginning.rate_hz, similarity: 0.5 };
+    let twin = PhaseLine { phase_at_start: (beginning.phase + 0.5).rem_euclid(1.0), similarity: 0.4, ..line };
+    StartReport {
+        path,
+        beginning,
+        direction,
+        p_other_direction: 0.01,
+        lines: TwinLines { best: line, twin },
+        other_direction: PhaseLine { rate_hz: -line.rate_hz, similarity: 0.3, ..line },
+        two_line_rule: TwoLineChoice { line, on_line: Vec::new(), by_similarity: false },
+        curves: Vec::new(),
+        frames: Vec::new(),
+    }
 }
 
 /// Five frames of a walker's contours and the course its rectangles would give; `forward` or walking
 /// backwards to the right.
 fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
-    let (walker, camera) = (walker(), Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap());
+    let (walker, camera) = (walker(), camera());
     let heading_rad = if forward { 0.0 } else { std::f64::consts::PI };
     let sign = if forward { 1.0 } else { -1.0 };
     let path = Path { origin: DVec2::ZERO, heading_rad };
@@ -193,10 +205,9 @@ fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
             height_m: walker.level_torso_height_m(),
             phase: (0.2 + sign * rate_hz * elapsed_s).rem_euclid(1.0),
         };
-        let lines = Scene { walker: &walker, camera: &camera, path: &path }.lines(&hypothesis);
-        let edge = |l: &ModelLine| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 };
+        let edges = edges_of(&Scene { walker: &walker, camera: &camera, path: &path }, &hypothesis);
         let window = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
-        FrameEdges { frame: 10 + k, time_s: 7.0 + elapsed_s, window, edges: lines.iter().map(edge).collect() }
+        FrameEdges { frame: 10 + k, time_s: 7.0 + elapsed_s, window, edges }
     };
     let frames = (0..5).map(frame).collect();
     (frames, course, camera)
