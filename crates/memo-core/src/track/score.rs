@@ -418,6 +418,15 @@ mod tests {
     }
 
     #[test]
+    fn by_default_all_edges_weigh_alike() {
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        for (gradient, velocity) in [(0.1, 0.0), (300.0, 9.0)] {
+            let e = EdgeLine { gradient, velocity, ..edge([0.0, 0.0], [40.0, 0.0]) };
+            assert!((value(line, &[e], &SimilarityOptions::default()) - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
     fn with_w_v_a_moving_edge_answers_before_a_nearer_one_that_stands_still() {
         let line = model([0.0, 0.0], [40.0, 0.0]);
         let moving = EdgeLine { velocity: 2.0, ..edge([0.0, 3.0], [40.0, 3.0]) };
