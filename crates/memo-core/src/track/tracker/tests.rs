@@ -148,6 +148,16 @@ fn options_out_of_range_are_refused_by_name() {
 }
 
 #[test]
+fn frames_of_another_size_than_the_camera_s_are_refused() {
+    let small = Image::filled(320, 240, 100u8);
+    let refused = tracker().update(&small.as_frame(), 0.0);
+    let expected = TrackError::CameraSize { camera_width: 640, camera_height: 480, width: 320, height: 240 };
+    assert_eq!(refused, Err(expected));
+    let mut guessing = Tracker::new(TrackerOptions { camera: None, ..options() }).unwrap();
+    assert_eq!(guessing.update(&small.as_frame(), 0.0), Ok(()));
+}
+
+#[test]
 fn the_report_counts_frames_candidates_borders_and_refused_starts() {
     let mut tracker = tracker();
     // A person who leaves to the right, then stands still: no start.
