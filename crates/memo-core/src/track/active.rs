@@ -136,3 +136,191 @@ impl Active {
         self.walk = walk;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kalman::ConstantVelocity;
+    use super::super::search::tests::{camera, edges_of, walker};
+    use super::super::search::{Axis, Path};
+    use super::super::start::Direction;
+    use super::super::start::tests::report;
+    use super::super::walk::{Look, State, Step};
+    use super::*;
+    use crate::image::Rectangle;
+    use glam::DVec2;
+
+    const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    const BEGINNING: Beginning =
+        Beginning { time_s: 0.0, along_m: -0.6, phase: 0.2, speed_mps: 1.2, rate_hz: 0.9 };
+    const WINDOW: Rectangle = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
+    const FRAME_S: f64 = 0.05;
+
+    /// A walk of the given steps, the second twin worse.
+    fn active(steps: Vec<Step>) -> Active {
+        let mut walk = Walk::new(walker(), PATH, BEGINNING);
+        walk.twins[0].similarity_sum = steps.iter().map(|s| f64::from(s.similarity)).sum();
+        walk.twins[0].steps = steps;
+        walk.twins[1].steps = walk.twins[0].steps.clone();
+        Active {
+            camera: camera(),
+            depth_sd_m: 0.1,
+            start: report(PATH, BEGINNING, Direction::Forward),
+            walk,
+            kept: Vec::new(),
+            gait_speed_mps: 1.2,
+            person_fit: None,
+            fitted: false,
+        }
+    }
+
+    /// A step with this similarity at a place and phase.
+    fn step(frame: usize, [along_m, cycles]: [f64; 2], similarity: f32) -> Step {
+        let state = State {
+            along: ConstantVelocity::new(along_m, 1.2, 1e-4, 1e-3),
+            height: ConstantVelocity::new(1.15, 0.0, 1e-4, 0.0),
+            phase: ConstantVelocity::new(cycles, 0.9, 1e-4, 1e-3),
+        };
+        let heights = Axis::around(1.15, 0.1, 0.02);
+        let look = Look { window: WINDOW, heights, best: state.hypothesis() };
+        let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
+        Step { frame, time_s, state, measured, similarity, look }
+    }
+
+    /// A walk of `count` frames that goes well, and its last twelve at these speeds and similarity.
+    fn ending(count: usize, speed_mps: f64, rate_hz: f64, similarity: f32) -> Active {
+        let mut at = [0.0, 0.0];
+        let next = |k: usize| {
+            let is_last = k + 12 >= count;
+            if k > 0 {
+                // The first of the last twelve is reached as before.
+                let moves = if k + 12 > count { [speed_mps, rate_hz] } else { [1.2, 0.9] };
+                at = [at[0] + moves[0] * FRAME_S, at[1] + moves[1] * FRAME_S];
+            }
+            step(k, at, if is_last { similarity } else { 0.5 })
+        };
+        active((0..count).map(next).collect())
+    }
+
+    #[test]
+    fn a_walk_goes_on_while_body_and_legs_move_and_the_model_fits() {
+        assert!(!ending(40, 1.2, 0.9, 0.5).is_over());
+        assert!(!ending(40, -1.2, -0.9, 0.5).is_over(), "backwards");
+        assert!(ending(40, 0.0, 0.0, 0.5).is_over());
+        // Whoever stands still or glides no longer walks: 0.25 m/s, 0.3 Hz.
+        for (speed_mps, rate_hz, is_over) in [
+            (0.24, 0.9, true),
+            (0.26, 0.9, false),
+            (1.2, 0.29, true),
+            (1.2, 0.31, false),
+            (-0.26, -0.31, false),
+        ] {
+            assert_eq!(ending(40, speed_mps, rate_hz, 0.5).is_over(), is_over, "{speed_mps}, {rate_hz}");
+        }
+    }
+
+    #[test]
+    fn a_walk_ends_where_the_model_finds_less_than_its_share() {
+        // Twelve of 40 frames at s, the others at 0.5: the share is 0.45 of (14 + 12 s) / 40.
+        let border = 0.45 * 14.0 / (40.0 - 0.45 * 12.0);
+        assert!(ending(40, 1.2, 0.9, border - 0.005).is_over());
+        assert!(!ending(40, 1.2, 0.9, border + 0.005).is_over());
+        assert!(ending(40, 1.2, 0.9, 0.0).is_over());
+    }
+
+    #[test]
+    fn a_young_walk_is_not_over() {
+        assert!(!ending(23, 0.0, 0.0, 0.0).is_over() && ending(24, 0.0, 0.0, 0.0).is_over());
+        assert!(!active(Vec::new()).is_over());
+    }
+
+    fn frames(active: &Active) -> (usize, usize) {
+        let steps = &active.walk.twins[0].steps;
+        assert_eq!(active.walk.twins[1].steps.len(), steps.len(), "both twins alike");
+        (steps[0].frame, steps[steps.len() - 1].frame)
+    }
+
+    #[test]
+    fn frames_before_the_person_and_after_the_walk_are_taken_off() {
+        let mut good = ending(40, 1.2, 0.9, 0.5);
+        good.trim();
+        assert_eq!(frames(&good), (0, 39));
+        let mut stopped = ending(40, 0.0, 0.0, 0.5);
+        stopped.trim();
+        assert_eq!(frames(&stopped), (0, 33), "half of the last twelve");
+        let mut late = ending(40, 1.2, 0.9, 0.5);
+        let steps = &mut late.walk.twins[0].steps;
+        steps[..3].iter_mut().for_each(|step| step.similarity = 0.1);
+        steps[20].similarity = 0.1;
+        late.trim();
+        assert_eq!(frames(&late), (3, 39), "a gap within stays");
+        let mut lost = ending(40, 1.2, 0.9, 0.0);
+        lost.walk.twins[0].steps.iter_mut().for_each(|step| step.similarity = 0.0);
+        lost.trim();
+        assert!(lost.walk.twins[0].steps.is_empty(), "nobody was there");
+    }
+
+    /// Twelve frames of the contours of somebody who walks along a path, with the rectangles of somebody who walks
+    /// along another.
+    fn kept(path: &Path, seen: &Path) -> Vec<(Option<Sighting>, FrameEdges)> {
+        let (walker, camera) = (walker(), camera());
+        let scene = Scene { walker: &walker, camera: &camera, path };
+        let crown_m = walker.level_crown_height_m();
+        let frame = |k: usize| {
+            let time_s = 0.1 * k as f64;
+            let along_m = -0.6 + 1.2 * time_s;
+            let height_m = walker.level_torso_height_m();
+            let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s });
+            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(seen.point(along_m, z)).unwrap());
+            let rectangle = Rectangle {
+                left: (sole.x - 40.0).round() as usize,
+                right: (sole.x + 40.0).round() as usize,
+                top: (crown.y - 2.0).round() as usize,
+                bottom: sole.y.round() as usize,
+            };
+            (Some(Sighting { time_s, rectangle }), FrameEdges { frame: k, time_s, window: WINDOW, edges })
+        };
+        (0..12).map(frame).collect()
+    }
+
+    fn options() -> TrackerOptions {
+        TrackerOptions { start_frames: 5, person: None, ..TrackerOptions::for_height(1.75) }
+    }
+
+    /// A walk followed on a path parallel to the image through frames that are kept.
+    fn refitted(kept: Vec<(Option<Sighting>, FrameEdges)>) -> Active {
+        let mut active = active(Vec::new());
+        for (_, edges) in &kept {
+            active.walk.follow(edges, &active.camera, &options().walk);
+        }
+        active.kept = kept;
+        active.refit(&options());
+        assert!(active.fitted && active.kept.is_empty());
+        active
+    }
+
+    #[test]
+    fn a_slanting_path_is_taken_where_rectangles_and_contours_show_it() {
+        let slanting = Path { heading_rad: 0.4, ..PATH };
+        let turned = refitted(kept(&slanting, &slanting));
+        assert!((turned.walk.path.heading_rad - 0.4).abs() < 0.1, "{:?}", turned.walk.path);
+        assert_eq!((turned.start.path, turned.walk.beginning), (turned.walk.path, turned.start.beginning));
+        assert_eq!(turned.walk.twins[0].steps.len(), 12);
+        assert!(turned.walk.twins[0].similarity_sum > 8.0);
+    }
+
+    #[test]
+    fn a_path_that_only_the_rectangles_show_is_not_taken() {
+        let straight = refitted(kept(&PATH, &Path { heading_rad: 0.4, ..PATH }));
+        assert_eq!((straight.walk.path, straight.start.path), (PATH, PATH));
+        assert!(straight.walk.twins[0].similarity_sum > 10.0);
+    }
+
+    #[test]
+    fn a_walk_is_fitted_once() {
+        let mut active = active(Vec::new());
+        active.fitted = true;
+        active.kept = kept(&PATH, &PATH);
+        active.refit(&options());
+        assert_eq!(active.kept.len(), 12, "left alone");
+    }
+}

@@ -244,3 +244,249 @@ fn detectors(options: &EvidenceOptions) -> [ChangeDetector; 2] {
     let min_threshold = options.rectangle_threshold.max(options.change.min_threshold);
     [options.change, ChangeOptions { min_threshold, ..options.change }].map(ChangeDetector::new)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Distortion;
+
+    const SIZE: [usize; 2] = [120, 90];
+
+    fn blank() -> Image<u8> {
+        Image::filled(SIZE[0], SIZE[1], 100)
+    }
+
+    /// A grey box of columns x and rows y.
+    fn fill(image: &mut Image<u8>, x: std::ops::Range<usize>, y: std::ops::Range<usize>, grey: u8) {
+        y.for_each(|y| image.row_mut(y)[x.clone()].fill(grey));
+    }
+
+    fn boxed(x: usize, grey: u8) -> Image<u8> {
+        let mut image = blank();
+        fill(&mut image, x..x + 14, 30..65, grey);
+        image
+    }
+
+    /// All evidence of frames 0.04 s apart.
+    fn evidence_of(options: EvidenceOptions, frames: &[Image<u8>]) -> Vec<Evidence> {
+        let mut stream = EvidenceStream::new(options);
+        let push = |(k, frame): (usize, &Image<u8>)| stream.push(&frame.as_frame(), 0.04 * k as f64).unwrap();
+        let mut all: Vec<Evidence> = frames.iter().enumerate().filter_map(push).collect();
+        all.extend(stream.finish().unwrap());
+        all
+    }
+
+    /// Two boxes, the left one marked as moving, the other one not.
+    fn two_boxes() -> Evidence {
+        let mut grey = boxed(20, 180);
+        fill(&mut grey, 80..100, 30..65, 180);
+        let mut mask = Image::filled(SIZE[0], SIZE[1], false);
+        (28..67).for_each(|y| mask.row_mut(y)[18..36].fill(true));
+        Evidence { frame: 3, time_s: 0.12, grey, firm_mask: mask.clone(), mask, velocity: None }
+    }
+
+    const WHOLE: Rectangle = Rectangle { left: 0, top: 0, right: 119, bottom: 89 };
+
+    fn lines_of(evidence: &Evidence, window: &Rectangle) -> Vec<EdgeLine> {
+        evidence.edges(window, None, &EvidenceOptions::default()).unwrap().lines
+    }
+
+    #[test]
+    fn evidence_of_a_frame_comes_with_the_next_and_of_the_last_one_at_the_end() {
+        let frames = [10, 20, 30, 40].map(|x| boxed(x, 180));
+        let mut stream = EvidenceStream::new(EvidenceOptions::default());
+        for (k, frame) in frames.iter().enumerate() {
+            let found = stream.push(&frame.as_frame(), 1.0 + 0.5 * k as f64).unwrap();
+            assert_eq!(found.is_none(), k == 0);
+            let Some(found) = found else { continue };
+            assert_eq!((found.frame, found.time_s), (k - 1, 0.5 + 0.5 * k as f64));
+            assert!(found.grey == frames[k - 1], "its own picture");
+            // Where the box is, where it goes and, after the first frame, where it came from.
+            let marked = |x: usize| found.mask.at(x + 7, 47);
+            assert!(marked(10 * k) && marked(10 * (k + 1)) && (k == 1 || marked(10 * (k - 1))));
+        }
+        let last = stream.finish().unwrap().expect("the last frame has one neighbour");
+        assert_eq!((last.frame, last.time_s), (3, 2.5));
+        assert!(last.mask.at(47, 47) && last.mask.at(37, 47) && !last.mask.at(18, 47));
+        let one = evidence_of(EvidenceOptions::default(), &frames[..1]);
+        assert!(one.is_empty() && evidence_of(EvidenceOptions::default(), &[]).is_empty());
+    }
+
+    #[test]
+    fn frames_out_of_order_are_refused_and_not_counted() {
+        let mut stream = EvidenceStream::new(EvidenceOptions::default());
+        let (first, second) = (boxed(10, 180), boxed(20, 180));
+        stream.push(&first.as_frame(), 0.5).unwrap();
+        for time_s in [0.5, 0.4] {
+            let refused = stream.push(&second.as_frame(), time_s);
+            assert_eq!(refused, Err(EvidenceError::TimeOrder { previous_s: 0.5, time_s }));
+        }
+        for time_s in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let refused = stream.push(&second.as_frame(), time_s);
+            assert!(matches!(refused, Err(EvidenceError::Time { .. })), "{time_s}");
+        }
+        let small = Image::filled(32, 32, 100u8);
+        assert!(matches!(stream.push(&small.as_frame(), 0.6), Err(EvidenceError::Frame(_))));
+        assert_eq!(stream.push(&second.as_frame(), 0.7).unwrap().unwrap().frame, 0);
+        let last = stream.finish().unwrap().unwrap();
+        assert_eq!((last.frame, last.time_s), (1, 0.7));
+    }
+
+    #[test]
+    fn faint_changes_are_in_the_mask_and_strong_ones_in_the_rectangle_as_well() {
+        let mut changed = blank();
+        // 2, 7 and 60 grey levels: below, between and above the thresholds 4 and 10.
+        for (x, grey) in [(10, 102), (45, 107), (80, 160)] {
+            fill(&mut changed, x..x + 14, 30..65, grey);
+        }
+        let found = |rectangle_threshold: f64| {
+            let options = EvidenceOptions { rectangle_threshold, ..EvidenceOptions::default() };
+            let all = evidence_of(options, &[blank(), changed.clone()]);
+            let columns = [17, 52, 87];
+            let candidates: Vec<usize> =
+                all[0].candidates(&options).iter().map(|r| r.rectangle.left).collect();
+            (columns.map(|x| all[0].mask.at(x, 47)), columns.map(|x| all[0].firm_mask.at(x, 47)), candidates)
+        };
+        let (mask, firm, candidates) = found(EvidenceOptions::default().rectangle_threshold);
+        assert_eq!((mask, firm), ([false, true, true], [false, false, true]));
+        assert!(candidates.len() == 1 && (76..=80).contains(&candidates[0]), "{candidates:?}");
+        // The rectangle's threshold is never the lower one.
+        let (mask, firm, candidates) = found(0.0);
+        assert_eq!((mask, firm, candidates.len()), ([false, true, true], [false, true, true], 2));
+    }
+
+    #[test]
+    fn a_ring_that_appears_is_filled() {
+        let mut ring = blank();
+        fill(&mut ring, 40..80, 20..70, 170);
+        fill(&mut ring, 50..70, 30..60, 100);
+        let found = &evidence_of(EvidenceOptions::default(), &[blank(), ring])[0];
+        assert!(found.mask.at(60, 45) && found.firm_mask.at(60, 45) && !found.mask.at(20, 45));
+    }
+
+    #[test]
+    fn before_a_background_somebody_who_stands_still_is_seen_on() {
+        let mut frames = vec![blank(); 6];
+        frames.extend(vec![boxed(50, 180); 30]);
+        // Fast enough to swallow the box within ten frames if it were not marked.
+        let background = BackgroundOptions { rate: 8.0, ..BackgroundOptions::default() };
+        let with = EvidenceOptions { background: Some(background), ..EvidenceOptions::default() };
+        let (seen, unseen) = (evidence_of(with, &frames), evidence_of(EvidenceOptions::default(), &frames));
+        for (k, (seen, unseen)) in seen.iter().zip(&unseen).enumerate() {
+            let at = |mask: &Mask| mask.at(57, 47);
+            let (is_there, appears) = (k >= 6, k == 5 || k == 6);
+            assert_eq!(
+                (at(&seen.mask), at(&seen.firm_mask)),
+                (is_there || appears, is_there || appears),
+                "{k}"
+            );
+            assert_eq!((at(&unseen.mask), at(&unseen.firm_mask)), (appears, appears), "{k}");
+            assert!(!seen.mask.at(10, 10));
+        }
+        assert!(seen[35].candidates(&with).len() == 1 && unseen[35].candidates(&with).is_empty());
+    }
+
+    #[test]
+    fn edges_are_those_near_the_moving_pixels_of_the_window() {
+        let evidence = two_boxes();
+        let ends =
+            |lines: &[EdgeLine]| -> Vec<[f32; 2]> { lines.iter().flat_map(|l| [l.start, l.end]).collect() };
+        let moving = ends(&lines_of(&evidence, &WHOLE));
+        assert!(moving.len() >= 8 && moving.iter().all(|p| p[0] < 41.0), "{moving:?}");
+        let narrow = Rectangle { left: 10, top: 20, right: 27, bottom: 50 };
+        let cut = ends(&lines_of(&evidence, &narrow));
+        assert!(!cut.is_empty() && cut.iter().all(|p| p[0] <= 28.0 && p[1] <= 51.0), "{cut:?}");
+        // Nothing moves about the right box: all of the rectangle counts.
+        let still = Rectangle { left: 60, ..WHOLE };
+        let lines = ends(&lines_of(&evidence, &still));
+        assert!(lines.len() >= 8 && lines.iter().all(|p| p[0] > 75.0), "{lines:?}");
+    }
+
+    #[test]
+    fn edges_a_few_pixels_outside_the_moving_ones_are_taken_too() {
+        let mut evidence = two_boxes();
+        // The box's left side is between the columns 19 and 20.
+        for (first, found) in [(18, true), (23, true), (27, false)] {
+            evidence.mask = Image::filled(SIZE[0], SIZE[1], false);
+            (28..67).for_each(|y| evidence.mask.row_mut(y)[first..31].fill(true));
+            let lines = lines_of(&evidence, &WHOLE);
+            let is_left = |l: &EdgeLine| (l.start[0] - 19.5).abs() < 1.0 && (l.end[0] - 19.5).abs() < 1.0;
+            assert_eq!(lines.iter().any(is_left), found, "marked from {first}: {lines:?}");
+        }
+    }
+
+    #[test]
+    fn an_edge_has_the_speed_of_the_image_at_its_middle() {
+        let mut evidence = two_boxes();
+        assert!(lines_of(&evidence, &WHOLE).iter().all(|l| l.velocity == 0.0), "no field");
+        let window = Window { x: 10, y: 20, width: 50, height: 60 };
+        let mut field = FlowField {
+            window,
+            u_px: Image::filled(50, 60, 3.0),
+            v_px: Image::filled(50, 60, 4.0),
+            components: Vec::new(),
+            iterations: 0,
+            relative_residual: 0.0,
+        };
+        evidence.velocity = Some(field.clone());
+        assert!(lines_of(&evidence, &WHOLE).iter().all(|l| (l.velocity - 5.0).abs() < 1e-6));
+        // Faster downwards: the upright sides differ between their ends and their middles.
+        (0..60).for_each(|y| field.v_px.row_mut(y).fill(0.1 * y as f32));
+        field.u_px = Image::filled(50, 60, 0.0);
+        evidence.velocity = Some(field.clone());
+        let upright = |l: &&EdgeLine| (l.start[0] - l.end[0]).abs() < 1.0;
+        let lines = lines_of(&evidence, &WHOLE);
+        assert!(lines.iter().filter(upright).count() >= 2);
+        for line in lines.iter().filter(upright) {
+            let middle = 0.5 * (line.start[1] + line.end[1]);
+            assert!((line.velocity - 0.1 * (middle - 20.0)).abs() < 0.06, "{line:?}");
+        }
+        field.v_px = Image::filled(50, 60, f32::NAN);
+        evidence.velocity = Some(field);
+        assert!(lines_of(&evidence, &WHOLE).iter().all(|l| l.velocity == 0.0), "not determined");
+    }
+
+    #[test]
+    fn velocities_lead_to_the_next_frame() {
+        // A textured plate that moves 2 pixels to the right and 1 down.
+        let plate = |k: usize| {
+            let mut image = blank();
+            let (left, top) = (30 + 2 * k, 15 + k);
+            for (x, y) in (0..44).flat_map(|x| (0..50).map(move |y| (x, y))) {
+                let texture = (0.5 * x as f32).sin() * (0.4 * y as f32).cos();
+                image.set(left + x, top + y, (150.0 + 40.0 * texture) as u8);
+            }
+            image
+        };
+        let frames = [plate(0), plate(1), plate(2)];
+        let options = EvidenceOptions { flow: Some(FlowOptions::default()), ..EvidenceOptions::default() };
+        let all = evidence_of(options, &frames);
+        for evidence in &all[..2] {
+            let velocity = evidence.velocity.as_ref().unwrap().at(54, 40).unwrap();
+            assert!(velocity.distance(DVec2::new(2.0, 1.0)) < 0.3, "{velocity}");
+        }
+        assert!(all[2].velocity.is_none(), "nothing follows the last frame");
+        assert!(evidence_of(EvidenceOptions::default(), &frames).iter().all(|e| e.velocity.is_none()));
+    }
+
+    #[test]
+    fn edges_are_compared_in_ideal_pixels_with_their_gradients() {
+        let mut camera = Camera::level([120, 90], 0.9, 1.1, 6.0).unwrap();
+        camera.distortion = Distortion::Brown { k1: -0.3, k2: 0.1, p1: 0.0, p2: 0.0, k3: 0.0 };
+        let evidence = two_boxes();
+        let found = evidence.edges(&WHOLE, Some(&camera), &EvidenceOptions::default()).unwrap();
+        assert!(found.segments.len() == found.lines.len() && found.chains.iter().len() > 0);
+        for (segment, line) in found.segments.iter().zip(&found.lines) {
+            for (seen, ideal) in [(segment.start_px, line.start), (segment.end_px, line.end)] {
+                let ideal = DVec2::new(f64::from(ideal[0]), f64::from(ideal[1]));
+                assert!(camera.distort(ideal).unwrap().distance(seen) < 1e-3);
+                assert!(ideal.distance(seen) > 0.05, "the lens bends");
+            }
+            assert!((f64::from(line.gradient) - segment.mean_gradient).abs() < 1e-4 && line.gradient > 5.0);
+        }
+        let plain = evidence.edges(&WHOLE, None, &EvidenceOptions::default()).unwrap();
+        assert!(
+            plain.segments.iter().zip(&plain.lines).all(|(s, l)| s.start_px.as_vec2().to_array() == l.start)
+        );
+    }
+}

@@ -119,15 +119,8 @@ fn smooth_step(
     let [a, b, d] = prior.covariance;
     let determinant = a * d - b * b;
     if determinant <= 1e-12 * a * d {
-        // A velocity known exactly: the position is all there is to correct.
-        let c = if a > 0.0 { (now.covariance[0] + dt_s * now.covariance[1]) / a } else { 0.0 };
-        let position = now.position + c * (later.position - prior.position);
-        let variance = now.covariance[0] + c * c * (later.covariance[0] - a);
-        return ConstantVelocity {
-            position,
-            velocity: later.velocity,
-            covariance: [variance, now.covariance[1], now.covariance[2]],
-        };
+        // Only without process noise: the state then follows from the later one alone.
+        return later.predict(-dt_s, &Noise { velocity_variance_per_s: 0.0, ..*noise });
     }
     let [pp, pv, vv] = now.covariance;
     // Rows of P Phi^T: position (pp + dt pv, pv), velocity (pv + dt vv, vv).
@@ -148,45 +141,4 @@ fn smooth_step(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn printed_variances_are_reproduced_at_25_images_a_second() {
-        let o = FilterOptions::default();
-        let per_image = |n: &Noise| n.velocity_variance_per_s / 25.0 / 625.0;
-        assert!((per_image(&o.along) * 1e4 - 3.69).abs() < 0.01, "cm²/image²");
-        assert!((per_image(&o.phase) - 0.000_144).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_smoother_equals_least_squares_over_all_frames() {
-        // Without process noise the state is a straight line, and smoothing is weighted least squares with
-        // the prior.
-        let noise = Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.5 };
-        let z = [0.3, 0.9, 2.4, 2.8, 4.4, 4.9];
-        let mut state = ConstantVelocity::new(0.0, 0.0, 1e6, 1e6);
-        let mut filtered = vec![];
-        for (k, &zk) in z.iter().enumerate() {
-            state =
-                if k == 0 { state.update(zk, &noise) } else { state.predict(1.0, &noise).update(zk, &noise) };
-            filtered.push(state);
-        }
-        let smoothed = smooth(&filtered, &[1.0; 5], &noise);
-        let design = nalgebra::DMatrix::from_fn(6, 2, |r, c| if c == 0 { 1.0 } else { r as f64 });
-        let line =
-            design.clone().svd(true, true).solve(&nalgebra::DVector::from_row_slice(&z), 1e-12).unwrap();
-        for (k, s) in smoothed.iter().enumerate() {
-            assert!((s.position - (line[0] + line[1] * k as f64)).abs() < 1e-4, "frame {k}: {s:?}");
-            assert!(s.position_sd() <= filtered[k].position_sd() + 1e-9);
-        }
-    }
-
-    #[test]
-    fn missed_measurements_coast_and_grow_uncertain() {
-        let o = FilterOptions::default();
-        let start = ConstantVelocity::new(1.0, 1.5, 0.01, 0.1);
-        let coasted = start.predict(0.2, &o.along);
-        assert!((coasted.position - 1.3).abs() < 1e-12 && coasted.position_sd() > start.position_sd());
-    }
-}
+mod tests;

@@ -227,6 +227,7 @@ fn check_size(camera: &Camera, foot: &DVec3, height_m: f64, got_px: f64) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Distortion;
 
     fn sightings(camera: &Camera, depth: f64, speed: f64, height_m: f64) -> Vec<Sighting> {
         (0..13)
@@ -244,6 +245,28 @@ mod tests {
                 Sighting { time_s, rectangle }
             })
             .collect()
+    }
+
+    fn sighted(left: usize, top: usize, right: usize, bottom: usize) -> Sighting {
+        Sighting { time_s: 0.0, rectangle: Rectangle { left, top, right, bottom } }
+    }
+
+    #[test]
+    fn a_quantile_lies_between_the_sorted_values() {
+        let values = vec![30.0, 10.0, 50.0, 20.0, 40.0];
+        for (q, value) in [(0.0, 10.0), (0.25, 20.0), (0.3, 22.0), (0.5, 30.0), (0.9, 46.0), (1.0, 50.0)] {
+            assert!((quantile(values.clone(), q) - value).abs() < 1e-12, "{q}");
+        }
+        assert_eq!(quantile(vec![7.0], 0.3), 7.0);
+    }
+
+    #[test]
+    fn the_sole_is_a_low_bottom_row_and_the_crown_the_middle_top_row_inside_the_mask() {
+        let bottoms = [400, 402, 404, 406, 408, 410, 470, 480, 490, 460, 450];
+        let tops = [100, 103, 106, 109, 112, 115, 118, 121, 124, 127, 130];
+        let seen: Vec<_> = bottoms.iter().zip(tops).map(|(b, t)| sighted(10, t, 60, *b)).collect();
+        // 30 % of the way through 400, 402, ... and 50 % through the tops; the windows of eq. (1) reach 2 px out.
+        assert_eq!(person_rows(&seen), (406.0, 117.0));
     }
 
     #[test]
@@ -297,6 +320,135 @@ mod tests {
         let course = locate_slanting(&slanting, &camera, 1.8).unwrap();
         assert!((course.path.heading_rad - 0.5f64.atan()).abs() < 0.1, "{course:?}");
         assert!((course.speed_mps - 1.25f64.sqrt()).abs() < 0.1, "{course:?}");
+    }
+
+    #[test]
+    fn slight_slants_are_left_alone_and_larger_ones_found_coming_and_going() {
+        let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
+        // The middles of the first and the last third of a walk of 1.2 s are 0.8 s apart.
+        for (towards_mps, found) in [(0.15, false), (-0.15, false), (0.4, true), (-0.4, true)] {
+            let course = locate_slanting(&slanting(&camera, towards_mps), &camera, 1.8);
+            assert_eq!(course.is_some(), found, "{towards_mps} m/s: {course:?}");
+            let Some(course) = course else { continue };
+            assert!((course.path.heading_rad - towards_mps.atan()).abs() < 0.1, "{course:?}");
+            let end = course.path.point(*course.along_m.last().unwrap(), 0.0);
+            assert!((end.x - 1.2).abs() < 0.05 && (end.y - 1.2 * towards_mps).abs() < 0.15, "{end}");
+        }
+        assert!(locate_slanting(&slanting(&camera, 0.4)[..2], &camera, 1.8).is_none(), "no thirds");
+    }
+
+    /// Seen for 1.2 s while walking 1 m/s to the right and some to the back.
+    fn slanting(camera: &Camera, back_mps: f64) -> Vec<Sighting> {
+        let at = |k: i32| {
+            let time_s = f64::from(k) * 0.04;
+            let foot = DVec3::new(time_s, back_mps * time_s, 0.0);
+            let [sole, crown] = [0.0, 1.8].map(|z| camera.project(foot + DVec3::Z * z).unwrap());
+            let rectangle = Rectangle {
+                left: (sole.x - 40.0).round() as usize,
+                right: (sole.x + 40.0).round() as usize,
+                top: (crown.y - MASK_MARGIN_PX).round() as usize,
+                bottom: sole.y.round() as usize,
+            };
+            Sighting { time_s, rectangle }
+        };
+        (0..31).map(at).collect()
+    }
+
+    /// Depth of a person whose reflection reaches `reflected` pixels below the feet: as taken, and by the feet, the
+    /// crown and both.
+    fn stood(camera: &Camera, reflected: f64) -> (f64, [f64; 3]) {
+        let [sole, crown] = [0.0, 1.8].map(|z| camera.project(DVec3::new(0.2, 0.0, z)).unwrap());
+        let midpoints = Midpoints { bottom_px: sole + reflected * DVec2::Y, top_px: crown };
+        let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
+        let found = stand(camera, &midpoints, 1.8, &options).unwrap().depth_m;
+        let ways = [position_from_feet, position_from_head, position_on_ground];
+        (found, ways.map(|way| way(camera, &midpoints, 1.8, &options).unwrap().depth_m))
+    }
+
+    #[test]
+    fn only_soles_far_below_the_crown_s_place_are_taken_for_a_reflection() {
+        // A high camera: crown and soles both tell a depth.
+        let camera = Camera::level([1280, 720], 1.08, 2.6, 6.0).unwrap();
+        let (found, [_, head, _]) = stood(&camera, 60.0);
+        assert!(found == head && (found - 6.0).abs() < 0.01, "the crown alone: {found}");
+        for reflected in [3.0, 0.0, -60.0] {
+            let (found, [feet, head, both]) = stood(&camera, reflected);
+            assert_eq!(found, both, "{reflected} px");
+            assert!(found >= feet.min(head) - 1e-9 && found <= feet.max(head) + 1e-9);
+        }
+        // The border between the two is one standard deviation of the difference.
+        let options = PositionOptions { height_sd_m: 0.02, ..PositionOptions::default() };
+        let excess = |reflected: f64| {
+            let [sole, crown] = [0.0, 1.8].map(|z| camera.project(DVec3::new(0.2, 0.0, z)).unwrap());
+            let midpoints = Midpoints { bottom_px: sole + reflected * DVec2::Y, top_px: crown };
+            let feet = position_from_feet(&camera, &midpoints, 1.8, &options).unwrap();
+            let head = position_from_head(&camera, &midpoints, 1.8, &options).unwrap();
+            (head.depth_m - feet.depth_m) / feet.depth_sd_m.hypot(head.depth_sd_m)
+        };
+        let border = (0..600).map(|k| 0.1 * f64::from(k)).find(|r| excess(*r) > 1.0).unwrap();
+        let (below, [_, _, both]) = stood(&camera, border - 0.3);
+        let (above, [_, head, _]) = stood(&camera, border + 0.3);
+        assert!(below == both && above == head, "at {border} px: {below}, {above}");
+    }
+
+    #[test]
+    fn a_person_up_to_a_third_too_small_or_half_too_large_is_accepted() {
+        let camera = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
+        let foot = DVec3::new(0.3, 0.5, 0.0);
+        let [sole, crown] = [0.0, 1.7].map(|z| camera.project(foot + DVec3::Z * z).unwrap().y);
+        for (share, fits) in
+            [(0.6, false), (0.66, false), (0.68, true), (1.0, true), (1.48, true), (1.52, false)]
+        {
+            let checked = check_size(&camera, &foot, 1.7, share * (sole - crown));
+            assert_eq!(checked.is_ok(), fits, "{share}");
+            if let Err(LocateError::Size { height_m, distance_m, expected_px, got_px }) = checked {
+                assert!((expected_px - (sole - crown)).abs() < 0.5 && height_m == 1.7);
+                assert!((got_px / expected_px - share).abs() < 0.01);
+                assert!((distance_m - foot.distance(camera.position())).abs() < 1e-9);
+            }
+        }
+    }
+
+    /// The standard deviation against depths found with the sole's and the crown's row and the height varied by
+    /// theirs.
+    #[test]
+    fn the_depth_s_standard_deviation_is_that_of_rows_and_height() {
+        let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
+        let seen = sightings(&camera, 0.0, 1.0, 1.8);
+        let course = locate(&seen, &camera, 1.8).unwrap();
+        let depth = |bottom: isize, top: isize, height_m: f64| {
+            let moved: Vec<Sighting> = seen
+                .iter()
+                .map(|s| {
+                    let r = s.rectangle;
+                    let rectangle = Rectangle {
+                        bottom: r.bottom.strict_add_signed(bottom),
+                        top: r.top.strict_add_signed(top),
+                        ..r
+                    };
+                    Sighting { rectangle, ..*s }
+                })
+                .collect();
+            locate(&moved, &camera, height_m).unwrap().path.origin.y
+        };
+        let at = depth(0, 0, 1.8);
+        // Rows by their 4 and 2 px, the height by 2 cm.
+        let changes = [depth(-4, 0, 1.8) - at, depth(0, 2, 1.8) - at, depth(0, 0, 1.82) - at];
+        let sum = changes.iter().map(|d| d * d).sum::<f64>().sqrt();
+        assert!((course.depth_sd_m / sum - 1.0).abs() < 0.15, "{} against {sum}", course.depth_sd_m);
+    }
+
+    #[test]
+    fn places_are_where_the_columns_meet_the_path() {
+        let mut camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
+        let path = Path { origin: DVec2::new(0.3, 0.4), heading_rad: 0.4 };
+        for (along, height) in [(-0.8, 0.2), (0.0, 1.0), (0.9, 1.6)] {
+            let pixel = camera.project(path.point(along, height)).unwrap();
+            assert!((place(&camera, &path, pixel.x, pixel.y) - along).abs() < 1e-9);
+        }
+        camera.distortion = Distortion::Brown { k1: -0.2, k2: 0.05, p1: 0.0, p2: 0.0, k3: 0.0 };
+        let pixel = camera.project(path.point(0.9, 1.6)).unwrap();
+        assert!((place(&camera, &path, pixel.x, pixel.y) - 0.9).abs() < 1e-6);
     }
 
     #[test]

@@ -253,3 +253,6 @@ impl Coordinate {
         Self { smoothed, sd_scale: if ratios.is_empty() { 1.0 } else { mean.sqrt() } }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,8 +3,8 @@
 //! Symbols of the paper: l_M `model_px`, l `overlap_px`, d `distance_px`, delta phi `angle_rad`.
 //!
 //! The search window of a model line is the rectangle of the line's length and half width r = c_r l_M about
-//! it; an edge is cut to that window before it is compared. One edge, the best, answers for each line. Both
-//! sides are straight lines in ideal (distortion-free) pixels. Scores are f32: they differ from f64 by some
+//! it; an edge is cut to that window before it is compared. One edge, the best, answers for each line; of equals
+//! the first. Both sides are straight lines in ideal (distortion-free) pixels. Scores are f32: they differ from f64 by some
 //! 1e-7, geometry stays f64 until it is projected.
 
 use crate::model::body::PART_COUNT;
@@ -312,6 +312,7 @@ fn clip(p: f32, d: f32, low: f32, high: f32, t0: &mut f32, t1: &mut f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec2;
     use proptest::prelude::*;
 
     fn model(start: [f32; 2], end: [f32; 2]) -> ModelLine {
@@ -370,6 +371,156 @@ mod tests {
         assert!((small - large).abs() < 1e-6 * large.max(1.0));
         let worse = value(model([0.0, 0.0], [10.0, 0.0]), &[edge([0.0, 1.5], [7.0, 1.7])], &o);
         assert!(worse < small);
+    }
+
+    /// Eq. (7) without clipping: the edge is sampled, and what lies in the line's window is kept.
+    fn sampled(line: &ModelLine, e: &EdgeLine, o: &SimilarityOptions) -> f64 {
+        let point = |p: [f32; 2]| DVec2::new(f64::from(p[0]), f64::from(p[1]));
+        let (start, along) = (point(line.start), point(line.end) - point(line.start));
+        let length = along.length();
+        let (from, to) = (point(e.start) - start, point(e.end) - start);
+        let local = |p: DVec2| DVec2::new(p.dot(along), along.perp_dot(p)) / length;
+        let half_width = f64::from(o.c_r) * length;
+        let inside = |p: &DVec2| (0.0..=length).contains(&p.x) && p.y.abs() <= half_width;
+        let shown: Vec<DVec2> =
+            (0..=20_000).map(|k| local(from.lerp(to, f64::from(k) / 2e4))).filter(inside).collect();
+        let (Some(first), Some(last)) = (shown.first(), shown.last()) else { return 0.0 };
+        let (overlap, distance) = ((last.x - first.x).abs(), (0.5 * (first.y + last.y)).abs());
+        let (missing, away) = (length - overlap, distance / f64::from(o.c_d) / half_width);
+        let turned = angle_between(along, to - from) / f64::from(o.sigma_phi_rad);
+        let sum_sq = (missing / (f64::from(o.c_l) * length)).powi(2) + away * away + turned * turned;
+        overlap * (-0.5 * sum_sq).exp() / length
+    }
+
+    /// Of undirected lines, radians.
+    fn angle_between(a: DVec2, b: DVec2) -> f64 {
+        let turn = a.angle_to(b).abs();
+        turn.min(std::f64::consts::PI - turn)
+    }
+
+    #[test]
+    fn gradient_and_velocity_weigh_an_edge_up_to_their_full_values() {
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        let moving = EdgeLine { velocity: 1.0, ..edge([0.0, 0.0], [40.0, 0.0]) };
+        for (full_gradient, full_velocity, weight) in [
+            (None, None, 1.0),
+            (Some(80.0), None, 0.25),
+            (Some(20.0), None, 1.0),
+            (Some(5.0), None, 1.0),
+            (None, Some(2.0), 0.5),
+            (None, Some(0.5), 1.0),
+            (Some(80.0), Some(2.0), 0.125),
+        ] {
+            let options = SimilarityOptions { full_gradient, full_velocity, ..SimilarityOptions::default() };
+            let found = value(line, &[moving], &options);
+            assert!((found - weight).abs() < 1e-6, "{full_gradient:?}, {full_velocity:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn by_default_all_edges_weigh_alike() {
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        for (gradient, velocity) in [(0.1, 0.0), (300.0, 9.0)] {
+            let e = EdgeLine { gradient, velocity, ..edge([0.0, 0.0], [40.0, 0.0]) };
+            assert!((value(line, &[e], &SimilarityOptions::default()) - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn with_w_v_a_moving_edge_answers_before_a_nearer_one_that_stands_still() {
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        let moving = EdgeLine { velocity: 2.0, ..edge([0.0, 3.0], [40.0, 3.0]) };
+        let edges = [edge([0.0, 0.0], [40.0, 0.0]), moving];
+        let plain = SimilarityOptions::default();
+        let weighted = SimilarityOptions { full_velocity: Some(2.0), ..plain };
+        assert_eq!(similarity(&[line], &edges, &plain).matches[0].edge, 0);
+        assert_eq!(similarity(&[line], &edges, &weighted).matches[0].edge, 1);
+    }
+
+    #[test]
+    fn each_part_has_its_own_weight_and_eq_11_weighs_lines_by_length() {
+        let mut options = SimilarityOptions::default();
+        (options.part_weights[2], options.part_weights[9]) = (0.5, 0.125);
+        let lines = [(2, 10.0f32, 0.0), (9, 30.0, 100.0), (5, 60.0, 200.0)]
+            .map(|(part, length, y)| ModelLine { part, start: [0.0, y], end: [length, y] });
+        let edges = lines.map(|l| edge(l.start, l.end));
+        let found = similarity(&lines, &edges, &options);
+        assert_eq!(found.model_px, 100.0);
+        assert!((found.value - (0.5 * 10.0 + 0.125 * 30.0 + 60.0) / 100.0).abs() < 1e-6);
+        // A line that no edge answers counts as well, one below the shortest length does not.
+        let unanswered = similarity(&lines, &edges[2..], &options);
+        assert!((unanswered.value - 0.6).abs() < 1e-6 && unanswered.matches.len() == 1);
+        let speck = ModelLine { part: 5, start: [0.0, 200.0], end: [0.9, 200.0] };
+        assert_eq!(similarity(&[lines[2], speck], &edges, &options).model_px, 60.0);
+        let short = model([0.0, 0.0], [2.0, 0.0]);
+        assert!((value(short, &[edge([0.0, 0.0], [2.0, 0.0])], &options) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn angles_are_compared_up_to_the_cut() {
+        let o = SimilarityOptions::default();
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        let turned = |sigma: f32| {
+            let (s, c) = (sigma * o.sigma_phi_rad).sin_cos();
+            value(line, &[edge([20.0 - 4.0 * c, -4.0 * s], [20.0 + 4.0 * c, 4.0 * s])], &o)
+        };
+        assert!(turned(2.75) > 1e-3 && turned(-2.75) > 1e-3);
+        assert!(turned(2.85) == 0.0 && turned(-2.85) == 0.0);
+    }
+
+    #[test]
+    fn of_equal_edges_the_first_answers() {
+        let line = model([0.0, 0.0], [40.0, 0.0]);
+        let edges = [edge([0.0, 2.0], [40.0, 2.0]), edge([0.0, -2.0], [40.0, -2.0])];
+        assert_eq!(similarity(&[line], &edges, &SimilarityOptions::default()).matches[0].edge, 0);
+    }
+
+    /// Eq. (10) is known up to a factor: ratios of two pairs are compared.
+    #[test]
+    fn lowes_measure_falls_with_each_factor_of_eq_10() {
+        let o = SimilarityOptions { measure: Measure::Lowe, ..SimilarityOptions::default() };
+        let pair = |length: f32, distance: f32, turn: f32| {
+            let (s, c) = turn.sin_cos();
+            let [x, y] = [0.5 * length * c, 0.5 * length * s];
+            let e = edge([50.0 - x, distance - y], [50.0 + x, distance + y]);
+            f64::from(value(model([0.0, 0.0], [100.0, 0.0]), &[e], &o))
+        };
+        let eq_10 =
+            |length: f64, distance: f64, turn: f64| length * length / ((100.0 - length) * distance * turn);
+        let (base, printed) = (pair(80.0, 5.0, 0.2), eq_10(80.0, 5.0, 0.2));
+        for (length, distance, turn) in
+            [(60.0, 5.0, 0.2), (80.0, 12.0, 0.2), (80.0, 5.0, 0.5), (40.0, 8.0, 0.1)]
+        {
+            let ratio = pair(length, distance, turn) / base;
+            let expected = eq_10(f64::from(length), f64::from(distance), f64::from(turn)) / printed;
+            assert!((ratio / expected - 1.0).abs() < 1e-4, "{ratio} against {expected}");
+        }
+        let turned = value(model([0.0, 0.0], [100.0, 0.0]), &[edge([50.0, -40.0], [50.0, 40.0])], &o);
+        assert!(turned > 0.0, "there is no cut of the angle");
+        let perfect = value(model([0.0, 0.0], [100.0, 0.0]), &[edge([0.0, 0.0], [100.0, 0.0])], &o);
+        assert!((perfect - 1.0).abs() < 1e-6, "scaled to 1 at the pole");
+    }
+
+    proptest! {
+        #[test]
+        fn the_similarity_equals_eq_7_of_the_edge_sampled_in_the_window(
+            e in prop::array::uniform4(-20.0f32..80.0),
+            line in prop::array::uniform4(0.0f32..60.0),
+            (c_l, c_d, c_r) in (0.4f32..2.0, 0.3f32..1.5, 0.1f32..0.8),
+            sigma_phi_rad in 0.1f32..0.7,
+        ) {
+            let options = SimilarityOptions { c_l, c_d, c_r, sigma_phi_rad, ..SimilarityOptions::default() };
+            let line = model([line[0], line[1]], [line[2], line[3]]);
+            let e = edge([e[0], e[1]], [e[2], e[3]]);
+            let direction = |a: [f32; 2], b: [f32; 2]| DVec2::new(f64::from(b[0] - a[0]), f64::from(b[1] - a[1]));
+            let (along, across) = (direction(line.start, line.end), direction(e.start, e.end));
+            prop_assume!(along.length() > 5.0 && across.length() > 1.0);
+            let angle = angle_between(along, across);
+            let cut = f64::from(ANGLE_CUT_SIGMA * sigma_phi_rad);
+            let expected = if angle <= cut { sampled(&line, &e, &options) } else { 0.0 };
+            let found = f64::from(value(line, &[e], &options));
+            prop_assert!((angle - cut).abs() < 1e-4 || (found - expected).abs() < 0.01, "{found} against {expected}");
+        }
     }
 
     proptest! {

@@ -31,7 +31,7 @@ impl PhaseCurve {
         f64::from(self.scores[i]) * (1.0 - t) + f64::from(self.scores[(i + 1) % n]) * t
     }
 
-    /// The phase of the highest similarity.
+    /// The phase of the highest similarity, the first of equals.
     pub fn best_phase(&self) -> f64 {
         let best =
             self.scores.iter().enumerate().fold(0, |b, (i, v)| if *v > self.scores[b] { i } else { b });
@@ -86,7 +86,7 @@ const RATE_STEPS: usize = 40;
 const OFFSET_STEPS: usize = 100;
 
 /// Sums the similarity curves along every line of the cadence range (both signs as given) and returns the
-/// best with its twin; `None` without curves.
+/// best with its twin; `None` without curves. Of equals the line of the lowest rate and then phase is best.
 pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLines> {
     let first = curves.first()?.time_s;
     let mean_along = |phase: f64, rate: f64| {
@@ -148,7 +148,8 @@ pub struct TwoLineChoice {
 ///
 /// Rate and offset modulo half a cycle come from a vote, the sum of cos(4 pi (phase - line)) over the frames,
 /// which neither twin can sway. "Number for one line higher than half of the number for the other" is read as
-/// min > max / 2: then the line of the higher mean similarity wins, else the longer one.
+/// min > max / 2: then the line of the higher mean similarity wins, else the longer one. So the longer line wins
+/// at exactly twice the number; of equal means the voted line wins, of equal votes the lowest rate.
 pub fn two_line_rule(estimates: &[PhaseEstimate], rates: &CadenceRange) -> Option<TwoLineChoice> {
     let first = estimates.first()?.time_s;
     let (rate, offset) = vote(estimates, rates, first);
@@ -399,79 +400,4 @@ pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapMo
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A similarity curve with a peak at `phase` and a lower one half a cycle on.
-    fn curve(time_s: f64, phase: f64, twin: f32) -> PhaseCurve {
-        let bump = |p: f64| (-0.5 * ((p - p.round()) / 0.05).powi(2)).exp() as f32;
-        let scores = (0..50)
-            .map(|i| f64::from(i) / 50.0)
-            .map(|p| 0.1 + 0.3 * bump(p - phase) + 0.3 * twin * bump(p - phase - 0.5));
-        PhaseCurve { time_s, scores: scores.collect() }
-    }
-
-    #[test]
-    fn a_planted_line_is_found_though_single_frames_lie() {
-        // Every fourth frame prefers the twin.
-        let curves: Vec<_> = (0..13)
-            .map(|k| {
-                let t = f64::from(k) * 0.04;
-                curve(t, 0.3 + 0.95 * t, if k % 4 == 0 { 1.2 } else { 0.8 })
-            })
-            .collect();
-        let lines = phase_lines(&curves, &CadenceRange::default()).unwrap();
-        assert!(
-            (lines.best.phase_at_start - 0.3).abs() < 0.02 && (lines.best.rate_hz - 0.95).abs() < 0.05,
-            "{lines:?}"
-        );
-        assert!(
-            (lines.twin.phase_at_start - 0.8).abs() < 0.02 && lines.twin.similarity < lines.best.similarity
-        );
-
-        let estimates: Vec<_> = curves
-            .iter()
-            .map(|c| PhaseEstimate {
-                time_s: c.time_s,
-                phase: c.best_phase(),
-                similarity: c.at(c.best_phase()),
-            })
-            .collect();
-        let choice = two_line_rule(&estimates, &CadenceRange::default()).unwrap();
-        assert!((choice.line.phase_at_start - 0.3).abs() < 0.02 && (choice.line.rate_hz - 0.95).abs() < 0.08);
-        assert_eq!(choice.on_line.iter().filter(|on| !**on).count(), 4);
-    }
-
-    #[test]
-    fn close_counts_are_decided_by_mean_similarity() {
-        let estimate = |k: i32, off: f64, similarity: f64| {
-            let time_s = f64::from(k) * 0.04;
-            PhaseEstimate { time_s, phase: (0.1 + time_s + off).rem_euclid(1.0), similarity }
-        };
-        let mixed: Vec<_> =
-            (0..12).map(|k| if k % 2 == 0 { estimate(k, 0.0, 0.4) } else { estimate(k, 0.5, 0.3) }).collect();
-        let choice = two_line_rule(&mixed, &CadenceRange::default()).unwrap();
-        assert!(choice.by_similarity && (choice.line.phase_at_start - 0.1).abs() < 1e-6);
-        let most: Vec<_> =
-            (0..12).map(|k| if k < 2 { estimate(k, 0.0, 0.9) } else { estimate(k, 0.5, 0.3) }).collect();
-        let choice = two_line_rule(&most, &CadenceRange::default()).unwrap();
-        assert!(!choice.by_similarity && (choice.line.phase_at_start - 0.6).abs() < 1e-6);
-    }
-
-    #[test]
-    fn the_swap_probability_is_symmetric_and_needs_time_and_margin() {
-        let m = SwapModel::default();
-        assert!((swap_probability(0.2, 0.2, 1.0, &m) - 0.5).abs() < 1e-12);
-        let p = swap_probability(0.20, 0.17, 0.5, &m);
-        assert!((p + swap_probability(0.17, 0.20, 0.5, &m) - 1.0).abs() < 1e-12);
-        assert!(swap_probability(0.20, 0.17, 2.0, &m) < p && p < 0.2);
-        assert!(swap_probability(0.20, 0.196, 100.0, &m) > 0.1, "a small margin never becomes certainty");
-        assert_eq!(swap_probability(0.0, 0.0, 1.0, &m), 0.5);
-    }
-
-    #[test]
-    fn no_frames_no_line() {
-        assert!(phase_lines(&[], &CadenceRange::default()).is_none());
-        assert!(two_line_rule(&[], &CadenceRange::default()).is_none());
-    }
-}
+pub(super) mod tests;

@@ -202,6 +202,8 @@ pub struct Tracker {
     finished: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
+    /// Frames after which a walk is handed out.
+    longest_walk: usize,
 }
 
 impl Tracker {
@@ -219,6 +221,7 @@ impl Tracker {
             finished: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
+            longest_walk: LONGEST_WALK,
         })
     }
 
@@ -422,7 +425,7 @@ impl Tracker {
             }
         }
         // On a wrongly assumed path a walk looks over, so the fit comes first.
-        if active.fitted && (active.is_over() || active.walk.twins[0].steps.len() >= LONGEST_WALK) {
+        if active.fitted && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
             self.end_walk();
         }
         Ok(())
@@ -531,3 +534,6 @@ fn grown(r: &Rectangle, evidence: &Evidence, margin_px: f64) -> Rectangle {
         bottom: (r.bottom + m).min(evidence.grey.height() - 1),
     }
 }
+
+#[cfg(test)]
+mod tests;

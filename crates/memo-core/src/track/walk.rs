@@ -86,7 +86,7 @@ impl State {
     }
 }
 
-/// Where in a frame one twin was looked for: with the frame, all that its similarity hangs on.
+/// Where in a frame one twin was looked for: with the frame, all that its similarity depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// The part of the image edges were taken from.
@@ -256,4 +256,217 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
     let best = measured.map_or(predicted.hypothesis(), |_| found.best());
     let look = Look { window: edges.window, heights: grid.height, best };
     Step { frame: edges.frame, time_s: edges.time_s, state, measured, similarity, look }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::tests::{camera, edges_of, walker};
+    use super::*;
+    use glam::DVec2;
+
+    const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    const BEGINNING: Beginning =
+        Beginning { time_s: 2.0, along_m: -0.3, phase: 0.7, speed_mps: 1.3, rate_hz: 0.9 };
+
+    fn walk() -> Walk {
+        Walk::new(walker(), PATH, BEGINNING)
+    }
+
+    /// Where the planted walker is: on the line from `BEGINNING`.
+    fn truth(time_s: f64) -> Hypothesis {
+        let elapsed_s = time_s - BEGINNING.time_s;
+        Hypothesis {
+            along_m: BEGINNING.along_m + elapsed_s * BEGINNING.speed_mps,
+            height_m: walker().level_torso_height_m(),
+            phase: (BEGINNING.phase + elapsed_s * BEGINNING.rate_hz).rem_euclid(1.0),
+        }
+    }
+
+    const WINDOW: Rectangle = Rectangle { left: 10, top: 20, right: 300, bottom: 400 };
+
+    /// The contours of the planted walker as edges.
+    fn planted(frame: usize, time_s: f64) -> FrameEdges {
+        let (walker, camera) = (walker(), camera());
+        let edges = edges_of(&Scene { walker: &walker, camera: &camera, path: &PATH }, &truth(time_s));
+        FrameEdges { frame, time_s, window: WINDOW, edges }
+    }
+
+    fn empty(frame: usize, time_s: f64) -> FrameEdges {
+        FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new() }
+    }
+
+    /// Noise that differs in every coordinate.
+    fn filter() -> FilterOptions {
+        let mut filter = FilterOptions::default();
+        filter.vertical.velocity_variance_per_s = 0.3;
+        filter.phase.velocity_variance_per_s = 0.7;
+        filter.phase.measurement_variance = 0.02;
+        filter
+    }
+
+    fn state(along: [f64; 2], height: [f64; 2], phase: [f64; 2]) -> State {
+        let of = |[position, sd]: [f64; 2]| ConstantVelocity::new(position, 0.4, sd * sd, 0.05);
+        State { along: of(along), height: of(height), phase: of(phase) }
+    }
+
+    /// A step that was measured as predicted.
+    fn step(time_s: f64, similarity: f32) -> Step {
+        let measured = truth(time_s);
+        let state = State {
+            along: ConstantVelocity::new(measured.along_m, 1.3, 0.01, 0.01),
+            height: ConstantVelocity::new(measured.height_m, 0.0, 1e-4, 0.0),
+            phase: ConstantVelocity::new(measured.phase, 0.9, 0.01, 0.01),
+        };
+        let look = Look { window: WINDOW, heights: Axis::around(1.0, 0.1, 0.02), best: measured };
+        Step { frame: 0, time_s, state, measured: Some(measured), similarity, look }
+    }
+
+    #[test]
+    fn a_walk_begins_with_the_printed_uncertainties_and_its_twin_half_a_cycle_on() {
+        let (walk, filter) = (walk(), filter());
+        let [first, second] = [0, 1].map(|twin| walk.predict(twin, 2.2, &filter));
+        assert_eq!((first.along, first.height), (second.along, second.height));
+        assert!((second.phase.position - first.phase.position - 0.5).abs() < 1e-12);
+        // At 2.2 s the walker is 0.2 s on.
+        assert!((first.along.position + 0.3 - 0.2 * 1.3).abs() < 1e-12);
+        assert!((first.phase.position - 0.7 - 0.2 * 0.9).abs() < 1e-12);
+        assert!((first.height.position - walker().level_torso_height_m()).abs() < 1e-12);
+        // Section 6: P_0 = R, and velocities deviate by 30 % from the average.
+        assert_eq!((first.along.velocity, first.phase.velocity, first.height.velocity), (1.3, 0.9, 0.0));
+        assert!((first.along.position_sd() - 0.2).abs() < 1e-12);
+        assert!((first.along.velocity_sd() - 0.3 * 1.3).abs() < 1e-12);
+        assert!((first.phase.position_sd() - 0.02f64.sqrt()).abs() < 1e-12);
+        assert!((first.phase.velocity_sd() - 0.3 * 0.9).abs() < 1e-12);
+        assert!((first.height.position_sd() - 0.02).abs() < 1e-12, "the ground holds the height");
+    }
+
+    #[test]
+    fn a_prediction_goes_from_the_last_step_with_each_coordinate_s_own_noise() {
+        let (mut walk, filter) = (walk(), filter());
+        walk.twins[1].steps.extend([step(2.0, 0.5), step(2.1, 0.5)]);
+        let predicted = walk.predict(1, 2.25, &filter);
+        let last = walk.twins[1].steps[1].state;
+        for (predicted, last, noise) in [
+            (predicted.along, last.along, filter.along),
+            (predicted.height, last.height, filter.vertical),
+            (predicted.phase, last.phase, filter.phase),
+        ] {
+            assert!((predicted.position - last.position - 0.15 * last.velocity).abs() < 1e-12);
+            let gained = predicted.covariance[2] - last.covariance[2];
+            assert!((gained - 0.15 * noise.velocity_variance_per_s).abs() < 1e-12, "{predicted:?}");
+        }
+    }
+
+    #[test]
+    fn an_update_weighs_each_coordinate_by_its_own_noise_at_the_nearest_turn() {
+        let filter = filter();
+        let before = state([0.5, 0.1], [1.2, 0.05], [3.97, 0.2]);
+        let measured = Hypothesis { along_m: 0.6, height_m: 1.1, phase: 0.03 };
+        let after = before.update(&measured, &filter);
+        // K = P / (P + R).
+        for (before, after, off, noise) in [
+            (before.along, after.along, 0.1, filter.along),
+            (before.height, after.height, -0.1, filter.vertical),
+            (before.phase, after.phase, 0.06, filter.phase),
+        ] {
+            let gain = before.covariance[0] / (before.covariance[0] + noise.measurement_variance);
+            assert!((after.position - before.position - gain * off).abs() < 1e-12, "{after:?}");
+            assert!((after.covariance[0] - (1.0 - gain) * before.covariance[0]).abs() < 1e-12);
+        }
+        let back = before.update(&Hypothesis { phase: 0.9, ..measured }, &filter);
+        assert!((3.89..3.97).contains(&back.phase.position), "{back:?}");
+    }
+
+    #[test]
+    fn the_grid_reaches_one_standard_deviation_within_its_limits() {
+        let centres = |grid: &Grid| [grid.along.centre, grid.height.centre, grid.phase.centre];
+        let counts = |grid: &Grid| [grid.along.count, grid.height.count, grid.phase.count];
+        // The printed grid is the largest: 40 cm, 20 cm and 0.4 of the cycle.
+        let wide = state([0.3, 1.0], [1.2, 1.0], [0.8, 1.0]).grid();
+        assert_eq!((centres(&wide), counts(&wide)), ([0.3, 1.2, 0.8], [21, 11, 21]));
+        let narrow = state([0.3, 1e-3], [1.2, 1e-3], [0.8, 1e-3]).grid();
+        assert_eq!(counts(&narrow), [7, 7, 7], "three steps on either side");
+        let between = state([0.3, 0.12], [1.2, 0.08], [0.8, 0.16]).grid();
+        assert_eq!(counts(&between), [13, 9, 17]);
+        assert_eq!([between.along.step, between.height.step, between.phase.step], [0.02; 3]);
+    }
+
+    #[test]
+    fn where_nothing_is_matched_the_filter_coasts() {
+        let (mut walk, options) = (walk(), WalkOptions::default());
+        walk.twins.iter_mut().for_each(|twin| twin.steps.push(step(2.0, 0.5)));
+        let predicted = walk.predict(0, 2.04, &options.filter);
+        walk.follow(&empty(1, 2.04), &camera(), &options);
+        let coasted = walk.twins[0].steps[1];
+        assert_eq!((coasted.measured, coasted.similarity, coasted.state), (None, 0.0, predicted));
+        assert_eq!((coasted.look.best, coasted.look.window), (predicted.hypothesis(), WINDOW));
+        assert_eq!((coasted.frame, coasted.time_s), (1, 2.04));
+    }
+
+    #[test]
+    fn a_planted_walker_is_followed_at_uneven_times_through_a_gap() {
+        let (mut walk, options) = (walk(), WalkOptions::default());
+        let times_s = [2.0, 2.03, 2.1, 2.12, 2.2, 2.24];
+        for (frame, time_s) in times_s.into_iter().enumerate() {
+            let edges = if frame == 3 { empty(frame, time_s) } else { planted(frame, time_s) };
+            walk.follow(&edges, &camera(), &options);
+        }
+        let [first, second] = &walk.twins;
+        assert_eq!(first.steps.len(), times_s.len());
+        for (k, (step, time_s)) in first.steps.iter().zip(times_s).enumerate() {
+            let (found, truth) = (step.state.hypothesis(), truth(time_s));
+            assert!((found.along_m - truth.along_m).abs() < 0.012, "{k}: {found:?} against {truth:?}");
+            assert!((found.height_m - truth.height_m).abs() < 0.012, "{k}: {found:?} against {truth:?}");
+            assert!((found.phase - truth.phase).abs() < 0.012, "{k}: {found:?} against {truth:?}");
+            assert_eq!((step.frame, step.time_s, step.measured.is_none()), (k, time_s, k == 3));
+        }
+        assert!(first.steps[3].state.along.position_sd() > first.steps[2].state.along.position_sd());
+        // Sums over all frames, the empty one included.
+        for twin in [first, second] {
+            let sum: f64 = twin.steps.iter().map(|s| f64::from(s.similarity)).sum();
+            assert!((twin.similarity_sum - sum).abs() < 1e-9);
+        }
+        assert!(first.similarity_sum > 4.5 && first.similarity_sum > 1.05 * second.similarity_sum);
+        assert_eq!((walk.best(), walk.last().unwrap().frame), (0, 5));
+    }
+
+    #[test]
+    fn the_better_twin_has_the_larger_sum_and_the_swap_its_margin_and_duration() {
+        let (mut walk, model) = (walk(), SwapModel::default());
+        assert_eq!((walk.best(), walk.swap_probability(&model)), (0, 0.5), "the first of equals");
+        walk.first_time_s = Some(2.0);
+        for (twin, sum) in walk.twins.iter_mut().zip([4.0, 5.0]) {
+            twin.steps.extend([step(2.5, 0.1), step(4.0, 0.2)]);
+            twin.similarity_sum = sum;
+        }
+        walk.twins[1].steps[1].frame = 17;
+        assert_eq!((walk.best(), walk.last().unwrap().frame), (1, 17));
+        // Two seconds are 10 glimpses of 0.2 s: log odds 2 mu m / (person² + glimpse² / 10), m = 1 / 5.
+        let log_odds = 2.0 * 0.13 * 0.2 / (0.05f64.powi(2) + 0.16f64.powi(2) / 10.0);
+        assert!((walk.swap_probability(&model) - 1.0 / (1.0 + log_odds.exp())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn followed_frames_count_from_the_first_one() {
+        let (mut walk, options) = (walk(), WalkOptions::default());
+        for (frame, time_s) in [2.0, 2.04, 2.08].into_iter().enumerate() {
+            walk.follow(&empty(frame, time_s), &camera(), &options);
+        }
+        assert_eq!(walk.first_time_s, Some(2.0));
+    }
+
+    #[test]
+    fn kept_steps_lose_no_similarity() {
+        let mut walk = walk();
+        for twin in &mut walk.twins {
+            twin.steps = (0..10).map(|k| step(2.0 + f64::from(k), 0.5)).collect();
+            twin.similarity_sum = 5.0;
+        }
+        walk.keep(2..7);
+        for twin in &walk.twins {
+            let times_s: Vec<f64> = twin.steps.iter().map(|s| s.time_s).collect();
+            assert_eq!(times_s, [4.0, 5.0, 6.0, 7.0, 8.0]);
+            assert_eq!(twin.similarity_sum, 5.0);
+        }
+    }
 }

@@ -1,0 +1,282 @@
+use super::super::kalman::FilterOptions;
+use super::super::search::tests::{camera, walker};
+use super::super::search::{Axis, Path};
+use super::super::start::tests::report;
+use super::super::walk::{Beginning, Look, State};
+use super::*;
+use crate::image::Rectangle;
+use crate::synth::Random;
+use glam::DVec2;
+
+/// A walk at 1.2 m/s and 0.9 Hz along a path, one hypothesis a frame; where there is none the filter coasts.
+/// The measured phase is wrapped, the state's is not.
+fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptions) -> TrackedWalk {
+    let (first_s, first) = (frames[0].0, frames[0].1.expect("a walk begins where something is seen"));
+    let beginning = Beginning {
+        time_s: first_s,
+        along_m: first.along_m,
+        phase: first.phase,
+        speed_mps: 1.2,
+        rate_hz: 0.9,
+    };
+    let mut state = State {
+        along: ConstantVelocity::new(first.along_m, 1.2, 0.04, 0.13),
+        height: ConstantVelocity::new(first.height_m, 0.0, 4e-4, 0.0),
+        phase: ConstantVelocity::new(first.phase, 0.9, 0.04, 0.07),
+    };
+    let (mut before_s, filter) = (first_s, options.filter);
+    let step = |(frame, (time_s, seen)): (usize, &(f64, Option<Hypothesis>))| {
+        state = state.predict(time_s - before_s, &filter);
+        before_s = *time_s;
+        if let Some(h) = seen {
+            let turns = (state.phase.position - h.phase).round();
+            state = State {
+                along: state.along.update(h.along_m, &filter.along),
+                height: state.height.update(h.height_m, &filter.vertical),
+                phase: state.phase.update(h.phase + turns, &filter.phase),
+            };
+        }
+        let measured = seen.map(|h| Hypothesis { phase: h.phase.rem_euclid(1.0), ..h });
+        let look = Look {
+            window: Rectangle { left: 0, top: 0, right: 9, bottom: 9 },
+            heights: Axis::around(1.0, 0.1, 0.02),
+            best: state.hypothesis(),
+        };
+        let similarity = if seen.is_some() { 0.5 } else { 0.0 };
+        Step { frame: 5 + 2 * frame, time_s: *time_s, state, measured, similarity, look }
+    };
+    let steps: Vec<Step> = frames.iter().enumerate().map(step).collect();
+    let mut walk = Walk::new(walker(), path, beginning);
+    walk.twins[0].similarity_sum = 5.0;
+    walk.twins[0].steps = steps;
+    TrackedWalk {
+        walk,
+        camera: camera(),
+        camera_is_guessed: false,
+        depth_sd_m: 0.0,
+        start: report(path, beginning, Direction::Forward),
+        gait_speed_mps: 1.2,
+        person_fit: None,
+        options,
+    }
+}
+
+const ACROSS: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+
+/// Where the walker is: in the middle of the picture after a second.
+fn truth(time_s: f64) -> Hypothesis {
+    Hypothesis { along_m: 1.2 * (time_s - 1.0), height_m: 1.15, phase: 0.3 + 0.9 * time_s }
+}
+
+/// Times with gaps, 0.03 to 0.08 s.
+fn uneven_s(count: usize) -> Vec<f64> {
+    let mut time_s = 0.0;
+    let next = |k: usize| {
+        time_s += [0.04, 0.03, 0.08, 0.05][k % 4];
+        time_s
+    };
+    (0..count).map(next).collect()
+}
+
+/// The truth measured with `scatter` times the filter's standard deviations, some frames not at all.
+fn scattered(scatter: f64, count: usize, filter: &FilterOptions) -> Vec<(f64, Option<Hypothesis>)> {
+    let mut random = Random::new(11);
+    let mut normal = |variance: f64| scatter * variance.sqrt() * f64::from(random.normal_pair()[0]);
+    let measure = |(k, time_s): (usize, f64)| {
+        let h = truth(time_s);
+        let seen = Hypothesis {
+            along_m: h.along_m + normal(filter.along.measurement_variance),
+            height_m: h.height_m + normal(filter.vertical.measurement_variance),
+            phase: h.phase + normal(filter.phase.measurement_variance),
+        };
+        // The first is exact, so that the filter's start does not depend on the scatter.
+        (time_s, if k == 0 { Some(h) } else { (k % 7 != 5).then_some(seen) })
+    };
+    uneven_s(count).into_iter().enumerate().map(measure).collect()
+}
+
+fn exact(times_s: &[f64]) -> Vec<(f64, Option<Hypothesis>)> {
+    times_s.iter().map(|t| (*t, Some(truth(*t)))).collect()
+}
+
+#[test]
+fn rows_are_the_smoothed_states_of_every_frame() {
+    let options = WalkOptions::default();
+    let frames = scattered(0.3, 30, &options.filter);
+    let walk = followed(ACROSS, &frames, options);
+    let dt_s: Vec<f64> = frames.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    let smoothed = |of: fn(&State) -> ConstantVelocity, noise: &Noise| {
+        smooth(&walk.steps().iter().map(|s| of(&s.state)).collect::<Vec<_>>(), &dt_s, noise)
+    };
+    let along = smoothed(|s| s.along, &options.filter.along);
+    let height = smoothed(|s| s.height, &options.filter.vertical);
+    let phase = smoothed(|s| s.phase, &options.filter.phase);
+    let rows = walk.rows();
+    assert_eq!(rows.len(), 30);
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row.hypothesis.along_m - along[k].position).abs() < 1e-12, "frame {k}");
+        assert!((row.speed_mps - along[k].velocity).abs() < 1e-12, "frame {k}");
+        assert!((row.hypothesis.height_m - height[k].position).abs() < 1e-12, "frame {k}");
+        assert!((row.phase - phase[k].position.rem_euclid(1.0)).abs() < 1e-12, "frame {k}");
+        assert_eq!((row.frame, row.time_s, row.heading_rad), (5 + 2 * k, frames[k].0, 0.0));
+        assert_eq!(row.similarity, if frames[k].1.is_some() { 0.5 } else { 0.0 });
+        assert!(row.hypothesis.phase == row.phase && row.p_swapped == walk.p_swapped());
+        let posed = walk.scene().pose(&row.hypothesis);
+        assert_eq!((row.torso_centre, row.right, row.left), (posed.torso_centre, posed.right, posed.left));
+    }
+}
+
+#[test]
+fn standard_deviations_grow_with_the_scatter_about_the_predictions() {
+    let options = WalkOptions::default();
+    let common = [0.015, 0.0, 0.02, 0.015];
+    let own_sq = |scatter: f64| -> Vec<[f64; 4]> {
+        let walk = followed(ACROSS, &scattered(scatter, 40, &options.filter), options);
+        let own = |row: &Row| std::array::from_fn(|i| row.sd[i].powi(2) - f64::powi(common[i], 2));
+        walk.rows().iter().map(own).collect()
+    };
+    for (once, twice) in own_sq(0.2).iter().zip(own_sq(0.4)) {
+        for i in [0, 2, 3] {
+            assert!(once[i] > 1e-8 && (twice[i] / once[i] - 4.0).abs() < 1e-6, "{i}: {once:?}, {twice:?}");
+        }
+    }
+}
+
+/// Of a filter whose noise is that of the measurements the standard deviations stay as smoothed, though the
+/// state is far less certain than a measurement and some frames show nothing.
+#[test]
+fn a_filter_that_fits_keeps_its_standard_deviations() {
+    let mut options = WalkOptions::default();
+    options.filter.along = Noise { velocity_variance_per_s: 40.0, measurement_variance: 1e-4 };
+    options.filter.vertical = Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.01 };
+    let (mut random, mut frames, mut along, mut velocity) = (Random::new(3), vec![], -1.2, 1.2);
+    for k in 0..500 {
+        let time_s = 0.04 * f64::from(k);
+        let [kick, off, up] =
+            [40.0 * 0.04, 1e-4, 0.01f64].map(|v| v.sqrt() * f64::from(random.normal_pair()[0]));
+        if k > 0 {
+            (along, velocity) = (along + 0.04 * velocity, velocity + kick);
+        }
+        let seen = Hypothesis { along_m: along + off, height_m: 1.15 + up, ..truth(time_s) };
+        frames.push((time_s, (k == 0 || k % 2 == 1).then_some(seen)));
+    }
+    let walk = followed(ACROSS, &frames, options);
+    let filtered: Vec<_> = walk.steps().iter().map(|s| s.state.along).collect();
+    let smoothed = smooth(&filtered, &[0.04; 499], &options.filter.along);
+    for (row, state) in walk.rows().iter().zip(smoothed).step_by(50) {
+        let scale = (row.sd[0].powi(2) - 0.015f64.powi(2)).sqrt() / state.position_sd();
+        assert!((0.9..1.1).contains(&scale), "{scale}");
+    }
+}
+
+#[test]
+fn a_perfect_fit_leaves_the_errors_common_to_all_frames() {
+    let walk = followed(ACROSS, &exact(&uneven_s(20)), WalkOptions::default());
+    for row in walk.rows() {
+        let off = [row.sd[0] - 0.015, row.sd[1], row.sd[2] - 0.02, row.sd[3] - 0.015];
+        assert!(off.iter().all(|x| x.abs() < 1e-6), "{row:?}");
+    }
+    // One frame has no prediction to be compared with: 0.04 / 2 m² after its measurement.
+    let alone = followed(ACROSS, &exact(&[0.0]), WalkOptions::default()).rows();
+    assert!((alone[0].sd[0] - 0.02f64.sqrt().hypot(0.015)).abs() < 1e-9, "{alone:?}");
+}
+
+#[test]
+fn an_uncertain_distance_shows_across_the_path_and_far_from_the_camera_along_it() {
+    // The camera stands at (0, -6): the path crosses its axis at along 0, 6 m away.
+    let mut walk = followed(ACROSS, &exact(&[0.0, 0.5, 1.0, 2.0]), WalkOptions::default());
+    walk.depth_sd_m = 0.3;
+    for row in walk.rows() {
+        let along = (0.3 / 6.0 * row.hypothesis.along_m).hypot(0.015);
+        assert!((row.sd[0] - along).abs() < 1e-6 && (row.sd[1] - 0.3).abs() < 1e-9, "{row:?}");
+    }
+    // Turned by 30 degrees about (0, 0): 6 cos 30 away, nearest at 6 sin 30 behind the origin.
+    let turned = Path { heading_rad: 30f64.to_radians(), ..ACROSS };
+    let mut walk = followed(turned, &exact(&[0.0, 0.5, 1.0, 2.0]), WalkOptions::default());
+    walk.depth_sd_m = 0.3;
+    let (sine, cosine) = 30f64.to_radians().sin_cos();
+    for row in walk.rows() {
+        let along = (0.3 / (6.0 * cosine) * (row.hypothesis.along_m + 6.0 * sine)).hypot(0.015);
+        let wanted = [(cosine * along).hypot(sine * 0.3), (sine * along).hypot(cosine * 0.3)];
+        assert!((row.sd[0] - wanted[0]).abs() < 1e-6 && (row.sd[1] - wanted[1]).abs() < 1e-6, "{row:?}");
+    }
+}
+
+#[test]
+fn events_are_where_the_phase_passes_their_marks() {
+    let times_s = uneven_s(50);
+    let walk = followed(ACROSS, &exact(&times_s), WalkOptions::default());
+    // Adults stand for 61 % of the cycle; the left foot half a cycle later.
+    let marks = [
+        (0.0, EventKind::HeelStrike, Side::Right),
+        (0.5, EventKind::HeelStrike, Side::Left),
+        (0.61, EventKind::ToeOff, Side::Right),
+        (0.11, EventKind::ToeOff, Side::Left),
+    ];
+    let mut expected = Vec::new();
+    for (mark, kind, side) in marks {
+        for turn in 0..4 {
+            let time_s = (f64::from(turn) + mark - 0.3) / 0.9;
+            if (times_s[0]..times_s[49]).contains(&time_s) {
+                expected.push((time_s, kind, side));
+            }
+        }
+    }
+    expected.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let events = walk.events();
+    assert_eq!(events.len(), expected.len(), "{events:?}");
+    for (event, (time_s, kind, side)) in events.iter().zip(expected) {
+        assert!((event.time_s - time_s).abs() < 1e-6, "{event:?} at {time_s}");
+        assert_eq!((event.kind, event.side), (kind, side));
+        // Every second frame is numbered.
+        let after = times_s.partition_point(|t| *t <= time_s);
+        let share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1]);
+        assert!((event.frame - (5.0 + 2.0 * (after as f64 - 1.0 + share))).abs() < 1e-5, "{event:?}");
+    }
+}
+
+#[test]
+fn walking_backwards_has_no_events_and_a_negative_speed() {
+    let times_s: Vec<f64> = (0..40).map(|k| 0.04 * f64::from(k)).collect();
+    let back = |t: &f64| {
+        let h = truth(*t);
+        (*t, Some(Hypothesis { along_m: -h.along_m, phase: 3.0 - h.phase, ..h }))
+    };
+    let mut walk = followed(ACROSS, &times_s.iter().map(back).collect::<Vec<_>>(), WalkOptions::default());
+    assert!(!walk.events().is_empty());
+    walk.start.direction = Direction::Backward;
+    assert!(walk.events().is_empty() && walk.direction() == Direction::Backward);
+    assert!(walk.rows().iter().skip(10).all(|row| row.speed_mps < -0.5));
+}
+
+#[test]
+fn a_mark_is_passed_once_forwards_backwards_and_through_the_turn() {
+    let row = followed(ACROSS, &exact(&[0.0]), WalkOptions::default()).rows()[0];
+    let at = |phase: f64| Row { phase, ..row };
+    let passed = |from: f64, to: f64, mark: f64| crossing(&at(from), &at(to), mark);
+    for (from, to, mark, share) in [
+        (0.4375, 0.5625, 0.5, 0.5),
+        (0.5625, 0.4375, 0.5, 0.5),
+        (0.96875, 0.09375, 0.0, 0.25),
+        (0.09375, 0.96875, 0.0, 0.75),
+        (0.96875, 0.09375, 0.0625, 0.75),
+    ] {
+        let found = passed(from, to, mark).expect("passed");
+        assert!((found - share).abs() < 1e-12, "{from} to {to}: {found}");
+    }
+    // On the mark: it belongs to what follows.
+    assert_eq!((passed(0.5, 0.5625, 0.5), passed(0.4375, 0.5, 0.5)), (Some(0.0), None));
+    assert_eq!((passed(0.4375, 0.5625, 0.0), passed(0.4375, 0.4375, 0.5)), (None, None));
+    assert_eq!((passed(0.5, 0.5, 0.5), passed(0.25, 0.375, 0.5)), (None, None));
+}
+
+#[test]
+fn rows_are_of_the_better_twin() {
+    let mut walk = followed(ACROSS, &exact(&[0.0, 0.1, 0.2]), WalkOptions::default());
+    walk.walk.twins[1] = walk.walk.twins[0].clone();
+    walk.walk.twins[1].steps.iter_mut().for_each(|step| step.frame += 100);
+    walk.walk.twins[1].similarity_sum = 6.0;
+    assert_eq!(walk.rows()[0].frame, 105);
+    assert_eq!(walk.steps()[2].frame, 109);
+    assert!(walk.p_swapped() < 0.5);
+}

@@ -1,0 +1,268 @@
+use super::super::score::{Measure, similarity};
+use super::*;
+use crate::model::{Body, Gait, GaitStyle};
+
+pub fn walker() -> Walker {
+    Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
+}
+
+pub fn camera() -> Camera {
+    Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
+}
+
+/// The image a hypothesis would show, as edges.
+pub fn edges_of(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
+    let edge = |l: ModelLine| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 };
+    scene.lines(truth).into_iter().map(edge).collect()
+}
+
+#[test]
+fn the_printed_grid_has_4851_hypotheses() {
+    let grid = Grid::printed(&Hypothesis { along_m: 0.0, height_m: 1.2, phase: 0.4 });
+    assert_eq!((grid.along.count, grid.height.count, grid.phase.count), (21, 11, 21));
+    assert_eq!(grid.len(), 4851);
+    assert!((grid.along.at(0) + 0.2).abs() < 1e-12 && (grid.phase.at(20) - 0.6).abs() < 1e-12);
+    assert_eq!(Grid::whole_cycle(0.0, 1.2).phase.count, 50);
+    assert!(Grid::whole_cycle(0.0, 1.2).phase.at(0).abs() < 1e-12);
+}
+
+/// Scores of a grid by a formula.
+fn scored(grid: Grid, score: impl Fn(&[f64; 3]) -> f64) -> SearchResult {
+    let mut scores = Vec::new();
+    for p in 0..grid.phase.count {
+        for a in 0..grid.along.count {
+            for h in 0..grid.height.count {
+                scores.push(score(&[grid.along.at(a), grid.height.at(h), grid.phase.at(p)]) as f32);
+            }
+        }
+    }
+    let best_index = arg_max(&scores);
+    SearchResult { grid, scores, best_index }
+}
+
+/// A grid whose axes all differ.
+fn uneven_grid() -> Grid {
+    Grid {
+        along: Axis { centre: -0.3, step: 0.02, count: 9 },
+        height: Axis { centre: 1.1, step: 0.01, count: 5 },
+        phase: Axis { centre: 0.42, step: 0.04, count: 7 },
+    }
+}
+
+#[test]
+fn the_vertex_of_a_planted_paraboloid_is_found_between_the_grid_points() {
+    // Vertices on either side of a grid point, along every axis.
+    for signs in [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]] {
+        let truth = [-0.26 + signs[0] * 0.008, 1.1 + signs[1] * 0.003, 0.46 + signs[2] * 0.013];
+        let found = scored(uneven_grid(), |at| {
+            let [x, y, z] = [at[0] - truth[0], at[1] - truth[1], at[2] - truth[2]];
+            0.9 - 40.0 * x * x - 300.0 * y * y - 20.0 * z * z
+        });
+        let best = found.refined();
+        let off = [best.along_m - truth[0], best.height_m - truth[1], best.phase - truth[2]];
+        assert!(off.iter().all(|x| x.abs() < 1e-4), "{signs:?}: off by {off:?}");
+        let nearest = found.best();
+        assert!((nearest.along_m + 0.26).abs() < 1e-9 && (nearest.height_m - 1.1).abs() < 1e-9);
+        assert!((nearest.phase - 0.46).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn at_the_ends_of_an_axis_nothing_is_moved() {
+    let grid = uneven_grid();
+    for sign in [-1.0, 1.0] {
+        let found = scored(grid, |at| sign * (at[0] + 2.0 * at[1] + at[2]));
+        let end = |axis: &Axis| axis.at(if sign < 0.0 { 0 } else { axis.count - 1 });
+        let best = found.refined();
+        assert_eq!((best.along_m, best.height_m), (end(&grid.along), end(&grid.height)));
+        assert_eq!(best.phase, end(&grid.phase));
+    }
+    let point = Axis { centre: 0.7, step: 0.02, count: 1 };
+    assert_eq!(point.refined(0, |_| 0.5), 0.7);
+}
+
+#[test]
+fn a_flat_top_stays_where_it_is_and_of_equals_the_first_is_best() {
+    let found = scored(uneven_grid(), |_| 0.25);
+    assert_eq!((found.best_index, found.best_score()), (0, 0.25));
+    assert_eq!(arg_max(&[0.1, 0.5, 0.2, 0.5]), 1);
+    let axis = Axis { centre: 0.0, step: 0.1, count: 5 };
+    assert_eq!(axis.refined(2, |_| 0.4), 0.0);
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let empty = search(&[], &scene, &uneven_grid(), &SimilarityOptions::default(), HiddenLines::default());
+    assert_eq!((empty.best_index, empty.best_score()), (0, 0.0));
+}
+
+#[test]
+fn phases_are_wrapped_and_the_curve_has_the_best_of_each_phase() {
+    let grid = Grid { phase: Axis { centre: 0.01, step: 0.04, count: 5 }, ..uneven_grid() };
+    let truth = |phase: f64| -0.3 + 0.5 * phase;
+    let found = scored(grid, |at| {
+        let (off, turned) = (at[0] - truth(at[2]), at[2] + 0.033);
+        0.9 - 40.0 * off * off - 3.0 * turned * turned - (at[1] - 1.1).abs()
+    });
+    assert!((0.95..1.0).contains(&found.refined().phase), "{:?}", found.refined());
+    let phases = [0.93, 0.97, 0.01, 0.05, 0.09];
+    let curve = found.curve();
+    assert_eq!(curve.len(), phases.len());
+    for (p, ((best, score), phase)) in curve.iter().zip(phases).enumerate() {
+        assert!((best.phase - phase).abs() < 1e-9 && (best.height_m - 1.1).abs() < 1e-9, "{best:?}");
+        assert!((best.along_m - truth(grid.phase.at(p))).abs() <= 0.0101, "{best:?}");
+        let slice = &found.scores[p * 45..(p + 1) * 45];
+        assert!(slice.contains(score) && slice.iter().all(|s| s <= score));
+    }
+}
+
+#[test]
+fn an_axis_reaches_its_half_width_to_the_nearest_step() {
+    for (half_width, step, count) in [(0.3, 0.1, 7), (0.2, 0.02, 21), (0.06, 0.02, 7), (0.071, 0.02, 9)] {
+        let axis = Axis::around(1.5, half_width, step);
+        assert_eq!(axis.count, count);
+        let reach = 0.5 * (count as f64 - 1.0) * step;
+        assert!((axis.at(0) - 1.5 + reach).abs() < 1e-12 && (axis.at(count - 1) - 1.5 - reach).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_pose_leads_back_to_its_hypothesis() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::new(0.4, -0.7), heading_rad: 2.3 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    for phase in [0.0, 0.13, 0.4, 0.77] {
+        let truth = Hypothesis { along_m: 0.6, height_m: 1.21, phase };
+        let found = scene.hypothesis_at(scene.pose(&truth).torso_centre, phase);
+        assert!((found.along_m - 0.6).abs() < 1e-12 && (found.height_m - 1.21).abs() < 1e-12, "{found:?}");
+    }
+    let across = path.point(0.6, 0.0).truncate() + 0.8 * path.direction().perp();
+    assert!((path.along(across) - 0.6).abs() < 1e-12);
+}
+
+/// More heights than one block has lanes.
+#[test]
+fn every_height_of_a_high_column_is_compared_as_its_searched_lines() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::new(0.1, 0.2), heading_rad: 0.2 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
+    let edges = edges_of(&scene, &truth);
+    let one = |centre: f64| Axis { centre, step: 0.02, count: 1 };
+    let height = Axis::around(truth.height_m - 0.03, 0.2, 0.01);
+    let grid = Grid { along: one(0.1), height, phase: one(0.43) };
+    let options = SimilarityOptions::default();
+    let found = search(&edges, &scene, &grid, &options, HiddenLines::PerColumn);
+    assert_eq!(found.scores.len(), 41);
+    for (index, score) in found.scores.iter().enumerate() {
+        let lines = scene.searched_lines(&grid.hypothesis(index), height.centre, HiddenLines::PerColumn);
+        let plain = similarity(&lines, &edges, &options).value;
+        assert!((plain - score).abs() < 1e-4, "height {index}: {plain} against {score}");
+    }
+    assert!((found.best().height_m - truth.height_m).abs() < 0.011);
+}
+
+#[test]
+fn a_planted_walker_is_found_in_both_directions() {
+    let (walker, camera) = (walker(), camera());
+    let height_m = walker.level_torso_height_m();
+    for heading_rad in [0.0, std::f64::consts::PI] {
+        let path = Path { origin: DVec2::ZERO, heading_rad };
+        let scene = Scene { walker: &walker, camera: &camera, path: &path };
+        for (i, phase) in [0.13, 0.37, 0.62, 0.88].into_iter().enumerate() {
+            let truth = Hypothesis { along_m: 0.3 * i as f64 - 0.5, height_m, phase };
+            let edges = edges_of(&scene, &truth);
+            let around =
+                Hypothesis { along_m: truth.along_m + 0.04, height_m: height_m - 0.02, phase: phase + 0.04 };
+            let found = search(
+                &edges,
+                &scene,
+                &Grid::printed(&around),
+                &SimilarityOptions::default(),
+                HiddenLines::default(),
+            );
+            let best = found.refined();
+            assert!((best.along_m - truth.along_m).abs() < 0.012, "{best:?} against {truth:?}");
+            assert!((best.height_m - height_m).abs() < 0.012, "{best:?} against {truth:?}");
+            assert!((best.phase - phase).abs() < 0.012, "{best:?} against {truth:?}");
+            assert!(found.best_score() > 0.98, "{}", found.best_score());
+        }
+    }
+}
+
+#[test]
+fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::new(0.2, 0.1), heading_rad: 0.3 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
+    let edges = edges_of(&scene, &Hypothesis { phase: 0.45, ..truth });
+    let grid = Grid::printed(&truth);
+    let options = SimilarityOptions::default();
+    let shared = search(&edges, &scene, &grid, &options, HiddenLines::PerColumn);
+    let exact = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
+    assert_eq!(shared.best_index, exact.best_index);
+    let worst = shared.scores.iter().zip(&exact.scores).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst < 0.02, "largest change of a score: {worst}");
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let again = pool.install(|| search(&edges, &scene, &grid, &options, HiddenLines::PerColumn));
+        assert!(again.scores.iter().zip(&shared.scores).all(|(a, b)| a.to_bits() == b.to_bits()));
+    }
+}
+
+#[test]
+fn fast_scores_equal_the_plain_similarity() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
+    let mut edges = edges_of(&scene, &truth);
+    for (i, edge) in edges.iter_mut().enumerate() {
+        (edge.gradient, edge.velocity) = ((7 * i % 50) as f32, (5 * i % 8) as f32);
+    }
+    let small = |v: f64, step: f64| Axis::around(v, 2.0 * step, step);
+    let grid =
+        Grid { along: small(0.05, 0.02), height: small(truth.height_m, 0.02), phase: small(0.25, 0.02) };
+    let rohr = SimilarityOptions::default();
+    let mut weighted = SimilarityOptions {
+        full_gradient: Some(40.0),
+        full_velocity: Some(6.0),
+        sigma_phi_rad: 0.7,
+        c_l: 0.5,
+        c_d: 0.8,
+        c_r: 0.4,
+        ..rohr
+    };
+    weighted.part_weights[3] = 0.2;
+    let lowe = SimilarityOptions { measure: Measure::Lowe, ..rohr };
+    for options in [rohr, weighted, lowe] {
+        let found = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
+        for (index, score) in found.scores.iter().enumerate() {
+            let plain = similarity(&scene.lines(&grid.hypothesis(index)), &edges, &options);
+            assert!((plain.value - score).abs() < 1e-4, "{} against {score}, {options:?}", plain.value);
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.4 };
+    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let truth = Hypothesis { along_m: 0.2, height_m: walker.level_torso_height_m(), phase: 0.3 };
+    let (edges, options) = (edges_of(&scene, &truth), SimilarityOptions::default());
+    let mut visible = Vec::new();
+    let posed = scene.pose(&Hypothesis { phase: 0.35, ..truth });
+    visible_contours(&posed.cylinders, camera.position(), &LINES_ONLY, &mut visible);
+    let on = |arch: pulp::Arch| {
+        arch.dispatch(Raised {
+            scorer: &ColumnScorer::new(&edges, &options),
+            projection: &Projection::new(&camera, DVec3::ZERO),
+            visible: &visible,
+            raised_m: std::array::from_fn(|i| 0.01 * i as f32 - 0.08),
+            near: &mut Vec::new(),
+        })
+    };
+    let (best, plain) = (on(pulp::Arch::new()), on(pulp::Arch::Scalar));
+    assert!(best[8] > 0.1 && best.map(f32::to_bits) == plain.map(f32::to_bits));
+}

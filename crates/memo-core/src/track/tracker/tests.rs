@@ -1,0 +1,466 @@
+//! What the tracker decides, on moving boxes and on walks put into it; no frame is drawn.
+
+use super::super::kalman::ConstantVelocity;
+use super::super::locate::locate;
+use super::super::score::EdgeLine;
+use super::super::search::tests::{camera, edges_of, walker};
+use super::super::search::{Axis, Path};
+use super::super::start::Direction;
+use super::super::start::tests::report;
+use super::super::walk::{Beginning, Look, State, Step};
+use super::*;
+use crate::image::Image;
+
+const SIZE: [usize; 2] = [640, 480];
+
+fn options() -> TrackerOptions {
+    TrackerOptions { camera: Some(camera()), person: None, ..TrackerOptions::for_height(1.75) }
+}
+
+fn tracker() -> Tracker {
+    Tracker::new(options()).unwrap()
+}
+
+/// An upright box with its lower left corner at a place.
+fn boxed(left: usize, bottom: usize, width: usize, height: usize) -> Rectangle {
+    Rectangle { left, top: bottom + 1 - height, right: left + width - 1, bottom }
+}
+
+/// Evidence of a frame without edges in which these boxes move.
+fn evidence(frame: usize, boxes: &[Rectangle]) -> Evidence {
+    let mut mask = Image::filled(SIZE[0], SIZE[1], false);
+    for r in boxes {
+        (r.top..=r.bottom).for_each(|y| mask.row_mut(y)[r.left..=r.right].fill(true));
+    }
+    Evidence {
+        frame,
+        time_s: 0.04 * frame as f64,
+        grey: Image::filled(SIZE[0], SIZE[1], 100),
+        firm_mask: mask.clone(),
+        mask,
+        velocity: None,
+    }
+}
+
+/// A box that could be a person of 200 px.
+fn person(left: usize) -> Rectangle {
+    boxed(left, 399, 80, 200)
+}
+
+/// The number of sightings kept after frames with a person (true) and without.
+fn kept_after(frames: &[bool]) -> usize {
+    let mut tracker = tracker();
+    for (k, is_there) in frames.iter().enumerate() {
+        let boxes: &[Rectangle] = if *is_there { &[person(100 + k)] } else { &[] };
+        tracker.advance(&evidence(k, boxes)).unwrap();
+    }
+    tracker.seen.len()
+}
+
+#[test]
+fn a_candidate_may_be_missed_in_three_frames_in_a_row_and_no_more() {
+    let (x, o) = (true, false);
+    assert_eq!(kept_after(&[x, x, x, x]), 4);
+    assert_eq!(kept_after(&[x, x, o, o, o, x]), 3);
+    assert_eq!(kept_after(&[x, x, o, o, o, o, x]), 1);
+    assert_eq!(kept_after(&[x, o, o, o, x, o, o, o, x]), 3, "counted anew after each sighting");
+}
+
+#[test]
+fn another_person_s_rectangle_begins_anew() {
+    let kept = |second: Rectangle| {
+        let mut tracker = tracker();
+        for (k, rectangle) in [person(100), second].into_iter().enumerate() {
+            tracker.advance(&evidence(k, &[rectangle])).unwrap();
+        }
+        tracker.seen.len()
+    };
+    assert_eq!(kept(person(179)), 2, "they overlap");
+    assert_eq!(kept(person(300)), 1, "somewhere else");
+    assert_eq!(kept(boxed(100, 399, 50, 100)), 1, "half as high");
+}
+
+#[test]
+fn rectangles_of_one_person_overlap_and_are_about_as_high() {
+    let first = boxed(100, 399, 80, 200);
+    for (second, is_same) in [
+        (boxed(100, 399, 80, 126), true),
+        (boxed(100, 399, 80, 124), false),
+        (boxed(100, 399, 80, 332), true),
+        (boxed(100, 399, 80, 336), false),
+        (boxed(150, 399, 20, 200), true),
+        (boxed(180, 399, 80, 200), true),
+        (boxed(181, 399, 80, 200), false),
+        (boxed(100, 199, 80, 190), true),
+        (boxed(100, 198, 80, 190), false),
+    ] {
+        assert_eq!(same_person(&first, &second), is_same, "{second:?}");
+    }
+}
+
+#[test]
+fn sides_and_top_cut_a_person_off_and_the_bottom_does_not() {
+    let inside = Rectangle { left: 2, top: 2, right: 637, bottom: 479 };
+    assert!(!touches_border(&inside, 640));
+    for cut in
+        [Rectangle { left: 1, ..inside }, Rectangle { top: 1, ..inside }, Rectangle { right: 638, ..inside }]
+    {
+        assert!(touches_border(&cut, 640), "{cut:?}");
+    }
+}
+
+#[test]
+fn feet_are_cut_off_where_most_rectangles_reach_the_last_rows() {
+    let seen = |bottoms: &[usize]| -> Vec<Sighting> {
+        let sighting = |b: &usize| Sighting { time_s: 0.0, rectangle: boxed(100, *b, 80, 200) };
+        bottoms.iter().map(sighting).collect()
+    };
+    assert!(feet_cut_off(&seen(&[478, 479, 400, 478]), 480));
+    assert!(!feet_cut_off(&seen(&[478, 479, 400, 400]), 480), "a half is not most");
+    assert!(!feet_cut_off(&seen(&[477, 477, 477]), 480));
+}
+
+#[test]
+fn a_grown_rectangle_stays_inside_the_picture() {
+    let evidence = evidence(0, &[]);
+    let r = Rectangle { left: 30, top: 40, right: 300, bottom: 400 };
+    assert_eq!(grown(&r, &evidence, 16.0), Rectangle { left: 14, top: 24, right: 316, bottom: 416 });
+    let r = Rectangle { left: 3, top: 4, right: 630, bottom: 475 };
+    assert_eq!(grown(&r, &evidence, 16.0), Rectangle { left: 0, top: 0, right: 639, bottom: 479 });
+}
+
+#[test]
+fn options_out_of_range_are_refused_by_name() {
+    let refused = |change: fn(&mut TrackerOptions)| {
+        let mut options = options();
+        change(&mut options);
+        match Tracker::new(options) {
+            Err(TrackError::Option { name, .. }) => Some(name),
+            _ => None,
+        }
+    };
+    assert_eq!(refused(|o| o.start_frames = 4), Some("start_frames"));
+    assert_eq!(refused(|o| o.start_frames = 101), Some("start_frames"));
+    assert_eq!(refused(|o| o.field_of_view_rad = 4f64.to_radians()), Some("field of view"));
+    assert_eq!(refused(|o| o.field_of_view_rad = 171f64.to_radians()), Some("field of view"));
+    assert_eq!(refused(|o| (o.start_frames, o.field_of_view_rad) = (5, 0.1)), None);
+    assert_eq!(refused(|o| o.start_frames = 100), None);
+}
+
+#[test]
+fn frames_of_another_size_than_the_camera_s_are_refused() {
+    let small = Image::filled(320, 240, 100u8);
+    let refused = tracker().update(&small.as_frame(), 0.0);
+    let expected = TrackError::CameraSize { camera_width: 640, camera_height: 480, width: 320, height: 240 };
+    assert_eq!(refused, Err(expected));
+    let mut guessing = Tracker::new(TrackerOptions { camera: None, ..options() }).unwrap();
+    assert_eq!(guessing.update(&small.as_frame(), 0.0), Ok(()));
+}
+
+#[test]
+fn the_report_counts_frames_candidates_borders_and_refused_starts() {
+    let mut tracker = tracker();
+    // A person who leaves to the right, then stands still: no start.
+    let frames = [&[][..], &[person(560)], &[person(400)], &[boxed(300, 300, 8, 9)]];
+    for (k, boxes) in frames.into_iter().enumerate() {
+        tracker.advance(&evidence(k, boxes)).unwrap();
+    }
+    let counts = tracker.seek_report();
+    assert_eq!((counts.frames_with_candidate, counts.frames_cut_off, counts.refused_starts), (2, 1, 0));
+    tracker.seen.clear();
+    (10..23).for_each(|k| tracker.advance(&evidence(k, &[person(400)])).unwrap());
+    assert_eq!(tracker.seek_report().refused_starts, 1);
+    assert_eq!(tracker.seen.len(), 13 - 4, "the oldest third is dropped");
+    let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
+    (0..3).for_each(|k| tracker.update(&frame.as_frame(), f64::from(k)).unwrap());
+    assert_eq!(tracker.seek_report().frames, 3);
+}
+
+#[test]
+fn sightings_do_not_pile_up_while_nobody_starts() {
+    let mut tracker = tracker();
+    for k in 0..120 {
+        tracker.advance(&evidence(k, &[person(400)])).unwrap();
+        assert!(tracker.seen.len() < options().start_frames);
+    }
+    assert!(tracker.walking.is_none() && tracker.seek_report().refused_starts > 20);
+}
+
+#[test]
+fn followed_is_who_overlaps_the_expected_place_and_sought_the_largest() {
+    let mut tracker = tracker();
+    let (large, small) = (boxed(100, 449, 100, 300), person(450));
+    let evidence = evidence(0, &[large, small]);
+    assert_eq!(tracker.sighting(&evidence, None).unwrap().rectangle, large);
+    assert_eq!(tracker.sighting(&evidence, Some(&person(430))).unwrap().rectangle, small);
+    assert!(tracker.sighting(&evidence, Some(&boxed(300, 399, 80, 200))).is_none());
+}
+
+const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+const BEGINNING: Beginning =
+    Beginning { time_s: 0.0, along_m: 0.0, phase: 0.2, speed_mps: 1.2, rate_hz: 0.9 };
+
+/// A step of a walk that goes well, at x metres along the path.
+fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
+    let time_s = 0.04 * frame as f64;
+    let height_m = walker().level_torso_height_m();
+    let state = State {
+        along: ConstantVelocity::new(along_m, speed_mps, 1e-4, 1e-3),
+        height: ConstantVelocity::new(height_m, 0.0, 1e-4, 0.0),
+        phase: ConstantVelocity::new(0.2 + 0.9 * time_s, 0.9, 1e-4, 1e-3),
+    };
+    let best = state.hypothesis();
+    let look = Look { window: boxed(100, 399, 80, 200), heights: Axis::around(height_m, 0.1, 0.02), best };
+    Step { frame, time_s, state, measured: Some(best), similarity: 0.5, look }
+}
+
+/// A tracker that has followed somebody through `count` frames and now sees him at x metres.
+fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
+    let mut tracker = tracker();
+    let mut walk = Walk::new(walker(), PATH, BEGINNING);
+    let steps = (0..count).map(|k| step(k, along_m - 0.04 * speed_mps * (count - 1 - k) as f64, speed_mps));
+    walk.twins[0].steps = steps.collect();
+    walk.twins[1].steps = walk.twins[0].steps.clone();
+    walk.twins[0].similarity_sum = 0.5 * count as f64;
+    tracker.walking = Some(Active {
+        camera: camera(),
+        depth_sd_m: 0.1,
+        start: report(PATH, BEGINNING, Direction::Forward),
+        walk,
+        kept: Vec::new(),
+        gait_speed_mps: 1.25,
+        person_fit: None,
+        fitted: true,
+    });
+    tracker
+}
+
+#[test]
+fn a_long_walk_is_handed_out_and_followed_on_as_a_new_one() {
+    for (longest, handed_out) in [(30, 1), (31, 0)] {
+        let mut tracker = following(29, 0.0, 1.2);
+        tracker.longest_walk = longest;
+        tracker.advance(&evidence(29, &[person(280)])).unwrap();
+        let walks = tracker.take_finished();
+        assert_eq!((walks.len(), tracker.walking.is_none()), (handed_out, handed_out == 1));
+        assert!(tracker.take_finished().is_empty(), "handed out once");
+        if handed_out == 1 {
+            assert_eq!(walks[0].rows().len(), 30);
+            (30..33).for_each(|k| tracker.advance(&evidence(k, &[person(280)])).unwrap());
+            assert_eq!(tracker.seen.len(), 3, "sought again");
+        }
+    }
+    assert_eq!(tracker().longest_walk, LONGEST_WALK);
+    assert_eq!(LONGEST_WALK, 20_000);
+}
+
+#[test]
+fn who_stands_still_is_let_go_once_the_person_is_fitted() {
+    for fitted in [true, false] {
+        let mut tracker = following(40, 0.0, 0.0);
+        tracker.walking.as_mut().unwrap().fitted = fitted;
+        tracker.advance(&evidence(40, &[])).unwrap();
+        assert_eq!(tracker.walking.is_none(), fitted);
+        assert_eq!(tracker.take_finished().len(), usize::from(fitted));
+    }
+    let mut walks_on = following(40, 0.0, 1.2);
+    walks_on.advance(&evidence(40, &[])).unwrap();
+    assert!(walks_on.walking.is_some());
+}
+
+#[test]
+fn frames_are_kept_until_there_are_enough_for_the_fit() {
+    let mut tracker = following(20, -0.5, 1.2);
+    tracker.options.person_frames = 3;
+    tracker.walking.as_mut().unwrap().fitted = false;
+    for (k, (kept, fitted)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
+        tracker.advance(&evidence(20 + k, &[])).unwrap();
+        let active = tracker.walking.as_ref().unwrap();
+        assert_eq!((active.kept.len(), active.fitted), (kept, fitted), "frame {k}");
+    }
+}
+
+/// The share of the body's box outside the picture, across and upright, at x metres with the torso at z.
+fn outside(along_m: f64, height_m: f64) -> [f64; 2] {
+    let (walker, camera) = (walker(), camera());
+    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
+    let posed = scene.pose(&Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * 0.04 });
+    let ends = posed.cylinders.iter().flat_map(|c| {
+        [-1.0, 1.0].map(|s| c.centre() + s * c.half_length * c.world_from_cylinder.matrix3.z_axis)
+    });
+    let pixels: Vec<DVec2> = ends.map(|p| camera.project(p).unwrap()).collect();
+    let share = |of: fn(&DVec2) -> f64, size: usize| {
+        let low = pixels.iter().map(of).fold(f64::INFINITY, f64::min);
+        let high = pixels.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let shown = high.min(size as f64 - 1.0) - low.max(0.0);
+        1.0 - shown / (high - low)
+    };
+    [share(|p| p.x, SIZE[0]), share(|p| p.y, SIZE[1])]
+}
+
+#[test]
+fn a_walk_ends_where_four_tenths_of_the_body_are_outside() {
+    let height_m = walker().level_torso_height_m();
+    let follows = |along_m: f64, height_m: f64| {
+        let mut tracker = following(1, along_m, 0.0);
+        let active = tracker.walking.as_mut().unwrap();
+        active.walk.twins[0].steps[0].state.height.position = height_m;
+        tracker.predicted_window(&evidence(1, &[])).is_some()
+    };
+    // Sideways on both sides, and through the top.
+    let right = (0..400).map(|k| 0.01 * f64::from(k)).map(|x| ((x, height_m), outside(x, height_m)[0]));
+    let left = (0..400).map(|k| -0.01 * f64::from(k)).map(|x| ((x, height_m), outside(x, height_m)[0]));
+    let up = (0..400).map(|k| height_m + 0.01 * f64::from(k)).map(|z| ((0.0, z), outside(0.0, z)[1]));
+    let ways: [Vec<((f64, f64), f64)>; 3] = [right.collect(), left.collect(), up.collect()];
+    for way in &ways {
+        let at = |share: f64| way.iter().find(|(_, outside)| *outside >= share).unwrap().0;
+        for (share, stays) in [(0.0, true), (0.15, true), (0.35, true), (0.43, false), (0.6, false)] {
+            let (along_m, height_m) = at(share);
+            assert_eq!(follows(along_m, height_m), stays, "{share} outside at {along_m}, {height_m}");
+        }
+    }
+}
+
+#[test]
+fn who_left_is_handed_out_and_the_same_frame_is_searched_for_the_next() {
+    let mut tracker = following(20, 4.0, 1.2);
+    tracker.advance(&evidence(20, &[person(100)])).unwrap();
+    assert_eq!((tracker.take_finished().len(), tracker.seen.len()), (1, 1));
+}
+
+#[test]
+fn the_window_is_the_body_s_box_with_a_margin_that_grows_with_the_uncertainty() {
+    let (walker, camera) = (walker(), camera());
+    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
+    let window = |position_variance: f64| {
+        let mut tracker = following(1, 0.0, 0.0);
+        let state = &mut tracker.walking.as_mut().unwrap().walk.twins[0].steps[0].state;
+        state.along.covariance = [position_variance, 0.0, 0.0];
+        state.height.covariance = [position_variance, 0.0, 0.0];
+        tracker.predicted_window(&evidence(0, &[])).unwrap()
+    };
+    let posed = scene.pose(&step(0, 0.0, 0.0).state.hypothesis());
+    let joints = posed.right.to_array().into_iter().chain(posed.left.to_array());
+    let pixels: Vec<DVec2> = joints.map(|p| camera.project(p).unwrap()).collect();
+    let (sure, unsure, lost) = (window(0.0), window(0.0025), window(4.0));
+    for p in &pixels {
+        assert!(sure.left as f64 <= p.x - 15.0 && sure.right as f64 >= p.x + 15.0, "{sure:?}, {p}");
+        assert!(sure.top as f64 <= p.y - 15.0 && sure.bottom as f64 >= p.y + 15.0, "{sure:?}, {p}");
+    }
+    let lowest = pixels.iter().map(|p| p.y).fold(0.0, f64::max);
+    assert!((sure.bottom as f64) < lowest + 60.0, "no more than a foot and the margin below the ankle");
+    // 6 m away 5 cm are some 5.5 pixels; beyond 20 cm along and 10 cm in height the margin stays.
+    let focal_px = camera.focal_px.x;
+    let near =
+        |grown: usize, m: f64| (grown as f64 - m * focal_px / 6.0).abs() < 2.5 + 0.05 * m * focal_px / 6.0;
+    assert!(near(sure.left - unsure.left, 0.05) && near(unsure.right - sure.right, 0.05), "{unsure:?}");
+    assert!(near(sure.top - unsure.top, 0.05) && near(unsure.bottom - sure.bottom, 0.05), "{unsure:?}");
+    assert!(near(sure.left - lost.left, 0.2) && near(sure.top - lost.top, 0.1), "{lost:?}");
+}
+
+#[test]
+fn what_is_handed_out_is_trimmed_and_knows_its_camera() {
+    let mut tracker = following(30, 0.0, 1.2);
+    let steps = &mut tracker.walking.as_mut().unwrap().walk.twins[0].steps;
+    steps[..2].iter_mut().for_each(|step| step.similarity = 0.0);
+    tracker.finish().unwrap();
+    let walk = tracker.take_finished().remove(0);
+    assert_eq!((walk.steps().len(), walk.steps()[0].frame), (28, 2));
+    assert!(!walk.camera_is_guessed && walk.camera == camera() && walk.person_fit.is_none());
+    assert_eq!((walk.depth_sd_m, walk.gait_speed_mps, walk.options), (0.1, 1.25, options().walk));
+    let mut guessed = following(30, 0.0, 1.2);
+    guessed.options.camera = None;
+    guessed.finish().unwrap();
+    assert!(guessed.take_finished()[0].camera_is_guessed);
+    let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
+    assert_eq!(tracker.update(&frame.as_frame(), 9.0), Err(TrackError::Finished));
+}
+
+#[test]
+fn the_current_estimate_is_the_last_step_of_the_better_twin() {
+    assert_eq!(tracker().current(), None);
+    let tracker = following(60, 0.4, 1.2);
+    let now = tracker.current().unwrap();
+    assert_eq!((now.frame, now.heading_rad, now.speed_mps), (59, 0.0, 1.2));
+    assert!((now.time_s - 2.36).abs() < 1e-12);
+    // 0.2 + 0.9 * 2.36 = 2.324 cycles.
+    assert!((now.phase - 0.324).abs() < 1e-9 && (now.torso_centre.x - 0.4).abs() < 1e-9, "{now:?}");
+    assert!(
+        now.torso_centre.y.abs() < 1e-9
+            && (now.torso_centre.z - walker().level_torso_height_m()).abs() < 0.05
+    );
+    assert!(now.p_swapped < 0.01);
+}
+
+/// Five sightings of somebody at a speed with the contours of a walker there; `drop_px` moves the rectangles down.
+fn seen_walking(speed_mps: f64, drop_px: f64) -> Vec<(Sighting, FrameEdges)> {
+    let (walker, camera) = (walker(), camera());
+    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
+    let crown_m = walker.level_crown_height_m();
+    let frame = |k: usize| {
+        let time_s = 0.1 * k as f64;
+        let along_m = -0.4 + speed_mps * time_s;
+        let height_m = walker.level_torso_height_m();
+        let hypothesis = Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s };
+        let [sole, crown] = [0.0, crown_m].map(|z| camera.project(PATH.point(along_m, z)).unwrap());
+        let rectangle = Rectangle {
+            left: (sole.x - 40.0).round() as usize,
+            right: (sole.x + 40.0).round() as usize,
+            top: (crown.y - 2.0 + drop_px).round() as usize,
+            bottom: (sole.y + drop_px).round() as usize,
+        };
+        let edges = edges_of(&scene, &hypothesis);
+        (Sighting { time_s, rectangle }, FrameEdges { frame: k, time_s, window: rectangle, edges })
+    };
+    (0..5).map(frame).collect()
+}
+
+fn begun(seen: Vec<(Sighting, FrameEdges)>) -> Option<Active> {
+    let mut tracker = tracker();
+    (tracker.options.start_frames, tracker.seen) = (5, seen);
+    tracker.begin([640, 480])
+}
+
+#[test]
+fn a_walker_is_started_with_both_twins_through_the_start_frames() {
+    let seen = seen_walking(1.3, 0.0);
+    let active = begun(seen.clone()).expect("a walker");
+    assert!((active.start.beginning.speed_mps - 1.3).abs() < 0.1 && active.start.contrast() > 1.22);
+    assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
+    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.fitted);
+    let sightings: Vec<Sighting> = seen.iter().map(|(s, _)| *s).collect();
+    let course = locate(&sightings, &camera(), walker().level_crown_height_m()).unwrap();
+    assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+}
+
+#[test]
+fn nobody_walks_slower_than_a_quarter_metre_a_second_or_faster_than_three() {
+    for (speed_mps, walks) in [(0.2, false), (0.3, true), (2.9, true), (3.2, false)] {
+        assert_eq!(begun(seen_walking(speed_mps, 0.0)).is_some(), walks, "{speed_mps} m/s");
+    }
+}
+
+#[test]
+fn what_has_no_legs_or_feet_is_not_started() {
+    // Two upright lines that slide along fit every phase alike.
+    let mut slides = seen_walking(1.3, 0.0);
+    for (sighting, frame) in &mut slides {
+        let r = sighting.rectangle;
+        let upright = |x: usize| EdgeLine {
+            start: [x as f32, r.top as f32],
+            end: [x as f32, r.bottom as f32],
+            gradient: 20.0,
+            velocity: 0.0,
+        };
+        frame.edges = vec![upright(r.left + 20), upright(r.right - 20)];
+    }
+    assert!(begun(slides).is_none());
+    let mut cut_off = seen_walking(1.3, 0.0);
+    cut_off[..3].iter_mut().for_each(|(sighting, _)| sighting.rectangle.bottom = 479);
+    let reflected = {
+        let mut seen = seen_walking(1.3, 0.0);
+        seen[..2].iter_mut().for_each(|(sighting, _)| sighting.rectangle.bottom = 479);
+        seen
+    };
+    assert!(begun(cut_off).is_none() && begun(reflected).is_some(), "most feet below the picture, or few");
+}
