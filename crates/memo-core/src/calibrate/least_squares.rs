@@ -115,4 +115,65 @@ mod tests {
             assert_eq!(fit.unit_covariance(), None, "{wrong}");
         }
     }
+
+    fn vector(values: &[f64]) -> DVector<f64> {
+        DVector::from_column_slice(values)
+    }
+
+    /// A straight line through points: parameters and their unit covariance from the normal equations by hand.
+    #[test]
+    fn a_line_has_the_covariance_of_the_textbook() {
+        let points = [(0.0, 1.1), (1.0, 2.9), (2.0, 5.2), (4.0, 8.8)];
+        let residuals = |p: &DVector<f64>| Some(vector(&points.map(|(x, y)| p[0] + p[1] * x - y)));
+        let fit = minimise(vector(&[0.0, 0.0]), &[1e-3, 1e-3], MOST_ITERATIONS, residuals).unwrap();
+        let (n, x, xx, y, xy) = (4.0, 7.0, 21.0, 18.0, 2.9 + 10.4 + 35.2);
+        let determinant = n * xx - x * x;
+        assert!((fit.parameters[0] - (xx * y - x * xy) / determinant).abs() < 1e-9);
+        assert!((fit.parameters[1] - (n * xy - x * y) / determinant).abs() < 1e-9);
+        let covariance = fit.unit_covariance().unwrap();
+        for (row, column, expected) in [(0, 0, xx), (0, 1, -x), (1, 0, -x), (1, 1, n)] {
+            assert!((covariance[(row, column)] - expected / determinant).abs() < 1e-9, "{covariance}");
+        }
+        let by_hand = points.map(|(x, y)| (fit.parameters[0] + fit.parameters[1] * x - y).powi(2));
+        assert!((fit.sum_sq() - by_hand.iter().sum::<f64>()).abs() < 1e-12);
+    }
+
+    /// Two parameters that do nearly the same are refused once rounding would decide between them.
+    #[test]
+    fn parameters_that_do_the_same_have_no_covariance() {
+        let with = |difference: f64| {
+            let residuals = |p: &DVector<f64>| {
+                Some(DVector::from_fn(4, |i, _| p[0] + p[1] * (1.0 + difference * i as f64) - 1.0))
+            };
+            minimise(vector(&[0.2, 0.3]), &[1.0, 1.0], MOST_ITERATIONS, residuals).unwrap().unit_covariance()
+        };
+        assert!(with(1e-4).is_some());
+        assert!(with(1e-7).is_none() && with(0.0).is_none());
+        let idle = |p: &DVector<f64>| Some(vector(&[p[0] - 1.0, p[0] + 1.0]));
+        assert!(minimise(vector(&[0.2, 0.3]), &[1e-3, 1e-3], MOST_ITERATIONS, idle).unwrap().unit_covariance().is_none());
+    }
+
+    /// Rosenbrock's valley, (1 - x, 10 (y - x²)) from (-1.2, 1): its floor at (1, 1) is far along a bend.
+    #[test]
+    fn a_bent_valley_is_followed_to_its_end() {
+        let residuals = |p: &DVector<f64>| Some(vector(&[1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]));
+        let fit = minimise(vector(&[-1.2, 1.0]), &[1e-6, 1e-6], MOST_ITERATIONS, residuals).unwrap();
+        assert!((fit.parameters - vector(&[1.0, 1.0])).norm() < 1e-6);
+    }
+
+    /// Undamped, the step from 3 on the arc tangent goes to -9.5 and from there farther and farther.
+    #[test]
+    fn steps_that_lead_away_are_shortened() {
+        let fit = minimise(vector(&[3.0]), &[1e-6], MOST_ITERATIONS, |p| Some(p.map(f64::atan))).unwrap();
+        assert!(fit.parameters[0].abs() < 1e-9, "{}", fit.parameters[0]);
+    }
+
+    /// From 20 the step to the root of ln x - 1 goes to -20, where there is no logarithm.
+    #[test]
+    fn steps_to_where_the_model_has_no_answer_are_shortened() {
+        let residuals = |p: &DVector<f64>| (p[0] > 0.0).then(|| p.map(|x| x.ln() - 1.0));
+        let fit = minimise(vector(&[20.0]), &[1e-6], MOST_ITERATIONS, residuals).unwrap();
+        assert!((fit.parameters[0] - std::f64::consts::E).abs() < 1e-8);
+        assert!(minimise(vector(&[-1.0]), &[1e-6], MOST_ITERATIONS, residuals).is_none());
+    }
 }

@@ -329,4 +329,41 @@ mod tests {
         let mask = Image::filled(7, 8, false);
         assert!(background.update(&Image::filled(8, 8, 0u8).as_frame(), Some(&mask)).is_err());
     }
+
+    /// A silhouette has no holes, though a person's shirt may be as grey as the wall.
+    #[test]
+    fn a_silhouette_is_filled() {
+        let background =
+            Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default());
+        let mut frame = Image::filled(40, 40, 100u8);
+        (10..30).for_each(|y| frame.row_mut(y)[10..30].fill(200));
+        (16..24).for_each(|y| frame.row_mut(y)[16..24].fill(100));
+        let everywhere = Image::filled(40, 40, true);
+        let mask = background.silhouette(&frame.as_frame(), &everywhere, 40.0).unwrap();
+        let marked = mask.pixels().iter().filter(|p| **p).count();
+        assert!(mask.at(20, 20) && (390..=410).contains(&marked), "{marked}");
+    }
+
+    /// Long after its beginning a background follows by a twentieth of a grey level a frame, and shows the
+    /// nearest grey level; changes begin at 8.
+    #[test]
+    fn an_old_background_follows_slowly() {
+        let mut background =
+            Background::new(&Image::filled(8, 8, 100u8).as_frame(), BackgroundOptions::default());
+        background.frames = 1_000_000;
+        let brighter = Image::filled(8, 8, 140u8);
+        for frame in 1..=100 {
+            background.update(&brighter.as_frame(), None).unwrap();
+            // Steps are whole 256ths: 13 of them.
+            let level = 100.0 + f64::from(frame) * 13.0 / 256.0;
+            assert_eq!(background.image().at(3, 3), level.round() as u8, "{frame}");
+        }
+        let still = Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default());
+        for (by, is_changed) in [(8, false), (9, true)] {
+            let mut frame = Image::filled(40, 40, 100u8);
+            (5..15).for_each(|y| frame.row_mut(y)[5..15].fill(100 + by));
+            let mask = still.foreground(&frame.as_frame()).unwrap();
+            assert_eq!(mask.at(10, 10), is_changed, "{by}");
+        }
+    }
 }

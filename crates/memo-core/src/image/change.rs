@@ -403,4 +403,37 @@ mod tests {
         assert!(masks[1].at(6, 4) && masks[1].at(16, 4) && masks[1].at(26, 4));
         assert!(!masks[3].pixels().contains(&true));
     }
+
+    /// With noise the default threshold is that of one window in a million: sd times the root of twice the
+    /// quantile of chi squared of 6 degrees of freedom over 25 pixels (38.258336, scipy 1.17.1 chi2.isf(1e-6, 6)).
+    #[test]
+    fn the_default_threshold_is_that_of_one_window_in_a_million() {
+        let mut random = crate::synth::Random::new(6);
+        let mut noisy = || {
+            let grey = |normal: f32| (128.0 + 12.0 * normal).round().clamp(0.0, 255.0) as u8;
+            let pixels = (0..160 * 120).map(|_| grey(random.normal_pair()[0]));
+            Image::from_vec(160, 120, pixels.collect()).unwrap()
+        };
+        let (a, b) = (noisy(), noisy());
+        let (a, b) = (a.as_frame(), b.as_frame());
+        let sd = noise_sd(&a, &b).unwrap();
+        assert!((sd / 12.0 - 1.0).abs() < 0.06, "{sd}");
+        let found = pair_threshold(&a, &b, &ChangeOptions::default()).unwrap();
+        assert!((found / (sd * (2.0 * 38.258336f64 / 25.0).sqrt()) - 1.0).abs() < 1e-6, "{found} {sd}");
+    }
+
+    /// Without noise changes begin at 4 grey levels; a threshold that is given holds, however low.
+    #[test]
+    fn still_footage_has_a_least_threshold() {
+        let changed = |by: u8, options: &ChangeOptions| {
+            let before = Image::filled(40, 40, 100u8);
+            let mut after = before.clone();
+            (15..25).for_each(|y| after.row_mut(y)[15..25].fill(100 + by));
+            pair_changes(&before.as_frame(), &after.as_frame(), options).unwrap().at(20, 20)
+        };
+        let default = ChangeOptions::default();
+        assert_eq!([4, 5].map(|by| changed(by, &default)), [false, true]);
+        let given = ChangeOptions { threshold: Some(1.5), ..default };
+        assert_eq!([1, 2].map(|by| changed(by, &given)), [false, true]);
+    }
 }

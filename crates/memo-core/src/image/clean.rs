@@ -301,4 +301,17 @@ mod tests {
         let error = clean(&mask, &CleanOptions { few: 4, many: 4 }).unwrap_err();
         assert_eq!(error, CleanError::ThresholdsMeet { few: 4, many: 4 });
     }
+
+    /// Pixels with up to two of eight neighbours go: lines of one pixel from end to end, and what sticks out.
+    #[test]
+    fn thin_lines_go() {
+        let mut mask = Image::filled(30, 20, false);
+        mask.row_mut(10)[3..27].fill(true);
+        let cleaned = clean(&mask, &CleanOptions::default()).unwrap();
+        assert!(cleaned.pixels().iter().all(|p| !p));
+        (9..12).for_each(|y| mask.row_mut(y)[3..15].fill(true));
+        let cleaned = clean(&mask, &CleanOptions::default()).unwrap();
+        // Corners have three neighbours and stay, and so does the pixel of the line that touches the block.
+        assert_eq!(cleaned.pixels().iter().filter(|p| **p).count(), 3 * 12 + 1);
+    }
 }

@@ -186,4 +186,49 @@ mod tests {
         let gain = Gain { scale: 1.1, offset: -2.6 };
         assert_eq!(gain.apply(&image.as_frame()).pixels(), [0, 107, 255]);
     }
+
+    /// Inliers are within two and a half standard deviations, 1.4826 medians each: 98.8 % of normal residuals.
+    #[test]
+    fn inliers_are_most_of_what_is_normal() {
+        let mut random = crate::synth::Random::new(2);
+        let pairs: Vec<(f64, f64)> = (0..20_000)
+            .map(|i| {
+                let b = f64::from(i % 200) + 20.0;
+                (0.9 * b + 5.0 + 6.0 * f64::from(random.normal_pair()[0]), b)
+            })
+            .collect();
+        let share = inliers(&pairs, Gain { scale: 0.9, offset: 5.0 }).len() as f64 / 20_000.0;
+        // Two-sided 2.5 standard deviations of a normal: 0.98758.
+        assert!((share - 0.98758).abs() < 0.004, "{share}");
+    }
+
+    #[test]
+    fn quartiles_give_an_exact_gain_away() {
+        let pairs: Vec<(f64, f64)> = (0..101).map(|i| (0.8 * f64::from(i) + 10.0, f64::from(i))).collect();
+        let found = quartile_gain(&pairs);
+        assert!((found.scale - 0.8).abs() < 1e-12 && (found.offset - 10.0).abs() < 1e-12, "{found:?}");
+    }
+
+    /// A scale is read off frames whose correlation is at least 0.9; off others an offset alone.
+    #[test]
+    fn frames_that_hardly_go_together_have_no_scale() {
+        let mut random = crate::synth::Random::new(4);
+        for (noise, has_scale) in [(0.3, true), (0.6, false)] {
+            let pairs: Vec<(f64, f64)> = (0..5000)
+                .map(|_| {
+                    let [a, b] = random.normal_pair().map(f64::from);
+                    (100.0 + 20.0 * (a + noise * b), 90.0 + 20.0 * a)
+                })
+                .collect();
+            // Correlations 0.958 and 0.857.
+            assert_eq!(total_least_squares(&pairs).is_some(), has_scale, "{noise}");
+        }
+    }
+
+    #[test]
+    fn greys_are_rounded_to_the_nearest() {
+        let frame = Image::from_vec(3, 1, vec![100u8, 101, 103]).unwrap();
+        let halved = Gain { scale: 0.5, offset: 0.2 }.apply(&frame.as_frame());
+        assert_eq!(halved.pixels(), [50, 51, 52]);
+    }
 }

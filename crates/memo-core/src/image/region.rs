@@ -467,4 +467,53 @@ pub(super) mod tests {
         assert_eq!(outlines.len(), 1);
         assert_eq!(outlines[0].pixels, [[7, 5], [7, 6], [8, 6], [8, 5]]);
     }
+
+    fn group_sizes(parts: &[Region]) -> Vec<usize> {
+        let areas = group_regions(parts, &GroupOptions::default());
+        areas.iter().map(|group| group.area).collect()
+    }
+
+    /// By default a group takes in what is 5 % of its height beside it, 30 % above or below it, and leaves it
+    /// no wider than 75 % of its height.
+    #[test]
+    fn areas_are_joined_up_to_the_default_gaps() {
+        let body = || block(100, 50, 40, 100);
+        for (gap, is_one) in [(0, true), (5, true), (6, false), (30, false)] {
+            for left in [140 + gap, 90 - gap] {
+                let found = group_sizes(&[body(), block(left, 60, 10, 50)]);
+                assert_eq!(found.len() == 1, is_one, "{gap} beside: {found:?}");
+            }
+        }
+        for (gap, is_one) in [(0, true), (30, true), (31, false)] {
+            for top in [150 + gap, 40 - gap] {
+                let found = group_sizes(&[body(), block(110, top, 20, 10)]);
+                assert_eq!(found.len() == 1, is_one, "{gap} above or below: {found:?}");
+            }
+        }
+        for (width, is_one) in [(35, true), (36, false)] {
+            let found = group_sizes(&[body(), block(140, 50, width, 100)]);
+            assert_eq!(found.len() == 1, is_one, "{width} wide: {found:?}");
+        }
+        // What is wide already may still grow downwards.
+        assert_eq!(group_sizes(&[block(0, 0, 90, 100), block(20, 105, 50, 20)]), [10_000]);
+        assert_eq!(group_sizes(&[block(0, 0, 90, 100), block(20, 105, 70, 20)]), [10_400]);
+    }
+
+    /// A gap is measured with what a group has grown to: a chain of small steps leads far.
+    #[test]
+    fn a_grown_group_reaches_farther() {
+        let parts = [block(100, 50, 40, 100), block(105, 178, 30, 30), block(105, 255, 30, 20)];
+        assert_eq!(group_sizes(&parts), [5500]);
+        // Without the middle part, 105 rows are free.
+        assert_eq!(group_sizes(&[parts[0].clone(), parts[2].clone()]), [4000, 600]);
+    }
+
+    #[test]
+    fn small_areas_neither_join_nor_are_candidates() {
+        let body = || block(100, 50, 40, 100);
+        assert_eq!(group_sizes(&[body(), block(110, 152, 4, 4)]), [4016]);
+        assert_eq!(group_sizes(&[body(), block(110, 152, 5, 3)]), [4000]);
+        assert_eq!(group_sizes(&[block(0, 0, 10, 15)]), [150]);
+        assert!(group_sizes(&[block(0, 0, 149, 1)]).is_empty());
+    }
 }

@@ -77,4 +77,54 @@ mod tests {
         }
         assert!(silhouettes(&views, f64::NAN).is_err() && silhouettes(&[], 25.0).is_err());
     }
+
+    /// Nine frames of a plain background through which one or two blocks move, with a line between them.
+    fn scene(blocks: &[(usize, usize, usize)], line_level: u8) -> Vec<crate::image::Image<u8>> {
+        (0..9usize)
+            .map(|t| {
+                let mut image = crate::image::Image::filled(220, 90, 100u8);
+                let shift = 8 * t;
+                for y in 0..90 {
+                    let row = image.row_mut(y);
+                    for &(left, width, height) in blocks {
+                        if (80 - height..80).contains(&y) {
+                            row[left + shift..left + shift + width].fill(200);
+                        }
+                    }
+                    if y == 50 && line_level > 0 {
+                        row[20 + shift..80 + shift].fill(100 + line_level);
+                    }
+                }
+                image
+            })
+            .collect()
+    }
+
+    fn cut_out(images: &[crate::image::Image<u8>]) -> Vec<usize> {
+        let views: Vec<_> = images.iter().map(|image| image.as_frame()).collect();
+        let mask = &silhouettes(&views, 25.0).unwrap()[4];
+        (0..220).filter(|&x| (0..90).any(|y| mask.at(x, y))).collect()
+    }
+
+    /// Of two people the larger one is cut out.
+    #[test]
+    fn the_largest_mover_is_the_silhouette() {
+        let columns = cut_out(&scene(&[(90, 14, 40), (10, 24, 60)], 0));
+        assert!(columns.iter().all(|x| (38..72).contains(x)) && columns.len() >= 22, "{columns:?}");
+    }
+
+    /// A line of single changed pixels joins nothing: cleaned away, it leaves both blocks apart.
+    #[test]
+    fn a_thin_line_joins_no_people() {
+        // So faint that only windows centred on it change, at the least threshold of 8 grey levels.
+        let (plain, mut lined) = (scene(&[], 0).remove(4), scene(&[], 0).remove(4));
+        lined.row_mut(50)[60..160].fill(101);
+        let norms = crate::image::fit_norms(&plain.as_frame(), &lined.as_frame()).unwrap();
+        let (on, beside) = (norms.at(110, 50), norms.at(110, 51));
+        assert!(on > 1.02 * beside, "{on} {beside}");
+        let level = (8.0 / on).ceil() as u8;
+        assert!(f32::from(level) * beside < 8.0, "{on} {beside}");
+        let columns = cut_out(&scene(&[(62, 14, 40), (2, 24, 60)], level));
+        assert!(columns.iter().all(|x| (30..64).contains(x)) && columns.len() >= 22, "{columns:?}");
+    }
 }

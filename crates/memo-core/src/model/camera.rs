@@ -539,6 +539,16 @@ mod tests {
         assert!((camera.position() - DVec3::new(0.0, -5.0, 1.4)).length() < 1e-12);
     }
 
+    /// Between the views of 28 and of 31 mm lenses on film 36 mm wide.
+    #[test]
+    fn the_default_view_is_that_of_a_phone() {
+        let across = |focal_mm: f64| 2.0 * (18.0 / focal_mm).atan();
+        assert!((across(31.0)..across(28.0)).contains(&DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD));
+        let portrait =
+            2.0 * (f64::from(1080) / 1920.0 * (DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD / 2.0).tan()).atan();
+        assert!((portrait.to_degrees() - 37.0).abs() < 1.0, "{portrait}");
+    }
+
     #[test]
     fn a_guessed_camera_that_cannot_be_is_refused() {
         let guess = |fov, height, foot, head| Camera::from_person([640, 480], fov, height, foot, head);

@@ -290,4 +290,79 @@ mod tests {
         assert!((gait.posture(0.1, &style).right.hip - (gait.mean.hip + 0.1)).abs() < 1e-12);
         assert!(gait.vertical_m(0.3) > 0.0 && gait.vertical_m(0.05) < 0.0);
     }
+
+    /// Perry and Burnfield, Gait Analysis, 2nd edition 2010: the thigh against the vertical, the knee, the shoulder
+    /// and the elbow of healthy adults. Averages of laboratories differ by some degrees.
+    #[test]
+    fn key_angles_are_the_published_ones() {
+        for gait in [Gait::sampled_10(), Gait::dense()] {
+            let peak = |joint: usize, from: f64, to: f64, sign: f64| {
+                let phases = (0..=100).map(|i| from + (to - from) * f64::from(i) / 100.0);
+                sign * phases.map(|p| sign * degrees_at(&gait, p)[joint]).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let (hip, knee, shoulder, elbow) = (0, 1, 2, 3);
+            for (joint, from, to, sign, published) in [
+                (hip, -0.02, 0.02, 1.0, 20.0),
+                (hip, 0.45, 0.60, -1.0, -20.0),
+                (hip, 0.75, 0.95, 1.0, 25.0),
+                (knee, -0.01, 0.01, -1.0, 5.0),
+                (knee, 0.08, 0.20, 1.0, 20.0),
+                (knee, 0.30, 0.50, -1.0, 5.0),
+                (knee, 0.62, 0.82, 1.0, 60.0),
+                (shoulder, -0.05, 0.05, -1.0, -24.0),
+                (shoulder, 0.40, 0.60, 1.0, 8.0),
+                (elbow, -0.05, 0.10, -1.0, 20.0),
+                (elbow, 0.45, 0.65, 1.0, 45.0),
+            ] {
+                let found = peak(joint, from, to, sign);
+                assert!((found - published).abs() < 7.0, "joint {joint} in {from} to {to}: {found}");
+            }
+        }
+    }
+
+    /// Both tables are of the same subjects, the short one rounded to a tenth of a degree.
+    #[test]
+    fn ten_samples_are_every_fifth_of_fifty() {
+        let tables = [
+            (&HIP_10_DEG, &HIP_50_DEG),
+            (&KNEE_10_DEG, &KNEE_50_DEG),
+            (&SHOULDER_10_DEG, &SHOULDER_50_DEG),
+            (&ELBOW_10_DEG, &ELBOW_50_DEG),
+        ];
+        for (ten, fifty) in tables {
+            for (i, angle) in ten.iter().enumerate() {
+                assert!((angle - fifty[5 * i]).abs() < 0.0501, "{i}: {angle} {}", fifty[5 * i]);
+            }
+        }
+    }
+
+    /// Each amplitude stretches its own curves about their means, each offset shifts one.
+    #[test]
+    fn every_style_has_its_own_curves() {
+        let gait = Gait::dense();
+        let curve = |style: &GaitStyle| -> Vec<[f64; 4]> {
+            let sides = (0..1000).map(|i| gait.posture(f64::from(i) / 1000.0, style).left);
+            sides.map(|a| [a.hip, a.knee, a.shoulder, a.elbow]).collect()
+        };
+        let plain = curve(&GaitStyle::default());
+        let mean = |joint: usize| plain.iter().map(|a| a[joint]).sum::<f64>() / 1000.0;
+        let style = GaitStyle {
+            hip_offset: 0.1,
+            knee_offset: 0.2,
+            shoulder_offset: -0.3,
+            elbow_offset: 0.4,
+            trunk_lean: 0.05,
+            leg_amplitude: 0.6,
+            arm_amplitude: 1.5,
+        };
+        for (styled, plain) in curve(&style).iter().zip(&plain) {
+            for (joint, (offset, amplitude)) in
+                [(0.1, 0.6), (0.2, 0.6), (-0.3, 1.5), (0.4, 1.5)].into_iter().enumerate()
+            {
+                let expected = mean(joint) + amplitude * (plain[joint] - mean(joint)) + offset;
+                assert!((styled[joint] - expected).abs() < 1e-4, "{joint}: {} {expected}", styled[joint]);
+            }
+        }
+        assert_eq!(gait.posture(0.1, &style).trunk_lean, 0.05);
+    }
 }

@@ -270,4 +270,24 @@ mod tests {
             }
         }
     }
+
+    /// A round post of radius 1 from aside and above its top, at a distance of 2: the third of its top edge that
+    /// faces the camera is a crease between two visible faces, the rest the outline; of its bottom edge that third
+    /// is outline, and the rest hidden.
+    #[test]
+    fn an_edge_between_two_visible_faces_is_a_crease() {
+        let post = posed(DVec3::ZERO, DVec3::ZERO, DVec2::ONE, 1.0);
+        let mut chords = Vec::new();
+        rims(&post, DVec3::new(2.0, 0.0, 3.0), 12, &mut chords);
+        for chord in chords {
+            let middle = (chord.contour.start + chord.contour.end) * 0.5;
+            let is_facing = middle.truncate().to_angle().abs() < std::f64::consts::FRAC_PI_3;
+            let expected = match (chord.contour.kind, is_facing) {
+                (ContourKind::TopRim, true) => RimAspect::Crease,
+                (ContourKind::TopRim, false) | (ContourKind::BottomRim, true) => RimAspect::Outline,
+                _ => RimAspect::Hidden,
+            };
+            assert_eq!(chord.aspect, expected, "{middle}");
+        }
+    }
 }

@@ -155,4 +155,43 @@ mod tests {
         }
         assert!((curve.at(0.9) - 25.0).abs() < 1e-12 && (curve.at(1.5) + 15.0).abs() < 1e-12);
     }
+
+    /// The slope at a knot between secants d0, d1 over h0, h1 is 3 (h0 + h1) over (2 h1 + h0) / d0 + (h1 + 2 h0) /
+    /// d1. SciPy 1.17.1 has the same formula:
+    /// `x = np.array([0.1, 0.25, 0.6, 0.7]); y = np.array([2.0, 5.0, 6.0, 1.0])`
+    /// `PchipInterpolator(np.concatenate([x - 1, x, x + 1]), np.tile(y, 3))(t)`.
+    #[test]
+    fn monotone_curves_agree_with_scipy() {
+        let curve = PeriodicCubic::monotone(&[(0.6, 6.0), (0.1, 2.0), (-0.3, 1.0), (1.25, 5.0)]);
+        for (phase, expected) in [
+            (0.0, 1.5603530534351147),
+            (0.17, 3.3537476203939307),
+            (0.25, 5.0),
+            (0.4, 5.665694849368319),
+            (0.55, 5.978620019436345),
+            (0.65, 3.4999999999999956),
+            (0.8, 1.0617843511450382),
+            (0.95, 1.388388597328244),
+        ] {
+            assert!((curve.at(phase) - expected).abs() < 1e-12, "{phase}: {}", curve.at(phase));
+        }
+    }
+
+    /// SciPy 1.17.1: `CubicSpline(np.arange(11) / 10, np.append(y, y[0]), bc_type='periodic')(t)`.
+    #[test]
+    fn periodic_splines_agree_with_scipy() {
+        let curve = PeriodicCubic::spline(&[23.8, 22.4, 12.0, 0.0, -9.0, -13.7, -7.3, 11.4, 23.9, 25.0]);
+        for (phase, expected) in [
+            (0.05, 23.784150717703348),
+            (0.13, 20.127043540669852),
+            (0.37, -6.628956459330143),
+            (0.5, -13.7),
+            (0.81, 24.43121722488038),
+            (0.96, 24.097554066985648),
+        ] {
+            assert!((curve.at(phase) - expected).abs() < 1e-12, "{phase}: {}", curve.at(phase));
+            let shifted = curve.affine(-2.0, 3.0).at(phase);
+            assert!((shifted - (3.0 - 2.0 * expected)).abs() < 1e-11, "{phase}: {shifted}");
+        }
+    }
 }

@@ -226,4 +226,15 @@ mod tests {
         assert_eq!(perspective_error_px(100.0, 0.2, 0.0), f64::INFINITY);
         assert!(perspective_error_px(f64::NAN, 0.2, 3.0).is_nan());
     }
+
+    /// The change of the distance is one more unknown than those of the plain fit.
+    #[test]
+    fn the_change_takes_one_equation() {
+        let [hip, knee, ankle, meta] = leg(30, 0.1, 0.002);
+        let times: Vec<f64> = meta.iter().map(|m| m.x).collect();
+        let options = FitOptions { noise_sd: 0.002, ..FitOptions::default() };
+        let found = fit_hinge_in_depth(&hip, &knee, &ankle, &times, &options).unwrap();
+        // 30 views of two rods: 60 equations; plane, two lengths and the change.
+        assert_eq!(found.fit.redundancy, 60 - 4 - 1);
+    }
 }

@@ -282,4 +282,140 @@ mod tests {
             assert_eq!(found, Verdict::Undecided(Undecided::LittleMotion));
         }
     }
+
+    /// A hinge of rods 0.5 and 0.8 long that move by 0.3 and 0.4, seen with little noise.
+    fn hinge(residual_rms: f64, redundancy: usize) -> HingeFit {
+        let [hip, knee, ankle] = leg(30, 0.4);
+        let fit = fit_hinge(&hip, &knee, &ankle, &FitOptions::default()).unwrap();
+        HingeFit {
+            residual_rms,
+            redundancy,
+            lengths: [0.8, 0.5],
+            motion: [0.3, 0.4],
+            at_tilt_limit: false,
+            ..fit
+        }
+    }
+
+    /// A rod 0.5 long that moves by 0.3.
+    fn rod(residual_rms: f64, redundancy: usize) -> RodFit {
+        let [hip, knee, _] = leg(30, 0.4);
+        let fit = crate::planar::fit_rod(&hip, &knee, &FitOptions::default()).unwrap();
+        RodFit { residual_rms, redundancy, length: 0.5, motion: 0.3, at_tilt_limit: false, ..fit }
+    }
+
+    const FIVE: EvidenceOptions = EvidenceOptions { rate: FalseTargetRate::FivePercent, least_motion: 0.0 };
+
+    /// The statistic of the head, and the thresholds at which the rates were measured.
+    #[test]
+    fn statistic_and_thresholds_are_the_calibrated_ones() {
+        let (one, noise_sd) = (EvidenceOptions::default(), 0.004f64);
+        for (redundancy, hinge_limit) in [(12, 1.0), (26, 1.0), (71, 1.075), (116, 1.15), (300, 1.15)] {
+            let n = redundancy as f64;
+            // u = 4 unknowns, r0 = 0.09 of the motion of the rod that moves least.
+            let of_hinge = hinge_evidence(&hinge(0.02, redundancy), noise_sd, &one);
+            let expected =
+                0.02f64.powi(2) * (n + 4.0) / n / (2.0 * noise_sd.powi(2) + (0.09 * 0.3f64).powi(2));
+            assert!((of_hinge.statistic / expected - 1.0).abs() < 1e-12, "{of_hinge:?}");
+            assert!((of_hinge.threshold - hinge_limit).abs() < 1e-12, "{of_hinge:?}");
+            assert_eq!(hinge_evidence(&hinge(0.02, redundancy), noise_sd, &FIVE).threshold, 1.5);
+            // u = 3, r0 = 0.06.
+            let of_rod = rod_evidence(&rod(0.02, redundancy), noise_sd, &one);
+            let expected =
+                0.02f64.powi(2) * (n + 3.0) / n / (2.0 * noise_sd.powi(2) + (0.06 * 0.3f64).powi(2));
+            assert!((of_rod.statistic / expected - 1.0).abs() < 1e-12, "{of_rod:?}");
+            assert_eq!(of_rod.threshold, 0.65);
+            assert_eq!(rod_evidence(&rod(0.02, redundancy), noise_sd, &FIVE).threshold, 1.25);
+        }
+        assert_eq!(
+            [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent].map(|r| r.fraction()),
+            [0.01, 0.05]
+        );
+    }
+
+    /// Just within and just beyond each threshold.
+    #[test]
+    fn a_residual_beyond_the_threshold_is_not_planar() {
+        let residual = |f: f64, departure: f64, unknowns: f64| {
+            (f * (departure * 0.3).powi(2) * 40.0 / (40.0 + unknowns)).sqrt()
+        };
+        for (options, of_hinge, of_rod) in
+            [(EvidenceOptions::default(), 1.0 + 0.15 * 14.0 / 90.0, 0.65), (FIVE, 1.5, 1.25)]
+        {
+            for (share, verdict) in [(0.99, Verdict::Planar), (1.01, Verdict::NotPlanar)] {
+                let fit = hinge(residual(share * of_hinge, 0.09, 4.0), 40);
+                assert_eq!(hinge_evidence(&fit, 0.0, &options).verdict, verdict);
+                let fit = rod(residual(share * of_rod, 0.06, 3.0), 40);
+                assert_eq!(rod_evidence(&fit, 0.0, &options).verdict, verdict);
+            }
+        }
+    }
+
+    /// Motion of 2.5 (a rod: 4) standard deviations of the noise, 5 % (15 %) of the shortest rod, or as asked.
+    #[test]
+    fn motion_must_be_more_than_noise_and_a_share_of_the_length() {
+        let one = EvidenceOptions::default();
+        for (noise_sd, asked, of_hinge, of_rod) in
+            [(0.1, 0.0, 0.25, 0.4), (0.0, 0.0, 0.025, 0.075), (0.001, 0.28, 0.28, 0.28)]
+        {
+            let options = EvidenceOptions { least_motion: asked, ..one };
+            let [found_hinge, found_rod] = [
+                hinge_evidence(&hinge(0.0, 40), noise_sd, &options),
+                rod_evidence(&rod(0.0, 40), noise_sd, &options),
+            ];
+            assert!((found_hinge.least_motion - of_hinge).abs() < 1e-12, "{found_hinge:?}");
+            assert!((found_rod.least_motion - of_rod).abs() < 1e-12, "{found_rod:?}");
+            assert_eq!((found_hinge.motion, found_rod.motion), (0.3, 0.3));
+            let little = Verdict::Undecided(Undecided::LittleMotion);
+            assert_eq!(found_hinge.verdict == little, of_hinge > 0.3);
+            assert_eq!(found_rod.verdict == little, of_rod > 0.3);
+        }
+    }
+
+    /// Good fits that say little: at the tilt limit, or of fewer views than the rates hold for.
+    #[test]
+    fn edge_on_and_few_views_are_undecided() {
+        let one = EvidenceOptions::default();
+        let edge_on = Verdict::Undecided(Undecided::EdgeOn);
+        let steep = HingeFit { at_tilt_limit: true, ..hinge(0.001, 40) };
+        assert_eq!(hinge_evidence(&steep, 0.0, &one).verdict, edge_on);
+        let steep = RodFit { at_tilt_limit: true, ..rod(0.001, 40) };
+        assert_eq!(rod_evidence(&steep, 0.0, &one).verdict, edge_on);
+        // A bad fit is none, however steep.
+        let bad = RodFit { residual_rms: 0.2, ..steep };
+        assert_eq!(rod_evidence(&bad, 0.0, &one).verdict, Verdict::NotPlanar);
+        for (redundancy, verdict) in [
+            (0, Verdict::Unfalsifiable),
+            (11, Verdict::Undecided(Undecided::FewViews)),
+            (12, Verdict::Planar),
+        ] {
+            assert_eq!(hinge_evidence(&hinge(0.001, redundancy), 0.0, &one).verdict, verdict);
+            assert_eq!(rod_evidence(&rod(0.001, redundancy), 0.0, &one).verdict, verdict);
+        }
+    }
+
+    /// Of three points the pivot is the one that alone makes a hinge.
+    #[test]
+    fn the_pivot_is_the_only_one_that_fits() {
+        let [hip, knee, ankle] = leg(30, 0.4);
+        let (fit, one) =
+            (FitOptions { noise_sd: 0.002, ..FitOptions::default() }, EvidenceOptions::default());
+        for (order, pivot) in
+            [([&hip, &knee, &ankle], 1), ([&knee, &hip, &ankle], 0), ([&ankle, &hip, &knee], 2)]
+        {
+            let found = link_three(order.map(|p| &p[..]), &fit, &one).unwrap();
+            assert_eq!(found.pivot, Some(pivot));
+        }
+        // Of a rigid triangle that turns in its plane every corner fits, and none is the pivot.
+        let corner = |phase: f64| -> Vec<DVec2> {
+            (0..30)
+                .map(|i| {
+                    let angle = phase + 0.2 * f64::from(i);
+                    DVec2::new(0.5 * angle.cos(), angle.sin())
+                })
+                .collect()
+        };
+        let [a, b, c] = [0.0, 1.9, 4.0].map(corner);
+        assert_eq!(link_three([&a, &b, &c], &fit, &one).unwrap().pivot, None);
+    }
 }

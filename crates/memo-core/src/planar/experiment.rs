@@ -396,4 +396,21 @@ mod tests {
         let [rods, hinges] = false_targets(20_000, 4);
         assert!((6600..7400).contains(&rods) && (6200..7000).contains(&hinges), "{rods} {hinges}");
     }
+
+    /// Rods that are never seen at more than nine tenths of their length are some of all, not all.
+    #[test]
+    fn never_extended_rods_are_counted_apart() {
+        let t = rod_trials(2000, 7);
+        let mut random = Random::new(7);
+        // As often as three projections of random tilts and angles are all short: by other draws.
+        let share = (0..4000)
+            .filter(|_| {
+                let plane = drawn_plane(&mut random);
+                [(); 3].iter().all(|()| in_plane(plane, random.uniform(0.0, TAU)).length() < EXTENDED)
+            })
+            .count() as f64
+            / 4000.0;
+        assert!((t.never_extended as f64 / 2000.0 - share).abs() < 0.04, "{} {share}", t.never_extended);
+        assert!(0 < t.never_extended && t.never_extended < 1900);
+    }
 }

@@ -276,15 +276,10 @@ mod tests {
 
     #[test]
     fn planted_hinges_in_two_views_are_recovered_as_far_as_their_condition_allows() {
-        let tally = plant_and_recover(50_000);
+        let draws = if std::env::var_os("MEMO_FULL").is_some() { 1_000_000 } else { 50_000 };
+        let tally = plant_and_recover(draws);
         println!("recovered, flagged, refused: {tally:?}");
-        assert!(tally[0] > 30_000, "{tally:?}");
-    }
-
-    #[test]
-    #[ignore = "a million problems: for the release profile"]
-    fn a_million_planted_hinges_in_two_views_are_recovered_as_far_as_their_condition_allows() {
-        println!("recovered, flagged, refused: {:?}", plant_and_recover(1_000_000));
+        assert!(10 * tally[0] > 6 * draws, "{tally:?}");
     }
 
     #[test]
@@ -373,5 +368,84 @@ mod tests {
             }
         }
         assert_eq!(missed, 0);
+    }
+
+    #[test]
+    fn the_mirror_lies_in_the_mirrored_plane() {
+        let [first, second] = planted_views(DVec2::new(0.7, -0.4), [[0.1, 1.3], [2.0, 0.4]], [0.5, 0.8]);
+        let hinge = hinge_from_two_views(&first, &second).unwrap();
+        let mirror = hinge.mirror();
+        for view in 0..2 {
+            for (rod, image) in [first, second].into_iter().enumerate() {
+                assert_eq!(mirror.depth[view][rod], -hinge.depth[view][rod]);
+                assert!((mirror.plane.depth(image[view]) - mirror.depth[view][rod]).abs() < 1e-12);
+            }
+        }
+    }
+
+    /// Jacobian and condition are of the equations over the rods' lengths: a rod twice as long changes neither.
+    #[test]
+    fn the_condition_does_not_depend_on_the_rods_lengths() {
+        let hinge = |lengths: [f64; 2]| {
+            let [first, second] = planted_views(DVec2::new(0.7, -0.4), [[0.1, 1.3], [2.0, 0.4]], lengths);
+            hinge_from_two_views(&first, &second).unwrap()
+        };
+        let [one, other] = [hinge([1.0, 1.0]), hinge([3.0, 0.2])];
+        assert!((one.jacobian / other.jacobian - 1.0).abs() < 1e-9, "{one:?} {other:?}");
+        assert!((one.condition / other.condition - 1.0).abs() < 1e-9);
+    }
+
+    /// Hinges seen nearly edge-on, where eliminations lose digits: depth errors stay within what is stated.
+    #[test]
+    fn hinges_near_edge_on_are_recovered_as_far_as_their_condition_allows() {
+        let mut random = Random::new(37);
+        let mut ratios = Vec::new();
+        for _ in 0..20_000 {
+            let (slope, angles, lengths) = draw(&mut random);
+            let steep = 10f64.powf(random.uniform(2.0, 6.0)) * slope.normalize_or(DVec2::X);
+            let [first, second] = planted_views(steep, angles, lengths);
+            let Ok(hinge) = hinge_from_two_views(&first, &second) else { continue };
+            if hinge.condition.is_infinite() {
+                continue;
+            }
+            let plane = Plane::from_slope(steep);
+            let off = |s: f64| {
+                let at = |view: usize, rod: usize| {
+                    (hinge.depth[view][rod] - s * plane.depth([first, second][rod][view])).abs()
+                        / lengths[rod]
+                };
+                at(0, 0).max(at(0, 1)).max(at(1, 0)).max(at(1, 1))
+            };
+            ratios.push(off(1.0).min(off(-1.0)) / hinge.condition / f64::EPSILON);
+        }
+        let worst = ratios.iter().copied().fold(0.0, f64::max);
+        assert!(ratios.len() > 10_000 && worst <= ROUNDING / f64::EPSILON, "{worst}");
+    }
+
+    /// A plane seen nearly edge-on: the fit stops at the largest tilt and says so; the default is 80 degrees.
+    #[test]
+    fn a_fit_at_the_tilt_limit_says_so() {
+        use crate::planar::fit_rod;
+        let mut random = Random::new(5);
+        for (tilt_deg, is_at_limit) in [(87.0, true), (83.0, true), (60.0, false)] {
+            let slope = f64::to_radians(tilt_deg).tan() * DVec2::from_angle(1.0);
+            let basis = [slope.normalize() * f64::to_radians(tilt_deg).cos(), slope.normalize().perp()];
+            let (mut a, mut b) = (vec![], vec![]);
+            for i in 0..40 {
+                let t = 0.15 * f64::from(i);
+                let at = |angle: f64, length: f64, random: &mut Random| {
+                    let noise = 0.002 * DVec2::from_array(random.normal_pair().map(f64::from));
+                    length * (angle.cos() * basis[0] + angle.sin() * basis[1]) + noise
+                };
+                a.push(at(0.8 * t.sin(), 0.4, &mut random));
+                b.push(at(2.0 + 0.8 * t.cos(), 0.45, &mut random));
+            }
+            let (o, options) =
+                (vec![DVec2::ZERO; 40], FitOptions { noise_sd: 0.002, ..FitOptions::default() });
+            assert_eq!(fit_hinge(&a, &o, &b, &options).unwrap().at_tilt_limit, is_at_limit, "{tilt_deg}");
+            assert_eq!(fit_rod(&o, &a, &options).unwrap().at_tilt_limit, is_at_limit, "{tilt_deg}");
+            let steeper = FitOptions { max_tilt_deg: 89.5, ..options };
+            assert!(!fit_hinge(&a, &o, &b, &steeper).unwrap().at_tilt_limit, "{tilt_deg}");
+        }
     }
 }

@@ -226,4 +226,40 @@ mod tests {
         let apart = |d: DVec2| RodMotion { position: d, velocity: d };
         assert_eq!(refuse(&[apart(DVec2::X), apart(DVec2::Y)]), MotionRefusal::Imaginary);
     }
+
+    /// Weights and plane belong to each other: the least squares once more with the weights of the plane found
+    /// give the same plane.
+    #[test]
+    fn the_plane_is_that_of_its_own_weights() {
+        let mut random = Random::new(13);
+        for _ in 0..20 {
+            let slope = random.uniform(0.3, 2.0) * DVec2::from_angle(random.uniform(0.0, 6.3));
+            let mut shake =
+                |p: DVec2, sd: f64| p + sd * DVec2::from_array(random.normal_pair().map(f64::from));
+            let motions: Vec<RodMotion> = (0..30)
+                .map(|i| {
+                    let exact = turning(slope, 0.3 * f64::from(i), 1.0 + 0.1 * f64::from(i), 0.4);
+                    RodMotion { position: shake(exact.position, 0.02), velocity: shake(exact.velocity, 0.05) }
+                })
+                .collect();
+            let Ok(fit) = plane_from_motions(&motions, 0.02, 0.05) else { continue };
+            let g = fit.plane.slope();
+            // d'V v = 0 with V = [1 + p², pq; pq, 1 + q²]: its variance by the errors of d and v.
+            let v = glam::DMat2::from_cols_array(&[1.0 + g.x * g.x, g.x * g.y, g.x * g.y, 1.0 + g.y * g.y]);
+            let mut normal = Matrix3::zeros();
+            for (m, residual) in motions.iter().zip(&fit.residuals) {
+                let sd = (0.02 * (v * m.velocity).length()).hypot(0.05 * (v * m.position).length());
+                assert!((m.position.dot(v * m.velocity) / sd - residual).abs() < 1e-9);
+                let (d, w) = (m.position, m.velocity);
+                let row = nalgebra::Vector3::new(d.x * w.x, d.x * w.y + d.y * w.x, d.y * w.y) / sd;
+                normal += row * row.transpose();
+            }
+            let v = smallest(normal).unwrap();
+            let again = slope_from_form(v, v.x * v.z - v.y * v.y).unwrap();
+            assert!(
+                (again - g).length().min((again + g).length()) < 1e-6 * (1.0 + g.length()),
+                "{again} {g}"
+            );
+        }
+    }
 }

@@ -445,20 +445,13 @@ mod tests {
     #[test]
     fn planted_rods_are_recovered_as_far_as_their_condition_allows() {
         for solve in [rod_from_three_views, rod_from_ellipse] {
-            let tally = plant_and_recover(50_000, solve);
+            let draws = if std::env::var_os("MEMO_FULL").is_some() { 1_000_000 } else { 50_000 };
+            let tally = plant_and_recover(draws, solve);
             println!("{tally:?}");
             assert_eq!(tally.beyond, 0, "{tally:?}");
-            assert!(tally.recovered > 30_000, "{tally:?}");
-        }
-    }
-
-    #[test]
-    #[ignore = "a million problems: for the release profile"]
-    fn a_million_planted_rods_are_recovered_as_far_as_their_condition_allows() {
-        for solve in [rod_from_three_views, rod_from_ellipse] {
-            let tally = plant_and_recover(1_000_000, solve);
-            println!("{tally:?}");
-            assert_eq!(tally.beyond, 0, "{tally:?}");
+            assert!(10 * tally.recovered > 6 * draws, "{tally:?}");
+            // Of fifty thousand draws none needs more than a few of the stated roundings.
+            assert!(draws > 50_000 || tally.worst < 3.0, "{tally:?}");
         }
     }
 
@@ -541,5 +534,72 @@ mod tests {
             let printed = nalgebra::Matrix3::new(2.0 * z1, -2.0 * z2, 0.0, 2.0 * z1, 0.0, -2.0 * z3, k3, k4, k5);
             prop_assert!((printed.determinant() / ordered.length.powi(4) - ordered.jacobian).abs() < 1e-9);
         }
+    }
+
+    /// Rods seen nearly edge-on, where eliminations lose digits: depth errors stay within what is stated.
+    #[test]
+    fn rods_near_edge_on_are_recovered_as_far_as_their_condition_allows() {
+        let mut random = Random::new(29);
+        for solve in [rod_from_three_views, rod_from_ellipse] {
+            let mut ratios = Vec::new();
+            for _ in 0..20_000 {
+                let (slope, angles, length) = draw(&mut random);
+                let steep = 10f64.powf(random.uniform(2.0, 6.0)) * slope.normalize_or(DVec2::X);
+                let views = planted(steep, angles, length);
+                let Ok(rod) = solve(&views) else { continue };
+                if rod.condition.is_infinite() {
+                    continue;
+                }
+                let z = views.map(|view| Plane::from_slope(steep).depth(view));
+                let off = |s: f64| (0..3).map(|i| (rod.depth[i] - s * z[i]).abs()).fold(0.0, f64::max);
+                ratios.push(off(1.0).min(off(-1.0)) / length / rod.condition / f64::EPSILON);
+            }
+            let worst = ratios.iter().copied().fold(0.0, f64::max);
+            assert!(ratios.len() > 10_000 && worst <= ROUNDING / f64::EPSILON, "{worst}");
+        }
+    }
+
+    /// Coordinates changed by at most so much of the rod move its depths by no more than the condition says,
+    /// and by a fair part of it in the worst of many changes.
+    #[test]
+    fn the_condition_bounds_what_errors_of_the_image_do() {
+        let mut random = Random::new(31);
+        let (mut nearest, mut checked): (f64, usize) = (0.0, 0);
+        for _ in 0..1000 {
+            let slope = random.uniform(0.2, 3.0) * DVec2::from_angle(random.uniform(0.0, 6.3));
+            let views = planted(slope, [0; 3].map(|_| random.uniform(0.0, 6.3)), 1.0);
+            let Ok(rod) = rod_from_three_views(&views) else { continue };
+            if rod.condition > 1e3 {
+                continue;
+            }
+            checked += 1;
+            let mut worst: f64 = 0.0;
+            for _ in 0..50 {
+                let step = 1e-8;
+                let sign = |random: &mut Random| random.uniform(-1.0, 1.0).signum();
+                let moved =
+                    views.map(|d| d * (1.0 + step * DVec2::new(sign(&mut random), sign(&mut random))));
+                let again = rod_from_three_views(&moved).unwrap();
+                let error =
+                    |s: f64| (0..3).map(|i| (again.depth[i] - s * rod.depth[i]).abs()).fold(0.0, f64::max);
+                worst = worst.max(error(1.0).min(error(-1.0)) / step);
+            }
+            assert!(worst <= rod.condition, "{worst} {rod:?}");
+            nearest = nearest.max(worst / rod.condition);
+        }
+        println!("{checked} rods, worst at {nearest:.3} of the bound");
+        assert!(checked > 500 && nearest > 0.2, "{checked} {nearest}");
+    }
+
+    #[test]
+    fn the_mirror_lies_in_the_mirrored_plane() {
+        let rod = rod_from_three_views(&planted(DVec2::new(0.7, 0.4), [0.1, 1.3, 2.9], 0.5)).unwrap();
+        let mirror = rod.mirror();
+        let views = planted(DVec2::new(0.7, 0.4), [0.1, 1.3, 2.9], 0.5);
+        for (view, (z, mirrored)) in views.iter().zip(rod.depth.iter().zip(mirror.depth)) {
+            assert_eq!(mirrored, -z);
+            assert!((mirror.plane.depth(*view) - mirrored).abs() < 1e-12);
+        }
+        assert_eq!((mirror.length, mirror.mirror()), (rod.length, rod));
     }
 }

@@ -471,4 +471,158 @@ mod tests {
         ));
         assert!(LengthPrior::from_height(Some(175.0)).is_err());
     }
+
+    /// A segment that stands across the view in front of somebody 5 m away, so long in each frame.
+    fn seen(extents: &[f64], noise_rad: f64, pitch_rad: f64, lean_rad: f64) -> (Vec<JointRays>, Vec<Anchor>) {
+        use crate::posture::anchor::from_given;
+        let frame = |extent: &f64| {
+            // Camera axes turned about x: a camera that looks down sees the vertical tilted.
+            let turn = glam::DMat3::from_rotation_x(pitch_rad);
+            let neck = turn * DVec3::new(0.0, -0.4, 5.0);
+            let along = turn * DVec3::new(lean_rad.sin(), lean_rad.cos(), 0.0);
+            let knee = neck + turn * DVec3::new(0.1, 0.9, 0.0);
+            let mut rays = JointRays::from_points(&PerJoint([DVec3::NAN; 14]));
+            rays.noise_rad = noise_rad;
+            rays.ray[Joint::Neck] = neck.normalize();
+            rays.ray[Joint::RightKnee] = knee.normalize();
+            rays.ray[Joint::RightAnkle] = (knee + *extent * along).normalize();
+            let anchor = from_given(&rays, neck.length(), 0.1).unwrap();
+            (rays, anchor)
+        };
+        extents.iter().map(frame).unzip()
+    }
+
+    /// The largest of extents that spread by 3 cm of themselves and by as much of noise: 0.84 of their own
+    /// spread above the middle.
+    #[test]
+    fn noise_does_not_lengthen_a_segment() {
+        use crate::synth::Random;
+        let mut random = Random::new(3);
+        let mut normal = || f64::from(random.normal_pair()[0]);
+        let extents: Vec<f64> = (0..4000).map(|_| 0.4 + 0.03 * normal() + 0.03 * normal()).collect();
+        let pair = [Joint::RightKnee, Joint::RightAnkle];
+        let of = |noise_rad: f64, scatter: f64| {
+            let (rays, anchors) = seen(&extents, noise_rad, 0.0, 0.0);
+            let frames: Vec<(&JointRays, &Anchor)> = rays.iter().zip(&anchors).collect();
+            envelope(&frames, pair, Some(DVec3::NEG_Y), scatter)
+        };
+        // Noise of two points: sqrt 2 times 5.016 m times the angle is 3 cm.
+        let noise_rad = 0.03 / 2f64.sqrt() / DVec3::new(0.0, -0.4, 5.0).length();
+        let quiet = of(0.0, 0.0);
+        assert!((quiet - 0.4 - 0.84 * 0.03 * 2f64.sqrt()).abs() < 0.004, "{quiet}");
+        let noisy = of(noise_rad, 0.0);
+        assert!((noisy - 0.4 - 0.84 * 0.03).abs() < 0.004, "{noisy}");
+        // Distances that scatter by 7.5 % make 3 cm of 40 too.
+        let scattered = of(0.0, 0.075);
+        assert!((scattered - 0.4 - 0.84 * 0.03).abs() < 0.004, "{scattered}");
+        assert!(envelope(&[], pair, None, 0.0).is_nan());
+    }
+
+    /// Joints in the vertical plane through the neck are seen as long as they are, if the vertical is known.
+    #[test]
+    fn a_camera_that_looks_down_sees_upright_segments_in_full() {
+        for (pitch_rad, lean_rad) in [(0.5f64, 0.0), (0.5, 0.7), (-0.3, 0.4)] {
+            let (rays, anchors) = seen(&[0.4; 8], 0.0, pitch_rad, lean_rad);
+            let frames: Vec<(&JointRays, &Anchor)> = rays.iter().zip(&anchors).collect();
+            let up = glam::DMat3::from_rotation_x(pitch_rad) * DVec3::NEG_Y;
+            let extent = envelope(&frames, [Joint::RightKnee, Joint::RightAnkle], Some(up), 0.0);
+            assert!((extent - 0.4).abs() < 1e-9, "{pitch_rad} {extent}");
+        }
+    }
+
+    /// Distances that scatter by 3 % from frame to frame about a steady approach.
+    #[test]
+    fn scatter_from_frame_to_frame_is_told_from_the_walk() {
+        use crate::posture::anchor::from_given;
+        use crate::synth::Random;
+        let mut random = Random::new(5);
+        let (rays, _) = seen(&[0.4; 2000], 0.0, 0.0, 0.0);
+        let anchors: Vec<Anchor> = (0..2000)
+            .map(|t| {
+                let noise = 1.0 + 0.03 * f64::from(random.normal_pair()[0]);
+                from_given(&rays[t], 9.0 * 0.9995f64.powi(t as i32) * noise, 0.1).unwrap()
+            })
+            .collect();
+        let frames: Vec<(&JointRays, &Anchor)> = rays.iter().zip(&anchors).collect();
+        let scatter = frame_scatter(&frames);
+        assert!((scatter / 0.03 - 1.0).abs() < 0.08, "{scatter}");
+        assert!((relative_sd(&frames[..1]) - 0.1 / anchors[0].distance_m).abs() < 1e-12);
+    }
+
+    /// Three limbs, 8 % of spread and 3 % of depth each, seen a tenth longer than they should, one percent
+    /// shortened as in the best views; distances known to 2 %; the height assumed to 6 %.
+    #[test]
+    fn the_scale_is_that_of_the_limbs_and_of_the_prior() {
+        let prior = LengthPrior::from_height(None).unwrap();
+        assert_eq!((prior.scale_sd, LengthPrior::from_height(Some(1.7)).unwrap().scale_sd), (0.06, 0.02));
+        let pooled: Vec<f64> =
+            GROUPS.iter().map(|g| 1.1 * 0.99 * length_of(&prior.lengths, g.pairs[0])).collect();
+        let (scale, sd) = scale_seen(&pooled, &prior, 0.02);
+        let each = 1.0 / (0.08f64.powi(2) + 0.03f64.powi(2));
+        let measured = 1.0 / (1.0 / (3.0 * each) + 0.02f64.powi(2));
+        let known = 1.0 / 0.06f64.powi(2);
+        assert!((sd - (measured + known).sqrt().recip()).abs() < 1e-12, "{sd}");
+        assert!((scale - (1.1 * measured + known) / (measured + known)).abs() < 1e-9, "{scale}");
+        assert_eq!(scale_seen(&[f64::NAN; 10], &prior, 0.02), (1.0, 0.06));
+        // Widths and forearms vary too much between people to tell their size.
+        let telling: Vec<usize> = (0..10).filter(|&i| GROUPS[i].tells_scale).collect();
+        assert_eq!(telling, [3, 5, 6]);
+    }
+
+    /// A shank seen by 20 frames on one side alone: measured there, pooled on the other; the rest by proportion.
+    #[test]
+    fn lengths_say_what_they_rest_on() {
+        let prior = LengthPrior::from_height(Some(1.75)).unwrap();
+        let shank = length_of(&prior.lengths, [Joint::RightKnee, Joint::RightAnkle]);
+        let (rays, anchors) = seen(&[1.05 * shank; 20], 0.0, 0.0, 0.0);
+        let anchors: Vec<Option<Anchor>> = anchors.into_iter().map(Some).collect();
+        let up = Some(DVec3::NEG_Y);
+        let fit = estimate(&rays, &anchors, up, &prior, None).unwrap();
+        let of = |name: &str| fit.estimates.iter().find(|e| e.segment == name).unwrap();
+        let [right, left] = ["right_knee_to_right_ankle", "left_knee_to_left_ankle"].map(of);
+        assert_eq!((right.basis, left.basis), (LengthBasis::Measured, LengthBasis::Pooled));
+        assert_eq!(right.length_m, left.length_m);
+        assert!((right.length_m / shank - 1.05).abs() < 0.03, "{}", right.length_m);
+        let thigh = of("right_hip_to_right_knee");
+        assert_eq!(thigh.basis, LengthBasis::Prior);
+        // Of the 8 % between people and of the 2 % of a known height.
+        let expected = thigh.length_m * 0.08f64.hypot(0.02);
+        assert!((thigh.sd_m - expected).abs() < 1e-9, "{}", thigh.sd_m);
+        assert!(right.sd_m > 0.02 * right.length_m && right.sd_m < 0.06 * right.length_m, "{}", right.sd_m);
+        assert_eq!((fit.scale, fit.scale_sd, fit.scale_from), (1.0, 0.02, ScaleFrom::BodyHeight));
+        assert_eq!(fit.sd_m[Joint::RightAnkle], right.sd_m);
+        // A scale no surer than before is the prior's, whatever it might have been read from.
+        let again = estimate(&rays, &anchors, up, &prior, Some(ScaleFrom::Ground)).unwrap();
+        assert_eq!(again.scale_from, ScaleFrom::BodyHeight);
+        let assumed = LengthPrior::from_height(None).unwrap();
+        let again =
+            estimate(&rays, &anchors, up, &LengthPrior { scale_sd: 0.3, ..assumed }, Some(ScaleFrom::Ground));
+        assert_eq!(again.unwrap().scale_from, ScaleFrom::Ground);
+    }
+
+    /// The posterior of a length against one drawn from the same description: people's spread, then how near
+    /// to across the view the segment stands and how far from the neck, or not across at all.
+    #[test]
+    fn a_posterior_is_that_of_drawn_people() {
+        use crate::synth::Random;
+        let mut random = Random::new(12);
+        let group = &GROUPS[4];
+        let (expected, seen_m) = (0.26, 0.25);
+        let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
+        for _ in 0..400_000 {
+            let [a, b] = random.normal_pair().map(f64::from);
+            let length = expected * (1.0 + group.spread * a);
+            let is_hidden = random.uniform(0.0, 1.0) < group.hidden;
+            let tilt = -SHORTENING * -random.uniform(1e-9, 1.0).ln();
+            let ratio = if is_hidden { random.uniform(0.0, 1.0) } else { 1.0 + tilt } + DEPTH_SD * b;
+            if length > 0.0 && (ratio * length - seen_m).abs() < 0.002 {
+                (total, first, second) = (total + 1.0, first + length, second + length * length);
+            }
+        }
+        let (mean, sd) = posterior(expected, group, seen_m, 0.0);
+        let drawn = first / total;
+        let drawn_sd = f64::sqrt(second / total - drawn * drawn);
+        assert!((mean - drawn).abs() < 0.003, "{mean} {drawn}");
+        assert!((sd / drawn_sd - 1.0).abs() < 0.1, "{sd} {drawn_sd}");
+    }
 }

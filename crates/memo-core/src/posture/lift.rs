@@ -204,4 +204,79 @@ mod tests {
         let sd = (extents.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / extents.len() as f64).sqrt();
         assert!((sd / stated - 1.0).abs() < 0.1, "measured {sd}, stated {stated}");
     }
+
+    /// Only what is in front of the camera counts: with the start one metre ahead and a ray to the side, a
+    /// long segment has one end before the camera and one behind it, and a ray away from the start none.
+    #[test]
+    fn roots_behind_the_camera_do_not_count() {
+        let start = DVec3::new(0.0, 0.0, 1.0);
+        let aside = DVec3::new(0.8, 0.0, 0.6);
+        // k = 0.6 ± sqrt(1.5² - 0.8²), of which the nearer one is behind.
+        let beyond = (1.5f64 * 1.5 - 0.8 * 0.8).sqrt();
+        let one = roots(start, aside, 1.5, 0.0, 0.0);
+        assert_eq!(one.kind, RootKind::Degenerate);
+        assert!((one.near - (0.6 + beyond) * aside).length() < 1e-12 && one.far == one.near);
+        assert_eq!(one.candidates().1, 1);
+        let both = roots(start, aside, 0.9, 0.0, 0.0);
+        assert_eq!((both.kind, both.candidates().1), (RootKind::Two, 2));
+        // Away from the start: both roots behind, the camera itself the nearest point of the ray, 1 m off.
+        let away = DVec3::new(0.8, 0.0, -0.6);
+        let none = roots(start, away, 0.9, 0.0, 0.0);
+        assert_eq!(none.near, DVec3::ZERO);
+        let RootKind::None { gap_m } = none.kind else { panic!("{:?}", none.kind) };
+        assert!((gap_m - 0.1).abs() < 1e-12);
+        // And where the segment is too short to reach the ray's line anyway.
+        let short = roots(start, away, 0.5, 0.0, 0.0);
+        assert_eq!(short.near, DVec3::ZERO);
+        assert!(matches!(short.kind, RootKind::None { .. }));
+    }
+
+    /// Roots as near as the limit are one, in their middle, and not where they are farther apart.
+    #[test]
+    fn roots_merge_within_the_distance_between_them() {
+        let (start, ray) = (DVec3::new(0.3, 0.0, 3.0), DVec3::Z);
+        // The roots lie 2 sqrt(0.5² - 0.3²) = 0.8 apart.
+        let merged = roots(start, ray, 0.5, 0.0, 0.81);
+        assert_eq!(merged.kind, RootKind::Degenerate);
+        assert!((merged.near - 3.0 * ray).length() < 1e-12);
+        assert_eq!(roots(start, ray, 0.5, 0.0, 0.79).kind, RootKind::Two);
+    }
+
+    /// Where the segment stands across the ray a longer one reaches sqrt((l + e)² - l²) along it; elsewhere
+    /// a small error e of the distance across changes sqrt(l² - d²) by d e / sqrt(l² - d²).
+    #[test]
+    fn the_noise_of_an_extent_is_that_of_a_side_of_its_triangle() {
+        for error in [1e-3, 0.01, 0.1] {
+            let reached = ((0.5 + error) * (0.5 + error) - 0.25f64).sqrt();
+            assert!((extent_sd(0.0, 0.5, error) - reached).abs() < 1e-12);
+        }
+        for across in [0.1, 0.3, 0.48] {
+            let extent = |across: f64| (0.25 - across * across).sqrt();
+            let change = extent(across - 1e-6) - extent(across + 1e-6);
+            assert!((extent_sd(extent(across), across, 1e-6) / (0.5 * change) - 1.0).abs() < 1e-4);
+        }
+    }
+
+    /// Rays of pixels go through the lens, and their noise is that of a pixel over the focal length.
+    #[test]
+    fn rays_of_pixels_undo_the_lens() {
+        let mut camera = Camera::level([1280, 720], 1.0, 1.2, 4.0).unwrap();
+        camera.distortion =
+            crate::model::Distortion::Brown { k1: -0.2, k2: 0.05, p1: 0.001, p2: -0.002, k3: 0.0 };
+        camera.focal_px = DVec2::new(1000.0, 1210.0);
+        let mut points = PerJoint([DVec3::NAN; JOINT_COUNT]);
+        let mut pixels = PerJoint([DVec2::NAN; JOINT_COUNT]);
+        for (i, joint) in Joint::ALL.into_iter().enumerate().skip(1) {
+            points[joint] = DVec3::new(0.2 * i as f64 - 1.2, 0.1 * i as f64, 1.0 + 0.05 * i as f64);
+            pixels[joint] = camera.project(points[joint]).unwrap();
+        }
+        let rays = JointRays::from_pixels(&camera, &pixels, &PerJoint([0.5; JOINT_COUNT]), 2.2).unwrap();
+        for joint in Joint::ALL.into_iter().skip(1) {
+            let truth = camera.camera_from_world(points[joint]).normalize();
+            assert!((rays.ray[joint] - truth).length() < 1e-9, "{joint:?}");
+        }
+        assert!(!rays.sees(Joint::Neck) && rays.weight[Joint::Neck] == 0.5);
+        // 2.2 px over the mean focal length sqrt(1000 * 1210) = 1100.
+        assert!((rays.noise_rad - 0.002).abs() < 1e-15);
+    }
 }

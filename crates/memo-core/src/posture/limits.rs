@@ -430,3 +430,6 @@ impl Default for Limits {
         Self::measured()
     }
 }
+
+#[cfg(test)]
+mod tests;

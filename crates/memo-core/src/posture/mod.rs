@@ -6,6 +6,8 @@ pub mod angles;
 pub mod collision;
 pub mod constraint;
 pub mod detector;
+#[cfg(test)]
+mod example;
 pub mod experiment;
 pub mod group;
 pub mod head;

@@ -206,6 +206,42 @@ mod tests {
         }
     }
 
+    /// People of three points, two of them at the top: frame, place, size, score. Who is followed.
+    fn of_three_points(people: &[(i64, f64, f64, f64)]) -> Vec<bool> {
+        let frames: Vec<i64> = people.iter().map(|p| p.0).collect();
+        let points: Vec<DVec2> =
+            people.iter().flat_map(|p| [0.0, 1.0, p.2].map(|y| DVec2::new(p.1, y))).collect();
+        let scores: Vec<f64> = people.iter().flat_map(|p| [p.3; 3]).collect();
+        follow_person(&frames, 3, &points, &scores, &FollowOptions::default()).unwrap()
+    }
+
+    /// Three tenths of the larger of both sizes to the next frame, a tenth more for every frame between, at
+    /// most one size.
+    #[test]
+    fn the_nearest_person_is_followed_within_reach() {
+        for (frame, size, reach_px) in
+            [(1, 100.0, 30.0), (1, 50.0, 30.0), (2, 100.0, 40.0), (4, 100.0, 60.0), (100, 100.0, 100.0)]
+        {
+            for beyond in [-1.0, 1.0] {
+                // Somebody else far away makes a choice necessary.
+                let people =
+                    [(0, 0.0, 100.0, 0.9), (0, 5000.0, 10.0, 0.1), (frame, reach_px + beyond, size, 0.9)];
+                assert_eq!(of_three_points(&people), [true, false, beyond < 0.0], "{frame} {size} {beyond}");
+            }
+        }
+    }
+
+    /// The most prominent person has the largest product of size and mean score, not of size and points.
+    #[test]
+    fn many_doubtful_points_are_not_prominent() {
+        let sure = [DVec2::ZERO, DVec2::new(0.0, 100.0), DVec2::NAN, DVec2::NAN, DVec2::NAN];
+        let doubtful: Vec<DVec2> = (0..5).map(|k| DVec2::new(900.0, 25.0 * f64::from(k))).collect();
+        let points = [sure.to_vec(), doubtful].concat();
+        let scores = [[0.9; 5], [0.4; 5]].concat();
+        let chosen = follow_person(&[0, 0], 5, &points, &scores, &FollowOptions::default()).unwrap();
+        assert_eq!(chosen, [true, false]);
+    }
+
     #[test]
     fn people_alone_in_their_frames_need_no_choice() {
         let points = [DVec2::ZERO, DVec2::new(1e6, 0.0), DVec2::NAN];

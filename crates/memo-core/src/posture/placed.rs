@@ -272,3 +272,6 @@ fn torso_sd(figure: &PlacedFigure, torso: &DMat3) -> DVec3 {
     let width = right.point.distance(left.point);
     DVec3::new(pelvis.direction_sd(z), right.along(x).hypot(left.along(x)) / width, pelvis.direction_sd(x))
 }
+
+#[cfg(test)]
+mod tests;

@@ -186,3 +186,79 @@ impl MotionPrior {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::gait::{Gait, GaitStyle, SideAngles};
+
+    #[test]
+    fn costs_are_squared_deviations_with_their_noise_and_end_somewhere() {
+        let soft = Soft::degrees(10.0, 3.0);
+        let deg = |angle: f64| angle.to_radians();
+        assert!((soft.cost(deg(16.0), 0.0) - 4.0).abs() < 1e-12);
+        // 5 degrees of spread and noise together.
+        assert!((soft.cost(deg(20.0), deg(4.0)) - 4.0).abs() < 1e-12);
+        assert!((soft.cost(deg(90.0), 0.0) - 25.0).abs() < 1e-12);
+        assert_eq!(soft.cost(f64::NAN, 0.0), 0.0);
+        assert_eq!(Soft::FREE.cost(deg(90.0), 0.0), 0.0);
+        // A limit counts below it alone.
+        assert!((soft.cost_beyond(deg(7.0), 0.0) - 1.0).abs() < 1e-12);
+        assert_eq!(soft.cost_beyond(deg(30.0), 0.0), 0.0);
+        assert_eq!([chi_sq(-2.0), chi_sq(9.0), capped(7.0), capped(f64::NAN)], [4.0, 25.0, 7.0, 0.0]);
+    }
+
+    /// Over the measured cycle of [`Gait`] each segment swings about the prior's mean, well within its spread.
+    #[test]
+    fn a_measured_walk_is_usual() {
+        let prior = MotionPrior::walking();
+        let phases =
+            (0..100).map(|i| Gait::dense().posture(f64::from(i) / 100.0, &GaitStyle::default()).right);
+        let angles: Vec<SideAngles> = phases.collect();
+        let swings: [fn(&SideAngles) -> f64; 4] =
+            [|a| a.shoulder, |a| a.shoulder + a.elbow, |a| a.hip, |a| a.hip - a.knee];
+        for (segment, swing) in prior.segments.iter().zip(swings) {
+            let mean = angles.iter().map(swing).sum::<f64>() / 100.0;
+            let variance = angles.iter().map(|a| (swing(a) - mean).powi(2)).sum::<f64>() / 100.0;
+            let off_deg = (segment.swing.mean_rad - mean).to_degrees();
+            assert!(off_deg.abs() < 6.0, "{off_deg}");
+            let ratio = segment.swing.sd_rad / variance.sqrt();
+            assert!((1.0..4.5).contains(&ratio), "{ratio}");
+        }
+        // Both sides together swing about twice the mean of one; elbows bend a little more than knees do.
+        for (both, inner) in prior.opposition.iter().zip([0, 2]) {
+            assert!((both.mean_rad - 2.0 * prior.segments[inner].swing.mean_rad).abs() < 1e-12);
+        }
+        // Arms hang away from the body, and come inwards in front of it.
+        let [upper_arm, forearm, ..] = prior.segments;
+        assert!(upper_arm.outward.mean_rad > 0.0 && upper_arm.outward_per_swing > 0.0);
+        assert!(forearm.outward_per_swing < 0.0);
+    }
+
+    #[test]
+    fn a_walker_s_trunk_faces_ahead_and_anybody_s_need_not() {
+        let [walking, any] = [MotionPrior::walking(), MotionPrior::any()];
+        let aside = 60f64.to_radians();
+        for soft in [walking.shoulder_turn, walking.hip_turn, walking.trunk_lean, walking.trunk_roll] {
+            assert_eq!(soft.cost(aside, 0.0), CAP);
+            assert_eq!(soft.mean_rad, 0.0);
+        }
+        assert_eq!(any.shoulder_turn.cost(aside, 0.0), 0.0);
+        assert_eq!(any.same_side.cost(3.0, 0.0) + any.opposition[0].cost(3.0, 0.0), 0.0);
+        assert!(any.trunk_lean.cost(0.3, 0.0) < walking.trunk_lean.cost(0.3, 0.0));
+    }
+
+    #[test]
+    fn lengths_are_as_sure_as_those_of_their_segment() {
+        let mut prior = MotionPrior::walking();
+        for (segment, length_sd) in prior.segments.iter_mut().zip([0.1, 0.2, 0.3, 0.4]) {
+            segment.length_sd = length_sd;
+        }
+        use crate::posture::skeleton::Side;
+        for side in Side::BOTH {
+            let ends = [side.elbow(), side.wrist(), side.knee(), side.ankle()];
+            assert_eq!(ends.map(|end| prior.length_sd(end)), [0.1, 0.2, 0.3, 0.4]);
+            assert_eq!(prior.length_sd(side.hip()), prior.trunk_length_sd);
+        }
+    }
+}

@@ -425,3 +425,6 @@ impl MotionModel {
         self.over(constraint, self.sure(lean, sd), tolerance)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -454,4 +454,53 @@ mod tests {
             Err(LengthError::NeverSeen { .. })
         ));
     }
+
+    /// Drillis and Contini 1966 (in Winter, Biomechanics and Motor Control of Human Movement, 4th ed., fig. 4.1):
+    /// thigh 0.245, shank 0.246, upper arm 0.186, forearm 0.146, hip to shoulder 0.288 of the height.
+    #[test]
+    fn lengths_by_height_are_those_of_the_published_table() {
+        let lengths = SegmentLengths::from_height(2.0).unwrap();
+        for side in Side::BOTH {
+            for (end, share) in
+                [(side.knee(), 0.245), (side.ankle(), 0.246), (side.elbow(), 0.186), (side.wrist(), 0.146)]
+            {
+                assert!((lengths.to[end] - 2.0 * share).abs() < 1e-12, "{end:?}");
+            }
+        }
+        // Neck to pelvis and pelvis to the middle of the hips make the trunk.
+        let half = |distance: RigidDistance| 0.5 * lengths.rigid[distance as usize];
+        let hips = (lengths.to[Joint::LeftHip].powi(2) - half(RigidDistance::Hips).powi(2)).sqrt();
+        assert!((lengths.to[Joint::Pelvis] + hips - 2.0 * 0.288).abs() < 1e-12);
+        assert!((lengths.to[Joint::Pelvis] / hips - 45.98 / 10.09).abs() < 1e-9);
+        // The neck is the middle of the shoulders.
+        assert!((lengths.to[Joint::LeftShoulder] - half(RigidDistance::Shoulders)).abs() < 1e-12);
+        let diagonal = lengths.to[Joint::Pelvis].hypot(half(RigidDistance::Shoulders));
+        assert!((lengths.rigid[RigidDistance::LeftShoulderPelvis as usize] - diagonal).abs() < 1e-12);
+    }
+
+    /// Of an even number of figures the mean of the middle two; metres beyond any segment are refused.
+    #[test]
+    fn lengths_of_figures_are_medians() {
+        let scaled = |scale: f64| {
+            let mut figure = StickFigure::UNKNOWN;
+            for (i, joint) in Joint::ALL.into_iter().enumerate() {
+                let i = i as f64;
+                figure[joint] = 0.1 * scale * DVec3::new(i.sin(), 0.3 * i, (2.0 * i).cos());
+            }
+            figure
+        };
+        let one = scaled(1.0).segment(Joint::LeftKnee).length();
+        let median = |scales: &[f64]| {
+            let figures: Vec<StickFigure> = scales.iter().map(|scale| scaled(*scale)).collect();
+            SegmentLengths::from_figures(&figures).unwrap().to[Joint::LeftKnee] / one
+        };
+        assert!((median(&[1.0, 1.2]) - 1.1).abs() < 1e-12);
+        assert!((median(&[1.0, 3.0, 1.2, 1.1]) - 1.15).abs() < 1e-12);
+        assert!((median(&[1.0, 3.0, 1.2]) - 1.2).abs() < 1e-12);
+        let mut lengths = SegmentLengths::lee_chen();
+        lengths.to[Joint::LeftKnee] = 1.6;
+        assert!(matches!(lengths.validated(), Err(LengthError::TooLong { .. })));
+        lengths.to[Joint::LeftKnee] = 1.4;
+        assert!(lengths.validated().is_ok());
+    }
 }

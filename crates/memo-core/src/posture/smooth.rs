@@ -140,4 +140,36 @@ mod tests {
         assert!(smooth_track(&[0.0], &[Measured::NOTHING], 1.0)[0].value.is_nan());
         assert!(smooth_track(&[], &[], 1.0).is_empty());
     }
+
+    /// Two measurements of 10 ± 1 and 14 ± 2 together: weights 1 and 1/4.
+    #[test]
+    fn measurements_fuse_by_their_variances() {
+        let [a, b] = [(10.0, 1.0), (14.0, 2.0)].map(|(value, sd)| Measured { value, sd });
+        for fused in [a.fused(b), b.fused(a)] {
+            assert!((fused.value - 10.8).abs() < 1e-12, "{fused:?}");
+            assert!((fused.sd - 0.8f64.sqrt()).abs() < 1e-12, "{fused:?}");
+        }
+        assert_eq!(a.fused(Measured::NOTHING), a);
+        assert_eq!(Measured::NOTHING.fused(a), a);
+    }
+
+    /// From 2 ± 0.1 at rest ± 2 a second: the velocity's variance gains 3² times 0.1 s a second, and the place
+    /// feels it from the next step on.
+    #[test]
+    fn an_innovation_is_as_unsure_as_prediction_and_measurement() {
+        let first = Measured { value: 2.0, sd: 0.1 };
+        let (filter, none) = filter_step(None, 0.0, first, 3.0);
+        assert_eq!(none, None);
+        let next = Measured { value: 5.0, sd: 0.5 };
+        let innovation = filter_step(filter, 1.0, next, 3.0).1.unwrap();
+        assert!((innovation.value - 3.0).abs() < 1e-12);
+        assert!((innovation.variance - (0.01 + 4.0 + 0.25)).abs() < 1e-9, "{innovation:?}");
+        let (waiting, nothing) = filter_step(filter, 1.0, Measured::NOTHING, 3.0);
+        assert_eq!(nothing, None);
+        let innovation = filter_step(waiting, 1.0, next, 3.0).1.unwrap();
+        assert!((innovation.variance - (0.01 + 4.0 * 4.0 + 0.9 + 0.25)).abs() < 1e-9, "{innovation:?}");
+        // Nothing is measured better than a tenth of a millimetre.
+        let (sharp, _) = filter_step(None, 0.0, Measured { value: 2.0, sd: 0.0 }, 3.0);
+        assert!(sharp.unwrap().position_sd() >= 1e-4);
+    }
 }

@@ -362,4 +362,38 @@ mod tests {
         let error = propagate(&figure(), &rays, &Causes { anchor_scale_sd_m: 0.2, ..causes() }).unwrap_err();
         assert!(matches!(error, UncertaintyError::PartExceedsWhole { .. }));
     }
+
+    /// Across its ray a joint is off by the noise of its own image point alone; along it by all else.
+    #[test]
+    fn deviations_along_the_rays_are_those_of_a_monte_carlo() {
+        let truth = figure();
+        let causes = Causes {
+            anchor_sd_m: 0.05,
+            length_sd_m: PerJoint([0.004; JOINT_COUNT]),
+            scale_sd: 0.01,
+            anchor_scale_sd_m: 0.03,
+        };
+        let noise_rad = 8e-4;
+        let rays = JointRays { noise_rad, ..JointRays::from_points(&truth) };
+        let stated = propagate(&truth, &rays, &causes).unwrap();
+        let mut random = Random::new(9);
+        let draws: Vec<StickFigure> =
+            (0..4000).map(|_| disturbed(&truth, noise_rad, &causes, &mut random)).collect();
+        for joint in Joint::ALL {
+            let ray = truth[joint].normalize();
+            let spread = |along: DVec3| {
+                let square = |f: &StickFigure| (f[joint] - truth[joint]).dot(along).powi(2);
+                (draws.iter().map(square).sum::<f64>() / draws.len() as f64).sqrt()
+            };
+            let along = spread(ray) / stated.along_ray_sd_m[joint];
+            assert!((along - 1.0).abs() < 0.1, "{joint:?} {along}");
+            for across in [ray.any_orthonormal_pair().0, ray.any_orthonormal_pair().1] {
+                let ratio = spread(across) / (noise_rad * truth[joint].length());
+                assert!((ratio - 1.0).abs() < 0.05, "{joint:?} {ratio}");
+                let of_covariance = nalgebra::Vector3::from(across.to_array());
+                let stated = of_covariance.dot(&(stated.covariance(joint) * of_covariance)).sqrt();
+                assert!((stated / (noise_rad * truth[joint].length()) - 1.0).abs() < 1e-9, "{joint:?}");
+            }
+        }
+    }
 }

@@ -113,4 +113,16 @@ mod tests {
         );
         assert!(found.iter().enumerate().all(|(t, &s)| (value(t, s) - swing[t]).abs() < 1e-12));
     }
+
+    #[test]
+    fn of_equal_costs_the_lower_state_wins() {
+        for frames in 1..6 {
+            let found = least_path(&vec![3; frames], |_, _| 1.0, |_, _, _, _| 2.0);
+            assert_eq!(found, vec![0; frames]);
+            // The first state is too dear: the second, not the third, of the same cost.
+            let found = least_path(&vec![3; frames], |_, s| if s == 0 { 9.0 } else { 1.0 }, |_, _, _, _| 0.0);
+            assert_eq!(found, vec![1; frames]);
+        }
+        assert_eq!(argmin([2.0, 1.0, 3.0, 1.0].into_iter()), 1);
+    }
 }

@@ -12,6 +12,9 @@ use crate::model::Camera;
 pub(super) const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
 const SLOWEST_HZ: f64 = 0.3;
+/// No stride, two steps, is shorter or longer than these shares of the body height. Slow and elderly walkers reach 0.5,
+/// the fastest 1.2 (Winter 2009, Murray and others 1964).
+const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
 /// A slanting path must explain the frames better than one parallel to the image by this share of similarity:
 /// seen from above a walk can seem to slant, and then fits worse.
 const SLANT_GAIN: f64 = 0.02;
@@ -54,6 +57,23 @@ impl Active {
         let similarity = recent.iter().map(|s| f64::from(s.similarity)).sum::<f64>() / RECENT_FRAMES as f64;
         let lost = similarity < LOST_SHARE * twin.similarity_sum / count as f64;
         stopped || lost
+    }
+
+    /// Whether what was followed walked: over all frames it got on, and as far with each cycle as legs of its height
+    /// carry.
+    ///
+    /// Arms that swing and things that are carried along can look like a walker for half a second; the legs of a model
+    /// that follows them do not go with the way.
+    pub(super) fn is_walk(&self) -> bool {
+        let twin = &self.walk.twins[self.walk.best()];
+        let (Some(first), Some(last)) = (twin.steps.first(), twin.steps.last()) else { return false };
+        let elapsed_s = last.time_s - first.time_s;
+        let covered_m = last.state.along.position - first.state.along.position;
+        let cycles = last.state.phase.position - first.state.phase.position;
+        let stride = covered_m / cycles / self.walk.walker.body.height_m;
+        covered_m.abs() >= SLOWEST_MPS * elapsed_s
+            && cycles.abs() >= SLOWEST_HZ * elapsed_s
+            && STRIDE_HEIGHTS.contains(&stride)
     }
 
     /// Takes off the frames in which the person was not there yet, and those in which the walk was already

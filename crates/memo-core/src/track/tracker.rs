@@ -168,7 +168,7 @@ pub struct SeekReport {
     pub frames_with_candidate: usize,
     /// Of these, frames in which the region was cut by the image border.
     pub frames_cut_off: usize,
-    /// Starts refused because the region moved too slowly or did not fit the height.
+    /// Starts refused because the region moved too slowly, did not fit the height or did not walk.
     pub refused_starts: usize,
 }
 
@@ -460,6 +460,10 @@ impl Tracker {
         if let Some(mut active) = self.walking.take() {
             active.refit(&self.options);
             active.trim();
+            if !active.is_walk() {
+                self.report.refused_starts += 1;
+                return;
+            }
             self.finished.push(TrackedWalk {
                 walk: active.walk,
                 camera: active.camera,

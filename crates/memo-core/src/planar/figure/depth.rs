@@ -334,4 +334,120 @@ mod tests {
         let reach = |sign: f64| smoothest(&sizes, start, Some([60, 61].map(|t| sign * truth(t)))).1;
         assert!(reach(1.0) < reach(-1.0));
     }
+
+    /// A window with one rod between points 0 and 1, at these depths; its reflection known or not.
+    fn window(start: usize, depths: &[f64], margin: Option<f64>) -> FigureWindow {
+        use crate::planar::figure::{Figure, Link, Method};
+        use crate::planar::{Evidence, FalseTargetRate, Plane};
+        let evidence = Evidence {
+            verdict: Verdict::Planar,
+            statistic: 0.0,
+            threshold: 1.0,
+            motion: 1.0,
+            least_motion: 0.0,
+            rate: FalseTargetRate::OnePercent,
+        };
+        let link = Link { points: [0, 1], length: 1.0, length_sd: 0.0, margin: 0.0, confidence: 1.0 };
+        let chain = Chain {
+            points: vec![0, 1],
+            links: vec![link],
+            plane: Plane { p: 0.0, q: 0.0 },
+            residual_rms: 0.0,
+            evidence,
+            depth: depths.iter().map(|&z| vec![0.0, z]).collect(),
+            reflection_margin_deg: margin,
+            angle_rad: vec![],
+        };
+        let figure = Figure {
+            method: Method::Cover,
+            chains: vec![chain],
+            joints: vec![],
+            alone: vec![],
+            cost: 0.0,
+            size: 1.0,
+        };
+        let end = start + depths.len();
+        FigureWindow { start, end, status: Status::Interpreted, chains: [1, 0, 0], figure }
+    }
+
+    /// What two windows share decides whether the later one is turned, and a turned one turns the next.
+    #[test]
+    fn the_sign_is_carried_from_window_to_window() {
+        let depth = |t: usize| (0.5 * t as f64).sin();
+        let part =
+            |from: usize, to: usize, sign: f64| (from..to).map(|t| sign * depth(t)).collect::<Vec<_>>();
+        // Truth with the second, the third and the fifth window read the other way round.
+        let windows = [
+            window(0, &part(0, 10, 1.0), None),
+            window(5, &part(5, 15, -1.0), None),
+            window(10, &part(10, 20, -1.0), None),
+            window(15, &part(15, 25, 1.0), None),
+            window(20, &part(20, 30, -1.0), None),
+        ];
+        let read: Vec<&FigureWindow> = windows.iter().collect();
+        assert_eq!(reflections(&read), [[1.0], [-1.0], [-1.0], [1.0], [-1.0]]);
+        let tracks = vec![vec![DVec2::ZERO; 30]; 2];
+        let (found, sources) = depth_over_time(&tracks, &windows, false);
+        for t in 0..30 {
+            assert!((found[2 * t + 1] - depth(t)).abs() < 1e-12, "frame {t}");
+            assert_eq!((found[2 * t], sources[t]), (0.0, DepthSource::Planar));
+        }
+        // A reflection that anatomy told stays, and is the start of what follows.
+        let told = [
+            window(0, &part(0, 10, 1.0), None),
+            window(5, &part(5, 15, -1.0), Some(9.0)),
+            window(10, &part(10, 20, 1.0), None),
+        ];
+        let read: Vec<&FigureWindow> = told.iter().collect();
+        assert_eq!(reflections(&read), [[1.0], [1.0], [-1.0]]);
+    }
+
+    /// Of two windows that hold a frame the one counts whose middle is nearer.
+    #[test]
+    fn a_frame_is_read_by_the_window_around_it() {
+        let windows = [window(0, &[1.0; 10], None), window(4, &[2.0; 10], None)];
+        let tracks = vec![vec![DVec2::ZERO; 14]; 2];
+        let (found, _) = depth_over_time(&tracks, &windows, false);
+        // Middles at frames 4.5 and 8.5: the first up to frame 6.
+        let first: Vec<usize> = (0..14).filter(|&t| found[2 * t + 1] == 1.0).collect();
+        assert_eq!(first, [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    /// A rod that goes on through a gap tells how the window after it is to be read, and those that follow it.
+    #[test]
+    fn the_sign_is_carried_through_a_gap() {
+        let depth = |t: usize| (0.15 * t as f64).sin();
+        let part =
+            |from: usize, to: usize, sign: f64| (from..to).map(|t| sign * depth(t)).collect::<Vec<_>>();
+        // The image of a rod of length 1 at these depths.
+        let image = |t: usize| DVec2::new((1.0 - depth(t) * depth(t)).sqrt(), 0.0);
+        let tracks = vec![vec![DVec2::ZERO; 60], (0..60).map(image).collect()];
+        for sign in [1.0, -1.0] {
+            let windows = [
+                window(0, &part(0, 20, 1.0), None),
+                window(30, &part(30, 45, sign), None),
+                window(40, &part(40, 55, sign), None),
+            ];
+            let (found, sources) = depth_over_time(&tracks, &windows, true);
+            for t in 0..55 {
+                assert!((found[2 * t + 1] - depth(t)).abs() < 1e-6, "{sign} frame {t}: {}", found[2 * t + 1]);
+            }
+            assert_eq!(
+                [sources[10], sources[25], sources[35]],
+                [DepthSource::Planar, DepthSource::Carried, DepthSource::Planar]
+            );
+            // Beyond the last window it goes on as it was.
+            assert!((found[2 * 58 + 1] - depth(58)).abs() < 1e-6 && sources[58] == DepthSource::Carried);
+        }
+        // Anatomy's word is kept, and what was before stays too.
+        let windows = [window(0, &part(0, 20, 1.0), None), window(30, &part(30, 45, -1.0), Some(9.0))];
+        let (found, _) = depth_over_time(&tracks, &windows, true);
+        assert!((found[2 * 40 + 1] + depth(40)).abs() < 1e-6 && (found[2 * 10 + 1] - depth(10)).abs() < 1e-6);
+        // Before the first window it is carried backwards.
+        let (found, sources) = depth_over_time(&tracks, &[window(8, &part(8, 30, 1.0), None)], true);
+        for t in 0..8 {
+            assert!((found[2 * t + 1] - depth(t)).abs() < 1e-6, "frame {t}");
+            assert_eq!(sources[t], DepthSource::Carried);
+        }
+    }
 }

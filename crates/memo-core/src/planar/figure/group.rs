@@ -264,6 +264,7 @@ fn forest(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::planar::FitOptions;
     use crate::planar::figure::example::{limbs, sorted_links, walker};
     use crate::planar::figure::{FigureOptions, Status, interpret_figure};
 
@@ -310,5 +311,177 @@ mod tests {
         );
         let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
         assert_eq!(found.windows[0].figure.method, Method::Forest);
+    }
+
+    fn options(noise_sd: f64) -> FigureOptions {
+        let fit = FitOptions { noise_sd, ..FigureOptions::default().fit };
+        FigureOptions { fit, ..FigureOptions::default() }
+    }
+
+    /// Of a residual the share that noise explains is no cost, nor is the noise's part of a motion one.
+    #[test]
+    fn noise_costs_nothing() {
+        let share = FigureOptions::default().costs.noise;
+        assert!((unexplained(0.05, &options(0.02)) - (0.05 - share * 2f64.sqrt() * 0.02)).abs() < 1e-12);
+        assert_eq!(unexplained(0.05, &options(0.0)), 0.05);
+        // Resting points show a motion of 2 standard deviations.
+        assert!(clean_motion(0.04, &options(0.02)) < 1e-9);
+        assert!((clean_motion(0.05, &options(0.02)) - 0.03).abs() < 1e-12);
+    }
+
+    /// Two rods and a hinge that all turn about one point of a body, and a pair far from it.
+    fn rods_of(tracks: &[Vec<DVec2>], size: f64) -> (Vec<&[DVec2]>, Rods) {
+        let part: Vec<&[DVec2]> = tracks.iter().map(|track| &track[..]).collect();
+        let rods = Rods::fitted(&part, size, &FigureOptions::default());
+        (part, rods)
+    }
+
+    /// A chain starts at the end that sits on another one, and depths are against its first point whatever the
+    /// numbers of its points are.
+    #[test]
+    fn a_chain_starts_where_it_sits_on_others() {
+        let (tracks, _, truth) = walker(66, |_| 0.0, 0.0);
+        let (part, rods) = rods_of(&tracks, 100.0);
+        let judge = |_: [usize; 2]| (0.0, 1.0);
+        let options = FigureOptions::default();
+        // Right leg: hip 6, knee 7, ankle 8; the hip is near another chain's end, then the ankle.
+        for (near, expected) in [(6, [6, 7, 8]), (8, [8, 7, 6])] {
+            let joints =
+                [Contact { points: [near, 9], apart: 0.1 }, Contact { points: [14 - near, 2], apart: 5.0 }];
+            let chain = chain(&[6, 7, 8], &part, &rods, &joints, &options, &judge).unwrap();
+            assert_eq!(chain.points, expected);
+        }
+        let sign_of = |points: [usize; 2], t: usize, z: f64| {
+            z * (truth[t * 12 + points[1]] - truth[t * 12 + points[0]])
+        };
+        let forth = chain(&[6, 7], &part, &rods, &[], &options, &judge).unwrap();
+        let joints = [Contact { points: [7, 9], apart: 0.1 }];
+        let back = chain(&[6, 7], &part, &rods, &joints, &options, &judge).unwrap();
+        assert_eq!((&forth.points, &back.points), (&vec![6, 7], &vec![7, 6]));
+        for t in 0..66 {
+            // The same rod in the same plane from the other end: the opposite depth.
+            assert!((forth.depth[t][1] + back.depth[t][1]).abs() < 1e-9);
+            let z = forth.plane.depth(tracks[7][t] - tracks[6][t]);
+            assert!((forth.depth[t][1] - z).abs() < 1e-9);
+            assert!(sign_of([6, 7], t, z) * sign_of([6, 7], 0, forth.depth[0][1]) >= -1.0);
+        }
+        // Deviations of lengths are roots of the covariance.
+        let hinge = fit_hinge(part[6], part[7], part[8], &options.fit).unwrap();
+        let hinged = chain(&[6, 7, 8], &part, &rods, &[], &options, &judge).unwrap();
+        for (k, link) in hinged.links.iter().enumerate() {
+            assert!((link.length_sd.powi(2) - hinge.covariance[(2 + k, 2 + k)]).abs() < 1e-12);
+        }
+    }
+
+    /// An angle beyond a right one is one, not its supplement.
+    #[test]
+    fn angles_are_between_the_segments() {
+        let (tracks, times_s, truth) = walker(66, |_| 0.0, 0.0);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let mut obtuse = 0;
+        for chain in &found.windows[0].figure.chains {
+            let [a, pivot, b] = chain.points[..] else { continue };
+            for t in 0..66 {
+                let point = |k: usize| tracks[k][t].extend(truth[t * 12 + k]);
+                let angle = (point(a) - point(pivot)).angle_between(point(b) - point(pivot));
+                assert!((chain.angle_rad[t] - angle).abs() < 0.02);
+                obtuse += usize::from(angle > 2.0);
+            }
+        }
+        assert!(obtuse > 100);
+    }
+
+    /// The cost of a cover is that of its pieces: what noise leaves of the residual and 2 % of the length, over
+    /// the figure's size; a pair pays for being one, a point for being alone.
+    #[test]
+    fn pieces_cost_residual_length_and_what_they_are() {
+        let (tracks, ..) = walker(66, |_| 0.0, 1.0);
+        let (part, rods) = rods_of(&tracks, 100.0);
+        let options = FigureOptions::default();
+        let costs = options.costs;
+        let found = candidates(&part, &rods, 100.0, &options);
+        let cost = |points: &[usize]| found.iter().find(|c| c.points == points).unwrap().cost;
+        let alone = cost(&[8]);
+        assert!(alone <= costs.alone, "{alone}");
+        let rod = rods.fit(6, 7).unwrap();
+        let own = rod.residual_rms / 100.0 + 0.02 * rod.length / 100.0 + costs.rod;
+        let apart = |ends: &[usize], group: &[usize]| {
+            let others = (0..12).filter(|j| !group.contains(j));
+            let nearest =
+                others.flat_map(|j| ends.iter().map(move |&i| (i, j))).map(|(i, j)| rods.apart(i, j));
+            nearest.fold(costs.detached, f64::min)
+        };
+        assert!((cost(&[6, 7]) - own - apart(&[6, 7], &[6, 7])).abs() < 1e-12);
+        let hinge = fit_hinge(part[6], part[7], part[8], &options.fit).unwrap();
+        let own = hinge.residual_rms / 100.0 + 0.02 * (hinge.lengths[0] + hinge.lengths[1]) / 100.0;
+        assert!((cost(&[6, 7, 8]) - own - apart(&[6, 8], &[6, 7, 8])).abs() < 1e-12);
+    }
+
+    /// Chains that are farther from each other than a detached group costs do not sit on each other.
+    #[test]
+    fn only_what_is_near_sits_on_each_other() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        // Two walkers, the second one walking alike far away and out of step.
+        let (other, ..) = walker(120, |_| 0.0, 0.0);
+        let mut both: Vec<Vec<DVec2>> = tracks[..6].to_vec();
+        let wander = |t: usize| DVec2::new(900.0 + 3.0 * t as f64, 200.0 * (0.11 * t as f64).sin());
+        both.extend(
+            other[..6].iter().map(|track| (0..66).map(|t| track[t + 31] + wander(t)).collect::<Vec<_>>()),
+        );
+        let found = interpret_figure(&both, &times_s, &FigureOptions::default()).unwrap();
+        let figure = &found.windows[0].figure;
+        let limit = figure.size * FigureOptions::default().costs.detached;
+        assert!(figure.joints.iter().all(|joint| joint.apart < limit), "{:?} {limit}", figure.joints);
+        assert!(figure.joints.iter().all(|j| (j.points[0] < 6) == (j.points[1] < 6)), "{:?}", figure.joints);
+    }
+
+    /// A forest's edges are weighed by residual and length together: a near point that moves otherwise is
+    /// farther than the next one of the limb.
+    #[test]
+    fn a_forest_spans_what_moves_together() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        let options = FigureOptions { most_covered: 4, ..FigureOptions::default() };
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
+        let (_, rods) = rods_of(&tracks, found.windows[0].figure.size);
+        let weight = |i: usize, j: usize| rods.fit(i, j).map(|fit| fit.residual_rms + 0.04 * fit.length);
+        // No edge left out joins what an edge of more weight joins.
+        let links = sorted_links(&found.windows[0].figure);
+        for i in 0..12 {
+            for j in i + 1..12 {
+                // Two shoulders that do not move against each other are no rod.
+                let Some(direct) = weight(i, j) else { continue };
+                let mut reached = vec![(i, 0.0f64)];
+                let mut at = 0;
+                while at < reached.len() {
+                    let (from, most) = reached[at];
+                    for &[a, b] in &links {
+                        let next = if a == from {
+                            b
+                        } else if b == from {
+                            a
+                        } else {
+                            continue;
+                        };
+                        if reached.iter().all(|(seen, _)| *seen != next) {
+                            reached.push((next, most.max(weight(a, b).unwrap())));
+                        }
+                    }
+                    at += 1;
+                }
+                let (_, most) = reached.iter().find(|(point, _)| *point == j).unwrap();
+                assert!(*most <= direct + 1e-9, "{i} {j}");
+            }
+        }
+    }
+
+    /// The margin of a link is by how much the best figure without it costs more, and its size is the figure's.
+    #[test]
+    fn the_margin_of_a_link_is_the_cost_of_its_rival() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 0.5);
+        let options = options(0.5);
+        let figure = interpret_figure(&tracks, &times_s, &options).unwrap().windows.remove(0).figure;
+        for link in figure.links() {
+            assert!(link.margin > 0.0 && link.margin < figure.cost, "{link:?} {}", figure.cost);
+        }
     }
 }

@@ -91,4 +91,18 @@ mod tests {
             }
         }
     }
+
+    /// Noise that is stated makes jumps of ten times its size usual, where points hardly move otherwise.
+    #[test]
+    fn a_jump_is_large_beside_the_noise_that_was_stated() {
+        let mut track = vec![DVec2::ZERO; 40];
+        for (t, p) in track.iter_mut().enumerate() {
+            p.x = f64::from(u8::try_from(t).unwrap());
+        }
+        track[20].y = 12.0;
+        assert!(without_jumps(&track, 0.0)[20].is_nan());
+        assert!(without_jumps(&track, 0.5)[20].is_nan());
+        // 14.4 px of a noise of 1 px.
+        assert_eq!(without_jumps(&track, 1.0), track);
+    }
 }

@@ -502,4 +502,59 @@ mod tests {
         let tiny: Vec<Vec<DVec2>> = tracks.iter().map(|t| t.iter().map(|p| *p * 1e-310).collect()).collect();
         assert_eq!(refused(&tiny, &times_s, FigureOptions { fit, ..fresh() }), FigureError::NoExtent);
     }
+
+    /// Windows are as long as asked and overlap by half or more; what is shorter than one and a half is one.
+    #[test]
+    fn windows_cover_a_stretch_and_overlap_by_half() {
+        for (frames, long) in [(30, 20), (31, 20), (40, 20), (59, 20), (61, 20), (200, 24)] {
+            let found = windows_of(7, 7 + frames, long);
+            if 2 * frames <= 3 * long {
+                assert_eq!(found, [(7, 7 + frames)]);
+                continue;
+            }
+            assert!(found.iter().all(|(start, end)| end - start == long), "{found:?}");
+            assert_eq!((found[0].0, found.last().unwrap().1), (7, 7 + frames));
+            for pair in found.windows(2) {
+                assert!(pair[0].0 < pair[1].0 && 2 * (pair[0].1 - pair[1].0) >= long, "{found:?}");
+            }
+            // No more of them than half-overlaps need.
+            assert!((found.len() - 2) * long < 2 * (frames - long), "{found:?}");
+        }
+    }
+
+    /// More planar chains than refuted ones, and silent ones alone, are told apart.
+    #[test]
+    fn a_window_is_judged_by_its_chains() {
+        let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
+        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let figure = &found.windows[0].figure;
+        use Verdict::{NotPlanar, Planar, Unfalsifiable};
+        for (verdicts, status, chains) in [
+            ([Planar, Planar, NotPlanar, Unfalsifiable], Status::Interpreted, [2, 1, 1]),
+            ([Planar, NotPlanar, Unfalsifiable, Unfalsifiable], Status::Lost, [1, 1, 2]),
+            ([NotPlanar, NotPlanar, Planar, Planar], Status::Lost, [2, 2, 0]),
+            ([NotPlanar, Unfalsifiable, Unfalsifiable, Unfalsifiable], Status::Lost, [0, 1, 3]),
+            ([Unfalsifiable; 4], Status::Still, [0, 0, 4]),
+        ] {
+            let mut figure = figure.clone();
+            for (chain, verdict) in figure.chains.iter_mut().zip(verdicts) {
+                chain.evidence.verdict = verdict;
+            }
+            let judged = FigureWindow::judged(0, 66, figure);
+            assert_eq!((judged.status, judged.chains), (status, chains));
+        }
+        let alone = Figure { chains: vec![], ..figure.clone() };
+        assert_eq!(FigureWindow::judged(0, 66, alone).status, Status::Unseen);
+    }
+
+    /// Points at (±3, ±4) about a wandering middle are 5 from it; what is not seen does not count.
+    #[test]
+    fn the_size_is_the_distance_from_the_middle() {
+        let corner = |x: f64, y: f64| -> Vec<DVec2> {
+            (0..9).map(|t| DVec2::new(x + 10.0 * f64::from(t), y)).collect()
+        };
+        let mut tracks = vec![corner(3.0, 4.0), corner(-3.0, 4.0), corner(3.0, -4.0), corner(-3.0, -4.0)];
+        tracks.push(vec![DVec2::NAN; 9]);
+        assert!((size_of(&tracks) - 5.0).abs() < 1e-12);
+    }
 }

@@ -195,4 +195,125 @@ mod tests {
         assert!(cost(true, 1.0) + 100.0 < cost(true, -1.0));
         assert!(cost(false, -1.0) + 100.0 < cost(false, 1.0));
     }
+
+    const FREE: DMat3 = DMat3::IDENTITY;
+
+    /// A limb of one frame in the axes of somebody who faces along x, y down, z to the left.
+    fn cost(limb: &Limb, segments: [DVec3; 2]) -> f64 {
+        let points = [DVec3::ZERO, segments[0], segments[0] + segments[1]];
+        let points = if limb.from_trunk { points } else { [points[2], points[1], points[0]] };
+        limb.cost(&[points], 1.0, &FREE, &Limits::measured())
+    }
+
+    /// Squares of the degrees by which a limb leaves each limit, and of 0.3 of its angles out of the sagittal
+    /// plane: upper and lower segment apart.
+    #[test]
+    fn a_limb_costs_what_it_leaves_its_limits_and_its_plane_by() {
+        let swung = |deg: f64| DVec3::new(deg.to_radians().sin(), deg.to_radians().cos(), 0.0);
+        let aside = |deg: f64| DVec3::new(0.0, deg.to_radians().cos(), deg.to_radians().sin());
+        for from_trunk in [true, false] {
+            let [leg, arm] = [true, false].map(|is_leg| Limb { side: Side::Left, is_leg, from_trunk });
+            let cases = [
+                // Straight down; thigh 55 degrees back, 10 beyond the limit of 45; arm 75 back, 15 beyond 60.
+                (&leg, [DVec3::Y, DVec3::Y], 0.0),
+                (&leg, [swung(-55.0), swung(-60.0)], 100.0),
+                (&arm, [swung(-75.0), swung(-70.0)], 225.0),
+                // Knee bent forward by 20, 12 beyond; elbow bent back by 20, 15 beyond.
+                (&leg, [DVec3::Y, swung(20.0)], 144.0),
+                (&arm, [DVec3::Y, swung(-20.0)], 225.0),
+                // Shank 30 degrees aside: 9 of 30. The thigh too: each its 9, and a leg spread by 40 is allowed.
+                (&leg, [DVec3::Y, aside(30.0)], 81.0),
+                (&leg, [aside(30.0), aside(30.0)], 162.0),
+                // Across the other leg by 45 degrees: 10 beyond 35, and 13.5 squared twice.
+                (&leg, [aside(-45.0), aside(-45.0)], 100.0 + 2.0 * 13.5 * 13.5),
+            ];
+            for (limb, segments, expected) in cases {
+                let found = cost(limb, segments);
+                assert!((found - expected).abs() < 1e-6, "{limb:?} {segments:?}: {found} for {expected}");
+            }
+            // The right leg is spread the other way.
+            let right = Limb { side: Side::Right, ..leg };
+            assert!((cost(&right, [aside(45.0), aside(45.0)]) - 100.0 - 2.0 * 13.5 * 13.5).abs() < 1e-6);
+        }
+    }
+
+    /// Somebody who walks to the right of the picture, seen 30 degrees from behind or from the front: which
+    /// side is nearer tells the reflection, and so does which shoulder is to the right.
+    #[test]
+    fn anatomy_finds_the_reflection_of_a_walk() {
+        use crate::planar::figure::example::walker;
+        use crate::planar::{FigureOptions, interpret_figure};
+        use crate::synth::motion::WALKER_NAMES;
+        for turn in [0.0, -1.2, 0.9, 2.0, 3.0, 4.4] {
+            let (tracks, times_s, truth) = walker(66, |_| turn, 0.0);
+            let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+            let joints: Vec<Option<Joint>> =
+                WALKER_NAMES.iter().take(12).map(|name| joint_of(name)).collect();
+            // From either reading of every chain.
+            for mirrored in [false, true] {
+                let mut windows = found.windows.clone();
+                for chain in &mut windows[0].figure.chains {
+                    if mirrored {
+                        chain.plane = chain.plane.mirror();
+                        chain.depth.iter_mut().flatten().for_each(|z| *z = -*z);
+                    }
+                }
+                reflect_by_anatomy(&mut windows, &tracks, &joints);
+                for chain in &windows[0].figure.chains {
+                    let Some(margin) = chain.reflection_margin_deg else { continue };
+                    assert!(margin >= 0.0);
+                    let [a, pivot, b] = chain.points[..] else { continue };
+                    let depth = |t: usize, k: usize| truth[t * 12 + k] - truth[t * 12 + a];
+                    let agreement: f64 = (0..66)
+                        .map(|t| chain.depth[t][1] * depth(t, pivot) + chain.depth[t][2] * depth(t, b))
+                        .sum();
+                    assert!(agreement > 0.0 || margin < 5.0, "{turn} {:?} {margin}", chain.points);
+                    // The plane is that of the depths.
+                    let z = chain.plane.depth(tracks[pivot][0] - tracks[a][0]);
+                    assert!((z - chain.depth[0][1]).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    /// The margin is the difference of the root mean squares of both readings, degrees.
+    #[test]
+    fn the_margin_is_in_degrees() {
+        use crate::planar::figure::example::walker;
+        use crate::planar::{FigureOptions, interpret_figure};
+        use crate::synth::motion::WALKER_NAMES;
+        let (tracks, times_s, _) = walker(66, |_| 0.3, 0.0);
+        let joints: Vec<Option<Joint>> = WALKER_NAMES.iter().take(12).map(|name| joint_of(name)).collect();
+        let mut windows = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap().windows;
+        reflect_by_anatomy(&mut windows, &tracks, &joints);
+        let part: Vec<&[DVec2]> = tracks.iter().map(|track| &track[..]).collect();
+        let apart = right_of_left(&part, &joints).unwrap();
+        let mean =
+            |a: usize, b: usize| part[a].iter().zip(part[b]).map(|(r, l)| r.x - l.x).sum::<f64>() / 66.0;
+        assert!((apart - 0.5 * (mean(0, 3) + mean(6, 9))).abs() < 1e-9, "right less left");
+        let limits = Limits::measured();
+        let of_chains = |axes: &DMat3| -> Vec<[f64; 2]> {
+            let chains = windows[0].figure.chains.iter();
+            chains
+                .map(|chain| {
+                    let limb = Limb::of([0, 1, 2].map(|k| joints[chain.points[k]])).unwrap();
+                    let frames: Vec<[DVec3; 3]> = (0..66)
+                        .map(|t| [0, 1, 2].map(|k| tracks[chain.points[k]][t].extend(chain.depth[t][k])))
+                        .collect();
+                    [1.0, -1.0].map(|sign| limb.cost(&frames, sign, axes, &limits))
+                })
+                .collect()
+        };
+        // Of the facings that show the right side as it is seen, the one that all limbs together like best.
+        let facing = |i: i32| (f64::from(i) * std::f64::consts::TAU / 48.0).copysign(apart);
+        let total = |costs: &[[f64; 2]]| costs.iter().map(|[a, b]| a.min(*b)).sum::<f64>();
+        let best = (0..=24)
+            .map(|i| of_chains(&upright(facing(i))))
+            .min_by(|a, b| total(a).total_cmp(&total(b)))
+            .unwrap();
+        for (chain, [kept, other]) in windows[0].figure.chains.iter().zip(best) {
+            let margin = chain.reflection_margin_deg.unwrap();
+            assert!((other.sqrt() - kept.sqrt() - margin).abs() < 1e-9, "{margin} {kept} {other}");
+        }
+    }
 }

@@ -513,4 +513,89 @@ mod tests {
         assert!(fit.plane.tilt_rad() < 0.25, "{:?}", fit.plane);
         assert!(fit.covariance.iter().all(|x| !x.is_nan()));
     }
+
+    /// Noise lengthens, by that of both points and of their depths: in the true plane nothing of it is left.
+    #[test]
+    fn lengths_are_without_the_noise_s_share() {
+        let mut random = Random::new(21);
+        let (sd, draws) = (0.03, 300);
+        let slope = 1.2 * DVec2::from_angle(0.7);
+        let options = FitOptions { noise_sd: sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
+        let mut mean = [0.0; 2];
+        for _ in 0..draws {
+            let [a, o, b] = swinging(slope, 60, sd, &mut random);
+            let views: Vec<View<2>> = (0..60).map(|i: usize| [a[i] - o[i], b[i] - o[i]]).collect();
+            let problem = Problem::new(&views, 0.45, &options);
+            let h = |d: DVec2| d.length_squared() + slope.dot(d).powi(2);
+            let c = [0, 1].map(|k| views.iter().map(|v| h(v[k])).sum::<f64>() / 60.0);
+            let fit = problem.report(Solution { g: slope, c, cost: 0.0 }, vec![false; 60], [1.0; 2]);
+            (0..2).for_each(|k| mean[k] += fit.lengths[k] / f64::from(draws));
+        }
+        // With the share in them they would be 7 mm longer.
+        assert!((mean[0] - 0.4).abs() < 0.001 && (mean[1] - 0.45).abs() < 0.001, "{mean:?}");
+    }
+
+    /// The covariance of exact points whose noise is stated is the spread of fits to noisy ones; without a
+    /// stated noise it is that of the residuals.
+    #[test]
+    fn covariance_has_the_stated_noise_or_that_of_the_residuals() {
+        let slope = 0.9 * DVec2::from_angle(0.4);
+        let sd = 0.01;
+        let mut random = Random::new(23);
+        let exact = swinging(slope, 40, 0.0, &mut random);
+        let options = FitOptions { noise_sd: sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
+        let stated = fit_hinge(&exact[0], &exact[1], &exact[2], &options).unwrap();
+        let unstated = FitOptions { noise_sd: 0.0, ..options };
+        let mut square = [0.0; 4];
+        let (mut of_residuals, draws) = ([0.0; 4], 400);
+        for _ in 0..draws {
+            let noisy = exact.each_ref().map(|points| -> Vec<DVec2> {
+                points.iter().map(|p| *p + sd * normal(&mut random)).collect()
+            });
+            let fit = fit_hinge(&noisy[0], &noisy[1], &noisy[2], &unstated).unwrap();
+            let sign = fit.plane.slope().dot(slope).signum();
+            let found = [sign * fit.plane.p, sign * fit.plane.q, fit.lengths[0], fit.lengths[1]];
+            let truth = [stated.plane.p, stated.plane.q, stated.lengths[0], stated.lengths[1]];
+            let flip = stated.plane.slope().dot(slope).signum();
+            for i in 0..4 {
+                let truth = if i < 2 { flip * truth[i] } else { truth[i] };
+                square[i] += (found[i] - truth).powi(2) / f64::from(draws);
+                of_residuals[i] += fit.covariance[(i, i)] / f64::from(draws);
+            }
+        }
+        for i in 0..2 {
+            let by_stated = (stated.covariance[(i, i)] / square[i]).sqrt();
+            assert!((0.85..1.18).contains(&by_stated), "{i}: {by_stated}");
+            let by_residuals = (of_residuals[i] / square[i]).sqrt();
+            assert!((0.8..1.25).contains(&by_residuals), "{i}: {by_residuals}");
+        }
+        for (k, length) in stated.lengths.iter().enumerate() {
+            let by_stated = (stated.covariance[(2 + k, 2 + k)] / square[2 + k]).sqrt();
+            assert!((0.7..1.3).contains(&by_stated), "{k}: {by_stated} of {length}");
+        }
+    }
+
+    /// Views that are left out as outliers are not in the covariance: it is that of the others alone.
+    #[test]
+    fn outliers_say_nothing_about_how_sure_a_fit_is() {
+        let mut random = Random::new(27);
+        let sd = 0.002;
+        let [mut a, o, b] = swinging(0.9 * DVec2::from_angle(1.1), 40, sd, &mut random);
+        let wrong = [4, 17, 18, 30];
+        wrong.iter().for_each(|&view| a[view] += DVec2::new(1.2, -0.9));
+        let options = FitOptions { noise_sd: sd, ..FitOptions::default() };
+        let fit = fit_hinge(&a, &o, &b, &options).unwrap();
+        let outliers: Vec<usize> = (0..40).filter(|&view| fit.outliers[view]).collect();
+        assert_eq!(outliers, wrong);
+        let kept = |points: &[DVec2]| -> Vec<DVec2> {
+            (0..40).filter(|view| !wrong.contains(view)).map(|view| points[view]).collect()
+        };
+        let without = FitOptions { max_outlier_fraction: 0.0, ..options };
+        let alone = fit_hinge(&kept(&a), &kept(&o), &kept(&b), &without).unwrap();
+        for i in 0..4 {
+            let ratio = fit.covariance[(i, i)] / alone.covariance[(i, i)];
+            assert!((ratio - 1.0).abs() < 1e-3, "{i} {ratio}");
+        }
+        assert_eq!(fit.redundancy, alone.redundancy);
+    }
 }

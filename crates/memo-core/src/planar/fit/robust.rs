@@ -123,4 +123,37 @@ mod tests {
         }
         assert!(false_alarms < 20, "{false_alarms}");
     }
+
+    /// The limit is `outlier_sd` standard deviations of the residuals: 1.4826 times their median size, the same
+    /// for normal ones; at least those of the noise that was stated.
+    #[test]
+    fn the_limit_of_outliers_is_in_standard_deviations() {
+        let mut random = Random::new(3);
+        for (sd, noise_sd) in [(0.01, 0.0), (0.01, 0.03)] {
+            let [a, o, _] = swinging(0.8 * DVec2::from_angle(0.3), 4000, sd, &mut random);
+            let views: Vec<View<1>> = a.iter().zip(&o).map(|(a, o)| [*a - *o]).collect();
+            let options = FitOptions { noise_sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
+            let problem = Problem::new(&views, 0.4, &options);
+            let (limit, outliers) = problem.outliers(&problem.solve());
+            // Of the difference of two points.
+            let expected = 4.5 * f64::max(sd, noise_sd) * 2f64.sqrt();
+            assert!((limit / expected - 1.0).abs() < 0.05, "{limit} {expected}");
+            assert!(outliers.iter().filter(|o| **o).count() <= 1);
+        }
+    }
+
+    /// More outliers than allowed are none: then the points do not fit, and that is what the residuals say.
+    #[test]
+    fn only_few_views_may_be_left_out() {
+        let mut random = Random::new(5);
+        for (wrong, is_found) in [(6, true), (12, false)] {
+            let [mut a, o, b] = swinging(0.8 * DVec2::from_angle(0.3), 40, 0.002, &mut random);
+            a.iter_mut().step_by(3).take(wrong).for_each(|p| *p += DVec2::new(0.6, 0.5));
+            let options = FitOptions { noise_sd: 0.002, ..FitOptions::default() };
+            let fit = fit_hinge(&a, &o, &b, &options).unwrap();
+            let found = fit.outliers.iter().filter(|o| **o).count();
+            assert_eq!(found, if is_found { wrong } else { 0 }, "{wrong}");
+            assert_eq!(fit.residual_rms < 0.01, is_found, "{}", fit.residual_rms);
+        }
+    }
 }

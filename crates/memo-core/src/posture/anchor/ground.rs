@@ -243,3 +243,154 @@ impl Scene<'_> {
         depth * depth / total + total.ln() + side
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trunk::rigid_trunk;
+    use super::*;
+    use crate::posture::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
+
+    /// Somebody upright 4 m before a level camera at 1.2 m, turned half aside, one foot lifted.
+    fn standing(lengths: &SegmentLengths, lifted: Side) -> StickFigure {
+        let trunk = rigid_trunk(lengths);
+        let turn = glam::DMat3::from_rotation_y(0.5);
+        let mut figure = PerJoint([DVec3::NAN; JOINT_COUNT]);
+        for joint in Joint::ALL {
+            figure[joint] = turn * trunk[joint];
+        }
+        for side in Side::BOTH {
+            let (thigh, shank) = if side == lifted { (0.5, -0.4) } else { (0.0, 0.0) };
+            let hang = |angle: f64| turn * DVec3::new(f64::sin(angle), f64::cos(angle), 0.0);
+            figure[side.knee()] = figure[side.hip()] + hang(thigh) * lengths.to[side.knee()];
+            figure[side.ankle()] = figure[side.knee()] + hang(shank) * lengths.to[side.ankle()];
+        }
+        let sole = 0.17 * lengths.to[Joint::RightAnkle];
+        let lowest = figure[lifted.other().ankle()].y;
+        PerJoint(figure.0.map(|p| p + DVec3::new(0.1, 1.2 - sole - lowest, 4.0)))
+    }
+
+    const GROUND: Ground = Ground { up_in_camera: DVec3::NEG_Y, camera_height_m: 1.2 };
+
+    fn rays(figure: &StickFigure) -> JointRays {
+        JointRays { noise_rad: 2e-3, ..JointRays::from_points(figure) }
+    }
+
+    /// Right for left and the picture mirrored: the same distance, whichever foot stands.
+    #[test]
+    fn either_foot_may_stand() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let options = AnchorOptions::default();
+        for lifted in Side::BOTH {
+            let figure = standing(&lengths, lifted);
+            let mirror = |p: DVec3| DVec3::new(-p.x, p.y, p.z);
+            let mirrored = PerJoint(Joint::ALL.map(|joint| mirror(figure[joint.mirrored()])));
+            let [a, b] =
+                [figure, mirrored].map(|f| from_ground(&rays(&f), &lengths, &GROUND, &options).unwrap());
+            assert!((a.distance_m - b.distance_m).abs() < 1e-9, "{a:?} {b:?}");
+            assert!((a.sd_depth_m - b.sd_depth_m).abs() < 1e-9);
+            assert!((a.distance_m - figure[Joint::Neck].length()).abs() < 2.0 * a.sd_depth_m);
+        }
+    }
+
+    /// The mean over all distances by another quadrature: evenly spaced, and many times finer.
+    #[test]
+    fn distances_weigh_by_their_density() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let options = AnchorOptions { scale_sd: 0.0, ankle_height_sd_m: 0.1, ..AnchorOptions::default() };
+        let figure = standing(&lengths, Side::Left);
+        let rays = JointRays { noise_rad: 2e-2, ..JointRays::from_points(&figure) };
+        let found = from_ground(&rays, &lengths, &GROUND, &options).unwrap();
+        let legs = Side::BOTH;
+        let scene = Scene { rays: &rays, lengths: &lengths, ground: &GROUND, options: &options, legs: &legs };
+        let ray = rays.ray[Joint::Neck];
+        let rough = from_extent(&rays, &lengths, Some(GROUND.up_in_camera), &options).unwrap().distance_m;
+        let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
+        for i in 0..4000 {
+            let k = rough * (0.5 + 1.5 * (f64::from(i) + 0.5) / 4000.0);
+            let p = scene.log_density(k * ray).exp();
+            (total, first, second) = (total + p, first + p * k, second + p * k * k);
+        }
+        let mean = first / total;
+        let sd = (second / total - mean * mean).sqrt();
+        assert!(sd > 0.05 * mean, "wide enough for the spacing to matter: {sd}");
+        assert!((found.distance_m / mean - 1.0).abs() < 2e-3, "{} {mean}", found.distance_m);
+        assert!((found.sd_depth_m / sd - 1.0).abs() < 0.02, "{} {sd}", found.sd_depth_m);
+    }
+
+    /// The part that the lengths' scale has in the deviation is what longer and shorter lengths do.
+    #[test]
+    fn the_scale_s_part_is_what_scaled_lengths_do() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let figure = standing(&lengths, Side::Left);
+        let at = |scale: f64| {
+            let options = AnchorOptions { scale_sd: 0.0, ..AnchorOptions::default() };
+            from_ground(&rays(&figure), &scaled(&lengths, scale), &GROUND, &options).unwrap().distance_m
+        };
+        let options = AnchorOptions { scale_sd: 0.02, ..AnchorOptions::default() };
+        let found = from_ground(&rays(&figure), &lengths, &GROUND, &options).unwrap();
+        let expected = 0.5 * (at(1.02) - at(0.98)).abs();
+        assert!(expected > 0.005, "{expected}");
+        assert!((found.sd_scale_m / expected - 1.0).abs() < 0.15, "{} {expected}", found.sd_scale_m);
+    }
+
+    fn scene_of<'a>(
+        rays: &'a JointRays,
+        lengths: &'a SegmentLengths,
+        options: &'a AnchorOptions,
+    ) -> Scene<'a> {
+        Scene { rays, lengths, ground: &GROUND, options, legs: &Side::BOTH }
+    }
+
+    /// The pelvis found and the pelvis below the neck are two normal densities: their product, at its mean.
+    #[test]
+    fn an_upright_trunk_and_its_image_are_put_together() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let options = AnchorOptions::default();
+        let (neck, pelvis) = (DVec3::new(0.0, -0.2, 4.0), DVec3::new(0.02, 0.25, 4.2));
+        let mut rays = JointRays::from_points(&StickFigure::UNKNOWN);
+        let ray = pelvis.normalize();
+        rays.ray[Joint::Pelvis] = ray;
+        let scene = scene_of(&rays, &lengths, &options);
+        for variance in [0.01, 0.2] {
+            let both = scene.upright(neck, Link { point: pelvis, variance, cost: 0.0 });
+            // Along the ray the trunk's horizontal offset from the neck is least where the ray is nearest.
+            let flat = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
+            let level = flat(ray).length_squared();
+            let mean = flat(neck).dot(flat(ray)) / level;
+            let usual = (options.lean_sd_rad * lengths.to[Joint::Pelvis]).powi(2) / level;
+            let [w, v] = [1.0 / variance, 1.0 / usual];
+            assert!((both.variance - 1.0 / (w + v)).abs() < 1e-12);
+            let expected = (w * pelvis.length() + v * mean) / (w + v);
+            assert!((both.point.dot(ray) - expected).abs() < 1e-9, "{variance}");
+            let sum: f64 = variance + usual;
+            assert!((both.cost - (pelvis.length() - mean).powi(2) / sum - sum.ln()).abs() < 1e-9);
+        }
+    }
+
+    /// The height of a standing ankle is a density over heights, whatever its noise; a lifted foot may be high,
+    /// and not below the ground.
+    #[test]
+    fn the_height_of_a_foot_is_a_density() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let options = AnchorOptions::default();
+        let rays = JointRays { noise_rad: 1e-3, ..JointRays::from_points(&StickFigure::UNKNOWN) };
+        let scene = scene_of(&rays, &lengths, &options);
+        let stands_m = 0.17 * lengths.to[Joint::LeftAnkle];
+        let at = |height_m: f64, variance: f64| {
+            let point = DVec3::new(0.0, 1.2 - stands_m - height_m, 4.0);
+            Link { point, variance, cost: 0.0 }
+        };
+        for variance in [0.0, 0.2, 1.0] {
+            // The slope of the ray makes height of depth: what matters is that all heights together are one.
+            let mass: f64 = (-4000..4000)
+                .map(|i| (-0.5 * scene.support(&at(f64::from(i) * 1e-3, variance))).exp() * 1e-3)
+                .sum();
+            assert!((mass / std::f64::consts::TAU.sqrt() - 1.0).abs() < 0.15, "{variance}: {mass}");
+        }
+        let [above, below] = [0.05, -0.05].map(|height_m| scene.swing(&at(height_m, 0.0)));
+        assert!(below > above + 3.0, "{above} {below}");
+        let [own, noise] = [options.swing_height_m, 1e-3 * 4.0f64];
+        let lift = scene.swing(&at(0.2, 0.0)) - scene.swing(&at(1e-9, 0.0));
+        assert!((lift / (0.04 / (own * own + noise * noise)) - 1.0).abs() < 0.01, "{lift}");
+    }
+}

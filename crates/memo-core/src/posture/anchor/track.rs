@@ -233,4 +233,58 @@ mod tests {
         let alone = smooth(&[0.0], &[Some(anchor(4.0, 0.1))], &options).unwrap();
         assert!((alone.distance_m[0] - 4.0).abs() < 1e-9 && (alone.sd_m[0] - 0.1).abs() < 0.01);
     }
+
+    /// Normal scatter of 10 cm about a steady walk is told as that.
+    #[test]
+    fn the_scatter_is_a_standard_deviation() {
+        let mut random = Random::new(7);
+        let times_s: Vec<f64> = (0..1500).map(|i| f64::from(i) / 25.0).collect();
+        let mut noise = || 0.1 * f64::from(random.normal_pair()[0]);
+        let anchors: Vec<Option<Anchor>> =
+            times_s.iter().map(|t| Some(anchor(4.0 + 0.1 * t + noise(), 0.1))).collect();
+        let track = smooth(&times_s, &anchors, &SmoothOptions::default()).unwrap();
+        assert!((track.scatter_m / 0.1 - 1.0).abs() < 0.07, "{}", track.scatter_m);
+        assert!(track.correlation < 0.1, "{}", track.correlation);
+    }
+
+    /// Errors that are alike in neighbouring frames are as many as they are different ones: the stated deviation
+    /// is that of the errors left.
+    #[test]
+    fn errors_alike_in_neighbouring_frames_average_out_less() {
+        let mut ratios = Vec::new();
+        for seed in 0..20 {
+            let mut random = Random::new(seed);
+            let times_s: Vec<f64> = (0..200).map(|i| f64::from(i) / 25.0).collect();
+            let mut error = 0.0;
+            let anchors: Vec<Option<Anchor>> = times_s
+                .iter()
+                .map(|_| {
+                    error = 0.8 * error + 0.06 * f64::from(random.normal_pair()[0]);
+                    Some(anchor(5.0 + error, 0.1))
+                })
+                .collect();
+            let options = SmoothOptions { velocity_variance_per_s: 0.01, ..SmoothOptions::default() };
+            let track = smooth(&times_s, &anchors, &options).unwrap();
+            assert!(track.correlation > 0.4, "{}", track.correlation);
+            let rms = (track.distance_m.iter().map(|d| (d - 5.0).powi(2)).sum::<f64>() / 200.0).sqrt();
+            let stated = track.sd_m.iter().sum::<f64>() / 200.0;
+            ratios.push(rms / stated.hypot(0.0));
+        }
+        ratios.sort_by(f64::total_cmp);
+        assert!((0.4..1.4).contains(&ratios[10]), "{ratios:?}");
+    }
+
+    /// Frames far from each other are no neighbours, however alike their errors are.
+    #[test]
+    fn only_neighbouring_frames_are_compared() {
+        let times_s: Vec<f64> = (0..300).map(|i| f64::from(i) / 25.0).collect();
+        // Every third frame is seen, its error that of a slow wave.
+        let wave = |i: usize| 0.1 * (0.2 * i as f64).sin();
+        let anchors: Vec<Option<Anchor>> =
+            (0..300_usize).map(|i| i.is_multiple_of(3).then(|| anchor(5.0 + wave(i), 0.1))).collect();
+        let stiff = SmoothOptions { velocity_variance_per_s: 1e-5, ..SmoothOptions::default() };
+        assert_eq!(smooth(&times_s, &anchors, &stiff).unwrap().correlation, 0.0);
+        let all: Vec<Option<Anchor>> = (0..300).map(|i| Some(anchor(5.0 + wave(i), 0.1))).collect();
+        assert!(smooth(&times_s, &all, &stiff).unwrap().correlation > 0.8);
+    }
 }

@@ -293,3 +293,98 @@ fn summary(ray: DVec3, fits: &[Fit], scale_sd: f64) -> Option<TrunkFit> {
     };
     Some(TrunkFit { anchor, attitudes })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::skeleton::{JOINT_COUNT, RigidDistance, Side, StickFigure};
+
+    /// All lengths of Table A.1 between the points of the rigid trunk; the neck in front of the shoulders.
+    #[test]
+    fn the_rigid_trunk_has_the_paper_s_lengths() {
+        let lengths = SegmentLengths::lee_chen();
+        let trunk = rigid_trunk(&lengths);
+        for joint in
+            [Joint::RightShoulder, Joint::LeftShoulder, Joint::Pelvis, Joint::RightHip, Joint::LeftHip]
+        {
+            let length = trunk.segment(joint).length();
+            assert!((length - lengths.to[joint]).abs() < 1e-9, "{joint:?} {length}");
+        }
+        for distance in RigidDistance::ALL {
+            let [a, b] = distance.joints();
+            let length = trunk[a].distance(trunk[b]);
+            assert!((length - lengths.rigid[distance as usize]).abs() < 1e-9, "{distance:?} {length}");
+        }
+        let middle = trunk[Joint::RightShoulder].midpoint(trunk[Joint::LeftShoulder]);
+        assert!((middle.length() - 0.0377).abs() < 1e-4 && middle.x < -0.037, "{middle}");
+        assert_eq!(trunk[Joint::Neck], DVec3::ZERO);
+        for side in Side::BOTH {
+            assert_eq!(trunk[side.shoulder()].z > 0.0, side == Side::Left);
+            assert_eq!(trunk[side.hip()].z > 0.0, side == Side::Left);
+        }
+    }
+
+    fn fit(distance_m: f64, variance: f64, chi_sq: f64, log_volume: f64) -> Fit {
+        Fit { rotation: DMat3::IDENTITY, distance_m, variance, chi_sq, log_volume }
+    }
+
+    /// Two attitudes: their odds are those of chi² and volume, the deviation that within and between them.
+    #[test]
+    fn attitudes_are_put_together_by_their_probabilities() {
+        // χ² worse by 2 ln 2, a volume of a half as much again: odds of 4 to 3.
+        let second = fit(4.4, 0.09, 1.0 + 2.0 * 2f64.ln(), 1.5f64.ln());
+        let found = summary(DVec3::Z, &[fit(4.0, 0.04, 1.0, 0.0), second], 0.01).unwrap();
+        let [p, q] = [4.0 / 7.0, 3.0 / 7.0];
+        assert!((found.attitudes[0].depth.probability - p).abs() < 1e-12);
+        let mean = 4.0 * p + 4.4 * q;
+        assert!((found.anchor.distance_m - mean).abs() < 1e-12);
+        // With one percent of each distance for the scale of the lengths.
+        let within = p * (0.04 + 0.04f64.powi(2)) + q * (0.09 + 0.044f64.powi(2));
+        let between = p * (4.0 - mean).powi(2) + q * (4.4 - mean).powi(2);
+        assert!((found.anchor.sd_depth_m.powi(2) - within - between).abs() < 1e-12);
+        assert!((found.anchor.sd_scale_m - 0.01 * mean).abs() < 1e-12);
+        assert!((found.attitudes[0].depth.sd_m.powi(2) - 0.04 - 0.0016).abs() < 1e-12);
+    }
+
+    fn problem<'a>(
+        rays: &'a JointRays,
+        trunk: &'a PerJoint<DVec3>,
+        up: Option<DVec3>,
+        options: &'a AnchorOptions,
+    ) -> Problem<'a> {
+        Problem { rays, trunk, up, options, rough_m: 4.0 }
+    }
+
+    /// A trunk that leans by 7 degrees is one standard deviation off, to whichever side.
+    #[test]
+    fn a_leaning_trunk_costs_its_lean() {
+        let options = AnchorOptions::default();
+        let trunk = rigid_trunk(&SegmentLengths::lee_chen());
+        let rays = JointRays::from_points(&StickFigure::UNKNOWN);
+        let problem = problem(&rays, &trunk, Some(-DVec3::Y), &options);
+        for axis in [DVec3::X, DVec3::Z, DVec3::new(1.0, 0.0, 1.0)] {
+            let leaning = DMat3::from_axis_angle(axis.normalize(), 7f64.to_radians());
+            let (_, _, chi_sq) = problem.linearised(&leaning, DVec3::new(0.0, 0.0, 4.0));
+            assert!((chi_sq - 1.0).abs() < 0.01, "{axis} {chi_sq}");
+        }
+        let upright = problem.linearised(&DMat3::from_rotation_y(1.0), DVec3::new(0.0, 0.0, 4.0));
+        assert!(upright.2 < 1e-12);
+    }
+
+    /// The pelvis 2 cm beside its ray, of 0.7 times 1 cm of the body and of image noise at 4 m.
+    #[test]
+    fn a_point_off_its_ray_costs_its_distance() {
+        let options = AnchorOptions::default();
+        let trunk = rigid_trunk(&SegmentLengths::lee_chen());
+        let mut rays = JointRays::from_points(&PerJoint([DVec3::NAN; JOINT_COUNT]));
+        let neck = DVec3::new(0.0, 0.0, 4.0);
+        rays.ray[Joint::Pelvis] = (neck + trunk[Joint::Pelvis]).normalize();
+        for noise_rad in [0.0, 0.002, 0.01] {
+            rays.noise_rad = noise_rad;
+            let problem = problem(&rays, &trunk, None, &options);
+            let (_, _, chi_sq) = problem.linearised(&DMat3::IDENTITY, neck + 0.02 * DVec3::X);
+            let sd = 0.007f64.hypot(noise_rad * 4.0);
+            assert!((chi_sq - (0.02 / sd).powi(2)).abs() < 1e-9 * chi_sq, "{noise_rad} {chi_sq}");
+        }
+    }
+}

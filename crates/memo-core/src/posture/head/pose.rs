@@ -177,3 +177,52 @@ pub(super) fn point_jacobian(rotation: DMat3, point: DVec3) -> Matrix3x6<f64> {
     }
     jacobian
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Focal, HeadModel, HeadOptions, head_pose};
+    use super::*;
+
+    /// A head seen aslant from 3 m, its points off by a pixel.
+    fn pose() -> HeadPose {
+        let model = HeadModel::lee_chen();
+        let turn = DMat3::from_rotation_y(0.5) * DMat3::from_rotation_x(0.2);
+        let rotation = turn * DMat3::from_cols(DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X);
+        let focal = 1000.0;
+        let image: Vec<DVec2> = model
+            .points_m
+            .iter()
+            .map(|point| rotation * (*point - model.points_m[0]) + DVec3::new(0.2, -0.1, 3.0))
+            .map(|q| focal * q.truncate() / q.z)
+            .collect();
+        let options = HeadOptions { image_sd: Some(1.0), ..HeadOptions::default() };
+        let known = Focal::Known(DVec2::splat(focal));
+        head_pose(&model.points_m, &image, known, &options).unwrap().best().clone()
+    }
+
+    /// The paper's axes turn y and shift z: so does the covariance.
+    #[test]
+    fn the_paper_s_axes_turn_the_covariance() {
+        let pose = pose();
+        let point = HeadModel::lee_chen().points_m[2];
+        let (own, paper) = (pose.point_in_camera(point), pose.point_in_paper_camera(point));
+        let mirror = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let expected = mirror * own.covariance * mirror;
+        assert!((paper.covariance - expected).abs_diff_eq(DMat3::ZERO, 1e-9 * expected.z_axis.z));
+        assert!(expected.y_axis.z.abs() > 1e-3 * expected.z_axis.z, "{expected}");
+        let shifted = mirror * own.position - DVec3::Z * pose.focal.x;
+        assert!((paper.position - shifted).length() < 1e-9);
+    }
+
+    /// Turning moves the facing to the head's side, nodding up and down.
+    #[test]
+    fn turning_and_nodding_are_the_facing_s_own_directions() {
+        let pose = pose();
+        let facing = pose.facing();
+        let along = |axis: DVec3| axis.dot(facing.covariance * axis).sqrt();
+        assert!((along(pose.rotation.z_axis) / facing.turn_sd_rad - 1.0).abs() < 1e-9);
+        assert!((along(pose.rotation.y_axis) / facing.nod_sd_rad - 1.0).abs() < 1e-9);
+        assert!((facing.turn_sd_rad / facing.nod_sd_rad - 1.0).abs() > 0.01, "{facing:?}");
+        assert!(along(pose.rotation.x_axis) < 1e-9);
+    }
+}

@@ -182,3 +182,149 @@ fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f6
     }
     0.5 * (cost + variances.ln())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::Random;
+
+    /// A track of noisy places, one of them far off.
+    fn track(frames: usize) -> Vec<(f64, Measured)> {
+        let mut random = Random::new(2);
+        (0..frames)
+            .map(|t| {
+                let value = 0.2 * (0.3 * t as f64).sin() + 0.02 * f64::from(random.normal_pair()[0]);
+                let off = if t == 13 { 3.0 } else { 0.0 };
+                let measured =
+                    if t == 5 { Measured::NOTHING } else { Measured { value: value + off, sd: 0.03 } };
+                (0.04 * t as f64 + random.uniform(0.0, 0.02), measured)
+            })
+            .collect()
+    }
+
+    /// The likelihood of normal innovations, frame by frame, those far off cut at 25.
+    #[test]
+    fn the_cost_of_a_motion_is_its_likelihood() {
+        for frames in [1, 2, 7, 8, 9, 10, 30] {
+            let track = track(frames);
+            let (mut filter, mut before_s, mut cost) = (None, track[0].0, 0.0);
+            let mut capped = 0;
+            for &(time_s, measured) in &track {
+                let (next, innovation) = filter_step(filter, time_s - before_s, measured, 3.0);
+                (filter, before_s) = (next, time_s);
+                let Some(Innovation { value, variance }) = innovation else { continue };
+                let square: f64 = value * value / variance;
+                capped += usize::from(square > 25.0);
+                cost += 0.5 * (square.min(25.0) + variance.ln());
+            }
+            assert_eq!(capped > 0, frames == 30);
+            assert!((motion_cost(track.into_iter(), 3.0) - cost).abs() < 1e-9, "{frames}");
+        }
+    }
+
+    /// Two segments that hang on each other, of four states a frame; bit 0 also turns the extent of bit 1.
+    fn extent(bit: usize, t: usize, state: usize) -> Measured {
+        let size = if bit == 0 { (0.25 * t as f64 - 2.0).sin() } else { 0.3 + 0.02 * t as f64 };
+        let is_far = |bit: usize| state >> bit & 1 == 1;
+        let value = match bit {
+            0 => {
+                if is_far(0) {
+                    size
+                } else {
+                    -size
+                }
+            }
+            _ => (if is_far(1) { size } else { -size }) + if is_far(0) { 0.1 } else { 0.0 },
+        };
+        Measured { value, sd: 0.02 }
+    }
+
+    fn chain<'a>(
+        times_s: &'a [f64],
+        cost: &'a (dyn Fn(usize, usize) -> f64 + Sync),
+        extent: &'a (dyn Fn(usize, usize, usize) -> Measured + Sync),
+    ) -> Chain<'a> {
+        let affected = |mask: usize| if mask & 1 == 1 { 3 } else { mask };
+        Chain { times_s, acceleration_mps2: &[4.0, 6.0], masks: &[1, 2, 3], affected, extent, cost }
+    }
+
+    /// Over a stretch so short that all of it is judged, what mirroring costs is the difference of the totals.
+    #[test]
+    fn mirroring_costs_the_difference_of_the_paths() {
+        let times_s: Vec<f64> = (0..10).map(|t| 0.04 * t as f64).collect();
+        let cost = |t: usize, state: usize| 0.3 * ((t * 7 + state * 5) % 4) as f64;
+        let chain = chain(&times_s, &cost, &extent);
+        let states = [0, 3, 1, 0, 2, 2, 3, 0, 0, 1];
+        let flips = chain.flips(&states);
+        assert!(flips.len() > 5 && flips.is_sorted_by(|a, b| a.delta <= b.delta), "{flips:?}");
+        for flip in flips {
+            let mut mirrored = states;
+            mirrored[flip.from..flip.to].iter_mut().for_each(|state| *state ^= flip.mask);
+            let difference = chain.total(&mirrored) - chain.total(&states);
+            assert!((flip.delta - difference).abs() < 1e-9, "{flip:?} {difference}");
+        }
+    }
+
+    /// Stretches are judged by half a second before and after them.
+    #[test]
+    fn a_stretch_is_judged_by_what_is_around_it() {
+        let times_s: Vec<f64> = (0..100).map(|t| 0.04 * t as f64).collect();
+        let none = |_: usize, _: usize| 0.0;
+        let chain = chain(&times_s, &none, &extent);
+        assert_eq!(chain.around(40, 50), [28, 62]);
+        assert_eq!(chain.around(3, 98), [0, 100]);
+    }
+
+    /// Where an extent crosses zero, where it is least and not surely different from it, where it is not seen.
+    #[test]
+    fn stretches_begin_where_a_segment_may_stand_across_its_ray() {
+        let times_s: Vec<f64> = (0..12).map(|t| 0.04 * t as f64).collect();
+        let none = |_: usize, _: usize| 0.0;
+        let bounds = |values: [f64; 12], sd: f64| {
+            let extent = move |_: usize, t: usize, _: usize| Measured { value: values[t], sd };
+            chain(&times_s, &none, &extent).bounds(&[0; 12], 0)
+        };
+        let high = 0.5;
+        let mut crossing = [high; 12];
+        crossing[6..].fill(-high);
+        assert_eq!(bounds(crossing, 0.01), [0, 6, 12]);
+        let mut dip = [high; 12];
+        dip[7] = 0.1;
+        assert_eq!(bounds(dip, 0.01), [0, 12]);
+        assert_eq!(bounds(dip, 0.06), [0, 7, 12]);
+        let mut unseen = [high; 12];
+        unseen[3..5].fill(f64::NAN);
+        assert_eq!(bounds(unseen, 0.01), [0, 3, 5, 12]);
+    }
+
+    /// A path read the wrong way round in a stretch is put right, however long the stretch is in excursions.
+    #[test]
+    fn what_is_better_mirrored_is_mirrored() {
+        let times_s: Vec<f64> = (0..120).map(|t| 0.04 * t as f64).collect();
+        let none = |_: usize, _: usize| 0.0;
+        let swing = |_: usize, t: usize, state: usize| {
+            let value = 0.4 * (0.25 * t as f64).sin();
+            Measured { value: if state & 1 == 1 { value } else { -value }, sd: 0.03 }
+        };
+        let affected = |mask: usize| mask;
+        let chain = Chain {
+            times_s: &times_s,
+            acceleration_mps2: &[15.0],
+            masks: &[1],
+            affected,
+            extent: &swing,
+            cost: &none,
+        };
+        // Truth: the same state throughout. Wrong between two passings of zero, 12 or 13 frames apart: one
+        // excursion, and three together.
+        for (from, to) in [(13, 26), (26, 63)] {
+            let mut states = vec![0; 120];
+            states[from..to].fill(1);
+            chain.refine(&mut states);
+            // Within the noise of zero nobody can tell.
+            let is_clear = |t: usize| swing(0, t, 0).value.abs() > 0.03;
+            let clear: Vec<usize> = (0..120).filter(|&t| is_clear(t)).map(|t| states[t]).collect();
+            assert!(clear.iter().all(|state| *state == clear[0]), "{states:?}");
+        }
+    }
+}

@@ -331,3 +331,95 @@ impl Problem<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LinkFrame, LinkOptions};
+    use super::*;
+    use crate::posture::lift::JointRays;
+    use crate::posture::prior::MotionPrior;
+    use crate::posture::skeleton::SegmentLengths;
+    use crate::synth::stick_walker::StickWalker;
+
+    /// A walk of the paper's walker 4 m away, facing right, ten frames in 0.36 s.
+    fn frames() -> (Vec<LinkFrame>, SegmentLengths, LinkOptions) {
+        let walker = StickWalker::lee_chen();
+        let camera_from_walker = |v: DVec3| DVec3::new(v.x, -v.y, v.z);
+        let frames = (0..10).map(|t| {
+            let figure = walker.posed(0.3 + t as f64 / 25.0, DVec3::ZERO);
+            let place = |p: DVec3| camera_from_walker(p) + DVec3::new(0.0, -0.3, 4.0);
+            let figure = PerJoint(figure.0.map(place));
+            let rays = JointRays { noise_rad: 1e-3, ..JointRays::from_points(&figure) };
+            LinkFrame { time_s: t as f64 / 25.0, rays, neck: figure[Joint::Neck] }
+        });
+        let options =
+            LinkOptions { up: Some(-DVec3::Y), moving_direction: Some(DVec3::X), ..LinkOptions::default() };
+        (frames.collect(), *walker.lengths(), options)
+    }
+
+    /// An inner segment's root moves the outer segment's extent: what mirroring costs has both in it.
+    #[test]
+    fn mirroring_a_segment_moves_what_hangs_on_it() {
+        let (frames, lengths, options) = frames();
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        let trunk = &Trunk::link(&problem)[0];
+        for pair in [0, 1] {
+            let readings = Pair::new(&problem, trunk, pair);
+            let cost = vec![[0.0; READINGS]; 10];
+            let mut states = readings.path(&cost);
+            let (flips, total) = readings.refine(&problem.times_s(), &cost, &mut states, true);
+            let mut inner = 0;
+            for flip in flips {
+                let mut mirrored = states.clone();
+                mirrored[flip.from..flip.to].iter_mut().for_each(|state| *state ^= flip.mask);
+                let chain = Chain {
+                    times_s: &problem.times_s(),
+                    acceleration_mps2: &readings.acceleration_mps2,
+                    masks: &MASKS,
+                    affected: |_| READINGS - 1,
+                    extent: &|bit, t, state| readings.extent(bit, t, state),
+                    cost: &|_, _| 0.0,
+                };
+                // All ten frames are within what a stretch is judged by.
+                let difference = chain.total(&mirrored) - total;
+                assert!((flip.delta - difference).abs() < 1e-9, "{flip:?} {difference}");
+                inner += usize::from(flip.mask & 0b0101 != 0);
+            }
+            assert!(inner > 0);
+        }
+    }
+
+    /// An elbow bent the wrong way costs the square of the angle in the deviations of its limit, a knee too.
+    #[test]
+    fn bending_the_wrong_way_costs() {
+        let (frames, lengths, options) = frames();
+        let options = LinkOptions { prior: MotionPrior::any(), ..options };
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        let axes = DMat3::IDENTITY;
+        let shank = |deg: f64| DVec3::new(deg.to_radians().sin(), deg.to_radians().cos(), 0.0);
+        for (pair, wrong_deg, limit) in [(0, -20.0, 20.0 / 15.0), (1, 20.0, 20.0 / 10.0f64)] {
+            let cost = |deg: f64| problem.limb_cost(0, &axes, [DVec3::Y, shank(deg)], [0.0; 2], pair, 0);
+            // Anybody's forearm and shank may swing as they like; only the bend differs.
+            assert!((cost(wrong_deg) - cost(-wrong_deg) - limit * limit).abs() < 1e-9, "{pair}");
+        }
+    }
+
+    /// The outer segment starts where the inner one ends, as unsure along its ray.
+    #[test]
+    fn an_outer_segment_is_as_unsure_as_its_start() {
+        let (frames, lengths, options) = frames();
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        let trunk = &Trunk::link(&problem)[0];
+        let [shoulder, elbow, wrist] = PAIRS[0][1];
+        let shoulder_sd = trunk.sd_m[3][shoulder].hypot(trunk.sd_m[3][Joint::Neck]);
+        for bits in 0..4 {
+            let [(inner, u), (outer, v)] = problem.limb_extents(3, trunk, 0, 1, bits);
+            let start = trunk.smoothed[3][shoulder];
+            let first = problem.roots(3, start, shoulder_sd, elbow);
+            assert_eq!(inner.sd, first.sd_m);
+            let second = problem.roots(3, start + u, shoulder_sd.hypot(inner.sd), wrist);
+            assert_eq!(outer.sd, second.sd_m);
+            assert!((outer.value - v.dot(frames[3].rays.ray[wrist])).abs() < 1e-12);
+        }
+    }
+}

@@ -270,3 +270,121 @@ impl Problem<'_> {
         sd.is_finite().then(|| Measured { value: usual.dot(self.ray(t, joint)), sd })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::super::{LinkFrame, LinkOptions};
+    use super::*;
+    use crate::posture::lift::JointRays;
+    use crate::posture::prior::MotionPrior;
+    use crate::posture::skeleton::SegmentLengths;
+    use crate::synth::stick_walker::StickWalker;
+
+    /// Somebody upright facing the camera, 4 m away; the trunk of Table A.1, its shoulders behind the neck.
+    fn facing() -> (Vec<LinkFrame>, StickFigure, SegmentLengths, LinkOptions) {
+        let walker = StickWalker::lee_chen();
+        let figure = walker.posed(0.25, DVec3::ZERO);
+        let figure = PerJoint(figure.0.map(|v| DVec3::new(-v.z, -v.y, -v.x) + DVec3::new(0.0, -0.3, 4.0)));
+        let frames = (0..50).map(|t| LinkFrame {
+            time_s: t as f64 / 25.0,
+            rays: JointRays::from_points(&figure),
+            neck: figure[Joint::Neck],
+        });
+        let options =
+            LinkOptions { up: Some(-DVec3::Y), moving_direction: Some(-DVec3::Z), ..LinkOptions::default() };
+        (frames.collect(), figure, *walker.lengths(), options)
+    }
+
+    /// Twice what an attitude costs, without noise.
+    fn cost(options: &LinkOptions, figure: &StickFigure) -> f64 {
+        let (frames, _, lengths, _) = facing();
+        let problem = Problem { frames: &frames, lengths: &lengths, options };
+        problem.attitude_cost(0, figure, &PerJoint::default())
+    }
+
+    /// The neck is 3.77 cm in front of the shoulders by the lengths of Table A.1, ± 2 cm.
+    #[test]
+    fn shoulders_before_the_neck_cost_their_distance_from_where_they_belong() {
+        let (_, figure, lengths, options) = facing();
+        let behind_m = 0.0377;
+        let moved = |by_m: f64| {
+            let mut moved = figure;
+            for joint in [Joint::RightShoulder, Joint::LeftShoulder] {
+                moved[joint].z -= by_m;
+            }
+            moved
+        };
+        let usual = cost(&options, &figure);
+        for by_m in [0.01, -0.02, behind_m, 2.0 * behind_m] {
+            let expected = f64::powi(by_m / 0.02, 2).min(25.0);
+            assert!((cost(&options, &moved(by_m)) - usual - expected).abs() < 0.15, "{by_m}");
+        }
+        let (frames, ..) = facing();
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        assert!((problem.neck_forward_m() - behind_m).abs() < 1e-4);
+    }
+
+    /// Hips that face against the torso cost 25 beside what their turn costs.
+    #[test]
+    fn hips_that_face_against_the_torso_cost() {
+        let (_, figure, _, options) = facing();
+        let options = LinkOptions { prior: MotionPrior::any(), ..options };
+        let turned = |deg: f64| {
+            let mut turned = figure;
+            for joint in [Joint::RightHip, Joint::LeftHip] {
+                let turn = DMat3::from_rotation_y(f64::to_radians(deg));
+                turned[joint] = figure[Joint::Pelvis] + turn * (figure[joint] - figure[Joint::Pelvis]);
+            }
+            turned
+        };
+        // Both turns are beyond the cap of a turn; the second one is more than a quarter.
+        let difference = cost(&options, &turned(175.0)) - cost(&options, &turned(-89.0));
+        // 89 degrees are 4.45 deviations of 20.
+        assert!((difference - 25.0 - (25.0 - 4.45f64.powi(2))).abs() < 1.5, "{difference}");
+    }
+
+    /// The usual places of trunk and hips of somebody who faces the camera, along the rays: the pelvis level
+    /// with the neck, shoulders 3.77 cm farther, right and left alike.
+    #[test]
+    fn usual_extents_are_those_of_an_upright_trunk() {
+        let (frames, _, lengths, options) = facing();
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        let usual = |joint: Joint| problem.usual_extent(0, joint).unwrap();
+        let off = |joint: Joint, vector: DVec3| usual(joint).value - vector.dot(frames[0].rays.ray[joint]);
+        let half = 0.5 * lengths.rigid[RigidDistance::Shoulders as usize];
+        let hip = 0.5 * lengths.rigid[RigidDistance::Hips as usize];
+        let drop = (lengths.to[Joint::LeftHip].powi(2) - hip * hip).sqrt();
+        // Facing the camera, the person's left is at its right.
+        for (joint, vector) in [
+            (Joint::LeftShoulder, DVec3::new(half, 0.0, 0.0377)),
+            (Joint::RightShoulder, DVec3::new(-half, 0.0, 0.0377)),
+            (Joint::Pelvis, DVec3::new(0.0, lengths.to[Joint::Pelvis], 0.0)),
+            (Joint::LeftHip, DVec3::new(hip, drop, 0.0)),
+            (Joint::RightHip, DVec3::new(-hip, drop, 0.0)),
+        ] {
+            assert!(off(joint, vector).abs() < 1e-4, "{joint:?} {}", off(joint, vector));
+        }
+        // Frames 40 ms apart count half: spreads grow by the root of two.
+        let lean = 8f64.to_radians() * lengths.to[Joint::Pelvis];
+        assert!((usual(Joint::Pelvis).sd - 2f64.sqrt() * lean).abs() < 1e-9);
+        let turn = (8f64.to_radians() * half).hypot(0.02);
+        assert!((usual(Joint::LeftShoulder).sd - 2f64.sqrt() * turn).abs() < 1e-9);
+        let nowhere = LinkOptions { moving_direction: None, ..options };
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &nowhere };
+        assert_eq!(problem.usual_extent(0, Joint::Pelvis), None);
+    }
+
+    /// What is steady in how a person holds the trunk does not average out over fifty frames.
+    #[test]
+    fn a_trunk_stays_as_unsure_as_people_hold_it() {
+        let (frames, _, lengths, options) = facing();
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        let trunk = &Trunk::link(&problem)[0];
+        let steady = 0.7 * 8f64.to_radians() * lengths.to[Joint::Pelvis];
+        for sd_m in &trunk.sd_m {
+            assert!(sd_m[Joint::Pelvis] >= steady - 1e-12, "{} {steady}", sd_m[Joint::Pelvis]);
+        }
+    }
+}

@@ -154,3 +154,59 @@ pub fn reason_totals(frames: &[Result<FrameReading, FrameProblem>]) -> Vec<Reaso
     totals.sort_by_key(|total| std::cmp::Reverse(total.branches));
     totals
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::sequence::example::{walk, with_lengths};
+    use crate::posture::sequence::{Motion, SequenceOptions};
+
+    /// Seen from the front with much noise thousands of postures are possible, too many to compare all.
+    #[test]
+    fn the_number_of_groups_is_known_of_few_postures_alone() {
+        let walk = walk(0.0, 6, 0.5);
+        let mut counts = Vec::new();
+        for noise_px in [0.5, 25.0] {
+            let options = SequenceOptions { motion: Motion::Physical, noise_px, ..with_lengths() };
+            for frame in walk.postures(&options).unwrap().frames.iter().flatten() {
+                let is_few = frame.survivors() <= MOST_GROUPED;
+                assert_eq!(frame.group_count.is_some(), is_few, "{}", frame.survivors());
+                counts.push(is_few);
+                let members: usize = frame.groups.iter().map(|group| group.size).sum();
+                assert!(members <= MOST_GROUPED && frame.groups.is_sorted_by(|a, b| a.size >= b.size));
+            }
+        }
+        assert!(counts.contains(&true) && counts.contains(&false), "{counts:?}");
+    }
+
+    /// The tree of a frame has the neck's deviation and that of the lengths about their scale.
+    #[test]
+    fn a_frame_knows_how_sure_neck_and_lengths_are() {
+        let walk = walk(60.0, 12, 0.5);
+        let options = SequenceOptions { lengths: None, height_m: Some(1.61), ..with_lengths() };
+        let found = walk.postures(&options).unwrap();
+        assert!(found.lengths.own_sd_m > 0.006, "{}", found.lengths.own_sd_m);
+        for (t, frame) in found.frames.iter().enumerate() {
+            let view = &frame.as_ref().unwrap().tree.view;
+            assert_eq!((view.neck_sd_m, view.length_sd_m), (found.neck.sd_m[t], found.lengths.own_sd_m));
+            assert_eq!(view.lengths, found.lengths.lengths);
+        }
+    }
+
+    /// Reasons of all frames, by a count of our own.
+    #[test]
+    fn reasons_add_up_with_the_strongest_first() {
+        let walk = walk(60.0, 6, 0.5);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let totals = reason_totals(&found.frames);
+        assert!(totals.len() > 3 && totals.is_sorted_by(|a, b| a.branches >= b.branches));
+        for total in &totals {
+            let cuts =
+                found.frames.iter().flatten().filter_map(|frame| {
+                    frame.tree.reasons.iter().find(|cut| cut.constraint == total.constraint)
+                });
+            let branches: Vec<u64> = cuts.map(|cut| u64::from(cut.branches)).collect();
+            assert_eq!((total.branches, total.frames), (branches.iter().sum(), branches.len()));
+        }
+    }
+}

@@ -105,3 +105,95 @@ fn turn(places: &[(DVec2, f64)], min_travel_m: f64) -> Option<Warning> {
     let turn_deg = first.angle_to(second).to_degrees().abs();
     (is_long && turn_deg > STRAIGHT_DEG).then_some(Warning::Turns { turn_deg })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::sequence::example::{Walk, walk, with_lengths};
+    use crate::posture::sequence::{AnchorChoice, SequenceOptions};
+
+    /// Places along straight lines, 10 cm apart: so many in each direction.
+    fn places(legs: &[(usize, DVec2)]) -> Vec<(DVec2, f64)> {
+        let mut at = DVec2::ZERO;
+        let steps = legs.iter().flat_map(|&(count, direction)| std::iter::repeat_n(direction, count));
+        steps
+            .map(|direction| {
+                at += 0.1 * direction;
+                (at, 0.03)
+            })
+            .collect()
+    }
+
+    /// From the mean of the first fifth to that of the last: two frames of ten.
+    #[test]
+    fn the_way_leads_from_the_first_fifth_to_the_last() {
+        let mut places = places(&[(10, DVec2::X)]);
+        places[0].0.y = 0.4;
+        (places[0].1, places[9].1) = (0.03, 0.04);
+        let (way, sd_m) = way(&places).unwrap();
+        assert!((way - DVec2::new(0.8, -0.2)).length() < 1e-12, "{way}");
+        assert!((sd_m - 0.05).abs() < 1e-12);
+        assert_eq!(super::way(&places[..1]), None);
+    }
+
+    #[test]
+    fn a_way_that_turns_is_no_straight_one_to_either_side() {
+        for (turn_deg, is_told) in [(45.0, true), (-45.0, true), (120.0, true), (20.0, false), (-20.0, false)]
+        {
+            let places = places(&[(20, DVec2::X), (20, DVec2::from_angle(f64::to_radians(turn_deg)))]);
+            let told = turn(&places, 0.5);
+            assert_eq!(told.is_some(), is_told, "{turn_deg}");
+            if let Some(Warning::Turns { turn_deg: told }) = told {
+                assert!((told - f64::abs(turn_deg)).abs() < 1e-9);
+            }
+            // Halves too short to have a direction.
+            assert_eq!(turn(&places, 5.0), None);
+        }
+    }
+
+    fn heading(walk: &Walk, change: impl Fn(&mut SequenceOptions)) -> (Heading, bool) {
+        let mut options = with_lengths();
+        change(&mut options);
+        let found = walk.postures(&options).unwrap();
+        let is_told = found.warnings.iter().any(|warning| matches!(warning, Warning::NoTravel { .. }));
+        (found.heading, is_told)
+    }
+
+    /// Given before the way, that before the face, that before the trunk.
+    #[test]
+    fn the_direction_is_taken_from_the_best_source() {
+        let mut walk = walk(60.0, 20, 0.2);
+        let (found, is_told) = heading(&walk, |o| o.moving_direction = Some(DVec3::new(0.0, 2.0, 1.0)));
+        assert_eq!((found.direction, found.from, is_told), (Some(DVec3::Y), HeadingFrom::Given, false));
+        let (found, is_told) = heading(&walk, |_| {});
+        assert_eq!((found.from, is_told), (HeadingFrom::Travel, false));
+        let direction = found.direction.unwrap();
+        assert!(direction.dot(walk.forward) > 0.98 && direction.z == 0.0, "{direction}");
+        // 19 frames of 4.8 cm, between the means of four frames at either end.
+        assert!((found.travelled_m - 16.0 * 0.048).abs() < 0.15, "{}", found.travelled_m);
+        // Too short a way, or as long as its noise alone makes it.
+        for change in
+            [|o: &mut SequenceOptions| o.min_travel_m = 3.0, |o: &mut SequenceOptions| o.noise_px = 300.0]
+        {
+            let (found, is_told) = heading(&walk, change);
+            assert_eq!((found.direction, found.from, is_told), (None, HeadingFrom::Trunk, true));
+        }
+        // A face in most frames goes before the trunk.
+        for (seen, from) in [(12, HeadingFrom::Head), (8, HeadingFrom::Trunk)] {
+            let face = |t: usize| if t < seen { walk.head_px(t) } else { [DVec2::NAN; 6] };
+            walk.head_points_px = Some((0..20).map(face).collect());
+            let (found, _) = heading(&walk, |o| o.min_travel_m = 3.0);
+            assert_eq!(found.from, from, "{seen} faces");
+        }
+    }
+
+    /// A distance that is wrong alike in all frames shifts the way and does not bend it.
+    #[test]
+    fn an_error_common_to_all_frames_does_not_hide_the_way() {
+        let walk = walk(60.0, 20, 0.2);
+        let necks = walk.truth.iter().map(|f| walk.camera.camera_from_world(f.0[0]).length());
+        let anchor = AnchorChoice::Given { distance_m: necks.collect(), sd_m: 2.0 };
+        let (found, _) = heading(&walk, |o| o.anchor = anchor.clone());
+        assert_eq!(found.from, HeadingFrom::Travel);
+    }
+}

@@ -200,3 +200,155 @@ pub(super) fn impossible(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use crate::posture::length::LengthEstimate;
+    use crate::posture::sequence::NeckFrom;
+    use crate::posture::sequence::example::{walk, with_lengths};
+    use crate::posture::skeleton::{JOINT_COUNT, PerJoint};
+
+    /// A fit whose segments have a scale known to 5 % and 2 cm of their own.
+    fn fit() -> LengthFit {
+        let lengths = SegmentLengths::lee_chen();
+        let estimate = |(segment, length_m): (String, f64)| LengthEstimate {
+            segment,
+            length_m,
+            sd_m: 0.02f64.hypot(0.05 * length_m),
+            basis: LengthBasis::Measured,
+            seen_m: length_m,
+        };
+        LengthFit {
+            estimates: lengths.named().map(estimate).collect(),
+            lengths,
+            sd_m: PerJoint([0.0; JOINT_COUNT]),
+            scale: 1.0,
+            scale_sd: 0.05,
+            scale_from: ScaleFrom::Ground,
+        }
+    }
+
+    #[test]
+    fn the_scale_is_apart_from_what_each_length_has_of_its_own() {
+        let fitted = SequenceLengths::fitted(&fit());
+        assert!((fitted.own_sd_m - 0.02).abs() < 1e-12, "{}", fitted.own_sd_m);
+        // The sources of the neck's distance are told the scale of the lengths, and their own deviation.
+        let options = AnchorOptions { scale_sd: 0.01, length_sd: 0.001, ..AnchorOptions::default() };
+        let told = fitted.anchor_options(&options);
+        assert_eq!(told.scale_sd, 0.05);
+        let mut shares: Vec<f64> = fitted.lengths.named().map(|(_, l)| 0.02 / l).collect();
+        shares.sort_by(f64::total_cmp);
+        assert!((told.length_sd - shares[8]).abs() < 1e-9, "{}", told.length_sd);
+        assert_eq!(fitted.anchor_options(&AnchorOptions { length_sd: 0.5, ..options }).length_sd, 0.5);
+        let given = SequenceLengths::given(SegmentLengths::lee_chen(), 0.03);
+        assert_eq!(given.anchor_options(&options), options);
+        for ((_, length_m), sd_m) in given.lengths.named().zip(&given.sd_m) {
+            assert!((sd_m * sd_m - 0.005f64.powi(2) - (0.03 * length_m).powi(2)).abs() < 1e-12);
+        }
+        assert_eq!(given.own_sd_m, 0.005);
+    }
+
+    /// Of an adult of assumed height: 6 % of scale and 8 % of each limb.
+    #[test]
+    fn proportions_alone_are_as_unsure_as_people_differ() {
+        let prior = LengthPrior::from_height(None).unwrap();
+        let found = SequenceLengths::of_prior(&prior);
+        for ((_, length_m), sd_m) in found.lengths.named().zip(&found.sd_m) {
+            assert!((sd_m / length_m - 0.1).abs() < 1e-12);
+        }
+        let mut lengths: Vec<f64> = prior.lengths.to.0[1..].to_vec();
+        lengths.sort_by(f64::total_cmp);
+        assert!((found.own_sd_m - 0.08 * lengths[6]).abs() < 1e-12);
+        assert!(found.origin.iter().all(|origin| origin.name() == "proportions"));
+    }
+
+    #[test]
+    fn the_scale_has_a_name_for_each_source() {
+        let mut lengths = SequenceLengths::given(SegmentLengths::lee_chen(), 0.0);
+        for (scale_from, name) in [
+            (None, "lengths"),
+            (Some(ScaleFrom::BodyHeight), "height"),
+            (Some(ScaleFrom::Ground), "ground"),
+            (Some(ScaleFrom::Distance), "distance"),
+            (Some(ScaleFrom::Assumed), "assumed"),
+        ] {
+            lengths.scale_from = scale_from;
+            assert_eq!(lengths.scale_name(), name);
+        }
+        let names = [LengthBasis::Measured, LengthBasis::Pooled, LengthBasis::Prior]
+            .map(|basis| LengthOrigin::Estimated(basis).name());
+        assert_eq!((names, LengthOrigin::Given.name()), (["measured", "other_side", "proportions"], "given"));
+    }
+
+    /// Where no frame shows the legs the ground tells no distance, but the trunk does.
+    #[test]
+    fn without_feet_on_the_ground_the_trunk_tells_the_lengths() {
+        let mut walk = walk(45.0, 30, 0.5);
+        for points in &mut walk.points_px {
+            for joint in [Joint::RightKnee, Joint::LeftKnee, Joint::RightAnkle, Joint::LeftAnkle] {
+                points[joint] = DVec2::NAN;
+            }
+        }
+        let options = SequenceOptions { lengths: None, height_m: Some(1.61), ..with_lengths() };
+        let found = walk.postures(&options).unwrap();
+        let is_told = found.warnings.iter().any(|warning| matches!(warning, Warning::LengthsNotSeen { .. }));
+        assert!(!is_told, "{:?}", found.warnings);
+        assert_eq!(found.lengths.scale_name(), "height");
+        assert!(found.lengths.origin.contains(&LengthOrigin::Estimated(LengthBasis::Measured)));
+        // Asked for the trunk or the head, nobody trusts the ground, even with feet on it.
+        let walk = walk_with_feet();
+        for source in [AnchorSource::Trunk, AnchorSource::Head] {
+            let anchor = AnchorChoice::Source(source);
+            let options = SequenceOptions { lengths: None, height_m: None, anchor, ..with_lengths() };
+            let found = walk.postures(&options).unwrap();
+            assert_eq!(found.lengths.scale_name(), "assumed", "{source:?}");
+        }
+        let options = SequenceOptions { lengths: None, height_m: None, ..with_lengths() };
+        assert_eq!(walk.postures(&options).unwrap().lengths.scale_name(), "ground");
+    }
+
+    fn walk_with_feet() -> crate::posture::sequence::example::Walk {
+        let mut walk = walk(45.0, 30, 0.5);
+        walk.head_points_px = Some((0..30).map(|t| walk.head_px(t)).collect());
+        walk
+    }
+
+    /// A forearm seen at the angle that its length makes at the least distance it can be at: one shoulder and
+    /// one upper arm before the neck, that three standard deviations nearer than found.
+    #[test]
+    fn a_segment_is_too_short_only_at_the_nearest_it_can_be() {
+        let lengths = SequenceLengths::given(SegmentLengths::lee_chen(), 0.0);
+        let to = lengths.lengths.to;
+        let joint = Joint::RightWrist;
+        let nearest_m = 4.0 - 3.0 * 0.1 - to[Joint::RightElbow] - to[Joint::RightShoulder];
+        let (noise_rad, frames) = (0.002, 3);
+        let noise = 3.0 * 2f64.sqrt() * noise_rad;
+        for (factor, is_told) in [(0.99, false), (1.01, true)] {
+            let angle = (factor * to[joint] / nearest_m).asin() + noise;
+            let mut rays = JointRays::from_points(&PerJoint([DVec3::NAN; JOINT_COUNT]));
+            rays.noise_rad = noise_rad;
+            rays.ray[Joint::RightElbow] = DVec3::Z;
+            rays.ray[joint] = DVec3::new(angle.sin(), 0.0, angle.cos());
+            let neck = NeckTrack {
+                distance_m: vec![4.0; frames],
+                sd_m: vec![0.1; frames],
+                from: vec![NeckFrom::Neighbours; frames],
+                vague: vec![None; frames],
+                conflicts: vec![],
+                common_sd_m: 0.0,
+                scale_sd: 0.0,
+            };
+            let mut warnings = Vec::new();
+            impossible(&vec![rays; frames], &neck, &lengths, &mut warnings);
+            assert_eq!(warnings.len(), usize::from(is_told), "{warnings:?}");
+            if let Some(Warning::SegmentTooShort { segment, seen_m, frames: told, of, .. }) = warnings.first()
+            {
+                assert_eq!((segment.as_str(), *told, *of), ("right_elbow_to_right_wrist", frames, frames));
+                assert!((seen_m - factor * to[joint]).abs() < 1e-9, "{seen_m}");
+            }
+        }
+    }
+}

@@ -448,6 +448,8 @@ fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::camera::Camera;
+    use crate::posture::sequence::example::{walk, with_lengths};
 
     #[test]
     fn long_sequences_are_asked_now_and_then() {
@@ -460,5 +462,194 @@ mod tests {
         let all = interpolated(&times_s, &known_s, &line);
         assert!(all.iter().zip(&times_s).all(|(value, s)| (value - 3.0 - 2.0 * s).abs() < 1e-9));
         assert_eq!(super::asked(&times_s[..500]).len(), 500);
+    }
+
+    /// The height that goes with lengths a tenth longer than the paper's is a tenth more.
+    #[test]
+    fn taller_legs_are_of_taller_people() {
+        let mut lengths = SegmentLengths::lee_chen();
+        lengths.to.0.iter_mut().for_each(|length| *length *= 1.1);
+        assert!((height_m(&lengths) - 1.1 * 1.608).abs() < 1e-12);
+    }
+
+    /// A head seen without noise: where its neck is and which way it faces, and that it says so.
+    #[test]
+    fn a_head_has_the_neck_and_the_facing_that_it_was_drawn_with() {
+        let mut walk = walk(60.0, 3, 0.0);
+        walk.head_points_px = Some((0..3).map(|t| walk.head_px(t)).collect());
+        let options = SequenceOptions { height_m: Some(LEE_CHEN_BODY_HEIGHT_M), ..with_lengths() };
+        let found = walk.postures(&options).unwrap();
+        let rays = found.frames.iter().map(|frame| frame.as_ref().unwrap().tree.view.rays);
+        let rays: Vec<JointRays> = rays.collect();
+        let (sequence, lengths) = (walk.sequence(), &found.lengths);
+        let ground = Some(Ground::of(&walk.camera));
+        let scene = Scene {
+            sequence: &sequence,
+            camera: &walk.camera,
+            ground,
+            rays: &rays,
+            lengths,
+            options: &options,
+        };
+        for (t, head) in heads(&scene).into_iter().enumerate() {
+            let head = head.unwrap();
+            let truth_m = walk.camera.camera_from_world(walk.truth[t][Joint::Neck]).length();
+            assert!((head.distance_m - truth_m).abs() < 1e-6, "{} {truth_m}", head.distance_m);
+            // A head of 20 cm at 5 m: some centimetres for a pixel.
+            assert!((0.01..0.5).contains(&head.sd_m), "{}", head.sd_m);
+            let axes = head.axes.unwrap();
+            let expected = [walk.forward, DVec3::NEG_Z, DVec3::Z.cross(walk.forward)];
+            for (axis, expected) in [axes.x_axis, axes.y_axis, axes.z_axis].into_iter().zip(expected) {
+                assert!((axis - walk.camera.rotation * expected).length() < 1e-6, "{axis} {expected}");
+            }
+            // What the rules are told: the vertical, the direction and the face.
+            let heading = Heading {
+                direction: Some(walk.forward),
+                from: super::super::HeadingFrom::Given,
+                travelled_m: 0.0,
+            };
+            let bearings = scene.bearings(&heading, Some(&head));
+            assert_eq!(bearings.up, Some(walk.camera.rotation * DVec3::Z));
+            assert_eq!(bearings.heading, Some(walk.camera.rotation * walk.forward));
+            assert_eq!(bearings.head, head.axes);
+        }
+    }
+
+    /// Two poses of a head 4 and 5 m away, one three times as probable: mean, and spread between and within.
+    #[test]
+    fn several_poses_of_a_head_are_one_distance_with_their_spread() {
+        let camera = Camera::level([1280, 720], 1.0, 1.2, 4.0).unwrap();
+        let model = HeadModel::lee_chen();
+        let turn = DMat3::from_cols(DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X);
+        let at = |distance_m: f64| DVec3::Z * distance_m - turn * model.points_m[0];
+        let pixels: Vec<glam::DVec2> = model
+            .points_m
+            .iter()
+            .map(|point| turn * *point + at(4.0))
+            .map(|q| q.truncate() / q.z * camera.focal_px + camera.centre_px)
+            .collect();
+        let options = HeadOptions { image_sd: Some(0.2), ..HeadOptions::default() };
+        let found = head_pose_in_image(&camera, &model.points_m, &pixels, &options).unwrap();
+        let neck = found.best().point_in_camera(model.points_m[0]);
+        let variance = DVec3::Z.dot(neck.covariance * DVec3::Z);
+        let one = head_of(&HeadSolution { poses: vec![found.best().clone()], minima: 1 }, &model);
+        assert!((one.distance_m - 4.0).abs() < 1e-6 && (one.sd_m.powi(2) / variance - 1.0).abs() < 1e-6);
+        assert!(one.axes.is_some());
+        let [mut near, mut far] = [found.best().clone(), found.best().clone()];
+        (near.probability, far.probability) = (0.75, 0.25);
+        far.translation.z += 1.0;
+        let two = head_of(&HeadSolution { poses: vec![near, far], minima: 2 }, &model);
+        assert!((two.distance_m - 4.25).abs() < 1e-6);
+        // Of a distance of two values with odds of three to one, 1 m apart: variance 3/16.
+        assert!((two.sd_m.powi(2) - variance - 3.0 / 16.0).abs() < 1e-6, "{}", two.sd_m);
+        assert!(two.axes.is_none(), "an ambiguous face decides nothing");
+    }
+
+    /// A facing that noise leaves unsure by more than 10 degrees decides nothing either.
+    #[test]
+    fn a_face_seen_badly_decides_nothing() {
+        let mut walk = walk(60.0, 2, 0.0);
+        walk.head_points_px = Some((0..2).map(|t| walk.head_px(t)).collect());
+        let faces = |noise_px: f64| {
+            let options = SequenceOptions { noise_px, min_travel_m: 9.0, ..with_lengths() };
+            walk.postures(&options).unwrap().heading.from.name()
+        };
+        assert_eq!([faces(0.5), faces(12.0)], ["head", "trunk"]);
+    }
+
+    #[test]
+    fn the_head_s_distance_is_as_unsure_as_its_size() {
+        let mut rays = JointRays::from_points(&crate::posture::skeleton::StickFigure::UNKNOWN);
+        let head = Head { distance_m: 4.0, sd_m: 0.15, axes: None };
+        assert!(matches!(from_head(&rays, Some(&head)), Err(AnchorError::NotSeen { missing: "neck", .. })));
+        rays.ray[Joint::Neck] = DVec3::new(0.6, 0.0, 0.8);
+        let anchor = from_head(&rays, Some(&head)).unwrap();
+        // 5 % of 4 m beside 15 cm.
+        assert!((anchor.sd_scale_m - 0.2).abs() < 1e-12 && (anchor.sd_depth_m - 0.25).abs() < 1e-12);
+        assert!((anchor.neck - DVec3::new(2.4, 0.0, 3.2)).length() < 1e-12);
+        assert!(matches!(from_head(&rays, None), Err(AnchorError::NotSeen { .. })));
+    }
+
+    /// Ground, trunk and extent together where they are seen; the head alone where it was not ruled out.
+    #[test]
+    fn sources_are_asked_as_chosen() {
+        let walk = walk(60.0, 1, 0.5);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let rays = [found.frames[0].as_ref().unwrap().tree.view.rays];
+        let (sequence, lengths) = (walk.sequence(), &found.lengths);
+        let ground = Some(Ground::of(&walk.camera));
+        let head = Head { distance_m: 9.0, sd_m: 0.1, axes: None };
+        let ask = |anchor: AnchorChoice, rays: &[JointRays]| {
+            let options = SequenceOptions { anchor, ..with_lengths() };
+            let scene =
+                Scene { sequence: &sequence, camera: &walk.camera, ground, rays, lengths, options: &options };
+            let anchor_options = lengths.anchor_options(&options.anchor_options);
+            frame_anchor(&scene, &anchor_options, &rays[0], Some(&head))
+        };
+        let options = AnchorOptions::default();
+        let up = Some(walk.camera.rotation * DVec3::Z);
+        let table = SegmentLengths::lee_chen();
+        let by_ground = from_ground(&rays[0], &table, &ground.unwrap(), &options).unwrap();
+        let by_trunk = from_trunk(&rays[0], &table, up, &options).unwrap().anchor;
+        let by_extent = from_extent(&rays[0], &table, up, &options).unwrap();
+        let all = combine(&[by_ground.clone(), by_trunk.clone(), by_extent.clone()]).unwrap().anchor;
+        for choice in [AnchorChoice::Auto, AnchorChoice::Source(AnchorSource::Combined)] {
+            let found = ask(choice, &rays);
+            assert!(found.is_combined && found.anchor == Ok(all.clone()));
+        }
+        for single in [by_ground, by_trunk, by_extent] {
+            let found = ask(AnchorChoice::Source(single.source), &rays);
+            assert!(!found.is_combined && found.anchor == Ok(single));
+        }
+        // The neck alone: no source but the head.
+        let mut neck_alone = JointRays::from_points(&crate::posture::skeleton::StickFigure::UNKNOWN);
+        neck_alone.ray[Joint::Neck] = rays[0].ray[Joint::Neck];
+        let auto = ask(AnchorChoice::Auto, &[neck_alone]).anchor.unwrap();
+        assert_eq!((auto.source, auto.distance_m), (AnchorSource::Head, 9.0));
+        let combined = ask(AnchorChoice::Source(AnchorSource::Combined), &[neck_alone]).anchor;
+        assert_eq!(combined.unwrap_err().len(), 3);
+    }
+
+    /// Conflicts are counted among the frames that had several sources, with the medians of what they say.
+    #[test]
+    fn conflicts_are_counted_by_pairs_of_sources() {
+        let conflict = |a_m: f64, b_m: f64, sigmas: f64| Conflict {
+            sources: [AnchorSource::Ground, AnchorSource::Trunk],
+            distances_m: [a_m, b_m],
+            sigmas,
+        };
+        let frame = |conflicts: Vec<Conflict>, is_combined: bool| FrameAnchor {
+            anchor: Err(vec![]),
+            conflicts,
+            is_combined,
+        };
+        let frames = [
+            frame(vec![conflict(4.0, 5.0, 3.5)], true),
+            frame(vec![], true),
+            frame(vec![conflict(4.4, 5.2, 3.1)], true),
+            frame(vec![conflict(4.2, 5.9, 9.0)], true),
+            frame(vec![], false),
+        ];
+        let expected = SourceConflict {
+            sources: [AnchorSource::Ground, AnchorSource::Trunk],
+            frames: 3,
+            of: 4,
+            distances_m: [4.2, 5.2],
+            sigmas: 3.5,
+        };
+        assert_eq!(conflicts(&frames), [expected]);
+    }
+
+    /// What the sources have wrong together stays with the track: here at least the scale of the lengths.
+    #[test]
+    fn what_all_frames_share_does_not_average_out() {
+        let walk = walk(60.0, 30, 0.3);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let mean_m = found.neck.distance_m.iter().sum::<f64>() / 30.0;
+        assert!(found.neck.common_sd_m > 0.5 * found.neck.scale_sd * mean_m, "{:?}", found.neck.common_sd_m);
+        assert!(found.neck.sd_m.iter().all(|sd| *sd >= found.neck.common_sd_m));
+        // A distance less sure than it is long is none.
+        let vague = NeckTrack { sd_m: vec![9.0; 30], ..found.neck.clone() }.without_vague();
+        assert!(vague.distance_m.iter().all(|d| d.is_nan()) && vague.vague.iter().all(Option::is_some));
     }
 }

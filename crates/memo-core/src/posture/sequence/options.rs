@@ -222,3 +222,85 @@ pub(super) fn check_options(options: &SequenceOptions) -> Result<(), SequenceErr
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posture::rules::Rule;
+
+    #[test]
+    fn every_motion_has_its_rules_at_both_strengths() {
+        for (motion, rules, measured, paper) in [
+            (Motion::Physical, 0, None, None),
+            (Motion::Walking, 9, Some(MotionModel::walking()), Some(MotionModel::walking_paper())),
+            (
+                Motion::WalkingGeneral,
+                3,
+                Some(MotionModel::walking_general()),
+                Some(MotionModel::walking_general_paper()),
+            ),
+            (Motion::Running, 5, Some(MotionModel::running()), Some(MotionModel::running())),
+            (Motion::Standing, 2, Some(MotionModel::standing()), Some(MotionModel::standing())),
+        ] {
+            let [free, strict] = [Strength::Measured, Strength::Paper].map(|strength| motion.tree(strength));
+            assert_eq!((&free.motion, &strict.motion), (&measured, &paper), "{motion:?}");
+            let applying =
+                |model: &MotionModel| Rule::ALL.iter().filter(|r| model.tolerance(**r).is_some()).count();
+            assert_eq!(measured.as_ref().map_or(0, applying), rules);
+            assert_eq!(free.limits.unwrap().noise_factor > 0.0, strict.limits.unwrap().noise_factor == 0.0);
+            assert_eq!(Motion::from_name(motion.name()), Some(motion));
+        }
+        for strength in [Strength::Measured, Strength::Paper] {
+            assert_eq!(Strength::from_name(strength.name()), Some(strength));
+        }
+    }
+
+    /// Who stands or does anything has no direction to keep to; a walker's habits are a walker's alone.
+    #[test]
+    fn walking_and_running_have_a_direction_and_walking_its_habits() {
+        let with_direction = Motion::ALL.into_iter().filter(|motion| motion.needs_heading());
+        assert_eq!(
+            with_direction.collect::<Vec<_>>(),
+            [Motion::Walking, Motion::WalkingGeneral, Motion::Running]
+        );
+        let walkers = Motion::ALL.into_iter().filter(|motion| motion.prior() == MotionPrior::walking());
+        assert_eq!(walkers.collect::<Vec<_>>(), [Motion::Walking, Motion::WalkingGeneral]);
+    }
+
+    #[test]
+    fn options_out_of_range_are_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut SequenceOptions)| {
+            let mut options = SequenceOptions::default();
+            change(&mut options);
+            check_options(&options).err().map(|error| error.to_string())
+        };
+        assert_eq!(refused(&|_| {}), None);
+        for value in [-0.1, f64::INFINITY, f64::NAN] {
+            let said = [
+                refused(&|o| o.noise_px = value),
+                refused(&|o| o.min_weight = value),
+                refused(&|o| o.min_travel_m = value),
+                refused(&|o| o.group_m = value),
+            ];
+            for (name, said) in ["noise_px", "min_weight", "min_travel_m", "group_m"].iter().zip(said) {
+                let said = said.unwrap();
+                assert!(said.starts_with(&format!("{name} must be finite and not negative")), "{said}");
+            }
+        }
+        let given = |distance_m: f64, sd_m: f64| {
+            let anchor = AnchorChoice::Given { distance_m: vec![4.0, distance_m], sd_m };
+            refused(&move |o| o.anchor = anchor.clone())
+        };
+        assert_eq!([given(f64::NAN, 0.1), given(0.1, 0.1), given(1000.0, 1000.0)], [None, None, None]);
+        for (distance_m, sd_m) in [(0.09, 0.1), (1001.0, 0.1), (4.0, 0.0), (4.0, 1001.0), (4.0, f64::NAN)] {
+            assert!(given(distance_m, sd_m).unwrap().contains("must be"), "{distance_m} {sd_m}");
+        }
+        assert!(refused(&|o| o.height_m = Some(17.0)).unwrap().contains("17"));
+        let mut lengths = SegmentLengths::lee_chen();
+        lengths.rigid[2] = f64::NAN;
+        assert!(refused(&|o| o.lengths = Some(lengths)).unwrap().contains("NaN"));
+        assert!(refused(&|o| o.moving_direction = Some(DVec3::Z)).unwrap().contains("not vertical"));
+        assert_eq!(refused(&|o| o.moving_direction = Some(DVec3::new(0.1, 0.0, 9.0))), None);
+        assert_eq!(SequenceOptions::default().min_weight, 0.2);
+    }
+}

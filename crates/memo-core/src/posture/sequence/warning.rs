@@ -374,3 +374,211 @@ pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::camera::Camera;
+    use crate::posture::anchor::{AnchorSource, Ground};
+    use crate::posture::lift::JointRays;
+    use crate::posture::sequence::example::{Walk, walk, with_lengths};
+    use crate::posture::sequence::{PostureSequence, SequenceOptions};
+    use crate::posture::skeleton::JOINT_COUNT;
+
+    #[test]
+    fn many_segments_too_long_are_told_from_the_share_that_noise_explains() {
+        for (long, is_told) in [(30, false), (40, true)] {
+            // Of 100 segments that are known so many look too long; those that are unknown do not count.
+            let gaps: Vec<f64> = (0..104)
+                .map(|i| {
+                    if i >= 100 {
+                        f64::NAN
+                    } else if i < long {
+                        0.01
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let gap_m: Vec<PerJoint<f64>> = gaps
+                .chunks(13)
+                .map(|gaps| {
+                    let mut frame = PerJoint([0.5; JOINT_COUNT]);
+                    frame.0[1..].copy_from_slice(gaps);
+                    frame
+                })
+                .collect();
+            let told = without_root(&gap_m);
+            assert_eq!(told.is_some(), is_told, "{told:?}");
+            if let Some(Warning::WithoutRoot { share, .. }) = told {
+                assert!((share - 0.4).abs() < 1e-12);
+            }
+        }
+    }
+
+    fn warnings(walk: &Walk, change: impl Fn(&mut SequenceOptions)) -> Vec<Warning> {
+        let mut options = with_lengths();
+        change(&mut options);
+        walk.postures(&options).unwrap().warnings
+    }
+
+    /// The noise of a walk's points is read off their jumps, at uneven times too.
+    #[test]
+    fn points_noisier_than_stated_are_told_by_how_much() {
+        let mut walk = walk(60.0, 60, 5.0);
+        for t in (0..60).rev().filter(|t| t % 3 == 1) {
+            walk.times_s.remove(t);
+            walk.points_px.remove(t);
+            walk.weights.remove(t);
+        }
+        let told = warnings(&walk, |options| options.noise_px = 1.0);
+        let seen = told.iter().find_map(|warning| match warning {
+            Warning::Noisy { seen_px, stated_px: 1.0 } => Some(*seen_px),
+            _ => None,
+        });
+        // The walk's own acceleration between frames adds to it.
+        assert!(seen.is_some_and(|seen_px| (4.5..6.5).contains(&seen_px)), "{seen:?}");
+        assert!(!warnings(&walk, |o| o.noise_px = 4.0).iter().any(|w| matches!(w, Warning::Noisy { .. })));
+    }
+
+    /// Left for right, or backwards: seen from the front that is one who faces away.
+    #[test]
+    fn a_trunk_against_the_way_is_told() {
+        let mut walk = walk(15.0, 20, 0.5);
+        let is_told = |told: &[Warning]| told.iter().any(|w| matches!(w, Warning::Backwards { .. }));
+        assert!(!is_told(&warnings(&walk, |options| options.motion = Motion::Running)));
+        for points in &mut walk.points_px {
+            *points = PerJoint(Joint::ALL.map(|joint| points[joint.mirrored()]));
+        }
+        let told = warnings(&walk, |options| options.motion = Motion::Running);
+        assert!(is_told(&told), "{told:?}");
+    }
+
+    /// A judged sequence of which so many frames have no survivors, and linked postures break so much.
+    fn judged(
+        found: &PostureSequence,
+        walk: &Walk,
+        motion: Motion,
+        empty: usize,
+        breaks: &[Constraint],
+    ) -> Vec<Warning> {
+        let mut frames = found.frames.clone();
+        for frame in frames.iter_mut().take(empty) {
+            frame.as_mut().unwrap().tree.survivors.clear();
+        }
+        // Six of ten linked postures break it.
+        let linked_breaks: Vec<Vec<Constraint>> =
+            (0..10).map(|t| if t < 6 { breaks.to_vec() } else { vec![] }).collect();
+        let options = SequenceOptions { motion, ..with_lengths() };
+        let trees = vec![motion.tree(options.strength); 10];
+        let rays: Vec<JointRays> = frames.iter().map(|f| f.as_ref().unwrap().tree.view.rays).collect();
+        let ground = Some(Ground::of(&walk.camera));
+        let (sequence, lengths) = (walk.sequence(), &found.lengths);
+        let scene = Scene {
+            sequence: &sequence,
+            camera: &walk.camera,
+            ground,
+            rays: &rays,
+            lengths,
+            options: &options,
+        };
+        let of = Found {
+            trees: &trees,
+            frames: &frames,
+            linked: &found.linked,
+            linked_breaks: &linked_breaks,
+            neck: &found.neck,
+            heading: &found.heading,
+        };
+        rejected(&scene, &of)
+    }
+
+    #[test]
+    fn what_leaves_no_posture_is_told_from_half_the_frames_on() {
+        let walk = walk(60.0, 10, 0.5);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let judge = |motion, empty, breaks: &[Constraint]| judged(&found, &walk, motion, empty, breaks);
+        assert_eq!(judge(Motion::Walking, 5, &[]), []);
+        // Bodies could do it, so the rules are against it.
+        let against = judge(Motion::Walking, 6, &[]);
+        assert!(
+            matches!(against[..], [Warning::AgainstRules { frames: 6, of: 10, linked: 0.0, .. }]),
+            "{against:?}"
+        );
+        // Without rules the bodies are.
+        assert_eq!(judge(Motion::Physical, 5, &[]), []);
+        assert_eq!(judge(Motion::Physical, 6, &[]), [Warning::NothingPossible { frames: 6, of: 10 }]);
+        // What the linked postures break.
+        let linked = judge(Motion::Walking, 0, &[Constraint::ArmsOpposed]);
+        assert!(matches!(linked[..], [Warning::AgainstRules { frames: 0, linked: 0.6, .. }]), "{linked:?}");
+        let limits = [Constraint::NeckFlexion];
+        assert_eq!(judge(Motion::Walking, 0, &limits), [Warning::LinkedBreaks { frames: 6, of: 10 }]);
+        // Where nothing is possible, that linked postures break limits is no news.
+        assert_eq!(judge(Motion::Physical, 6, &limits), [Warning::NothingPossible { frames: 6, of: 10 }]);
+    }
+
+    /// Frames in which bodies cannot be either do not count against the rules.
+    #[test]
+    fn impossible_frames_are_not_held_against_the_rules() {
+        let walk = walk(60.0, 10, 0.5);
+        let mut found = walk.postures(&with_lengths()).unwrap();
+        // Legs as thick as trees collide in every posture.
+        let mut thick = Motion::Walking.tree(Strength::Measured);
+        thick.collisions.as_mut().unwrap().leg_m = 2.0;
+        for frame in found.frames.iter_mut().flatten() {
+            frame.tree.survivors.clear();
+        }
+        let options = with_lengths();
+        let rays: Vec<JointRays> = found.frames.iter().map(|f| f.as_ref().unwrap().tree.view.rays).collect();
+        let sequence = walk.sequence();
+        let scene = Scene {
+            sequence: &sequence,
+            camera: &walk.camera,
+            ground: None,
+            rays: &rays,
+            lengths: &found.lengths,
+            options: &options,
+        };
+        let of = Found {
+            trees: &vec![thick; 10],
+            frames: &found.frames,
+            linked: &found.linked,
+            linked_breaks: &vec![vec![]; 10],
+            neck: &found.neck,
+            heading: &found.heading,
+        };
+        assert_eq!(rejected(&scene, &of), [Warning::NothingPossible { frames: 10, of: 10 }]);
+        // Conflicts of sources are told from one frame in ten on.
+        let conflict = |frames| SourceConflict {
+            sources: [AnchorSource::Ground, AnchorSource::Trunk],
+            frames,
+            of: 100,
+            distances_m: [4.0, 5.0],
+            sigmas: 4.0,
+        };
+        let neck = NeckTrack { conflicts: vec![conflict(9), conflict(11)], ..found.neck.clone() };
+        let mut told = Vec::new();
+        judge(&scene, &Found { neck: &neck, ..of }, &mut told);
+        let conflicts: Vec<&Warning> = told.iter().filter(|w| matches!(w, Warning::Conflict(_))).collect();
+        assert_eq!(conflicts, [&Warning::Conflict(conflict(11))]);
+    }
+
+    #[test]
+    fn a_scale_that_nobody_told_is_told() {
+        let walk = walk(60.0, 10, 0.5);
+        let mut low = Camera::level([1920, 1920], 0.9273, 1.2, 5.0).unwrap();
+        low.translation.y = -0.3;
+        let is_assumed = |told: &[Warning]| told.iter().any(|w| matches!(w, Warning::ScaleAssumed { .. }));
+        let trunk = AnchorChoice::Source(AnchorSource::Trunk);
+        assert!(is_assumed(&warnings(&walk, |o| (o.lengths, o.anchor) = (None, trunk.clone()))));
+        assert!(!is_assumed(
+            &warnings(&walk, |o| (o.lengths, o.height_m, o.anchor) = (None, Some(1.6), trunk.clone()))
+        ));
+        assert!(!is_assumed(&warnings(&walk, |o| o.anchor = trunk.clone())));
+        let given = AnchorChoice::Given { distance_m: vec![5.0], sd_m: 0.1 };
+        assert!(!is_assumed(&warnings(&walk, |o| (o.lengths, o.anchor) = (None, given.clone()))));
+        let sunk = Walk { camera: low, ..walk };
+        let told = warnings(&sunk, |_| {});
+        assert!(told.iter().any(|w| matches!(w, Warning::NoGround { .. })), "{told:?}");
+    }
+}

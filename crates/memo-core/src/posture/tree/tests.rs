@@ -239,3 +239,106 @@ fn bad_input_is_refused_with_its_values() {
     let options = options.clone().with_bearings(Bearings { up: Some(DVec3::ZERO), ..Bearings::default() });
     assert!(view.interpret(&options).unwrap_err().to_string().contains("up"));
 }
+
+/// Noise of a joint's depth adds up along its chain, with the neck's; that of lengths without noise of the image
+/// is the one that each length makes.
+#[test]
+fn depths_are_as_unsure_as_their_chain() {
+    let view = View { neck_sd_m: 0.05, ..view_of(3, 1e-3) };
+    let found = view.interpretation(Path::default());
+    for joint in Joint::ALL.into_iter().skip(1) {
+        let mut variance = 0.05f64.powi(2);
+        let mut end = joint;
+        while let Some(start) = end.start() {
+            variance += found.segment_sd_m[end].powi(2);
+            end = start;
+        }
+        assert!((found.depth_sd_m[joint] - variance.sqrt()).abs() < 1e-12, "{joint:?}");
+    }
+    let quiet = View { length_sd_m: 0.02, ..view_of(3, 0.0) };
+    let found = quiet.interpretation(Path::default());
+    for joint in Joint::ALL.into_iter().skip(1) {
+        let ray = quiet.rays.ray[joint];
+        let start = found.figure[joint.start().unwrap()];
+        let across = (start - start.dot(ray) * ray).length();
+        let extent = (quiet.lengths.to[joint].powi(2) - across * across).max(0.0).sqrt();
+        let expected = crate::posture::lift::extent_sd(extent, across, 0.02);
+        assert!((found.segment_sd_m[joint] - expected).abs() < 1e-9, "{joint:?}");
+    }
+}
+
+/// The path of a figure is told by its segments, wherever the figure stands.
+#[test]
+fn a_figure_elsewhere_has_the_same_path() {
+    for seed in 0..10 {
+        let view = view_of(seed, 0.0);
+        let path = Path((seed as u16 * 1237) << 1);
+        let figure = view.interpretation(path).figure;
+        let again = view.interpretation(view.nearest_path(&figure)).figure;
+        let moved = PerJoint(figure.0.map(|p| p + DVec3::new(0.7, -0.2, 1.5)));
+        let elsewhere = view.interpretation(view.nearest_path(&moved)).figure;
+        for joint in Joint::ALL {
+            assert!((again[joint] - figure[joint]).length() < 1e-9);
+            assert!((elsewhere[joint] - figure[joint]).length() < 1e-9);
+        }
+    }
+}
+
+/// Cut branches come as a walk down the tree meets them: near before far, at the first joint at which they part.
+#[test]
+fn cuts_are_in_the_order_of_the_walk() {
+    let options = TreeOptions { keep_cuts: true, ..TreeOptions::physical() };
+    let found = view_of(5, 1e-3).interpret(&options).unwrap();
+    assert!(found.cuts.len() > 20);
+    for pair in found.cuts.windows(2) {
+        let parts =
+            Joint::ALL.into_iter().find(|&joint| pair[0].path.is_far(joint) != pair[1].path.is_far(joint));
+        assert!(parts.is_none_or(|joint| !pair[0].path.is_far(joint)), "{pair:?}");
+    }
+}
+
+/// Of postures that break the constraints alike the first of the walk is taken.
+#[test]
+fn of_equally_bad_postures_the_first_is_taken() {
+    let view = view_of(4, 0.0);
+    let mut lengths = view.lengths;
+    // The shoulders are much too near in every posture, and nothing else is asked.
+    lengths.rigid = [1.4; 4];
+    let anything = |limits: &mut crate::posture::limits::Limits| {
+        let free = crate::posture::limits::AngleRange::from_deg(-400.0, 400.0);
+        (limits.shoulder_swing, limits.shoulder_abduction, limits.hip_swing) = (free, free, free);
+        (limits.hip_abduction, limits.elbow, limits.knee, limits.pelvis_flexion) = (free, free, free, free);
+        limits.pelvis_rotation_rad = 9.0;
+        limits.pelvis_bending_rad = 9.0;
+        limits.hip_flexion_straight_rad = 9.0;
+    };
+    let mut options = TreeOptions::physical_paper();
+    options.collisions = None;
+    anything(options.limits.as_mut().unwrap());
+    let found = View { lengths, ..view }.interpret(&options).unwrap();
+    let least = found.least_violating.unwrap();
+    // Limbs are free: all their joints at the nearer root.
+    for side in Side::BOTH {
+        for joint in [side.elbow(), side.wrist(), side.knee(), side.ankle()] {
+            assert!(!least.interpretation.path.is_far(joint), "{joint:?}");
+        }
+    }
+}
+
+/// Limits of the neck are asked where the head is known.
+#[test]
+fn the_neck_s_limits_need_the_head() {
+    use crate::posture::constraint::Constraint;
+    let without = TreeOptions::physical();
+    let head = Bearings { head: Some(glam::DMat3::IDENTITY), ..Bearings::default() };
+    let with = TreeOptions::physical().with_bearings(head);
+    for constraint in [
+        Constraint::NeckFlexion,
+        Constraint::NeckExtension,
+        Constraint::NeckRotation,
+        Constraint::NeckBending,
+    ] {
+        assert!(!without.asks(constraint) && with.asks(constraint));
+    }
+    assert!(without.asks(Constraint::PelvisFlexion) && with.asks(Constraint::PelvisFlexion));
+}

@@ -233,3 +233,136 @@ fn prior_cost(levels: usize, seen: usize, last: usize, now: usize, prior: Prior)
     });
     prior.as_is * share + partial.sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::Random;
+
+    /// Frames that show random levels, with any costs of their motion; costs of frame 0 and 1 too.
+    fn drawn(levels: usize, frames: usize, random: &mut Random) -> Vec<Step> {
+        let n = 1 << levels;
+        let mut step = || {
+            let seen = 1 + (random.uniform(0.0, (n - 1) as f64) as usize).min(n - 2);
+            let mut motion = vec![0.0; n * n];
+            for (i, cost) in motion.iter_mut().enumerate() {
+                // Of levels that are not seen the motion cannot speak.
+                if (i / n) & !seen == 0 && (i % n) & !seen == 0 {
+                    *cost = random.uniform(0.0, 3.0);
+                }
+            }
+            Step { seen, motion }
+        };
+        (0..frames).map(|_| step()).collect()
+    }
+
+    /// Every history of bits with its cost, level by level as the module head tells it: each level has a list
+    /// of its own bits, in the frames that show it, before which it was not exchanged.
+    fn histories(levels: usize, steps: &[Step], prior: Prior) -> Vec<(Vec<Vec<usize>>, f64)> {
+        let mut all: Vec<(Vec<Vec<usize>>, f64)> = vec![(vec![vec![]; levels], 0.0)];
+        for step in steps {
+            let shown: Vec<usize> = (0..levels).filter(|level| step.seen >> level & 1 == 1).collect();
+            all = all
+                .iter()
+                .flat_map(|history| (0..1usize << shown.len()).map(move |choice| (history, choice)))
+                .map(|((bits, cost), choice)| {
+                    let last = |level: usize, back: usize| {
+                        bits[level].len().checked_sub(back).map_or(0, |at| bits[level][at])
+                    };
+                    let now = |i: usize| choice >> i & 1;
+                    let (mut turned_before, mut turned_now) = (0, 0);
+                    for (i, &level) in shown.iter().enumerate() {
+                        turned_before |= (last(level, 2) ^ last(level, 1)) << level;
+                        turned_now |= (last(level, 1) ^ now(i)) << level;
+                    }
+                    let mut cost = cost + step.motion[(turned_before << levels) | turned_now];
+                    cost += prior.as_is * choice.count_ones() as f64 / shown.len() as f64;
+                    for i in 1..shown.len() {
+                        let differed = last(shown[i - 1], 1) != last(shown[i], 1);
+                        if now(i - 1) != now(i) {
+                            cost += if differed { prior.partial_stay } else { prior.partial_begin };
+                        }
+                    }
+                    let mut longer = bits.clone();
+                    shown.iter().enumerate().for_each(|(i, &level)| longer[level].push(now(i)));
+                    (longer, cost)
+                })
+                .collect();
+        }
+        all
+    }
+
+    /// Best path and probabilities against all histories, one by one.
+    #[test]
+    fn path_and_posterior_are_those_of_all_histories() {
+        let prior = Prior { as_is: 0.7, partial_begin: 1.1, partial_stay: 0.4 };
+        let mut random = Random::new(6);
+        for (levels, frames) in [(1, 8), (2, 6), (3, 4), (2, 7), (3, 5)] {
+            for _ in 0..4 {
+                let steps = drawn(levels, frames, &mut random);
+                let chain = Chain::new(levels, &steps, prior);
+                let (path, posterior) = (chain.best_path(), chain.posterior());
+                let all = histories(levels, &steps, prior);
+                let total: f64 = all.iter().map(|(_, cost)| (-cost).exp()).sum();
+                let (best, _) = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+                let mut shown = vec![0; levels];
+                for (k, step) in steps.iter().enumerate() {
+                    for (level, shown) in shown.iter_mut().enumerate() {
+                        *shown += step.seen >> level & 1;
+                        let Some(at) = shown.checked_sub(1) else { continue };
+                        assert_eq!(path[k] >> level & 1, best[level][at], "step {k} level {level}");
+                        let exchanged = all.iter().filter(|(bits, _)| bits[level][at] == 1);
+                        let p = exchanged.map(|(_, cost)| (-cost).exp()).sum::<f64>() / total;
+                        assert!((posterior.exchanged(k, level, levels) - p).abs() < 1e-12, "{k} {level}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Motion of one level whose every turn costs 9 nats; in some frames it says nothing.
+    fn one_level(frames: usize, silent: &[usize]) -> Vec<Step> {
+        let motion = |k: usize| if silent.contains(&k) { vec![0.0; 4] } else { vec![0.0, 9.0, 9.0, 18.0] };
+        (0..frames).map(|k| Step { seen: 1, motion: motion(k) }).collect()
+    }
+
+    #[test]
+    fn runs_end_where_motion_leaves_the_label_open_for_long() {
+        let no_prior = Prior { as_is: 0.0, partial_begin: 0.0, partial_stay: 0.0 };
+        let runs = |steps: &[Step], sure: f64, patience: usize| {
+            let chain = Chain::new(1, steps, no_prior);
+            chain.runs(&vec![0; steps.len()], &chain.posterior(), sure, patience)
+        };
+        assert_eq!(runs(&one_level(20, &[]), 0.95, 3), [0]);
+        // Two silent frames, and nobody knows whether the label is the same after them as before.
+        assert_eq!(runs(&one_level(20, &[8, 9]), 0.95, 3), [0, 8]);
+        assert_eq!(runs(&one_level(20, &[8, 9, 14, 15]), 0.95, 3), [0, 8, 14]);
+        // Half sure is enough if asked so.
+        assert_eq!(runs(&one_level(20, &[8, 9]), 0.4, 3), [0]);
+        // A frame that is silent on both sides of itself is a moment's doubt: the next ones go on from before.
+        let mut steps = one_level(20, &[8]);
+        // Frame 9 speaks of the change from frame 7 to itself, whatever frame 8 is.
+        steps[9].motion = vec![0.0, 9.0, 9.0, 0.0];
+        assert_eq!(runs(&steps, 0.95, 3), [0]);
+        // A doubt shorter than the patience begins a run if it lasts to the end: here frame 18, and 19 anew.
+        assert_eq!(runs(&one_level(20, &[18, 19]), 0.95, 12), [0, 18, 19]);
+        assert_eq!(runs(&[], 0.95, 3), [] as [usize; 0]);
+    }
+
+    /// One of two levels sure is sure enough.
+    #[test]
+    fn a_run_goes_on_while_any_level_is_sure() {
+        let motion = |is_silent: bool| {
+            let cost = |i: usize| {
+                let (turned_before, turned_now) = (i / 4, i % 4);
+                let turns = |level: usize| (turned_before >> level & 1) + (turned_now >> level & 1);
+                9.0 * (turns(0) as f64 + if is_silent { 0.0 } else { turns(1) as f64 })
+            };
+            (0..16).map(cost).collect()
+        };
+        let steps: Vec<Step> =
+            (0..12).map(|k| Step { seen: 3, motion: motion((5..7).contains(&k)) }).collect();
+        let chain = Chain::new(2, &steps, Prior { as_is: 0.0, partial_begin: 0.0, partial_stay: 0.0 });
+        assert_eq!(chain.runs(&[0; 12], &chain.posterior(), 0.95, 2), [0]);
+    }
+}

@@ -195,3 +195,142 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::Random;
+
+    fn sample(difference: DVec2, mean: DVec2, weight: f64) -> Sample {
+        Sample { difference, mean, weight }
+    }
+
+    /// The formula of the head, by hand: steps of 0.1 and 0.2 s, so q = 2, and weights that differ.
+    #[test]
+    fn costs_of_sign_patterns_are_those_of_the_formula() {
+        let [d0, d1, d2] = [DVec2::new(3.0, 1.0), DVec2::new(4.0, 0.0), DVec2::new(7.0, -2.5)];
+        let scale = Scale { noise_sq: 0.5, acceleration_sq: 200.0, floor_sq: 0.25 };
+        let samples = [(d0, 0.5), (d1, 1.0), (d2, 2.0)].map(|(d, w)| sample(d, DVec2::ZERO, w));
+        let found = triple_costs([1.0, 1.1, 1.3], samples, &scale);
+        // The noise of q d0, (1 + q) d1 and d2 by their weights, of differences of two joints and doubled; the
+        // change of velocity that an acceleration makes over both steps; the floor.
+        let noise = 2.0 * 2.0 * 0.5 * (4.0 / 0.5 + 9.0 + 1.0 / 2.0);
+        let bend = 0.5 * 0.2 * 0.3;
+        let variance = noise + 200.0 * bend * bend + 0.25;
+        let costs: Vec<f64> = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+            .into_iter()
+            .map(|(before, now)| {
+                // From d1 on with the velocity of the step before: d1 + q (d1 - d0).
+                let expected = d1 + 2.0 * (d1 - before * d0);
+                3.0 * (1.0 + (now * d2 - expected).length_squared() / (4.0 * variance)).ln()
+            })
+            .collect();
+        let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        for (found, cost) in found.into_iter().zip(&costs) {
+            assert!((found - (cost - least)).abs() < 1e-12, "{found} {costs:?}");
+        }
+        assert!(found.iter().any(|cost| *cost > 0.5), "{found:?}");
+    }
+
+    /// Uniform motion costs nothing without an exchange, at uneven times; a single frame never says more than 8.
+    #[test]
+    fn uniform_motion_is_free_and_no_frame_decides_alone() {
+        let at = |time_s: f64| DVec2::new(50.0 + 30.0 * time_s, -20.0 * time_s);
+        let times_s = [0.0, 0.03, 0.11];
+        let scale = Scale { noise_sq: 1e-6, acceleration_sq: 0.0, floor_sq: 1e-9 };
+        let samples = times_s.map(|time_s| sample(at(time_s), DVec2::ZERO, 1.0));
+        assert_eq!(triple_costs(times_s, samples, &scale), [0.0, 8.0, 8.0, 8.0]);
+    }
+
+    /// A sum of slow sines of random phases, its acceleration's mean square, and noise added.
+    struct Drawn {
+        means: Vec<DVec2>,
+        differences: Vec<DVec2>,
+        acceleration_sq: f64,
+    }
+
+    fn drawn(times_s: &[f64], noise_sd: f64, random: &mut Random) -> Drawn {
+        let waves: Vec<[f64; 4]> = (0..12)
+            .map(|_| [random.uniform(2.0, 6.0), random.uniform(0.0, 6.3), random.uniform(0.0, 6.3), 0.0])
+            .collect();
+        let at = |time_s: f64, size: f64| -> DVec2 {
+            waves
+                .iter()
+                .map(|[rate, x, y, _]| {
+                    size * DVec2::new((rate * time_s + x).sin(), (rate * time_s + y).sin())
+                })
+                .sum()
+        };
+        let mut noise = || noise_sd * DVec2::from(random.normal_pair().map(f64::from));
+        let (mut means, mut differences) = (vec![], vec![]);
+        for &time_s in times_s {
+            // Noise of the right and of the left joint.
+            let (right, left) = (noise(), noise());
+            means.push(at(time_s, 4.0) + 0.5 * (right + left));
+            differences.push(at(time_s, 12.0) + right - left);
+        }
+        let acceleration_sq = waves.iter().map(|[rate, ..]| 0.5 * (12.0 * rate * rate).powi(2)).sum();
+        Drawn { means, differences, acceleration_sq }
+    }
+
+    /// Noise and acceleration planted are found, whatever the rate.
+    #[test]
+    fn planted_noise_and_acceleration_are_found() {
+        let mut random = Random::new(17);
+        for rate_hz in [50.0, 100.0] {
+            let times_s: Vec<f64> = (0..4000).map(|t| f64::from(t) / rate_hz).collect();
+            let drawn = drawn(&times_s, 1.5, &mut random);
+            let pairs = drawn.differences.iter().zip(&drawn.means);
+            let track: Track = pairs.map(|(d, m)| Some(sample(*d, *m, 1.0))).collect();
+            let signs = vec![vec![1.0; track.len()]];
+            let [found] = scales(&times_s, &[track], Some(&signs))[..] else { panic!() };
+            let noise_sd = found.noise_sq.sqrt();
+            assert!((noise_sd / 1.5 - 1.0).abs() < 0.1, "{rate_hz} Hz: {noise_sd}");
+            let ratio = (found.acceleration_sq / drawn.acceleration_sq).sqrt();
+            assert!((ratio - 1.0).abs() < 0.25, "{rate_hz} Hz: {ratio}");
+            // Half a percent of the usual distance: nothing is known better.
+            let mut lengths: Vec<f64> = drawn.differences.iter().map(|d| d.length()).collect();
+            lengths.sort_by(f64::total_cmp);
+            assert!((found.floor_sq.sqrt() / (0.005 * lengths[2000]) - 1.0).abs() < 0.01);
+        }
+    }
+
+    /// Without signs the smoothest pattern of each triple is taken: exchanges change nothing of what is found.
+    #[test]
+    fn exchanges_do_not_disturb_the_scales() {
+        let mut random = Random::new(4);
+        let times_s: Vec<f64> = (0..600).map(|t| f64::from(t) / 50.0).collect();
+        let drawn = drawn(&times_s, 0.5, &mut random);
+        let track = |flip: &dyn Fn(usize) -> bool| -> Track {
+            let sign = |t: usize| if flip(t) { -1.0 } else { 1.0 };
+            (0..600).map(|t| Some(sample(sign(t) * drawn.differences[t], drawn.means[t], 1.0))).collect()
+        };
+        let straight = scales(&times_s, &[track(&|_| false)], None)[0];
+        let exchanged = scales(&times_s, &[track(&|t| t % 3 == 0)], None)[0];
+        assert_eq!(straight.noise_sq, exchanged.noise_sq);
+        assert!((straight.acceleration_sq / exchanged.acceleration_sq - 1.0).abs() < 1e-9);
+    }
+
+    /// Detections off their neighbours' line go, a small one beside a large one too, in mean or difference;
+    /// exchanges stay.
+    #[test]
+    fn outliers_go_and_exchanges_stay() {
+        let mut random = Random::new(8);
+        let times_s: Vec<f64> = (0..120).map(|t| f64::from(t) / 25.0).collect();
+        let drawn = drawn(&times_s, 0.3, &mut random);
+        let mut track: Track =
+            (0..120).map(|t| Some(sample(drawn.differences[t], drawn.means[t], 1.0))).collect();
+        let far = DVec2::new(90.0, -70.0);
+        for (t, size) in [(20, 10.0), (22, 1.0), (80, 1.0)] {
+            track[t] = Some(sample(drawn.differences[t], drawn.means[t] + size * far, 1.0));
+        }
+        // Both joints off in opposite directions: the mean is where it was.
+        track[50] = Some(sample(drawn.differences[50] + 2.0 * far, drawn.means[50], 1.0));
+        for t in [35, 36, 65] {
+            track[t] = Some(sample(-drawn.differences[t], drawn.means[t], 1.0));
+        }
+        assert_eq!(drop_outliers(&times_s, &mut track), [20, 22, 50, 80]);
+        let left: Vec<usize> = (0..120).filter(|&t| track[t].is_none()).collect();
+        assert_eq!(left, [20, 22, 50, 80]);
+    }
+}

@@ -177,6 +177,7 @@ pub fn report(path: Path, beginning: Beginning, direction: Direction) -> StartRe
         p_other_direction: 0.01,
         lines: TwinLines { best: line, twin },
         other_direction: PhaseLine { rate_hz: -line.rate_hz, similarity: 0.3, ..line },
+        frozen: PhaseLine { rate_hz: 0.0, similarity: 0.35, ..line },
         two_line_rule: TwoLineChoice { line, on_line: Vec::new(), by_similarity: false },
         curves: Vec::new(),
         frames: Vec::new(),
