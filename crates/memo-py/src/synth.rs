@@ -24,7 +24,10 @@ fn grey_frame(
     draw: impl FnOnce() -> Image<u8> + Send,
 ) -> PyResult<Bound<'_, PyArray2<u8>>> {
     if index >= count {
-        return Err(PyIndexError::new_err(format!("frame {index} of a scene with {}", counted(count, "frame"))));
+        return Err(PyIndexError::new_err(format!(
+            "frame {index} of a scene with {}",
+            counted(count, "frame")
+        )));
     }
     numpy_from_image(py, py.detach(draw))
 }
@@ -68,7 +71,9 @@ impl PyClothedScene {
             }
         };
         if !(1..=MOST_FRAMES).contains(&frames) {
-            return Err(PyValueError::new_err(format!("frames must be between 1 and {MOST_FRAMES}, got {frames}")));
+            return Err(PyValueError::new_err(format!(
+                "frames must be between 1 and {MOST_FRAMES}, got {frames}"
+            )));
         }
         let options = ClothedOptions {
             seed,

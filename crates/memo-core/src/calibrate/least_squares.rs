@@ -150,7 +150,12 @@ mod tests {
         assert!(with(1e-4).is_some());
         assert!(with(1e-7).is_none() && with(0.0).is_none());
         let idle = |p: &DVector<f64>| Some(vector(&[p[0] - 1.0, p[0] + 1.0]));
-        assert!(minimise(vector(&[0.2, 0.3]), &[1e-3, 1e-3], MOST_ITERATIONS, idle).unwrap().unit_covariance().is_none());
+        assert!(
+            minimise(vector(&[0.2, 0.3]), &[1e-3, 1e-3], MOST_ITERATIONS, idle)
+                .unwrap()
+                .unit_covariance()
+                .is_none()
+        );
     }
 
     /// Rosenbrock's valley, (1 - x, 10 (y - x²)) from (-1.2, 1): its floor at (1, 1) is far along a bend.

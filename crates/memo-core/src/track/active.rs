@@ -253,6 +253,40 @@ mod tests {
         assert!(!active(Vec::new()).is_over());
     }
 
+    /// 40 frames at these speeds throughout, by somebody 1.75 m high.
+    fn steady(speed_mps: f64, rate_hz: f64) -> Active {
+        let at = |k: usize| [speed_mps, rate_hz].map(|v| v * FRAME_S * k as f64);
+        active((0..40).map(|k| step(k, at(k), 0.5)).collect())
+    }
+
+    #[test]
+    fn what_does_not_get_on_with_its_legs_is_no_walk() {
+        for (speed_mps, rate_hz, is_walk) in [
+            (1.2, 0.9, true),
+            (-1.2, -0.9, true),
+            // Elderly walkers and the fastest: strides of 0.5 and 1.2 body heights.
+            (0.7 * 0.5 * 1.75, 0.7, true),
+            (1.2 * 1.2 * 1.75, 1.2, true),
+            // Legs that go forward while the body goes back.
+            (1.2, -0.9, false),
+            (-1.2, 0.9, false),
+            // Less than 0.25 m/s or 0.3 Hz, however they go together.
+            (0.24, 0.35, false),
+            (0.26, 0.35, true),
+            (0.5, 0.29, false),
+            (0.5, 0.31, true),
+            // Strides of 0.24 and 1.7 heights.
+            (0.24 * 1.75, 1.0, false),
+            (0.26 * 1.75, 1.0, true),
+            (1.7 * 1.75, 1.0, false),
+            (1.5 * 1.75, 1.0, true),
+            (0.0, 0.0, false),
+        ] {
+            assert_eq!(steady(speed_mps, rate_hz).is_walk(), is_walk, "{speed_mps} m/s, {rate_hz} Hz");
+        }
+        assert!(!active(Vec::new()).is_walk(), "without a frame");
+    }
+
     fn frames(active: &Active) -> (usize, usize) {
         let steps = &active.walk.twins[0].steps;
         assert_eq!(active.walk.twins[1].steps.len(), steps.len(), "both twins alike");

@@ -37,6 +37,23 @@ fn a_planted_line_is_found_though_single_frames_lie() {
     assert_eq!(choice.on_line.iter().filter(|on| !**on).count(), 4);
 }
 
+/// Half a cycle in 13 frames explains a walker, one phase somebody who keeps a posture.
+#[test]
+fn one_phase_explains_who_does_not_walk() {
+    let curves = |rate_hz: f64| -> Vec<PhaseCurve> {
+        (0..13).map(|k| 0.04 * f64::from(k)).map(|t| curve(t, 0.3 + rate_hz * t, 0.5)).collect()
+    };
+    let frozen = frozen_line(&curves(0.0)).unwrap();
+    assert!((frozen.phase_at_start - 0.3).abs() < 0.006 && frozen.rate_hz == 0.0, "{frozen:?}");
+    assert!((frozen.similarity - 0.4).abs() < 1e-3, "the mean over frames: {frozen:?}");
+    for (rate_hz, walks) in [(0.95, true), (0.0, false), (0.1, false)] {
+        let curves = curves(rate_hz);
+        let line = phase_lines(&curves, &CadenceRange::default()).unwrap().best;
+        assert_eq!(line.similarity > frozen_line(&curves).unwrap().similarity, walks, "{rate_hz}");
+    }
+    assert_eq!(frozen_line(&[]), None);
+}
+
 fn estimate(time_s: f64, phase: f64, similarity: f64) -> PhaseEstimate {
     PhaseEstimate { time_s, phase: phase.rem_euclid(1.0), similarity }
 }

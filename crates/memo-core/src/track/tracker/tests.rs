@@ -254,18 +254,39 @@ fn a_long_walk_is_handed_out_and_followed_on_as_a_new_one() {
     assert_eq!(LONGEST_WALK, 20_000);
 }
 
+/// A tracker that has followed somebody for 60 frames, who stood still in the last 15 of them.
+fn following_to_a_stop() -> Tracker {
+    let mut tracker = following(60, 0.0, 1.2);
+    for twin in &mut tracker.walking.as_mut().unwrap().walk.twins {
+        let stop = twin.steps[44].state;
+        twin.steps[45..].iter_mut().for_each(|step| step.state = stop);
+    }
+    tracker
+}
+
 #[test]
 fn who_stands_still_is_let_go_once_the_person_is_fitted() {
     for fitted in [true, false] {
-        let mut tracker = following(40, 0.0, 0.0);
+        let mut tracker = following_to_a_stop();
         tracker.walking.as_mut().unwrap().fitted = fitted;
-        tracker.advance(&evidence(40, &[])).unwrap();
+        tracker.advance(&evidence(60, &[])).unwrap();
         assert_eq!(tracker.walking.is_none(), fitted);
         assert_eq!(tracker.take_finished().len(), usize::from(fitted));
+        assert_eq!(tracker.seek_report().refused_starts, 0);
     }
     let mut walks_on = following(40, 0.0, 1.2);
     walks_on.advance(&evidence(40, &[])).unwrap();
     assert!(walks_on.walking.is_some());
+}
+
+#[test]
+fn who_never_got_on_is_refused_at_the_end() {
+    for speed_mps in [0.0, -1.2, 4.0] {
+        let mut tracker = following(40, 0.0, speed_mps);
+        tracker.finish().unwrap();
+        assert!(tracker.take_finished().is_empty(), "{speed_mps}");
+        assert_eq!(tracker.seek_report().refused_starts, 1);
+    }
 }
 
 #[test]
