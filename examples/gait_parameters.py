@@ -27,7 +27,7 @@ for sentence in track.sentences:
     print(sentence)
 
 # %%
-# Several walks: speed with its interval, and the speed with which each walker was drawn. (For many videos
+# Several walks: speed with its interval, and the speed with which each person was drawn. (For many videos
 # there is `memo batch`.)
 
 seeds = range(4)

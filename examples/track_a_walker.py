@@ -2,7 +2,7 @@
 Track a walker
 ==============
 
-A synthetic walker crosses the picture. Its motion is known, so what tracking finds can be compared.
+A drawn person crosses a room. The motion is known, so what tracking finds can be compared.
 """
 
 import matplotlib.pyplot as plt
@@ -33,8 +33,8 @@ ax.imshow(draw_row(scene.frames[track.columns["frame"][row]], track, row))
 ax.set_axis_off()
 
 # %%
-# Against the truth. The knee's curve is that of average gait at the phase found; the walker here has no
-# other.
+# Against the truth. The knee's curve is that of average gait at the phase found, and this person walks by
+# curves of their own: what is left between the two is what the average does not know.
 
 found, true = track.columns, scene.truth
 rows = np.searchsorted(true["frame"], found["frame"])

@@ -18,7 +18,7 @@ from memo.run import Source, write_run
 from memo.video import VideoReader
 
 # %%
-# A run: here of the synthetic walker, whose frames are written as a folder of images. `memo track` leaves
+# A run: here of a drawn person, whose frames are written as a folder of images. `memo track` leaves
 # such a folder of results; for that, nothing of this block is needed.
 
 scene = memo.demo_scene(seed=0)

@@ -557,6 +557,38 @@ def _(d, name):
     )
 
 
+@case(
+    "ClothedScene.__new__",
+    "ClothedScene.frame",
+    "ClothedScene.time_s",
+    "ClothedScene.truth",
+    "ClothedScene.contacts",
+    "ClothedScene.camera",
+    "ClothedScene.height_m",
+    "ClothedScene.speed_mps",
+    "ClothedScene.heading_rad",
+    "ClothedScene.__len__",
+)
+def _(d, name):
+    options = d.options(
+        frames=lambda: d.whole(1, 200),
+        noise_sd=lambda: d.number(0, 255),
+        leftward=lambda: d.choice(None, True, False),
+        late_left=lambda: d.number(-0.1, 0.1),
+        slant_rad=lambda: d.number(-1, 1),
+        mover=lambda: d.choice("walker", "rider", "waver", "trolley"),
+    )
+    scene = _memo.ClothedScene(d.whole(0, 2**62), **options)
+    member = name.split(".")[1]
+    if member in ("frame", "time_s", "truth"):
+        return getattr(scene, member)(d.whole(0, len(scene)))
+    if member == "contacts":
+        return scene.contacts()
+    if member == "__new__":
+        return scene
+    return len(scene) if member == "__len__" else getattr(scene, member)
+
+
 def tracker_options(d):
     return d.options(
         fov_deg=lambda: d.number(5, 170),
@@ -1141,6 +1173,8 @@ def _(d):
     options = d.options(
         noise_sd=lambda: d.number(0, 300),
         leftward=lambda: d.choice(None, True, False),
+        late_left=lambda: d.number(-0.1, 0.1),
+        mover=lambda: d.choice("walker", "rider", "waver", "trolley"),
         progress=d.called_back,
     )
     return repr(memo.demo_scene(d.whole(0, 2**62), frames=d.whole(0, 14), **options))

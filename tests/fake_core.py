@@ -157,8 +157,14 @@ def demo_scene(seed=0):
     camera = Camera((160, 120))
     times_s = np.arange(20) / 25
     frames = np.random.default_rng(seed).integers(0, 255, (20, 120, 160), dtype=np.uint8)
+    events = {
+        "time_s": np.array([0.2, 0.5]),
+        "event": np.array(["heel_strike"] * 2),
+        "side": np.array(["left", "right"]),
+    }
+    truth = walk(times_s, camera)
     return SimpleNamespace(
-        frames=frames, times_s=times_s, camera=camera, height_m=1.75, truth=walk(times_s, camera)
+        frames=frames, times_s=times_s, camera=camera, height_m=1.75, truth=truth, events=events
     )
 
 

@@ -21,7 +21,7 @@ def main() -> None:
     error_m = np.abs(
         track.columns["x_m"] - np.interp(track.columns["frame"], scene.truth["frame"], scene.truth["x_m"])
     )
-    assert len(track) > 60 and error_m.max() < 0.03, (len(track), error_m.max())
+    assert len(track) > 60 and error_m.max() < 0.1, (len(track), error_m.max())
     assert repr(pickle.loads(pickle.dumps(track))) == repr(track)
     walk = memo.walker_motion(60, rate_hz=30)
     dots = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)

@@ -9,6 +9,7 @@ import sys
 import time
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import memo
@@ -17,7 +18,7 @@ import pytest
 import typer
 from conftest import shared_video
 from memo import cli
-from memo.cli.demo import from_truth
+from memo.cli.demo import from_truth, strikes_from_truth
 from memo.files import (
     TRACK_COLUMNS,
     complete_file,
@@ -245,6 +246,28 @@ def test_truth_is_compared_by_frame_number(core):
     differences = from_truth(columns, truth)
     assert differences["frames"] == 20 and differences["phase"] == pytest.approx(0.01)
     assert differences["x_m"] == pytest.approx(0.03) and differences["y_m"] == 0
+
+
+def test_heel_strikes_are_compared_by_time_and_side():
+    def strike(time_s, side, event="heel_strike"):
+        return {"time_s": time_s, "event": event, "side": side}
+
+    drawn = [strike(0.1, "left"), strike(0.5, "right"), strike(0.6, "right", "toe_off"), strike(1.0, "left")]
+    columns = {name: np.array([event[name] for event in drawn]) for name in ("time_s", "event", "side")}
+
+    def compared(*found, until_s=2.0):
+        tracked = {"time_s": np.linspace(0.0, until_s, 50)}
+        return strikes_from_truth(SimpleNamespace(columns=tracked, events=list(found)), columns)
+
+    both = compared(strike(0.13, "left"), strike(0.46, "right"), strike(1.0, "right"), strike(1.2, "left"))
+    assert both["heel_strikes"] == 3 and both["heel_strikes_found"] == 2
+    assert both["heel_strike_s"] == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 2))
+    assert compared(strike(0.1, "left"), until_s=0.7)["heel_strikes"] == 2
+    assert compared(strike(0.1, "right"), strike(0.1, "left", "toe_off")) == {
+        "heel_strikes": 3,
+        "heel_strikes_found": 0,
+    }
+    assert strikes_from_truth(SimpleNamespace(columns={"time_s": np.array([])}, events=[]), columns) == {}
 
 
 def interrupted(process, started, after_s=0.3):

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 __all__ = [
     "Camera",
+    "ClothedScene",
     "Explainer",
     "InternalError",
     "Scene",

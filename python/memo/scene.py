@@ -37,8 +37,8 @@ class DemoScene:
     height_m: float
     #: Columns of `track.csv` that have a truth, one row per frame with the walker in it.
     truth: Columns
-    #: Columns `time_s`, `event` and `side` of `events.csv`: when the drawn feet touch and leave the floor; empty for
-    #: a scene drawn from the model, which has no floor to touch.
+    #: Columns `time_s`, `event` and `side` of `events.csv`: when the drawn feet touch and leave the floor;
+    #: empty for a scene drawn from the model, which has no floor to touch.
     events: Columns = field(default_factory=dict)
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -63,21 +63,25 @@ def demo_scene(
     """Draws a person in clothes who walks through a room, 25 frames a second.
 
     Body, gait and picture share nothing with the model that tracks: round limbs in clothes, joint curves with
-    deviations of 5 to 10 degrees from the average, uneven sides, a textured wall and a contact shadow. Proportions,
-    clothes, gait, heading, camera, room and all that is None follow from the seed.
+    deviations of 5 to 10 degrees from the average, uneven sides, a textured wall and a contact shadow.
+    Proportions, clothes, gait, heading, camera, room and all that is None follow from the seed.
 
-    `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle by which
-    the left foot strikes late (-0.1 to 0.1). Other movers than a walker are there to be refused: a `rider` carried
-    along in one posture, a `waver` who stands and swings the arms, a `trolley`; they have no truth. `progress` is
-    called with the number of frames drawn and of all.
+    `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
+    by which the left foot strikes late (-0.1 to 0.1). Other movers than a walker are there to be refused: a
+    `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`; they have no
+    truth. `progress` is called with the number of frames drawn and of all.
     """
     scene = _memo.ClothedScene(
         seed, frames=frames, noise_sd=noise_sd, leftward=leftward, late_left=late_left, mover=mover
     )
     rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
     truth = _truth(scene, [(index, centre, phase, *pose) for index, centre, phase, pose in rows])
-    times_s, kinds, sides = zip(*scene.contacts(), strict=True) if rows else ((), (), ())
-    events: Columns = {"time_s": np.array(times_s, float), "event": np.array(kinds), "side": np.array(sides)}
+    contacts = scene.contacts()
+    events: Columns = {
+        "time_s": np.array([time_s for time_s, _, _ in contacts], float),
+        "event": np.array([kind for _, kind, _ in contacts], "U11"),
+        "side": np.array([side for _, _, side in contacts], "U5"),
+    }
     return _drawn(scene, truth, events, progress)
 
 
@@ -89,10 +93,10 @@ def model_scene(
     leftward: bool | None = None,
     progress: Progress | None = None,
 ) -> DemoScene:
-    """Draws the model itself as a walker before a wall, like the synthetic sequence of Rohr 1994 (Figs. 23, 26, 27).
+    """Draws the model itself as a walker before a wall, as in Rohr 1994 (Figs. 23, 26, 27).
 
-    What tracking reaches here is bounded by the method alone, not by how people differ from the model. Options as
-    for `demo_scene`.
+    What tracking reaches here is bounded by the method alone, not by how people differ from the model.
+    Options as for `demo_scene`.
     """
     scene = _memo.Scene(seed, frames=frames, noise_sd=noise_sd, leftward=leftward)
     rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
@@ -118,7 +122,9 @@ def _truth(
 ) -> Columns:
     """Columns of rows of frame, torso centre, phase, joints (2, 6, 3) and angles in degrees."""
     joints = np.array([points for _, _, _, points, _ in rows]).reshape(-1, 12, 3)
-    pixels = np.array([scene.camera.project(np.ascontiguousarray(points)) for points in joints]).reshape(-1, 12, 2)
+    pixels = np.array([scene.camera.project(np.ascontiguousarray(points)) for points in joints]).reshape(
+        -1, 12, 2
+    )
     angles = np.array([angles for *_, angles in rows]).reshape(-1, 8)
     torso = np.array([centre for _, centre, *_ in rows]).reshape(-1, 3)
     columns: Columns = {

@@ -1,4 +1,4 @@
-"""`memo demo`: a walker whose motion is known, tracked and compared.
+"""`memo demo`: a drawn person whose motion is known, tracked and compared.
 
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
@@ -16,7 +16,7 @@ from memo.cli.track import deliver_interrupted, report
 from memo.exits import Exit
 from memo.files import JOINTS
 from memo.given import check_writable
-from memo.recording import follow, write_results, write_tables
+from memo.recording import Recorded, follow, write_results, write_tables
 from memo.run import Source
 from memo.wording import counted
 
@@ -30,9 +30,13 @@ EPILOG = """Examples:
   memo demo --seed 3 --out another
   memo demo --json
 
-Exit codes: 0 the walker was tracked; 1 the results cannot be written; 2 wrong usage; \
-3 no walker was tracked; 4 the app extra is not installed; 130 interrupted \
+Exit codes: 0 the person was tracked; 1 the results cannot be written; 2 wrong usage; \
+3 nobody was tracked; 4 the app extra is not installed; 130 interrupted \
 (what was tracked until then is written)."""
+
+
+#: A heel strike farther from the drawn one was not found: about a sixth of a cycle, seconds.
+NEAR_S = 0.15
 
 
 def add_demo(app: "typer.Typer") -> None:
@@ -45,7 +49,7 @@ def add_demo(app: "typer.Typer") -> None:
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Draws a walker whose motion is known, tracks it and compares."""
+        """Draws a person whose motion is known, tracks it and compares."""
         delivery = Delivery(out, as_json=as_json, quiet=quiet)
         raise typer.Exit(guarded(lambda: _demo(delivery, seed)))
 
@@ -64,7 +68,7 @@ def _demo(delivery: Delivery, seed: int) -> Exit:
             write_results(recorded, delivery.out, frames, len(frames), progress=progress)
     if recorded.interrupted:
         return deliver_interrupted(recorded, delivery)
-    differences = from_truth(recorded.columns, scene.truth)
+    differences = from_truth(recorded.columns, scene.truth) | strikes_from_truth(recorded, scene.events)
     report(recorded, delivery, {"rms_from_truth": differences})
     if delivery.talks:
         for line in _described(differences):
@@ -103,15 +107,40 @@ def from_truth(columns: dict[str, Any], truth: dict[str, Any]) -> dict[str, floa
     }
 
 
+def strikes_from_truth(recorded: Recorded, drawn: dict[str, Any]) -> dict[str, float]:
+    """Heel strikes drawn while the person was tracked, how many of them were found within `NEAR_S`, and the
+    root mean square difference of these in seconds; empty if nobody was tracked or no heel strike drawn."""
+    times_s = recorded.columns["time_s"]
+    if not len(times_s):
+        return {}
+    is_strike = (
+        (drawn["event"] == "heel_strike") & (drawn["time_s"] >= times_s[0]) & (drawn["time_s"] <= times_s[-1])
+    )
+    nearest = []
+    for time_s, side in zip(drawn["time_s"][is_strike], drawn["side"][is_strike], strict=True):
+        found = [e["time_s"] for e in recorded.events if e["event"] == "heel_strike" and e["side"] == side]
+        nearest.append(min((abs(other - time_s) for other in found), default=math.inf))
+    near = [difference for difference in nearest if difference <= NEAR_S]
+    if not nearest:
+        return {}
+    figures = {"heel_strikes": len(nearest), "heel_strikes_found": len(near)}
+    return figures | ({"heel_strike_s": math.sqrt(np.mean(np.square(near)))} if near else {})
+
+
 def _described(differences: dict[str, float]) -> list[str]:
     """The differences in sentences."""
     if not differences:
         return []
     torso = ", ".join(f"{axis} {100 * differences[f'{axis}_m']:.1f} cm" for axis in "xyz")
     phase, angles = differences["phase"], differences["hips_and_knees_deg"]
-    return [
+    lines = [
         f"Against the drawn truth, root mean square over {counted(differences['frames'], 'frame')}:",
         f"  torso {torso}",
         f"  phase {phase:.3f} of a cycle, hips and knees {angles:.1f} degrees",
         f"  joints {100 * differences['joints_m']:.1f} cm in space",
     ]
+    if "heel_strike_s" in differences:
+        found, drawn = differences["heel_strikes_found"], differences["heel_strikes"]
+        off_ms = 1e3 * differences["heel_strike_s"]
+        lines.append(f"  {found} of {counted(drawn, 'heel strike')} found, {off_ms:.0f} ms off")
+    return lines
