@@ -1,4 +1,5 @@
-//! The whole tracker on synthetic sequences with ground truth: 20 seeds, noise sigma 5, both directions.
+//! The whole tracker on walkers drawn from its own model, noise of 5 grey levels, both directions: what the method
+//! reaches where the model is right. People who differ from it are in `clothed_walks`.
 
 use memo_core::synth::{SceneOptions, SynthScene};
 use memo_core::track::result::{EventKind, Side, TrackedWalk};
@@ -47,10 +48,11 @@ fn errors(scene: &SynthScene, walk: &TrackedWalk) -> [f64; 3] {
 }
 
 #[test]
-fn twenty_seeds_in_both_directions() {
+fn the_model_itself_is_tracked_to_the_centimetre_in_both_directions() {
+    let seeds = if std::env::var_os("MEMO_FULL").is_some() { 20 } else { 6 };
     let mut worst = [0.0f64; 3];
     let mut all = [0.0f64; 3];
-    for seed in 0..20 {
+    for seed in 0..seeds {
         let scene =
             SynthScene::new(SceneOptions { seed, leftward: Some(seed % 2 == 0), ..SceneOptions::default() })
                 .unwrap();
@@ -65,7 +67,7 @@ fn twenty_seeds_in_both_directions() {
         assert!(errors[2] < 0.1, "seed {seed}: half a cycle off? {errors:?}");
         for i in 0..3 {
             worst[i] = worst[i].max(errors[i]);
-            all[i] += errors[i] * errors[i] / 20.0;
+            all[i] += errors[i] * errors[i] / seeds as f64;
         }
     }
     let rms = all.map(f64::sqrt);
