@@ -128,6 +128,8 @@ def test_only_what_excludes_zero_is_said():
     assert symmetry_sentences(gait_table([LINES]), 0) == [
         "The left step is 10 cm shorter than the right (3 to 17)."
     ]
+    wide = [(*line[:2], 0.1 if line[1] == "left" else line[2], *line[3:]) for line in LINES]
+    assert symmetry_sentences(gait_table([wide]), 0)[0].startswith("The left step is 60 cm shorter")
     unknown = [(*line[:2], np.nan, line[3], np.nan, np.nan, 0) for line in LINES]
     assert symmetry_sentences(gait_table([LINES, unknown]), 1) == []
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from memo import batch, cli
-from memo.given import is_url, nothing_at
+from memo.given import InputError, is_url, nothing_at, tracker_options
 
 
 @pytest.fixture
@@ -113,6 +113,15 @@ def test_a_file_called_like_a_url_is_read(command, tmp_path, write_video, luma_f
 def test_what_is_not_there_or_has_no_effect_is_refused(command, tmp_path, line, says):
     assert command(line) == (1, f"memo: {says}\n")
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_how_a_camera_file_is_read_needs_one():
+    reading = {"name": None, "unit": None, "size": None, "v_up": None}
+    assert tracker_options(1.7, None, reading, None) == {"height_m": 1.7}
+    assert tracker_options(1.7, None, reading, 60.0) == {"height_m": 1.7, "fov_deg": 60.0}
+    for name, option in (("unit", "--camera-unit"), ("v_up", "--camera-v-up")):
+        with pytest.raises(InputError, match=f"{option} needs --camera"):
+            tracker_options(1.7, None, reading | {name: "m"}, None)
 
 
 def test_dots_with_a_lifetime_are_shown(command, tmp_path):

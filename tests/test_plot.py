@@ -7,7 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from memo.overlay import CONTOUR, draw_row, draw_segments, draw_text, write_overlay
-from memo.plot import _cut_at_wraps, plot_angles, plot_motion, plot_similarity, plot_start, write_plots
+from memo.plot import (
+    _cut_at_wraps,
+    _phase_line,
+    plot_angles,
+    plot_motion,
+    plot_similarity,
+    plot_start,
+    write_plots,
+)
 from memo.video import Frame, VideoReader
 
 WHITE = (255, 255, 255)
@@ -130,6 +138,12 @@ def test_start_line_passes_through_the_tracked_phases(track):
     frames, swapped = ax.lines[2].get_data()
     known = ~np.isnan(swapped)
     np.testing.assert_allclose(swapped[known], (frames[known] * 0.9 / 25 + 0.5) % 1, atol=1e-6)
+
+
+def test_two_frames_have_a_line_and_one_has_none():
+    two = {"frame": np.array([4, 6]), "phase": np.array([0.9, 0.1])}
+    assert _phase_line(two)(5) == pytest.approx(1.0)
+    assert _phase_line({name: values[:1] for name, values in two.items()}) is None
 
 
 def test_a_line_is_cut_where_the_phase_starts_anew_forwards_and_backwards():

@@ -359,6 +359,7 @@ def test_lee_chens_tables_are_those_of_the_paper(papers):
         assert row.verdict is Verdict.SAME and row.ours == ours
     assert sum(row.item == "Table 1" for row in made.rows) == 13
     assert sum(row.item == "Table A.1" for row in made.rows) == 10
+    assert sum(row.item == "Table A.2 (b)" for row in made.rows) == 2
     leaves = [row for row in made.rows if row.quantity.startswith("level 13, left ankle")]
     assert [row.printed for row in leaves] == ["192 96 80; 32 20 28", "44 32 8; 6 5 4"]
     assert all(row.verdict is Verdict.IN_KIND for row in leaves)

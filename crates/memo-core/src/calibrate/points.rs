@@ -243,6 +243,7 @@ fn check(places: &[DVec3], pixels: &[DVec2]) -> Result<(), PointError> {
 }
 
 /// How points spread.
+#[derive(Debug)]
 struct Shape {
     /// Second and third over first singular value of the centred points.
     ratios: [f64; 2],
@@ -766,6 +767,22 @@ mod tests {
             if let Ok(found) = camera_from_points(&places, &pixels, &options) {
                 prop_assert!(found.camera.validated().is_ok());
             }
+        }
+    }
+
+    #[test]
+    fn the_shape_of_points_does_not_depend_on_their_unit() {
+        for unit in [1e-3, 1.0, 1e3] {
+            let corners: Vec<DVec3> = (0..8)
+                .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
+                .map(|corner| unit * DVec3::new(4.0, 2.0, 1.0) * corner)
+                .collect();
+            let shape = Shape::of(&corners);
+            assert!(
+                (shape.ratios[0] - 0.5).abs() < 1e-9 && (shape.ratios[1] - 0.25).abs() < 1e-9,
+                "{shape:?}"
+            );
+            assert!((shape.normal.z.abs() - 1.0).abs() < 1e-9);
         }
     }
 

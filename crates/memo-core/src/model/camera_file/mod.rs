@@ -675,6 +675,7 @@ rvec: [ 1.623156204, 0., 0. ]\ntvec: [ 0.1, 1.18, 4.4 ]\n";
         assert!(said(&text, Some("1"), None).contains("does not say how large the picture is"));
         assert!(said("1 2\n3\n", None, size).ends_with("line 2: 1 number, 2 in the first row"));
         assert!(said("1\n2\nx\n", None, size).ends_with("line 3: \"x\" is no number"));
+        assert!(said(&"1\n".repeat(13), None, size).ends_with("line 12: more than 11 rows of coefficients"));
         assert!(said("1\n2\n", None, size).ends_with("expected 11 rows, a column a camera; got 2 rows of 1"));
         let up: String = coefficients(&camera, true).iter().map(|x| format!("{x:?}\n")).collect();
         assert_eq!(read(&up, None, size), Err(CameraFileError::MirroredDlt));

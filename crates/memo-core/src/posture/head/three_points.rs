@@ -151,6 +151,39 @@ mod tests {
         }
     }
 
+    /// Distances along the rays by least squares on what the turned sides leave; in front of the eye they are positive.
+    #[test]
+    fn no_rotation_puts_the_triangle_on_the_rays_behind_the_eye() {
+        let mut random = Random::new(11);
+        let (mut exact, mut triangles) = (0, 0);
+        for _ in 0..300 {
+            let mut draw = || DVec3::from_array(std::array::from_fn(|_| random.uniform(-1.0, 1.0)));
+            let points = [draw(), draw(), draw()];
+            let turned = DMat3::from_axis_angle(draw().normalize(), 3.0 * draw().x);
+            let rays = points.map(|p| (turned * p + DVec3::new(0.3, -0.2, 2.5)).normalize());
+            triangles += 1;
+            for rotation in rotations_onto_rays(points, rays) {
+                let sides = [1, 2].map(|i| rotation * (points[i] - points[0]));
+                let a = nalgebra::SMatrix::<f64, 6, 3>::from_fn(|row, column| {
+                    let (side, axis) = (row / 3, row % 3);
+                    match column {
+                        0 => -rays[0][axis],
+                        _ if column == side + 1 => rays[column][axis],
+                        _ => 0.0,
+                    }
+                });
+                let b = nalgebra::SVector::<f64, 6>::from_fn(|row, _| sides[row / 3][row % 3]);
+                let distances = a.svd(true, true).solve(&b, 1e-12).unwrap();
+                // Roots that are nearly double are given by their middle, which does not put it there exactly.
+                if (a * distances - b).norm() < 1e-6 {
+                    assert!(distances.min() > 0.0, "{distances}");
+                    exact += 1;
+                }
+            }
+        }
+        assert!(exact >= triangles && exact <= 4 * triangles, "{exact} of {triangles}");
+    }
+
     #[test]
     fn three_points_on_a_line_have_no_axes() {
         let line = [1.0, 2.0, 4.0].map(|x| DVec3::X * x);

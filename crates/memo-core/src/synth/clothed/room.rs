@@ -126,3 +126,17 @@ fn near_line(x: f64, spacing: f64, width: f64) -> f64 {
     let off = (x / spacing - (x / spacing).round()).abs() * spacing;
     (1.0 - off / (0.5 * width)).max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_at_multiples_of_their_spacing_and_as_wide_as_asked() {
+        for (x, expected) in
+            [(0.0, 1.0), (0.6, 1.0), (-1.2, 1.0), (0.605, 0.5), (0.595, 0.5), (0.61, 0.0), (0.3, 0.0)]
+        {
+            assert!((near_line(x, 0.6, 0.02) - expected).abs() < 1e-9, "{x}");
+        }
+    }
+}

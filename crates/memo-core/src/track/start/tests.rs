@@ -69,6 +69,21 @@ fn mixed(phase0: f64, rate_hz: f64, off: &[bool], [on, beside]: [f64; 2]) -> Vec
 }
 
 #[test]
+fn the_two_lines_are_found_wherever_in_the_cycle_they_start() {
+    let off = [false, false, true, false, false, false, true, false, false, false, false, true];
+    for step in 0..40 {
+        let phase0 = f64::from(step) / 40.0;
+        let choice = two_line_rule(&mixed(phase0, 0.93, &off, [0.9, 0.4]), &CadenceRange::default()).unwrap();
+        assert_eq!(choice.on_line, off.map(|off| !off), "from {phase0}");
+        let (apart, rate_hz) = (choice.line.phase_at_start - phase0, choice.line.rate_hz);
+        assert!(
+            (apart - apart.round()).abs() < 1e-9 && (rate_hz - 0.93).abs() < 1e-9,
+            "from {phase0}: {choice:?}"
+        );
+    }
+}
+
+#[test]
 fn twice_as_many_estimates_win_whatever_their_similarity() {
     let (x, o) = (true, false);
     // 8 against 4: exactly half is not higher than half.
