@@ -52,7 +52,7 @@ static FOLLOWED: LazyLock<Vec<Followed>> = LazyLock::new(|| {
         let walks = tracked(&scene, 0..scene.len(), true);
         Followed { seed, scene, walks }
     };
-    (0..many(10)).map(of).collect()
+    (0..many(8)).map(of).collect()
 });
 
 /// Difference of two phases, -0.5 to 0.5.
@@ -240,7 +240,7 @@ fn intervals_of_parameters_hold_most_of_the_time_and_are_not_endless() {
 
 #[test]
 fn without_a_camera_speed_and_cadence_are_nearly_as_good() {
-    for seed in 0..many(3) {
+    for seed in 0..many(2) {
         let scene = scene(ClothedOptions { seed, ..ClothedOptions::default() });
         let walk = &tracked(&scene, 0..scene.len(), false)[0];
         for line in walk.gait_parameters() {
@@ -254,7 +254,7 @@ fn without_a_camera_speed_and_cadence_are_nearly_as_good() {
 
 #[test]
 fn a_film_played_backwards_shows_somebody_walking_backwards() {
-    for seed in 0..many(3) {
+    for seed in 0..many(2) {
         let scene = scene(ClothedOptions { seed, ..ClothedOptions::default() });
         let walks = tracked(&scene, (0..scene.len()).rev(), true);
         let longest = walks.iter().max_by_key(|walk| walk.steps().len()).expect("somebody walks");
@@ -267,8 +267,8 @@ fn a_film_played_backwards_shows_somebody_walking_backwards() {
 fn what_is_carried_stands_or_rolls_is_no_walk() {
     let (mut shown, mut taken) = (0, Vec::new());
     for mover in [Mover::Rider, Mover::Waver, Mover::Trolley] {
-        for seed in 0..many(4) {
-            let scene = scene(ClothedOptions { seed, mover, frames: 60, ..ClothedOptions::default() });
+        for seed in 0..many(2) {
+            let scene = scene(ClothedOptions { seed, mover, frames: 50, ..ClothedOptions::default() });
             let walks = tracked(&scene, 0..scene.len(), true);
             shown += 1;
             taken.extend(walks.iter().map(|walk| (mover, seed, walk.steps().len())));
