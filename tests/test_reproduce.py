@@ -434,6 +434,37 @@ def test_a_posture_is_drawn_from_the_side_with_the_left_limbs_dashed():
     assert len(ax.lines) > before + 12 * len(left["figures"])
 
 
+def test_places_in_drawn_figures_are_those_of_the_geometry():
+    from matplotlib.figure import Figure
+    from memo.reproduce.lee_chen import _draw_rigid, _draw_two_ends
+    from memo.reproduce.rohr_figures import _draw_states
+
+    states = Figure()
+    _draw_states(states)
+    ax = states.axes[0]
+    assert [text.get_text() for text in ax.texts] == [f"{0.5 * k / 9:.2f}" for k in range(10)]
+    for text, contours in zip(ax.texts, ax.collections, strict=True):
+        columns = np.concatenate(contours.get_segments())[:, 0]
+        assert columns.min() < text.xy[0] < columns.max()
+
+    left = _memo.lee_chen_figures("SEQ1")
+    two_ends = Figure()
+    _draw_two_ends(two_ends, left)
+    circle = np.column_stack(two_ends.axes[0].lines[0].get_data())[:-1]
+    radii = np.linalg.norm(circle - circle.mean(axis=0), axis=1)
+    assert np.ptp(radii) < 1e-3 * radii.mean()
+
+    rigid = Figure()
+    _draw_rigid(rigid, left)
+    lines = rigid.axes[0].lines
+    for ray, first, second in (lines[0:3], lines[3:6]):
+        along = np.diff(np.column_stack(ray.get_data()), axis=0)[0]
+        for place in (first, second):
+            off = np.ravel(place.get_data()) - np.column_stack(ray.get_data())[0]
+            assert abs(along[0] * off[1] - along[1] * off[0]) < 1e-9
+        assert first.get_xdata()[0] < second.get_xdata()[0]
+
+
 # Hoffman and Flinchbaugh.
 
 
