@@ -295,7 +295,7 @@ fn chains_of(image: &Image<u8>, mask: Option<&Mask>) -> EdgeChains {
 /// edge begins at 12 grey levels a pixel and goes on down to 5.
 #[test]
 fn edges_begin_and_end_at_their_gradients() {
-    let sums = (1..=3).map(|k| f64::from(k)).fold((0.0, 0.0), |(first, second), k: f64| {
+    let sums = (1..=3).map(f64::from).fold((0.0, 0.0), |(first, second), k: f64| {
         let g = (-0.5 * k * k).exp();
         (first + k * g, second + k * k * g)
     });

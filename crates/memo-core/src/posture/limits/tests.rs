@@ -42,11 +42,13 @@ fn with_hips(turn: DMat3) -> StickFigure {
 
 /// A figure or head with one angle at a value, degrees, that only the named constraint bounds.
 type Posed = (StickFigure, Option<DMat3>);
+/// A constraint, its bound in degrees, and the posture at an angle.
+type Row = (Constraint, f64, Box<dyn Fn(f64) -> Posed>);
 
 /// Table 1 of Lee and Chen: every bound in degrees with a posture at an angle. The knee bends backwards.
-fn table_1() -> Vec<(Constraint, f64, Box<dyn Fn(f64) -> Posed>)> {
+fn table_1() -> Vec<Row> {
     use Constraint as C;
-    let mut rows: Vec<(Constraint, f64, Box<dyn Fn(f64) -> Posed>)> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     let mut add = |constraint, bound: f64, pose: Box<dyn Fn(f64) -> Posed>| {
         rows.push((constraint, bound, pose));
     };

@@ -577,19 +577,25 @@ mod tests {
         let found = walk.postures(&with_lengths()).unwrap();
         let rays = [found.frames[0].as_ref().unwrap().tree.view.rays];
         let (sequence, lengths) = (walk.sequence(), &found.lengths);
-        let ground = Some(Ground::of(&walk.camera));
+        let ground = Ground::of(&walk.camera);
         let head = Head { distance_m: 9.0, sd_m: 0.1, axes: None };
         let ask = |anchor: AnchorChoice, rays: &[JointRays]| {
             let options = SequenceOptions { anchor, ..with_lengths() };
-            let scene =
-                Scene { sequence: &sequence, camera: &walk.camera, ground, rays, lengths, options: &options };
+            let scene = Scene {
+                sequence: &sequence,
+                camera: &walk.camera,
+                ground: Some(ground),
+                rays,
+                lengths,
+                options: &options,
+            };
             let anchor_options = lengths.anchor_options(&options.anchor_options);
             frame_anchor(&scene, &anchor_options, &rays[0], Some(&head))
         };
         let options = AnchorOptions::default();
         let up = Some(walk.camera.rotation * DVec3::Z);
         let table = SegmentLengths::lee_chen();
-        let by_ground = from_ground(&rays[0], &table, &ground.unwrap(), &options).unwrap();
+        let by_ground = from_ground(&rays[0], &table, &ground, &options).unwrap();
         let by_trunk = from_trunk(&rays[0], &table, up, &options).unwrap().anchor;
         let by_extent = from_extent(&rays[0], &table, up, &options).unwrap();
         let all = combine(&[by_ground.clone(), by_trunk.clone(), by_extent.clone()]).unwrap().anchor;

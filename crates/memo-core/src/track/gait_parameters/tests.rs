@@ -263,7 +263,7 @@ fn intervals_hold_the_truth_of_simulated_people_as_often_as_they_say() {
 #[test]
 fn before_a_guessed_camera_lengths_along_the_view_hold_the_focal_length_too() {
     let mut random = Random::new(2);
-    let person = |k: usize| Simulated::new(&mut random, Some(if k % 2 == 0 { 0.45 } else { -0.45 }));
+    let person = |k: usize| Simulated::new(&mut random, Some(if k.is_multiple_of(2) { 0.45 } else { -0.45 }));
     let people: Vec<Simulated> = (0..500).map(person).collect();
     let is_length = |name: &str| name == "speed" || name.contains("length");
     assert_calibrated(&people, [0.92, 0.985], [0.9, 1.2], is_length);
