@@ -281,7 +281,7 @@ def test_a_rust_example_is_run_as_it_wants_to_be(page, block):
 
 
 def built_example():
-    """`track_frames`, linked to the core that `cargo test` has built; None where that is older than its source.
+    """`track_frames`, linked to the core of `cargo test`; None where that is older than its source.
 
     `cargo test` itself builds the example's tests alone.
     """
@@ -294,7 +294,7 @@ def built_example():
 
 
 def test_the_rust_example_of_the_readme_runs(workplace):
-    """`MEMO_FULL=1` compiles all of it, as the block says; else it is linked to what `cargo test` has built."""
+    """`MEMO_FULL=1` compiles all of it, as the block says; else it is linked to what is built."""
     full, example = bool(os.environ.get("MEMO_FULL")), built_example()
     if not full and example is None:
         pytest.skip("cargo test has not built it since the core was changed")
