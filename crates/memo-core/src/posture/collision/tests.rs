@@ -293,8 +293,8 @@ fn span(ray: DVec3, near_m: f64, far_m: f64) -> Span {
     Span { ray: ray.normalize(), near_m, far_m }
 }
 
-/// Segments that are told apart by their rays are apart wherever on their rays they end; and most of those
-/// that are never near are told apart.
+/// Segments that the test on rays separates are apart wherever on their rays they end; and it separates most of
+/// those that are never near.
 #[test]
 fn what_is_out_of_reach_is_never_reached() {
     let mut random = Random::new(8);

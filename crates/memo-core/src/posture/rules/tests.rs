@@ -340,7 +340,7 @@ fn values_are_drawn_in_by_the_noise_of_limb_and_trunk() {
     }
 }
 
-/// A hip before the body's plane by less than its noise says nothing.
+/// A hip before the body's plane by less than its noise breaks no rule.
 #[test]
 fn noise_of_the_hip_lets_rule_3_pass() {
     let figure = hips_ahead(0.05, &[(Joint::RightKnee, -30.0), (Joint::RightAnkle, -30.0)]);

@@ -235,7 +235,7 @@ mod tests {
     fn the_scale_is_apart_from_what_each_length_has_of_its_own() {
         let fitted = SequenceLengths::fitted(&fit());
         assert!((fitted.own_sd_m - 0.02).abs() < 1e-12, "{}", fitted.own_sd_m);
-        // The sources of the neck's distance are told the scale of the lengths, and their own deviation.
+        // The sources of the neck's distance get the scale of the lengths, and their own deviation.
         let options = AnchorOptions { scale_sd: 0.01, length_sd: 0.001, ..AnchorOptions::default() };
         let told = fitted.anchor_options(&options);
         assert_eq!(told.scale_sd, 0.05);
