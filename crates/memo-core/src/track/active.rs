@@ -12,8 +12,8 @@ use crate::model::Camera;
 pub(super) const SLOWEST_MPS: f64 = 0.25;
 /// Slower than this no legs walk, gait cycles a second.
 const SLOWEST_HZ: f64 = 0.3;
-/// No stride, two steps, is shorter or longer than these shares of the body height. Measured on walkers of motion capture,
-/// video and drawn, 90 in all: 0.60 to 1.05; on what only seemed to walk mostly below 0.2 or negative.
+/// No stride, two steps, is shorter or longer than these shares of the body height. Some 90 walks, motion-captured, on
+/// video and drawn, had 0.60 to 1.05.
 const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
 /// A slanting path must explain the frames better than one parallel to the image by this share of similarity:
 /// seen from above a walk can seem to slant, and then fits worse.
