@@ -639,7 +639,10 @@ def kill(run, out, chance, longest_s, amid_files):
 
 
 def unfinished(out):
-    return bool(list((out / ".batch").glob("1-of-1.work/*")))
+    try:
+        return bool(os.listdir(out / ".batch" / "1-of-1.work"))
+    except FileNotFoundError:  # not yet, or no more
+        return False
 
 
 def wait_for(condition, seconds=LONGEST_S):

@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import sys
+import time
 
 import fake_core
 import fake_explain
@@ -698,8 +699,10 @@ def opened(browser):
 
     yield open_page
     assert [line for line in browser.get_log("browser") if line["level"] != "INFO"] == []
-    asked = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
-    addresses = [e["params"]["request"]["url"] for e in asked if e["method"] == "Network.requestWillBeSent"]
+    addresses, asked_until = [], time.monotonic() + 30
+    while not addresses and time.monotonic() < asked_until:  # the log of a busy browser comes late
+        asked = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
+        addresses = [e["params"]["request"]["url"] for e in asked if e["method"] == "Network.requestWillBeSent"]
     assert addresses and all(address.startswith(("file:", "data:")) for address in addresses)
 
 
