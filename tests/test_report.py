@@ -702,7 +702,9 @@ def opened(browser):
     addresses, asked_until = [], time.monotonic() + 30
     while not addresses and time.monotonic() < asked_until:  # the log of a busy browser comes late
         asked = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
-        addresses = [e["params"]["request"]["url"] for e in asked if e["method"] == "Network.requestWillBeSent"]
+        addresses = [
+            e["params"]["request"]["url"] for e in asked if e["method"] == "Network.requestWillBeSent"
+        ]
     assert addresses and all(address.startswith(("file:", "data:")) for address in addresses)
 
 
