@@ -3,7 +3,8 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use memo_core::image::Image;
 use memo_core::synth::{ClothedOptions, ClothedScene};
-use memo_core::track::tracker::{Tracker, TrackerOptions};
+use memo_core::track::options::TrackerOptions;
+use memo_core::track::tracker::Tracker;
 use std::hint::black_box;
 
 fn track(c: &mut Criterion) {

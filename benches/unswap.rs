@@ -1,7 +1,7 @@
 //! Repair of exchanged left and right labels over 10,000 frames of a walking figure.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use memo_core::posture::unswap::{Keypoints, Level, LimbGroup, UnswapOptions, unswap};
+use memo_core::keypoints::unswap::{Keypoints, Level, LimbGroup, UnswapOptions, unswap};
 use memo_core::synth::Random;
 use std::hint::black_box;
 

@@ -6,9 +6,10 @@
 
 use memo_core::synth::{ClothedOptions, ClothedScene, Contact, Mover};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
+use memo_core::track::options::TrackerOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::{Tracker, TrackerOptions};
+use memo_core::track::tracker::Tracker;
 use std::sync::LazyLock;
 
 /// Above this probability of interchanged sides a walk claims nothing by side.

@@ -9,9 +9,10 @@
 
 use memo_core::synth::{Random, SceneOptions, SynthScene, Uneven};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
+use memo_core::track::options::TrackerOptions;
 use memo_core::track::result::{Side, TrackedWalk};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::{Tracker, TrackerOptions};
+use memo_core::track::tracker::Tracker;
 use std::collections::BTreeMap;
 
 fn normal(random: &mut Random, sd: f64) -> f64 {

@@ -6,13 +6,14 @@
 use crate::recorded;
 
 use glam::{DVec2, DVec3};
+use memo_core::keypoints::Layout;
+use memo_core::keypoints::detector::Detector;
 use memo_core::model::Camera;
+use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::anchor::AnchorSource;
-use memo_core::posture::detector::{Detector, Layout};
 use memo_core::posture::sequence::{
     AnchorChoice, KeypointSequence, Motion, PostureSequence, SequenceOptions, Warning, postures,
 };
-use memo_core::posture::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 
 use crate::recordings;
 use recorded::{keypoints, triangulated};

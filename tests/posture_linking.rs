@@ -6,10 +6,10 @@
 use crate::mocap;
 
 use glam::DVec3;
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
 use memo_core::posture::lift::{JointRays, roots};
 use memo_core::posture::link::{LinkFrame, LinkOptions, LinkedPath, link};
 use memo_core::posture::prior::MotionPrior;
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
 
 /// Joints nearer than this count as the same, metres.
 const NEAR_M: f64 = 0.10;

@@ -4,10 +4,10 @@ use crate::mocap;
 
 use std::collections::BTreeMap;
 
+use memo_core::model::skeleton::SegmentLengths;
 use memo_core::posture::Bearings;
 use memo_core::posture::group::{DEFAULT_GROUP_M, group};
 use memo_core::posture::rules::MotionModel;
-use memo_core::posture::skeleton::SegmentLengths;
 use memo_core::posture::tree::{TreeOptions, View};
 use mocap::{Motion, WALKS, load, view};
 

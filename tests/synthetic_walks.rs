@@ -2,9 +2,10 @@
 //! reaches where the model is right. People who differ from it are in `clothed_walks`.
 
 use memo_core::synth::{SceneOptions, SynthScene};
+use memo_core::track::options::{GaitChoice, TrackerOptions};
 use memo_core::track::result::{EventKind, Side, TrackedWalk};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::{GaitChoice, TrackError, Tracker, TrackerOptions};
+use memo_core::track::tracker::{TrackError, Tracker};
 
 fn options_for(scene: &SynthScene) -> TrackerOptions {
     TrackerOptions {

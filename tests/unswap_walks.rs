@@ -5,7 +5,7 @@
 
 use crate::recordings;
 
-use memo_core::posture::unswap::{
+use memo_core::keypoints::unswap::{
     Keypoints, Level, LimbGroup, Reason, UnswapOptions, Unswapped, Verdict, unswap,
 };
 use memo_core::synth::Random;

@@ -7,9 +7,9 @@
 pub mod stride;
 
 use glam::{DMat3, DVec2, DVec3};
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::model::{Camera, Distortion};
 use memo_core::posture::lift::JointRays;
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::synth::Random;
 
 use crate::recordings;

@@ -5,8 +5,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use memo_core::model::Camera;
+use memo_core::model::skeleton::{Joint, PELVIS_ON_TRUNK, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::lift::JointRays;
-use memo_core::posture::skeleton::{Joint, PELVIS_ON_TRUNK, PerJoint, SegmentLengths, StickFigure};
 use memo_core::synth::Random;
 
 use crate::recordings;

@@ -8,11 +8,11 @@
 //! of the linked joints.
 
 use glam::DVec2;
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 use memo_core::model::{Camera, CameraFileOptions};
 use memo_core::posture::sequence::{KeypointSequence, PostureSequence, SequenceOptions, postures};
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
+use memo_core::reproduce::stick_walker::{StickWalker, world_from_head};
 use memo_core::synth::Random;
-use memo_core::synth::stick_walker::{StickWalker, world_from_head};
 use std::error::Error;
 use std::time::Instant;
 

@@ -4,8 +4,9 @@
 
 use memo_core::image::Image;
 use memo_core::model::{Camera, CameraFileOptions, SideJoints};
+use memo_core::track::options::TrackerOptions;
 use memo_core::track::result::{Row, TrackedWalk};
-use memo_core::track::tracker::{SeekReport, Tracker, TrackerOptions};
+use memo_core::track::tracker::{SeekReport, Tracker};
 use std::error::Error;
 use std::path::PathBuf;
 

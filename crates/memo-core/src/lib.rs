@@ -10,7 +10,8 @@
 //!
 //! ```
 //! use memo_core::synth::{SceneOptions, SynthScene};
-//! use memo_core::track::tracker::{Tracker, TrackerOptions};
+//! use memo_core::track::options::TrackerOptions;
+//! use memo_core::track::tracker::Tracker;
 //!
 //! let scene = SynthScene::new(SceneOptions::default())?;
 //! let height_m = scene.walker.body.height_m;
@@ -37,17 +38,17 @@
 //! # Postures from keypoints
 //!
 //! Image points of joints, a camera, lengths or a height: [`posture::sequence::postures`] gives every posture
-//! they allow and the likeliest motion. [`posture::detector::Detector`] makes the fourteen joints of the points
+//! they allow and the likeliest motion. [`keypoints::Detector`] makes the fourteen joints of the points
 //! of a detector, and [`model::Camera::from_file`] reads the camera.
 //!
 //! ```
 //! use memo_core::glam::DVec2;
 //! use memo_core::model::Camera;
-//! use memo_core::posture::detector::Detector;
+//! use memo_core::keypoints::detector::Detector;
 //! use memo_core::posture::sequence::{KeypointSequence, SequenceOptions, postures};
-//! use memo_core::posture::skeleton::{Joint, PerJoint};
+//! use memo_core::model::skeleton::{Joint, PerJoint};
 //! use memo_core::synth::{WalkOptions, sampled_walk};
-//! use memo_core::track::tracker::TrackerOptions;
+//! use memo_core::track::options::TrackerOptions;
 //!
 //! // A walk seen from its side, its points called RSH, REL and so on; of a known detector it is
 //! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
@@ -89,7 +90,7 @@
 //! ```
 //! use memo_core::planar::{FigureOptions, interpret_figure};
 //! use memo_core::synth::{PointLightOptions, WalkOptions, limbs_of, point_light_display, sampled_walk};
-//! use memo_core::track::tracker::TrackerOptions;
+//! use memo_core::track::options::TrackerOptions;
 //!
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
 //! let walk = sampled_walk(&walker, &WalkOptions::default())?;
@@ -126,11 +127,15 @@
 pub use {glam, nalgebra};
 
 pub mod calibrate;
+pub mod estimate;
 pub mod image;
+pub mod keypoints;
 pub mod model;
 pub mod planar;
 pub mod posture;
 pub mod progress;
+#[cfg(any(test, feature = "reproduce"))]
+pub mod reproduce;
 pub mod synth;
 pub mod track;
 pub mod wording;

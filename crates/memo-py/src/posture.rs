@@ -8,13 +8,13 @@ use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::sequence::{
     AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameReading, KeypointSequence, Motion, PostureSequence,
     SequenceLengths, SequenceOptions, Strength, postures_with_progress, reason_totals,
 };
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::tree::{LevelCount, View};
 use memo_core::progress::Progress;
 use numpy::{PyArray2, PyArray3};

@@ -3,7 +3,7 @@
 use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track_from_numpy};
 use crate::error::value_error;
 use crate::wait::interruptible;
-use memo_core::posture::unswap::{
+use memo_core::keypoints::unswap::{
     GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, Unswapped, unswap as core_unswap,
 };
 use numpy::{IntoPyArray, PyArrayMethods};

@@ -7,7 +7,6 @@
 //!
 //! Both fit by least squares and give the covariance of what they fitted. Pixels are taken as square.
 
-pub(crate) mod least_squares;
 pub mod points;
 pub mod walker;
 

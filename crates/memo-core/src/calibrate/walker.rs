@@ -28,8 +28,8 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::DVector;
 use thiserror::Error;
 
-use super::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use super::{Estimate, KnownLens};
+use crate::estimate::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
 

@@ -13,7 +13,8 @@
 //! None of this knows what a person is: two people who touch become one area, a faint person several.
 
 use super::frame::{Image, Mask};
-use super::region::{self, Connectivity, Rectangle, connected_runs, runs};
+use super::region::{self, Rectangle};
+use super::runs::{Connectivity, connected_runs, runs};
 use std::collections::VecDeque;
 use thiserror::Error;
 
@@ -173,7 +174,7 @@ pub fn fill_holes(mask: &Mask) -> Mask {
     let mut filled = mask.clone();
     for area in connected_runs(&runs(mask, false), Connectivity::Four) {
         let at_edge =
-            |run: &super::region::Run| run.start == 0 || run.end == right || run.y == 0 || run.y == bottom;
+            |run: &super::runs::Run| run.start == 0 || run.end == right || run.y == 0 || run.y == bottom;
         if !area.iter().any(at_edge) {
             for run in area {
                 filled.row_mut(run.y)[run.start..run.end].fill(true);

@@ -25,9 +25,11 @@
 //! The motion is smoothed across the borders of limbs that move differently; grey values must persist from
 //! frame to frame; what moves farther than its own size on the coarsest pyramid level is lost.
 
+mod domain;
 mod multigrid;
 
-use self::multigrid::{Multigrid, Vectors};
+use self::domain::Domain;
+use self::multigrid::{Goal, Multigrid, Vectors};
 use super::edge::Window;
 use super::frame::{Frame, FrameError, Image, Mask};
 use glam::{DVec2, Vec2};
@@ -212,72 +214,6 @@ fn window_of_region(frame: &Frame<'_>, region: &Mask) -> Result<Window, FlowErro
     let (x0, x1) = inside().fold((width, 0), |(x0, x1), p| (x0.min(p % width), x1.max(p % width)));
     let (y0, y1) = (first / width, last / width);
     Ok(Window { x: x0, y: y0, width: x1 - x0 + 1, height: y1 - y0 + 1 })
-}
-
-/// Pixels of the region in a window, with a free cell all round so that every pixel has four neighbours.
-#[derive(Clone)]
-struct Domain {
-    width: usize,
-    height: usize,
-    is_inside: Vec<bool>,
-}
-
-impl Domain {
-    fn empty(width: usize, height: usize) -> Self {
-        Self { width, height, is_inside: vec![false; (width + 2) * (height + 2)] }
-    }
-
-    fn of_region(region: &Mask, window: &Window) -> Self {
-        let mut domain = Self::empty(window.width, window.height);
-        for y in 0..window.height {
-            let row = &region.row(window.y + y)[window.x..window.x + window.width];
-            let start = domain.cell(0, y);
-            domain.is_inside[start..start + window.width].copy_from_slice(row);
-        }
-        domain
-    }
-
-    fn stride(&self) -> usize {
-        self.width + 2
-    }
-
-    fn cell(&self, x: usize, y: usize) -> usize {
-        (y + 1) * self.stride() + x + 1
-    }
-
-    /// Columns, rows and cells of the pixels inside, in reading order.
-    fn pixels(&self) -> impl Iterator<Item = (usize, usize, usize)> {
-        let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
-        all.map(|(x, y)| (x, y, self.cell(x, y))).filter(|&(_, _, cell)| self.is_inside[cell])
-    }
-
-    /// Half the size; a pixel is inside if one of the four it covers is.
-    fn halved(&self) -> Self {
-        let mut half = Self::empty(self.width.div_ceil(2), self.height.div_ceil(2));
-        for (x, y, _) in self.pixels() {
-            let cell = half.cell(x / 2, y / 2);
-            half.is_inside[cell] = true;
-        }
-        half
-    }
-
-    /// The cells connected to `start`, itself first.
-    fn connected_to(&self, start: usize, is_seen: &mut [bool]) -> Vec<usize> {
-        let mut found = vec![start];
-        is_seen[start] = true;
-        let mut next = 0;
-        while next < found.len() {
-            let cell = found[next];
-            next += 1;
-            for neighbour in [cell - self.stride(), cell - 1, cell + 1, cell + self.stride()] {
-                if self.is_inside[neighbour] && !is_seen[neighbour] {
-                    is_seen[neighbour] = true;
-                    found.push(neighbour);
-                }
-            }
-        }
-        found
-    }
 }
 
 /// Removes the components without gradients in two directions from the domain and reports on all of them.
@@ -517,7 +453,8 @@ fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: 
         let (gradient, offset) = constraint(level, x, y, velocity).unwrap_or_default();
         solver.set_constraint(cell, gradient, offset);
     }
-    let solved = solver.solve(&mut motion.velocity, options);
+    let goal = Goal { tolerance: options.tolerance, max_iterations: options.max_iterations };
+    let solved = solver.solve(&mut motion.velocity, goal);
     motion.iterations += solved.iterations;
     motion.relative_residual = solved.relative_residual;
 }

@@ -11,6 +11,7 @@ pub mod gain;
 pub mod line;
 pub mod outline;
 pub mod region;
+pub mod runs;
 pub mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
@@ -25,5 +26,6 @@ pub use frame::{Frame, FrameError, Image, Mask};
 pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
-pub use region::{GroupOptions, Rectangle, Region, Run, Sides, group_regions, regions};
+pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};
+pub use runs::Run;
 pub use silhouette::{SilhouetteError, silhouettes};

@@ -6,7 +6,7 @@
 //! nesting of borders is not computed.
 
 use super::frame::Mask;
-use super::region::{Connectivity, Run, connected_runs, runs};
+use super::runs::{Connectivity, Run, connected_runs, runs};
 
 /// One border. Consecutive pixels are neighbours, as are the last and the first; where the area is one pixel
 /// wide a pixel occurs twice.

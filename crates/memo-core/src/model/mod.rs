@@ -1,13 +1,17 @@
 //! What a walker would show: camera, body, gait, contours and what hides what.
 
+pub mod angles;
 pub mod body;
 pub mod camera;
 pub mod camera_file;
 pub mod cylinder;
 pub mod distortion;
 pub mod gait;
+pub mod limits;
 pub mod position;
+pub mod resection;
 pub mod silhouette;
+pub mod skeleton;
 pub mod spline;
 pub mod surface;
 pub mod visibility;

@@ -209,8 +209,8 @@ pub fn fit_hinge(
 
 #[cfg(test)]
 mod tests {
-    use super::super::experiment::planes_by_search;
     use super::*;
+    use crate::reproduce::hoffman_flinchbaugh::planes_by_search;
     use crate::synth::Random;
 
     /// The image vectors of both ends in two views; angles[view][rod] within the plane.

@@ -9,7 +9,6 @@
 pub mod batch;
 pub mod depth_change;
 pub mod evidence;
-pub mod experiment;
 pub mod figure;
 mod fit;
 pub mod group;

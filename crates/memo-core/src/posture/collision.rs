@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::constraint::{Constraint, Violation};
 use super::placed::{Placed, PlacedFigure};
-use super::skeleton::{Joint, PerJoint, Side};
+use crate::model::skeleton::{Joint, PerJoint, Side};
 
 /// Radii of the parts of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use super::skeleton::{Joint, RigidDistance, Side};
+use crate::model::skeleton::{Joint, RigidDistance, Side};
 
 /// One constraint of one joint, pair of joints or limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

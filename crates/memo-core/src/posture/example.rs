@@ -7,7 +7,7 @@ use std::array::from_fn;
 use glam::DVec3;
 
 use super::placed::{Placed, placed_points};
-use super::skeleton::{Joint, PerJoint, SegmentLengths, Side, StickFigure};
+use crate::model::skeleton::{Joint, PerJoint, SegmentLengths, Side, StickFigure};
 
 /// Length of upper arm and forearm.
 pub(super) const ARM_M: f64 = 0.3;

@@ -5,7 +5,7 @@
 //! members of a group differ by more in any joint. Ties go to the groups of the earliest members. The result
 //! does not depend on threads; on the order of the postures only through ties.
 
-use super::skeleton::{Joint, StickFigure};
+use crate::model::skeleton::{Joint, StickFigure};
 
 /// The distance within which the paper's figures look alike: 10 cm.
 pub const DEFAULT_GROUP_M: f64 = 0.10;

@@ -10,13 +10,14 @@
 //! side, forearms from the front) stay with the prior, and the result says so. The overall scale cannot be seen
 //! in one view: it comes from body height, from the ground or a given distance, or is assumed ([`ScaleFrom`]).
 
+use crate::estimate::median::median;
 use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
 use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk};
 use super::lift::JointRays;
-use super::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
+use crate::model::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
 
 /// What a length rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -329,13 +330,9 @@ fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVe
 /// Relative standard deviation of the distances from frame to frame, without steady motion.
 fn frame_scatter(frames: &[(&JointRays, &Anchor)]) -> f64 {
     let steps: Vec<f64> = frames.windows(2).map(|w| (w[1].1.distance_m / w[0].1.distance_m).ln()).collect();
-    let drift = median(steps.clone());
-    median(steps.iter().map(|s| (s - drift).abs()).collect()) * 1.4826 / std::f64::consts::SQRT_2
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    let drift = median(&mut steps.clone()).unwrap_or(0.0);
+    let mut off: Vec<f64> = steps.iter().map(|s| (s - drift).abs()).collect();
+    median(&mut off).unwrap_or(0.0) * 1.4826 / std::f64::consts::SQRT_2
 }
 
 fn mean_of_seen(sides: &[f64]) -> f64 {
@@ -424,7 +421,7 @@ fn set(fit: &mut LengthFit, pair: [Joint; 2], mut estimate: LengthEstimate) {
         None => {
             fit.lengths.to[pair[1]] = estimate.length_m;
             fit.sd_m[pair[1]] = estimate.sd_m;
-            estimate.segment = super::skeleton::segment_name(pair[1]);
+            estimate.segment = crate::model::skeleton::segment_name(pair[1]);
         }
     }
     fit.estimates.push(estimate);

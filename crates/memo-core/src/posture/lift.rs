@@ -6,8 +6,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::skeleton::{JOINT_COUNT, Joint, PerJoint};
 use crate::model::camera::{Camera, CameraError};
+use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint};
 
 /// What one view shows of a stick figure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,10 +10,10 @@ use std::rc::Rc;
 
 use glam::{DMat3, DVec3};
 
-use super::angles::{PartAngles, hip_axes, knee_rad, swing_rad, trunk_axes};
 use super::constraint::JointSet;
 use super::lift::{RootKind, Roots};
-use super::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
+use crate::model::angles::{PartAngles, hip_axes, knee_rad, swing_rad, trunk_axes};
+use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 
 /// A joint in its place, and the segment that ends there.
 #[derive(Debug, Clone, Copy, PartialEq)]

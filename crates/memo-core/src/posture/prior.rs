@@ -6,7 +6,7 @@
 //! Chosen on four walks of motion capture (two Plug-in-Gait walkers of BTKData, CMU 02_01 and 12_01); the
 //! spreads are two to three times what one walker shows, so that people may differ.
 
-use super::skeleton::Joint;
+use crate::model::skeleton::Joint;
 
 /// A quantity's usual value and spread, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -254,7 +254,7 @@ mod tests {
         for (segment, length_sd) in prior.segments.iter_mut().zip([0.1, 0.2, 0.3, 0.4]) {
             segment.length_sd = length_sd;
         }
-        use crate::posture::skeleton::Side;
+        use crate::model::skeleton::Side;
         for side in Side::BOTH {
             let ends = [side.elbow(), side.wrist(), side.knee(), side.ankle()];
             assert_eq!(ends.map(|end| prior.length_sd(end)), [0.1, 0.2, 0.3, 0.4]);

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use super::constraint::{Constraint, Unit, Violation};
 use super::placed::{Placed, PlacedFigure, Trunk};
-use super::skeleton::{Joint, Side};
+use crate::model::skeleton::{Joint, Side};
 
 /// A rule by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

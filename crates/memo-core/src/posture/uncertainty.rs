@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Matrix3};
 use thiserror::Error;
 
 use super::lift::JointRays;
-use super::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
+use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 
 /// What the uncertainty comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -189,8 +189,8 @@ fn joint_effects(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::skeleton::PerJoint;
     use crate::posture::lift::roots;
-    use crate::posture::skeleton::PerJoint;
     use crate::synth::Random;
 
     /// A figure 4 m away whose segments all have some extent along their rays.

@@ -5,7 +5,6 @@ pub mod motion;
 pub mod pointlight;
 pub mod random;
 pub mod scene;
-pub mod stick_walker;
 
 pub use clothed::{ClothedOptions, ClothedScene, ClothedTruth, Contact, Mover};
 pub use motion::{Motion, MotionError, WALKER_LIMBS, WalkOptions, limbs_of, sampled_walk};
@@ -15,4 +14,3 @@ pub use pointlight::{
 };
 pub use random::Random;
 pub use scene::{SceneError, SceneOptions, SynthScene, Truth, Uneven};
-pub use stick_walker::{StickCamera, StickView, StickWalker};

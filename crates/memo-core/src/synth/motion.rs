@@ -11,7 +11,7 @@ use thiserror::Error;
 
 /// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist (`RSH`, `REL`, `RWR`, `LSH`,
 /// `LEL`, `LWR`); right then left hip, knee, ankle (`RHP`, `RKN`, `RAN`, `LHP`, `LKN`, `LAN`); head (`HEAD`).
-/// [`joint_name`](crate::posture::detector::joint_name) spells them out.
+/// [`joint_name`](crate::keypoints::joint_name) spells them out.
 pub const WALKER_NAMES: [&str; 13] =
     ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN", "HEAD"];
 

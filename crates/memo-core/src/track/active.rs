@@ -1,10 +1,10 @@
 //! The walk under way: whether it goes on, and what its first frames say of path, person and distance.
 
 use super::locate::{Sighting, locate_slanting};
+use super::options::TrackerOptions;
 use super::person::{PersonFit, PersonOptions, fit_distance, fit_person};
 use super::search::{Hypothesis, Scene};
 use super::start::{StartReport, start};
-use super::tracker::TrackerOptions;
 use super::walk::{Beginning, FrameEdges, Walk};
 use crate::model::Camera;
 
@@ -159,13 +159,13 @@ impl Active {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kalman::ConstantVelocity;
     use super::super::search::tests::{camera, edges_of, walker};
     use super::super::search::{Axis, Path};
     use super::super::start::Direction;
     use super::super::start::tests::report;
     use super::super::walk::{Look, State, Step};
     use super::*;
+    use crate::estimate::kalman::ConstantVelocity;
     use crate::image::Rectangle;
     use glam::DVec2;
 

@@ -91,8 +91,9 @@ mod tests {
     use super::*;
     use crate::synth::{SceneOptions, SynthScene};
     use crate::track::evidence::EvidenceStream;
+    use crate::track::options::TrackerOptions;
     use crate::track::result::TrackedWalk;
-    use crate::track::tracker::{Tracker, TrackerOptions};
+    use crate::track::tracker::Tracker;
 
     fn tracked(scene: &SynthScene, options: &TrackerOptions) -> TrackedWalk {
         let mut tracker = Tracker::new(options.clone()).unwrap();

@@ -33,8 +33,9 @@
 //! reflections at the feet, for which the scale leaves room, and a tilted camera where none is given.
 
 use super::result::{Row, Side, TrackedWalk};
-use super::start::{Direction, line_through};
+use super::start::Direction;
 use super::walk::Step;
+use crate::estimate::line::line_through;
 
 /// Above this probability that sides are interchanged, or that the person walks the other way round, nothing is
 /// told by side.

@@ -5,7 +5,7 @@
 //! half a metre of depth), so rows are pooled over the frames before they become a depth.
 
 use super::search::Path;
-use super::start::line_through;
+use crate::estimate::line::line_through;
 use crate::image::Rectangle;
 use crate::model::position::{
     FootPosition, Midpoints, PositionError, PositionOptions, position_from_feet, position_from_head,

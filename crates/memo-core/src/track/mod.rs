@@ -3,15 +3,15 @@
 mod active;
 mod column;
 pub mod evidence;
-pub mod experiment;
 pub mod explain;
 pub mod gait_parameters;
-pub mod kalman;
 pub mod locate;
+pub mod options;
 pub mod person;
 pub mod result;
 pub mod score;
 pub mod search;
 pub mod start;
+pub mod swap;
 pub mod tracker;
 pub mod walk;

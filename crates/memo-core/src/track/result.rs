@@ -5,15 +5,15 @@
 //! measurements really fell from predictions; to this scatter comes what no number of frames averages out:
 //! the body that is not the model's, and the distance.
 
-use super::kalman::{ConstantVelocity, Noise, smooth};
 use super::person::PersonFit;
 use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
+use crate::estimate::kalman::{ConstantVelocity, Noise, smooth};
 use crate::model::{Camera, Posture, SideJoints};
 use glam::DVec3;
 
-pub use crate::posture::skeleton::Side;
+pub use crate::model::skeleton::Side;
 
 /// A walk that has ended, with everything it was made of.
 #[derive(Debug, Clone, PartialEq)]

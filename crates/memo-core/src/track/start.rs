@@ -9,7 +9,9 @@
 
 use super::locate::Course;
 use super::search::{Grid, Hypothesis, Path, Scene, search};
+use super::swap::swap_probability;
 use super::walk::{Beginning, FrameEdges, WalkOptions};
+use crate::estimate::line::line_through;
 use crate::model::{Camera, Walker};
 use std::f64::consts::TAU;
 
@@ -210,17 +212,6 @@ fn regression(
     PhaseLine { phase_at_start: (base + level).rem_euclid(1.0), rate_hz: rate + slope, similarity }
 }
 
-/// Least-squares line y = level + slope x as (slope, level); slope 0 where x does not vary.
-pub(crate) fn line_through(points: &[(f64, f64)]) -> (f64, f64) {
-    let n = points.len().max(1) as f64;
-    let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (sxx, sxy) = points
-        .iter()
-        .fold((0.0, 0.0), |(a, b), p| (a + (p.0 - mx) * (p.0 - mx), b + (p.0 - mx) * (p.1 - my)));
-    let slope = if sxx > 1e-12 { sxy / sxx } else { 0.0 };
-    (slope, my - slope * mx)
-}
-
 /// Which way a body moves relative to where it faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
@@ -360,43 +351,6 @@ fn estimates(curves: &[PhaseCurve]) -> Vec<PhaseEstimate> {
         PhaseEstimate { time_s: c.time_s, phase, similarity: c.at(phase) }
     };
     curves.iter().map(estimate).collect()
-}
-
-/// How the margin between the twins behaves, after a handful of real and motion-captured walks: probabilities
-/// far from 1/2 mean "sure", their size is not a rate that was counted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwapModel {
-    /// Typical margin (S_right - S_wrong) / S_right of the summed similarity. Measured medians: 0.13 to 0.17.
-    pub margin: f64,
-    /// Its standard deviation over independent glimpses of one walk: wrong windows of 0.4 s had margins up to
-    /// 0.07.
-    pub glimpse_sd: f64,
-    /// Standard deviation that no amount of time removes: people whose arms or legs differ from the average.
-    pub person_sd: f64,
-    /// Frames closer than this are not independent, seconds.
-    pub glimpse_s: f64,
-}
-
-impl Default for SwapModel {
-    fn default() -> Self {
-        Self { margin: 0.13, glimpse_sd: 0.16, person_sd: 0.05, glimpse_s: 0.2 }
-    }
-}
-
-/// Probability that the twin with the summed similarity `other`, and not the one with `chosen`, is the true
-/// one.
-///
-/// The margin m = (chosen - other) / max is taken as normal about ±mu with variance v = person² + glimpse² /
-/// n, n the number of independent glimpses in `duration_s`; then log odds = 2 mu m / v.
-pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
-    let top = chosen.max(other);
-    if top <= 0.0 {
-        return 0.5;
-    }
-    let glimpses = (duration_s / model.glimpse_s).max(1.0);
-    let variance = model.person_sd.powi(2) + model.glimpse_sd.powi(2) / glimpses;
-    let log_odds = 2.0 * model.margin * (chosen - other) / top / variance;
-    1.0 / (1.0 + log_odds.exp())
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 //! A track started half a cycle off never corrects itself: its legs fit almost as well. So both twins are
 //! followed, each with its own filters, and the similarities they collect decide between them.
 
-use super::kalman::{ConstantVelocity, FilterOptions};
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
-use super::start::{SwapModel, swap_probability};
+use super::swap::{SwapModel, swap_probability};
+use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
 use crate::image::Rectangle;
 use crate::model::{Camera, Walker};
 

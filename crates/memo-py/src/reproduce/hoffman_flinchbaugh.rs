@@ -3,7 +3,7 @@
 use crate::array::rows_from_numpy;
 use crate::wait::interruptible;
 use glam::DVec2;
-use memo_core::planar::experiment::{
+use memo_core::reproduce::hoffman_flinchbaugh::{
     DEGENERATE, PrintedRod, degenerate_refusals, false_targets, hinge_trials, rod_trials,
 };
 use pyo3::exceptions::PyValueError;

@@ -2,11 +2,13 @@
 
 use crate::array::{numpy_from_column, numpy_from_figures, numpy_from_rows};
 use crate::error::value_error;
-use memo_core::posture::experiment::{self, Counts, LevelCounts, Reading, Sequence};
-use memo_core::posture::head::{HeadModel, HeadPoint, HeadTableColumn, exact_projections, table_2};
-use memo_core::posture::limits::{AngleRange, Limits};
-use memo_core::posture::skeleton::{JOINT_COUNT, Joint, SegmentLengths};
-use memo_core::synth::stick_walker::FRAME_S;
+use memo_core::model::limits::{AngleRange, Limits};
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, SegmentLengths};
+use memo_core::posture::head::{HeadModel, HeadPoint};
+use memo_core::reproduce::head_table::{HeadTableColumn, exact_projections, table_2};
+use memo_core::reproduce::lee_chen;
+use memo_core::reproduce::lee_chen::{Counts, LevelCounts, Reading, Sequence};
+use memo_core::reproduce::stick_walker::FRAME_S;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -33,11 +35,11 @@ pub fn segment_names() -> Vec<String> {
 /// `physical`, `rules_1_2`, `printed_physical` and `printed_rules_1_2` nodes of shape (14 levels, 3 frames);
 /// `truth_kept` (3 frames, 2).
 #[pyfunction]
-#[pyo3(signature = (sequence, merge_m=experiment::MERGE_M))]
+#[pyo3(signature = (sequence, merge_m=lee_chen::MERGE_M))]
 pub fn lee_chen_counts<'py>(py: Python<'py>, sequence: &str, merge_m: f64) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
     let table = py
-        .detach(|| experiment::count_table(sequence, &experiment::table_walker(), merge_m))
+        .detach(|| lee_chen::count_table(sequence, &lee_chen::table_walker(), merge_m))
         .map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("phases", table.phases)?;
@@ -60,7 +62,7 @@ fn set_counts(dict: &Bound<'_, PyDict>, prefix: &str, counts: &Counts) -> PyResu
 ///
 /// `reading` is "as_printed" or "rigid_torso".
 #[pyfunction]
-#[pyo3(signature = (sequence, reading, merge_m=experiment::MERGE_M))]
+#[pyo3(signature = (sequence, reading, merge_m=lee_chen::MERGE_M))]
 pub fn lee_chen_last_stage<'py>(
     py: Python<'py>,
     sequence: &str,
@@ -71,10 +73,10 @@ pub fn lee_chen_last_stage<'py>(
     let reading = Reading::from_name(reading).ok_or_else(|| {
         PyValueError::new_err(format!("reading must be as_printed or rigid_torso, got {reading}"))
     })?;
-    let phases = experiment::LAST_STAGE_PHASES;
+    let phases = lee_chen::LAST_STAGE_PHASES;
     let stages =
-        py.detach(|| experiment::last_stage(sequence, reading, &phases, merge_m)).map_err(value_error)?;
-    let dict_of = |stage: experiment::LastStage| {
+        py.detach(|| lee_chen::last_stage(sequence, reading, &phases, merge_m)).map_err(value_error)?;
+    let dict_of = |stage: lee_chen::LastStage| {
         let dict = PyDict::new(py);
         dict.set_item("phase", stage.phase)?;
         dict.set_item("postures", stage.postures)?;
@@ -94,7 +96,7 @@ pub fn lee_chen_last_stage<'py>(
 pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
     let left = py
-        .detach(|| experiment::frame_survivors(sequence, &experiment::table_walker(), 0))
+        .detach(|| lee_chen::frame_survivors(sequence, &lee_chen::table_walker(), 0))
         .map_err(value_error)?;
     let dict = PyDict::new(py);
     dict.set_item("figures", numpy_from_figures(py, &left.figures)?)?;
@@ -191,7 +193,7 @@ pub fn lee_chen_walker<'py>(
     if frames > MOST_FRAMES {
         return Err(PyValueError::new_err(format!("frames must be at most {MOST_FRAMES}, got {frames}")));
     }
-    let (camera, walker) = (sequence_of(sequence)?.camera(), experiment::table_walker());
+    let (camera, walker) = (sequence_of(sequence)?.camera(), lee_chen::table_walker());
     let figures: Vec<_> = (0..frames).map(|frame| camera.view(&walker, frame).figure).collect();
     let phases = (0..frames).map(|frame| walker.phase(frame)).collect();
     Ok((numpy_from_figures(py, &figures)?, numpy_from_column(py, phases)))

@@ -12,8 +12,8 @@ use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
 use memo_core::model::body::Part;
 use memo_core::model::{Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours};
+use memo_core::reproduce::rohr;
 use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
-use memo_core::track::experiment;
 use memo_core::track::score::EdgeLine;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::search::{Axis, Grid, search};
@@ -26,14 +26,14 @@ use pyo3::types::PyDict;
 /// The paper's constants as the code has them, by name.
 #[pyfunction]
 pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
-    experiment::numbers()
+    rohr::numbers()
 }
 
 /// By how much the two sides of each equation differ, computed in two ways, by name.
 #[pyfunction]
 #[pyo3(signature = (seed=0))]
 pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
-    py.detach(|| experiment::deviations(seed))
+    py.detach(|| rohr::deviations(seed))
 }
 
 fn gait_of(name: &str) -> PyResult<Gait> {
@@ -186,7 +186,7 @@ pub fn search_windows<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let lines = segments_from_numpy(lines)?;
     let point = |p: [f32; 2]| DVec2::from_array(p.map(f64::from));
-    let corners = |[start, end]: &[[f32; 2]; 2]| experiment::search_window(point(*start), point(*end), c_r);
+    let corners = |[start, end]: &[[f32; 2]; 2]| rohr::search_window(point(*start), point(*end), c_r);
     let flat: Vec<f64> = lines.iter().flat_map(corners).flat_map(|corner| corner.to_array()).collect();
     numpy_from_flat(py, flat, vec![lines.len(), 4, 2])
 }

@@ -4,7 +4,7 @@
 //! It solves what [`super`] has linearised and knows neither frames nor pyramids. On components where the
 //! equations are singular it finds one of the solutions; such components are refused before.
 
-use super::{Domain, FlowOptions};
+use super::domain::Domain;
 use glam::DVec2;
 use std::ops::Range;
 
@@ -347,8 +347,8 @@ impl Multigrid {
     }
 
     /// Solves A x = b from the given x on, until |b - A x| <= tolerance |b|.
-    pub(super) fn solve(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
-        pulp::Arch::new().dispatch(Solve { grids: self, x, options })
+    pub(super) fn solve(&mut self, x: &mut Vectors, goal: Goal) -> Solved {
+        pulp::Arch::new().dispatch(Solve { grids: self, x, goal })
     }
 
     /// Completes A on all grids after the constraints were set.
@@ -363,12 +363,12 @@ impl Multigrid {
     }
 
     #[inline(always)]
-    fn conjugate_gradients(&mut self, x: &mut Vectors, options: &FlowOptions) -> Solved {
-        let goal = options.tolerance * self.right_side.norm();
+    fn conjugate_gradients(&mut self, x: &mut Vectors, goal: Goal) -> Solved {
+        let least_norm = goal.tolerance * self.right_side.norm();
         self.levels[0].multiply(x, &mut self.residual);
         self.residual.combine(-1.0, 1.0, &self.right_side);
         let (mut residual_norm, mut slope, mut iterations) = (self.residual.norm(), f64::INFINITY, 0);
-        while residual_norm > goal && iterations < options.max_iterations {
+        while residual_norm > least_norm && iterations < goal.max_iterations {
             self.precondition();
             let preconditioned = &self.levels[0].solution;
             let next_slope = self.residual.dot(preconditioned);
@@ -410,11 +410,20 @@ impl Multigrid {
     }
 }
 
+/// When a solution is good enough.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
+    /// Residual relative to the right side.
+    pub(super) tolerance: f64,
+    /// Iterations after which it is given up.
+    pub(super) max_iterations: usize,
+}
+
 /// A solution, compiled for each width of vectors.
 struct Solve<'a> {
     grids: &'a mut Multigrid,
     x: &'a mut Vectors,
-    options: &'a FlowOptions,
+    goal: Goal,
 }
 
 impl pulp::WithSimd for Solve<'_> {
@@ -423,6 +432,6 @@ impl pulp::WithSimd for Solve<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Solved {
         self.grids.update_diagonals();
-        self.grids.conjugate_gradients(self.x, self.options)
+        self.grids.conjugate_gradients(self.x, self.goal)
     }
 }

@@ -50,7 +50,8 @@ fn iterated_solution(domain: &Domain, g: &[DVec2], c: &[f64], options: &FlowOpti
         solver.set_constraint(cell, g[cell], c[cell]);
     }
     let mut x = Vectors::zero(g.len());
-    let solved = solver.solve(&mut x, options);
+    let goal = Goal { tolerance: options.tolerance, max_iterations: options.max_iterations };
+    let solved = solver.solve(&mut x, goal);
     (x, solved)
 }
 

@@ -32,7 +32,7 @@ pub use linkage::{Chain, Contact, Figure, Link, Method};
 pub use reflection::joint_of;
 
 use super::{EvidenceOptions, FitOptions, Verdict};
-use crate::posture::skeleton::Joint;
+use crate::model::skeleton::Joint;
 use crate::progress::{Progress, Stopped};
 use crate::wording::counted;
 use depth::depth_over_time;

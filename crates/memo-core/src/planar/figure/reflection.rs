@@ -12,9 +12,9 @@
 //! trunk.
 
 use super::{Figure, FigureWindow, Verdict};
-use crate::posture::angles::{abduction_rad, elbow_rad, knee_rad, swing_rad};
-use crate::posture::limits::Limits;
-use crate::posture::skeleton::{Joint, Side};
+use crate::model::angles::{abduction_rad, elbow_rad, knee_rad, swing_rad};
+use crate::model::limits::Limits;
+use crate::model::skeleton::{Joint, Side};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Facings tried, all round.

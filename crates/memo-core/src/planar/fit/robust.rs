@@ -2,13 +2,13 @@
 
 use super::moments::grid;
 use super::{Problem, Solution, View, count};
+use crate::estimate::median::median;
 use glam::DVec2;
 
-/// Median of the numbers among the values; they are reordered.
-fn median(values: &mut Vec<f64>) -> f64 {
+/// The median of what is known; NaN of none.
+fn known_median(values: &mut Vec<f64>) -> f64 {
     values.retain(|x| !x.is_nan());
-    let middle = values.len() / 2;
-    if values.is_empty() { f64::NAN } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    median(values).unwrap_or(f64::NAN)
 }
 
 impl<const K: usize> Problem<'_, K> {
@@ -60,7 +60,7 @@ impl<const K: usize> Problem<'_, K> {
     fn outliers(&self, solution: &Solution<K>) -> (f64, Vec<bool>) {
         let residuals: Vec<[f64; K]> =
             self.views.iter().map(|v| self.residuals(v, solution).map(f64::abs)).collect();
-        let spread = 1.4826 * median(&mut residuals.iter().flatten().copied().collect());
+        let spread = 1.4826 * known_median(&mut residuals.iter().flatten().copied().collect());
         let limit = self.options.outlier_sd * spread.max(self.noise_sq.sqrt()).max(1e-12 * self.size);
         (limit, residuals.iter().map(|r| r.iter().any(|r| *r > limit)).collect())
     }
@@ -74,12 +74,12 @@ impl<const K: usize> Problem<'_, K> {
             let c = std::array::from_fn(|k| {
                 values.clear();
                 values.extend(self.views.iter().map(|v| h(v[k])));
-                median(&mut values)
+                known_median(&mut values)
             });
             let solution = Solution { g, c, cost: 0.0 };
             values.clear();
             values.extend(self.views.iter().flat_map(|v| self.residuals(v, &solution).map(f64::abs)));
-            Solution { cost: median(&mut values), ..solution }
+            Solution { cost: known_median(&mut values), ..solution }
         });
         candidates.min_by(|a, b| a.cost.total_cmp(&b.cost)).expect("the grid is not empty")
     }

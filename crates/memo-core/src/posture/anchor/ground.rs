@@ -16,8 +16,8 @@ use super::{
     Anchor, AnchorError, AnchorOptions, AnchorSource, Ground, NORMAL_NODES, anchor_of_density, check_lengths,
     check_up, from_extent, neck_ray, pelvis_to_hip_line_m, positive,
 };
+use crate::model::skeleton::{Joint, SegmentLengths, Side};
 use crate::posture::lift::{JointRays, RootKind, roots};
-use crate::posture::skeleton::{Joint, SegmentLengths, Side};
 
 /// Number of distances tried, evenly spaced in their logarithm: steps of 0.6 %.
 const GRID: usize = 240;
@@ -248,7 +248,7 @@ impl Scene<'_> {
 mod tests {
     use super::super::trunk::rigid_trunk;
     use super::*;
-    use crate::posture::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
+    use crate::model::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
 
     /// Somebody upright 4 m before a level camera at 1.2 m, turned half aside, one foot lifted.
     fn standing(lengths: &SegmentLengths, lifted: Side) -> StickFigure {

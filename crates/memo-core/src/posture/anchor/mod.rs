@@ -24,8 +24,8 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::lift::JointRays;
-use super::skeleton::{Joint, SegmentLengths, Side};
 use crate::model::camera::Camera;
+use crate::model::skeleton::{Joint, SegmentLengths, Side};
 
 pub use ground::from_ground;
 pub use track::{DepthTrack, SmoothOptions, smooth};

@@ -1,5 +1,5 @@
 use super::*;
-use crate::posture::skeleton::StickFigure;
+use crate::model::skeleton::StickFigure;
 use glam::DMat3;
 use proptest::prelude::*;
 

@@ -1,15 +1,16 @@
 //! The neck's distance over a sequence: constant velocity, uneven times, missing frames, outliers.
 //!
-//! A Kalman filter with Rauch-Tung-Striebel smoothing ([`crate::track::kalman`]), repeated with weights: a
+//! A Kalman filter with Rauch-Tung-Striebel smoothing ([`crate::estimate::kalman`]), repeated with weights: a
 //! frame far off the track counts less (Huber's weights). What all frames have wrong together (lengths,
 //! posture of the person) does not average out. It is told from the scatter: a stated variance beyond the
 //! scatter of the frames about the track is taken to be common, and stays in the result; scatter that is
 //! alike in neighbouring frames (the steps of a walk) counts as fewer frames.
 
+use crate::estimate::median::median;
 use glam::DVec3;
 
 use super::{Anchor, AnchorError, positive};
-use crate::track::kalman::{ConstantVelocity, Noise, smooth as smooth_states};
+use crate::estimate::kalman::{ConstantVelocity, Noise, smooth as smooth_states};
 
 /// How a track of distances is smoothed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +76,7 @@ pub fn smooth(
         .iter()
         .map(|a| a.as_ref().map_or((f64::NAN, f64::INFINITY), |a| (a.distance_m, a.sd_depth_m.powi(2))))
         .collect();
-    let stated = median(seen.iter().map(|&i| measured[i].1).collect());
+    let stated = median(&mut seen.iter().map(|&i| measured[i].1).collect::<Vec<_>>()).unwrap_or(0.0);
     // What an anchor states relative to the others; the scale of it is measured below.
     let relative: Vec<f64> = measured.iter().map(|m| m.1 / stated).collect();
     let mut scatter_sq = stated;
@@ -88,7 +89,8 @@ pub fn smooth(
         states = filtered(times_s, &measured, &variances, &seen, options);
         let residual = |i: usize| (measured[i].0 - states[i].position) / relative[i].sqrt();
         let residuals: Vec<f64> = seen.iter().map(|&i| residual(i)).collect();
-        let spread = 1.4826 * median(residuals.iter().map(|r| r.abs()).collect());
+        let spread =
+            1.4826 * median(&mut residuals.iter().map(|r| r.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
         // Never below a tenth of what is stated: a few frames can lie on a line by chance.
         scatter_sq = (spread * spread).max(0.01 * stated);
         correlation = neighbour_correlation(&seen, &residuals, 3.0 * scatter_sq.sqrt());
@@ -155,11 +157,6 @@ fn filtered(
         states.push(state);
     }
     smooth_states(&states, &dt_s, &noise(0.0))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
 }
 
 /// Correlation of the residuals of neighbouring frames, those beyond `most` cut to it.

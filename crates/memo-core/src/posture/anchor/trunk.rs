@@ -15,8 +15,8 @@ use super::{
     Anchor, AnchorError, AnchorOptions, AnchorSource, DepthMode, check_lengths, check_up, neck_ray,
     pelvis_to_hip_line_m,
 };
+use crate::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use crate::posture::lift::JointRays;
-use crate::posture::skeleton::{Joint, PerJoint, SegmentLengths};
 
 /// One attitude of the trunk that explains the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -297,7 +297,7 @@ fn summary(ray: DVec3, fits: &[Fit], scale_sd: f64) -> Option<TrunkFit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posture::skeleton::{JOINT_COUNT, RigidDistance, Side, StickFigure};
+    use crate::model::skeleton::{JOINT_COUNT, RigidDistance, Side, StickFigure};
 
     /// All lengths of Table A.1 between the points of the rigid trunk; the neck in front of the shoulders.
     #[test]

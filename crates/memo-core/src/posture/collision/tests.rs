@@ -1,9 +1,9 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::model::skeleton::StickFigure;
 use crate::posture::constraint::ConstraintKind;
 use crate::posture::example::{ARM_M, seen_along, standing, turned};
-use crate::posture::skeleton::StickFigure;
 use crate::synth::Random;
 
 fn point() -> impl Strategy<Value = DVec3> {

@@ -1,9 +1,9 @@
 use super::*;
+use crate::model::skeleton::{Joint, PerJoint, StickFigure};
 use crate::posture::example::{
     ARM_M, LEG_M, TRUNK_M, WIDTH_M, forward_deg, lengths_of, outward_deg, seen_along, standing, turned,
 };
 use crate::posture::placed::{Bearings, PlacedFigure};
-use crate::posture::skeleton::{Joint, PerJoint, StickFigure};
 use crate::posture::tree::{TreeOptions, explain};
 
 /// What a constraint has against a figure whose lengths are those of somebody standing.

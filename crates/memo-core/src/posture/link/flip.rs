@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use super::super::prior::capped;
-use super::super::smooth::{Innovation, Measured, filter_step};
+use crate::estimate::smooth::{Innovation, Measured, filter_step};
 
 /// Time before and after a stretch over which it is judged, seconds.
 const AROUND_S: f64 = 0.5;

@@ -3,13 +3,13 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::super::angles::{elbow_rad, knee_rad, swing_rad};
-use super::super::skeleton::{Joint, PerJoint, Side, StickFigure};
-use super::super::smooth::{Measured, smooth_track};
-use super::super::viterbi::least_path;
 use super::flip::{Chain, Flip};
 use super::trunk::Trunk;
 use super::{Problem, place};
+use crate::estimate::smooth::{Measured, smooth_track};
+use crate::estimate::viterbi::least_path;
+use crate::model::angles::{elbow_rad, knee_rad, swing_rad};
+use crate::model::skeleton::{Joint, PerJoint, Side, StickFigure};
 
 /// Both limbs of a pair, right and left: where the limb hangs, its middle joint, its end. Pair 0 the arms.
 const PAIRS: [[[Joint; 3]; 2]; 2] = [
@@ -336,10 +336,10 @@ impl Problem<'_> {
 mod tests {
     use super::super::{LinkFrame, LinkOptions};
     use super::*;
+    use crate::model::skeleton::SegmentLengths;
     use crate::posture::lift::JointRays;
     use crate::posture::prior::MotionPrior;
-    use crate::posture::skeleton::SegmentLengths;
-    use crate::synth::stick_walker::StickWalker;
+    use crate::reproduce::stick_walker::StickWalker;
 
     /// A walk of the paper's walker 4 m away, facing right, ten frames in 0.36 s.
     fn frames() -> (Vec<LinkFrame>, SegmentLengths, LinkOptions) {

@@ -19,11 +19,11 @@ use glam::{DMat3, DVec3};
 use thiserror::Error;
 
 use super::anchor::{AnchorOptions, Ground};
-use super::angles::trunk_axes;
 use super::lift::{JointRays, RootKind, Roots, extent_sd, roots};
 use super::prior::{MotionPrior, chi_sq};
-use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
-use super::smooth::Measured;
+use crate::estimate::smooth::Measured;
+use crate::model::angles::trunk_axes;
+use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 use crate::progress::{Progress, Stopped};
 use flip::Flip;
 use limbs::Limbs;

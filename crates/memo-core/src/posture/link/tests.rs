@@ -1,5 +1,5 @@
 use super::*;
-use crate::synth::stick_walker::StickWalker;
+use crate::reproduce::stick_walker::StickWalker;
 use glam::DQuat;
 
 const FRAMES: usize = 60;

@@ -3,13 +3,13 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::angles::{hip_axes, swing_rad, trunk_axes};
 use super::super::prior::{Soft, chi_sq};
-use super::super::skeleton::{Joint, PerJoint, RigidDistance, StickFigure};
-use super::super::smooth::{Measured, smooth_track};
-use super::super::viterbi::least_path;
 use super::flip::{Chain, Flip};
 use super::{Problem, place};
+use crate::estimate::smooth::{Measured, smooth_track};
+use crate::estimate::viterbi::least_path;
+use crate::model::angles::{hip_axes, swing_rad, trunk_axes};
+use crate::model::skeleton::{Joint, PerJoint, RigidDistance, StickFigure};
 
 /// Joints of the trunk in the order of their levels; bit i of a reading is the root of joint i, 1 the farther.
 const JOINTS: [Joint; 5] =
@@ -277,10 +277,10 @@ mod tests {
 
     use super::super::{LinkFrame, LinkOptions};
     use super::*;
+    use crate::model::skeleton::SegmentLengths;
     use crate::posture::lift::JointRays;
     use crate::posture::prior::MotionPrior;
-    use crate::posture::skeleton::SegmentLengths;
-    use crate::synth::stick_walker::StickWalker;
+    use crate::reproduce::stick_walker::StickWalker;
 
     /// Somebody upright facing the camera, 4 m away; the trunk of Table A.1, its shoulders behind the neck.
     fn facing() -> (Vec<LinkFrame>, StickFigure, SegmentLengths, LinkOptions) {

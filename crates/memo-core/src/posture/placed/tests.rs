@@ -1,7 +1,7 @@
 use super::*;
+use crate::model::skeleton::Side;
 use crate::posture::example::{LEG_M, TRUNK_M, WIDTH_M, seen_along, standing, turned};
 use crate::posture::lift::roots;
-use crate::posture::skeleton::Side;
 use crate::synth::Random;
 
 /// A segment seen aslant, its end noisy.

@@ -1,12 +1,12 @@
 use std::collections::BTreeSet;
 
 use super::*;
+use crate::model::skeleton::{PerJoint, StickFigure};
 use crate::posture::example::{
     ARM_M, LEG_M, TRUNK_M, WIDTH_M, forward_deg, lengths_of, outward_deg, seen_along, shifted, standing,
     turned,
 };
 use crate::posture::placed::Bearings;
-use crate::posture::skeleton::{PerJoint, StickFigure};
 use crate::posture::tree::{TreeOptions, explain};
 
 /// The rules that a figure breaks, moving forward, and by what.

@@ -4,10 +4,10 @@ use glam::{DVec2, DVec3};
 
 use super::{KeypointSequence, PostureSequence, SequenceError, SequenceOptions, postures};
 use crate::model::camera::Camera;
+use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
 use crate::posture::head::HeadModel;
-use crate::posture::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
+use crate::reproduce::stick_walker::{StickWalker, world_from_head};
 use crate::synth::Random;
-use crate::synth::stick_walker::{StickWalker, world_from_head};
 
 const RATE_HZ: f64 = 25.0;
 

@@ -5,9 +5,9 @@ use thiserror::Error;
 
 use super::figure_in_world;
 use super::neck::{NeckTrack, Scene};
+use crate::model::skeleton::{Joint, StickFigure};
 use crate::posture::constraint::Constraint;
 use crate::posture::group::group;
-use crate::posture::skeleton::{Joint, StickFigure};
 use crate::posture::tree::{Interpretations, TreeError, TreeOptions, View};
 
 /// Why a frame says nothing.

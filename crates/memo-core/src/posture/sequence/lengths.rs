@@ -1,13 +1,13 @@
 //! Lengths of a sequence: given, or by height and proportions refined by what is seen.
 
 use super::{AnchorChoice, SequenceError, SequenceOptions, Warning};
+use crate::model::skeleton::{Joint, SegmentLengths, segment_name};
 use crate::posture::anchor::{Anchor, AnchorOptions, AnchorSource, Ground, from_given};
 use crate::posture::length::{
     LengthBasis, LengthFit, LengthFitError, LengthPrior, ScaleFrom, estimate, estimate_from_sequence,
 };
 use crate::posture::lift::JointRays;
 use crate::posture::sequence::NeckTrack;
-use crate::posture::skeleton::{Joint, SegmentLengths, segment_name};
 use crate::posture::tree::DEFAULT_LENGTH_SD_M;
 
 /// What a length rests on.
@@ -206,10 +206,10 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use super::*;
+    use crate::model::skeleton::{JOINT_COUNT, PerJoint};
     use crate::posture::length::LengthEstimate;
     use crate::posture::sequence::NeckFrom;
     use crate::posture::sequence::example::{walk, with_lengths};
-    use crate::posture::skeleton::{JOINT_COUNT, PerJoint};
 
     /// A fit whose segments have a scale known to 5 % and 2 cm of their own.
     fn fit() -> LengthFit {

@@ -4,7 +4,7 @@
 //! The interpretation tree of every frame is grown and pruned (Lee and Chen 1985, sections 2.2-3.4), and one
 //! posture a frame is chosen by linking over time.
 //!
-//! The limits: one person; left and right as given (repair them before, [`super::unswap`]); a
+//! The limits: one person; left and right as given (repair them before, [`crate::keypoints::unswap`]); a
 //! camera that stands still, calibrated against the vertical. Rules and the prior of walking are of
 //! straight-line walking forwards. Weights say which joints count as seen; all that are seen get the same
 //! noise, for scores of detectors are no standard deviations.
@@ -26,10 +26,10 @@ use super::anchor::{AnchorError, AnchorSource, Ground};
 use super::constraint::Constraint;
 use super::lift::JointRays;
 use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress};
-use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, StickFigure};
 use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
 use crate::model::camera::{Camera, CameraError};
+use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, StickFigure};
 use crate::progress::{Progress, Stopped};
 
 pub use frame::{FrameProblem, FrameReading, MOST_GROUPED, ReasonTotal, RepresentedGroup, reason_totals};
@@ -48,7 +48,7 @@ pub struct KeypointSequence<'a> {
     pub points_px: &'a [PerJoint<DVec2>],
     /// Weight of each joint, 0 to 1.
     pub weights: &'a [PerJoint<f64>],
-    /// The six points of the head in the order of [`super::head::HeadPoint::ALL`], pixels; NaN: missing.
+    /// The six points of the head in the order of [`crate::posture::head::HeadPoint::ALL`], pixels; NaN: missing.
     pub head_points_px: Option<&'a [[DVec2; 6]]>,
 }
 
@@ -204,7 +204,7 @@ pub fn postures_with_progress(
     let tree = options.motion.tree(options.strength);
     let trees: Vec<TreeOptions> = heads
         .iter()
-        .map(|head| tree.clone().with_bearings(scene.bearings(&heading, head.as_ref())))
+        .map(|head| tree.clone().with_bearings(scene.bearings(heading.direction, head.as_ref())))
         .collect();
     let read = |t: usize| {
         progress.advance(1)?;

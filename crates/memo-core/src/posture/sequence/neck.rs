@@ -7,20 +7,19 @@ use std::fmt;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::heading::Heading;
 use super::lengths::SequenceLengths;
 use super::{AnchorChoice, KeypointSequence, SequenceError, SequenceOptions, Warning};
+use crate::estimate::median::median;
 use crate::model::camera::Camera;
+use crate::model::resection::{Resection, ResectionOptions, resect_in_image};
+use crate::model::skeleton::{Joint, SegmentLengths};
 use crate::posture::anchor::{
     Anchor, AnchorError, AnchorOptions, AnchorSource, Conflict, DepthMode, Ground, combine, from_extent,
     from_given, from_ground, from_trunk, smooth,
 };
-use crate::posture::head::{
-    HeadModel, HeadOptions, HeadSolution, LEE_CHEN_BODY_HEIGHT_M, head_pose_in_image,
-};
+use crate::posture::head::{HeadModel, LEE_CHEN_BODY_HEIGHT_M};
 use crate::posture::lift::JointRays;
 use crate::posture::placed::Bearings;
-use crate::posture::skeleton::{Joint, SegmentLengths};
 use crate::progress::{Progress, Stopped};
 
 /// What all stages look at.
@@ -40,11 +39,11 @@ impl Scene<'_> {
         self.camera.rotation.z_axis
     }
 
-    /// Vertical, moving direction and head of a frame, camera axes.
-    pub fn bearings(&self, heading: &Heading, head: Option<&Head>) -> Bearings {
+    /// Vertical, moving direction (given in the world) and head of a frame, camera axes.
+    pub fn bearings(&self, moving_direction: Option<DVec3>, head: Option<&Head>) -> Bearings {
         Bearings {
             up: Some(self.up()),
-            heading: heading.direction.map(|direction| self.camera.rotation * direction),
+            heading: moving_direction.map(|direction| self.camera.rotation * direction),
             head: head.and_then(|head| head.axes),
         }
     }
@@ -167,12 +166,13 @@ pub(super) fn heads(scene: &Scene) -> Vec<Option<Head>> {
     let height_m = scene.options.height_m.unwrap_or_else(|| height_m(&scene.lengths.lengths));
     let Ok(model) = HeadModel::lee_chen_for_height(height_m) else { return vec![None; frames] };
     let noise_px = scene.options.noise_px;
-    let options = HeadOptions { image_sd: (noise_px > 0.0).then_some(noise_px), ..HeadOptions::default() };
+    let options =
+        ResectionOptions { image_sd: (noise_px > 0.0).then_some(noise_px), ..ResectionOptions::default() };
     let head = |points_px: &[glam::DVec2; 6]| {
         let seen: Vec<usize> = (0..6).filter(|&i| points_px[i].is_finite()).collect();
         let points: Vec<DVec3> = seen.iter().map(|&i| model.points_m[i]).collect();
         let pixels: Vec<_> = seen.iter().map(|&i| points_px[i]).collect();
-        let found = head_pose_in_image(scene.camera, &points, &pixels, &options).ok()?;
+        let found = resect_in_image(scene.camera, &points, &pixels, &options).ok()?;
         Some(head_of(&found, &model))
     };
     points_px.par_iter().map(head).collect()
@@ -185,7 +185,7 @@ fn height_m(lengths: &SegmentLengths) -> f64 {
 }
 
 /// The neck over all poses by their probabilities, the facing of the only one.
-fn head_of(found: &HeadSolution, model: &HeadModel) -> Head {
+fn head_of(found: &Resection, model: &HeadModel) -> Head {
     let mut total = 0.0;
     let mut sums = [0.0; 2];
     for pose in &found.poses {
@@ -431,10 +431,7 @@ fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
     for conflict in found.iter().flat_map(|frame| &frame.conflicts) {
         pairs.entry(conflict.sources).or_default().push(conflict);
     }
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
+    let median = |mut values: Vec<f64>| median(&mut values).unwrap_or(f64::NAN);
     let pair = |(sources, list): ([AnchorSource; 2], Vec<&Conflict>)| SourceConflict {
         sources,
         frames: list.len(),
@@ -503,12 +500,7 @@ mod tests {
                 assert!((axis - walk.camera.rotation * expected).length() < 1e-6, "{axis} {expected}");
             }
             // What the rules are told: the vertical, the direction and the face.
-            let heading = Heading {
-                direction: Some(walk.forward),
-                from: super::super::HeadingFrom::Given,
-                travelled_m: 0.0,
-            };
-            let bearings = scene.bearings(&heading, Some(&head));
+            let bearings = scene.bearings(Some(walk.forward), Some(&head));
             assert_eq!(bearings.up, Some(walk.camera.rotation * DVec3::Z));
             assert_eq!(bearings.heading, Some(walk.camera.rotation * walk.forward));
             assert_eq!(bearings.head, head.axes);
@@ -528,17 +520,17 @@ mod tests {
             .map(|point| turn * *point + at(4.0))
             .map(|q| q.truncate() / q.z * camera.focal_px + camera.centre_px)
             .collect();
-        let options = HeadOptions { image_sd: Some(0.2), ..HeadOptions::default() };
-        let found = head_pose_in_image(&camera, &model.points_m, &pixels, &options).unwrap();
+        let options = ResectionOptions { image_sd: Some(0.2), ..ResectionOptions::default() };
+        let found = resect_in_image(&camera, &model.points_m, &pixels, &options).unwrap();
         let neck = found.best().point_in_camera(model.points_m[0]);
         let variance = DVec3::Z.dot(neck.covariance * DVec3::Z);
-        let one = head_of(&HeadSolution { poses: vec![found.best().clone()], minima: 1 }, &model);
+        let one = head_of(&Resection { poses: vec![found.best().clone()], minima: 1 }, &model);
         assert!((one.distance_m - 4.0).abs() < 1e-6 && (one.sd_m.powi(2) / variance - 1.0).abs() < 1e-6);
         assert!(one.axes.is_some());
         let [mut near, mut far] = [found.best().clone(), found.best().clone()];
         (near.probability, far.probability) = (0.75, 0.25);
         far.translation.z += 1.0;
-        let two = head_of(&HeadSolution { poses: vec![near, far], minima: 2 }, &model);
+        let two = head_of(&Resection { poses: vec![near, far], minima: 2 }, &model);
         assert!((two.distance_m - 4.25).abs() < 1e-6);
         // Of a distance of two values with odds of three to one, 1 m apart: variance 3/16.
         assert!((two.sd_m.powi(2) - variance - 3.0 / 16.0).abs() < 1e-6, "{}", two.sd_m);
@@ -559,7 +551,7 @@ mod tests {
 
     #[test]
     fn the_head_s_distance_is_as_unsure_as_its_size() {
-        let mut rays = JointRays::from_points(&crate::posture::skeleton::StickFigure::UNKNOWN);
+        let mut rays = JointRays::from_points(&crate::model::skeleton::StickFigure::UNKNOWN);
         let head = Head { distance_m: 4.0, sd_m: 0.15, axes: None };
         assert!(matches!(from_head(&rays, Some(&head)), Err(AnchorError::NotSeen { missing: "neck", .. })));
         rays.ray[Joint::Neck] = DVec3::new(0.6, 0.0, 0.8);
@@ -608,7 +600,7 @@ mod tests {
             assert!(!found.is_combined && found.anchor == Ok(single));
         }
         // The neck alone: no source but the head.
-        let mut neck_alone = JointRays::from_points(&crate::posture::skeleton::StickFigure::UNKNOWN);
+        let mut neck_alone = JointRays::from_points(&crate::model::skeleton::StickFigure::UNKNOWN);
         neck_alone.ray[Joint::Neck] = rays[0].ray[Joint::Neck];
         let auto = ask(AnchorChoice::Auto, &[neck_alone]).anchor.unwrap();
         assert_eq!((auto.source, auto.distance_m), (AnchorSource::Head, 9.0));

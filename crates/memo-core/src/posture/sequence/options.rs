@@ -4,11 +4,11 @@
 use glam::DVec3;
 
 use super::SequenceError;
+use crate::model::skeleton::SegmentLengths;
 use crate::posture::anchor::{AnchorOptions, AnchorSource, SmoothOptions};
 use crate::posture::group::DEFAULT_GROUP_M;
 use crate::posture::prior::MotionPrior;
 use crate::posture::rules::MotionModel;
-use crate::posture::skeleton::SegmentLengths;
 use crate::posture::tree::TreeOptions;
 
 /// Rules of motion beyond what a body can do.

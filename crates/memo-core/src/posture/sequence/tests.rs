@@ -1,7 +1,7 @@
 use super::example::{Walk, walk, with_lengths};
 use super::*;
+use crate::model::skeleton::SegmentLengths;
 use crate::posture::constraint::ConstraintKind;
-use crate::posture::skeleton::SegmentLengths;
 use proptest::prelude::*;
 
 /// Median and 90 % quantile of the distances from the truth, necks on each other, cm.

@@ -10,10 +10,10 @@ use super::frame::{FrameProblem, FrameReading};
 use super::heading::{Heading, HeadingFrom};
 use super::neck::{NeckTrack, Scene, SourceConflict};
 use super::{AnchorChoice, Motion, Strength};
-use crate::posture::angles::trunk_axes;
+use crate::model::angles::trunk_axes;
+use crate::model::skeleton::{Joint, PerJoint};
 use crate::posture::constraint::{Constraint, ConstraintKind};
 use crate::posture::link::LinkedPath;
-use crate::posture::skeleton::{Joint, PerJoint};
 use crate::posture::tree::TreeOptions;
 
 /// Something that casts doubt on a result, as a sentence with its numbers.
@@ -379,11 +379,11 @@ pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
 mod tests {
     use super::*;
     use crate::model::camera::Camera;
+    use crate::model::skeleton::JOINT_COUNT;
     use crate::posture::anchor::{AnchorSource, Ground};
     use crate::posture::lift::JointRays;
     use crate::posture::sequence::example::{Walk, walk, with_lengths};
     use crate::posture::sequence::{PostureSequence, SequenceOptions};
-    use crate::posture::skeleton::JOINT_COUNT;
 
     #[test]
     fn many_segments_too_long_are_told_from_the_share_that_noise_explains() {

@@ -1,10 +1,10 @@
 //! What is left of a tree, and what was cut.
 
 use super::View;
+use crate::model::skeleton::{Joint, PerJoint, StickFigure};
 use crate::posture::constraint::{Constraint, Violation};
 use crate::posture::lift::RootKind;
 use crate::posture::placed::{HeadingSource, PlacedFigure};
-use crate::posture::skeleton::{Joint, PerJoint, StickFigure};
 
 /// A way down the tree: for each joint near or far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]

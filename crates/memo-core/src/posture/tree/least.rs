@@ -1,8 +1,8 @@
 //! The posture that breaks the constraints least.
 
-use super::walk::{Asked, Tree};
+use super::checks::{Asked, Tree};
 use super::{LeastViolating, Path};
-use crate::posture::skeleton::{JOINT_COUNT, Joint};
+use crate::model::skeleton::{JOINT_COUNT, Joint};
 
 /// Branch and bound, depth first, for the leaf of the least sum of squared severities.
 pub(super) fn least_violating(tree: &Tree) -> LeastViolating {

@@ -12,6 +12,7 @@
 //!
 //! What it cannot do: choose. Hard constraints that true postures keep leave tens to hundreds of leaves.
 
+mod checks;
 mod interpretation;
 mod least;
 mod nodes;
@@ -27,7 +28,7 @@ use thiserror::Error;
 use super::constraint::{Constraint, Violation};
 use super::lift::{JointRays, roots};
 use super::placed::{Placed, PlacedFigure, Trunk, placed_points};
-use super::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
+use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 
 pub use interpretation::{Cut, CutCount, Interpretation, Interpretations, LeastViolating, LevelCount, Path};
 pub use options::TreeOptions;

@@ -5,7 +5,7 @@
 //! whose numbers agree in them make the same choice within the scope, which has the number of the node that
 //! is near everywhere else.
 
-use crate::posture::skeleton::JOINT_COUNT;
+use crate::model::skeleton::JOINT_COUNT;
 use crate::posture::tree::Path;
 
 /// Roots a path chooses.

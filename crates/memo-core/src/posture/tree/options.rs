@@ -1,11 +1,11 @@
 //! What a tree is pruned by.
 
+use crate::model::limits::Limits;
+use crate::model::skeleton::SegmentLengths;
 use crate::posture::collision::Collisions;
 use crate::posture::constraint::{Constraint, ConstraintKind, Violation};
-use crate::posture::limits::Limits;
 use crate::posture::placed::{Bearings, PlacedFigure, Trunk};
 use crate::posture::rules::{MotionModel, Rule};
-use crate::posture::skeleton::SegmentLengths;
 
 /// What cuts.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,9 @@
 
 use super::View;
 use super::nodes::all_choices;
+use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint};
 use crate::posture::collision::Span;
 use crate::posture::placed::{MOST_PLACES, Placed};
-use crate::posture::skeleton::{JOINT_COUNT, Joint, PerJoint};
 
 /// A joint and those it hangs on, but the neck, as bits of a node's number: their roots say where it is.
 pub(super) const CHAINS: [usize; JOINT_COUNT] = {

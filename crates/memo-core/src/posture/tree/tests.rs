@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
+use crate::model::skeleton::Side;
 use crate::posture::placed::Bearings;
 use crate::posture::rules::{MotionModel, Rule, Tolerance};
-use crate::posture::skeleton::Side;
 use crate::synth::Random;
 
 /// Someone upright in camera axes, 4 m away, every segment turned at random by up to `spread_rad`.
@@ -304,8 +304,8 @@ fn of_equally_bad_postures_the_first_is_taken() {
     let mut lengths = view.lengths;
     // The shoulders are much too near in every posture, and nothing else is asked.
     lengths.rigid = [1.4; 4];
-    let anything = |limits: &mut crate::posture::limits::Limits| {
-        let free = crate::posture::limits::AngleRange::from_deg(-400.0, 400.0);
+    let anything = |limits: &mut crate::model::limits::Limits| {
+        let free = crate::model::limits::AngleRange::from_deg(-400.0, 400.0);
         (limits.shoulder_swing, limits.shoulder_abduction, limits.hip_swing) = (free, free, free);
         (limits.hip_abduction, limits.elbow, limits.knee, limits.pelvis_flexion) = (free, free, free, free);
         limits.pelvis_rotation_rad = 9.0;

@@ -16,6 +16,7 @@ mod person;
 mod render;
 mod room;
 mod round_cone;
+mod sizes;
 mod stride;
 
 use super::random::Random;
@@ -24,10 +25,11 @@ use crate::image::Image;
 use crate::model::{Camera, SideAngles, SideJoints};
 use crate::track::result::{EventKind, Side};
 use glam::{DMat3, DVec2, DVec3};
-use person::{Clothes, Sizes, Solid};
+use person::{Clothes, Solid};
 use render::draw;
 use room::Room;
 use round_cone::RoundCone;
+use sizes::Sizes;
 use std::f64::consts::{PI, TAU};
 use stride::{Figure, Stride};
 

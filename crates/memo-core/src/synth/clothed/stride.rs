@@ -12,8 +12,8 @@
 //!
 //! When a foot strikes and leaves follows from how it moves; no phase is assumed for it.
 
-use super::person::Sizes;
-use crate::calibrate::least_squares::minimise;
+use super::sizes::Sizes;
+use crate::estimate::least_squares::minimise;
 use crate::model::SideJoints;
 use crate::synth::Random;
 use glam::{DMat3, DVec3};

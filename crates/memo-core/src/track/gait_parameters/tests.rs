@@ -1,9 +1,9 @@
-use super::super::kalman::ConstantVelocity;
 use super::super::search::tests::{camera, walker};
 use super::super::search::{Axis, Hypothesis, Path};
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Walk, WalkOptions};
 use super::*;
+use crate::estimate::kalman::ConstantVelocity;
 use crate::image::Rectangle;
 use crate::synth::Random;
 use glam::DVec2;

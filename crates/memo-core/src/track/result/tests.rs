@@ -1,9 +1,9 @@
-use super::super::kalman::FilterOptions;
 use super::super::search::tests::{camera, walker};
 use super::super::search::{Axis, Path};
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State};
 use super::*;
+use crate::estimate::kalman::FilterOptions;
 use crate::image::Rectangle;
 use crate::synth::Random;
 use glam::DVec2;

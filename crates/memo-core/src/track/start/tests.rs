@@ -174,30 +174,6 @@ fn a_curve_is_linear_between_its_phases_and_closed() {
     assert_eq!(curve.best_phase(), 0.25);
 }
 
-#[test]
-fn a_line_through_points_has_their_slope_and_level_at_zero() {
-    let (slope, level) = line_through(&[(2.0, 1.0), (4.0, 0.0), (6.0, -1.0)]);
-    assert!((slope + 0.5).abs() < 1e-12 && (level - 2.0).abs() < 1e-12);
-    assert_eq!(line_through(&[(3.0, 1.0), (3.0, 2.0)]), (0.0, 1.5));
-    assert_eq!(line_through(&[]), (0.0, 0.0));
-}
-
-/// The log odds by Bayes from the two normal densities of the margin.
-#[test]
-fn the_swap_probability_is_bayes_rule_on_the_margin() {
-    let model = SwapModel { margin: 0.11, glimpse_sd: 0.2, person_sd: 0.06, glimpse_s: 0.25 };
-    for (chosen, other, duration_s, glimpses) in
-        [(8.0, 7.0, 1.5, 6.0f64), (3.0, 3.6, 0.1, 1.0), (20.0, 19.0, 40.0, 160.0), (5.0, 4.0, 0.0, 1.0)]
-    {
-        let margin = (chosen - other) / f64::max(chosen, other);
-        let variance = 0.06f64.powi(2) + 0.2f64.powi(2) / glimpses;
-        let density = |mean: f64| (-0.5 * (margin - mean).powi(2) / variance).exp();
-        let expected = density(-0.11) / (density(0.11) + density(-0.11));
-        let found = swap_probability(chosen, other, duration_s, &model);
-        assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
-    }
-}
-
 /// What a start that found this would have reported, sure of the direction.
 pub fn report(path: Path, beginning: Beginning, direction: Direction) -> StartReport {
     let line = PhaseLine { phase_at_start: beginning.phase, rate_hz: beginning.rate_hz, similarity: 0.5 };
@@ -297,17 +273,6 @@ fn close_counts_are_decided_by_mean_similarity() {
         (0..12).map(|k| if k < 2 { estimate(k, 0.0, 0.9) } else { estimate(k, 0.5, 0.3) }).collect();
     let choice = two_line_rule(&most, &CadenceRange::default()).unwrap();
     assert!(!choice.by_similarity && (choice.line.phase_at_start - 0.6).abs() < 1e-6);
-}
-
-#[test]
-fn the_swap_probability_is_symmetric_and_needs_time_and_margin() {
-    let m = SwapModel::default();
-    assert!((swap_probability(0.2, 0.2, 1.0, &m) - 0.5).abs() < 1e-12);
-    let p = swap_probability(0.20, 0.17, 0.5, &m);
-    assert!((p + swap_probability(0.17, 0.20, 0.5, &m) - 1.0).abs() < 1e-12);
-    assert!(swap_probability(0.20, 0.17, 2.0, &m) < p && p < 0.2);
-    assert!(swap_probability(0.20, 0.196, 100.0, &m) > 0.1, "a small margin never becomes certainty");
-    assert_eq!(swap_probability(0.0, 0.0, 1.0, &m), 0.5);
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! What the tracker decides, on moving boxes and on walks put into it; no frame is drawn.
 
-use super::super::kalman::ConstantVelocity;
 use super::super::locate::locate;
 use super::super::score::EdgeLine;
 use super::super::search::tests::{camera, edges_of, walker};
@@ -9,6 +8,7 @@ use super::super::start::Direction;
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Step};
 use super::*;
+use crate::estimate::kalman::ConstantVelocity;
 use crate::image::Image;
 
 const SIZE: [usize; 2] = [640, 480];

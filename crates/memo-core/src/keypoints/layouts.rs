@@ -2,8 +2,9 @@
 
 use glam::DVec2;
 
-use super::name::{nearest, plain};
-use super::{DetectorError, STICK_JOINTS};
+use crate::estimate::median::median;
+
+use super::names::{DetectorError, STICK_JOINTS, nearest, plain};
 
 /// The order of a detector's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -227,11 +228,11 @@ pub static LAYOUTS: [Layout; 8] = [
     },
 ];
 
-pub(super) fn layout_names() -> Vec<&'static str> {
+fn layout_names() -> Vec<&'static str> {
     LAYOUTS.iter().map(|layout| layout.name).collect()
 }
 
-pub(super) fn layout_counts() -> Vec<String> {
+fn layout_counts() -> Vec<String> {
     LAYOUTS.iter().map(|layout| format!("{} ({})", layout.joints.len(), layout.name)).collect()
 }
 
@@ -243,6 +244,7 @@ impl Layout {
         LAYOUTS.iter().find(same).ok_or_else(|| DetectorError::UnknownLayout {
             name: name.to_owned(),
             nearest: nearest(&wanted, layout_names()),
+            known: layout_names(),
         })
     }
 
@@ -257,7 +259,7 @@ impl Layout {
     pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
         let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
         let (with_middles, without) = match fitting[..] {
-            [] => return Err(DetectorError::UnknownCount { count: joint_count }),
+            [] => return Err(DetectorError::UnknownCount { count: joint_count, known: layout_counts() }),
             [only] => return Ok(only),
             [first, second, ..] => (first, second),
         };
@@ -278,22 +280,21 @@ impl Layout {
     fn distance_from_middles(&self, points_px: &[DVec2]) -> Option<f64> {
         let place = |name: &str| self.joints.iter().position(|joint| *joint == name);
         let middles = [["neck", "right_shoulder", "left_shoulder"], ["mid_hip", "right_hip", "left_hip"]];
-        let median = |[middle, right, left]: [&str; 3]| {
+        let farthest = |[middle, right, left]: [&str; 3]| {
             let (middle, right, left) = (place(middle)?, place(right)?, place(left)?);
             let mut distances: Vec<f64> = points_px
                 .chunks_exact(self.joints.len())
                 .map(|frame| frame[middle].distance(frame[right].midpoint(frame[left])) / size_px(frame))
                 .filter(|distance| distance.is_finite())
                 .collect();
-            distances.sort_by(f64::total_cmp);
-            distances.get(distances.len() / 2).copied()
+            median(&mut distances)
         };
-        middles.into_iter().filter_map(median).max_by(f64::total_cmp)
+        middles.into_iter().filter_map(farthest).max_by(f64::total_cmp)
     }
 }
 
 /// Diagonal of the box around the points that are not missing.
-pub(in crate::posture) fn size_px(points_px: &[DVec2]) -> f64 {
+pub(super) fn size_px(points_px: &[DVec2]) -> f64 {
     let seen = || points_px.iter().filter(|point| point.is_finite());
     let low = seen().fold(DVec2::INFINITY, |low, point| low.min(*point));
     let high = seen().fold(DVec2::NEG_INFINITY, |high, point| high.max(*point));

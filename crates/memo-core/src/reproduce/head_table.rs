@@ -3,10 +3,11 @@
 //! A.2(b) is printed with five digits, of which Table 2's are the result of more: no method gets them back.
 //! [`exact_projections`] does, as it is what A.2(b) was before rounding.
 
-use super::linear::LinearHead;
-use super::model::TABLE_A2_POINTS_CM;
-use super::search::{Focal, HeadOptions, head_pose};
-use super::{Conditioning, HeadError, HeadPose, PaperView, linear_head};
+use crate::model::resection::{
+    Conditioning, Focal, LinearResection, PaperView, ResectedPose, ResectionError, ResectionOptions,
+    linear_resection, resect,
+};
+use crate::posture::head::TABLE_A2_POINTS_CM;
 use glam::{DMat3, DVec2, DVec3, DVec4};
 
 /// Table A.2(b): (x', y') of the head's points, y' up, in units of f = 5.
@@ -42,7 +43,7 @@ pub struct HeadTableColumn {
     pub camera_position: DVec3,
     /// Its standard deviations.
     pub camera_position_sd: Option<DVec3>,
-    /// (d) Head points in the camera frame, in the order of [`super::HeadPoint::ALL`].
+    /// (d) Head points in the camera frame, in the order of [`crate::posture::head::HeadPoint::ALL`].
     pub points: [DVec3; 6],
     /// Their standard deviations.
     pub point_sds: Option<[DVec3; 6]>,
@@ -75,11 +76,11 @@ pub fn exact_projections() -> [DVec2; 6] {
 /// # Errors
 ///
 /// None for the printed data; the type is that of the methods.
-pub fn table_2() -> Result<HeadTable, HeadError> {
-    let linear = |image: &[DVec2; 6]| linear_head(&TABLE_A2_POINTS_CM, image, Conditioning::AsPrinted);
+pub fn table_2() -> Result<HeadTable, ResectionError> {
+    let linear = |image: &[DVec2; 6]| linear_resection(&TABLE_A2_POINTS_CM, image, Conditioning::AsPrinted);
     let downwards = TABLE_A2_PROJECTIONS.map(|q| DVec2::new(q.x, -q.y));
-    let options = HeadOptions { image_sd: Some(ROUNDING_SD), ..HeadOptions::default() };
-    let fitted = |focal| head_pose(&TABLE_A2_POINTS_CM, &downwards, focal, &options);
+    let options = ResectionOptions { image_sd: Some(ROUNDING_SD), ..ResectionOptions::default() };
+    let fitted = |focal| resect(&TABLE_A2_POINTS_CM, &downwards, focal, &options);
     Ok(HeadTable {
         printed: PRINTED,
         linear: from_linear("linear, A.2(b) as printed", &linear(&TABLE_A2_PROJECTIONS)?),
@@ -89,7 +90,7 @@ pub fn table_2() -> Result<HeadTable, HeadError> {
     })
 }
 
-fn from_linear(method: &'static str, linear: &LinearHead) -> HeadTableColumn {
+fn from_linear(method: &'static str, linear: &LinearResection) -> HeadTableColumn {
     HeadTableColumn {
         method,
         transform: linear.transform,
@@ -103,7 +104,7 @@ fn from_linear(method: &'static str, linear: &LinearHead) -> HeadTableColumn {
     }
 }
 
-fn from_pose(method: &'static str, pose: &HeadPose) -> HeadTableColumn {
+fn from_pose(method: &'static str, pose: &ResectedPose) -> HeadTableColumn {
     let view = pose.paper_view();
     let camera = pose.paper_camera_in_head();
     let points = TABLE_A2_POINTS_CM.map(|p| pose.point_in_paper_camera(p));

@@ -6,9 +6,9 @@
 //! degrees and all angles uniform; a depth counts as recovered when it errs by less than 1e-6 of the length, up
 //! to the mirror. Counts say what happens to problems as drawn; they prove nothing about every problem.
 
-use super::Plane;
-use super::hinge::{HingeRefusal, hinge_from_two_views};
-use super::rod::{RodRefusal, rod_by_paper, rod_from_ellipse, rod_from_three_views};
+use crate::planar::Plane;
+use crate::planar::hinge::{HingeRefusal, hinge_from_two_views};
+use crate::planar::rod::{RodRefusal, rod_by_paper, rod_from_ellipse, rod_from_three_views};
 use crate::synth::Random;
 use glam::{DVec2, DVec3};
 use nalgebra::{Matrix3, Matrix4};

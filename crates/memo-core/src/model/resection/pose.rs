@@ -48,7 +48,7 @@ impl Facing {
 
 /// A least-squares pose of the head, OpenCV axes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeadPose {
+pub struct ResectedPose {
     /// Rotation of `camera_from_head`: x_cam = R x_head + t.
     pub rotation: DMat3,
     /// Translation of `camera_from_head`, in the unit of the head points.
@@ -72,7 +72,7 @@ pub struct HeadPose {
     pub(super) covariance: Matrix7,
 }
 
-impl HeadPose {
+impl ResectedPose {
     /// Covariance of (w, t): w the rotation vector in the head's frame that turns R into R exp(w), radians.
     pub fn covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(0, 0).into_owned()
@@ -180,11 +180,12 @@ pub(super) fn point_jacobian(rotation: DMat3, point: DVec3) -> Matrix3x6<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Focal, HeadModel, HeadOptions, head_pose};
+    use super::super::{Focal, ResectionOptions, resect};
     use super::*;
+    use crate::posture::head::HeadModel;
 
     /// A head seen aslant from 3 m, its points off by a pixel.
-    fn pose() -> HeadPose {
+    fn pose() -> ResectedPose {
         let model = HeadModel::lee_chen();
         let turn = DMat3::from_rotation_y(0.5) * DMat3::from_rotation_x(0.2);
         let rotation = turn * DMat3::from_cols(DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X);
@@ -195,9 +196,9 @@ mod tests {
             .map(|point| rotation * (*point - model.points_m[0]) + DVec3::new(0.2, -0.1, 3.0))
             .map(|q| focal * q.truncate() / q.z)
             .collect();
-        let options = HeadOptions { image_sd: Some(1.0), ..HeadOptions::default() };
+        let options = ResectionOptions { image_sd: Some(1.0), ..ResectionOptions::default() };
         let known = Focal::Known(DVec2::splat(focal));
-        head_pose(&model.points_m, &image, known, &options).unwrap().best().clone()
+        resect(&model.points_m, &image, known, &options).unwrap().best().clone()
     }
 
     /// The paper's axes turn y and shift z: so does the covariance.

@@ -1,7 +1,7 @@
 //! The six feature points of a head (Lee and Chen 1985, Table A.2(a)).
 
-use super::HeadError;
 use crate::model::Body;
+use crate::model::resection::ResectionError;
 use glam::DVec3;
 
 /// The feature points, in the order of [`HeadModel::points_m`].
@@ -31,7 +31,7 @@ impl HeadPoint {
 ///
 /// The right eye's x is printed -32.168; only -31.168, as for the left eye, agrees with A.2(b) and with the
 /// depths of Table 2(d).
-pub(super) const TABLE_A2_POINTS_CM: [DVec3; 6] = [
+pub(crate) const TABLE_A2_POINTS_CM: [DVec3; 6] = [
     DVec3::new(-34.168, 52.103, 0.0),
     DVec3::new(-29.168, 61.603, 0.0),
     DVec3::new(-31.168, 65.103, 5.5),
@@ -67,7 +67,7 @@ impl HeadModel {
     /// # Errors
     ///
     /// A height outside 0.4 to 2.6 metres.
-    pub fn lee_chen_for_height(height_m: f64) -> Result<Self, HeadError> {
+    pub fn lee_chen_for_height(height_m: f64) -> Result<Self, ResectionError> {
         Body::from_height(height_m)?;
         let scale = height_m / LEE_CHEN_BODY_HEIGHT_M;
         Ok(Self { points_m: Self::lee_chen().points_m.map(|point_m| point_m * scale) })
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn implausible_heights_are_refused() {
         for height_m in [f64::NAN, 0.0, -1.7, 170.0, f64::INFINITY] {
-            assert!(matches!(HeadModel::lee_chen_for_height(height_m), Err(HeadError::Body(_))));
+            assert!(matches!(HeadModel::lee_chen_for_height(height_m), Err(ResectionError::Body(_))));
         }
     }
 }

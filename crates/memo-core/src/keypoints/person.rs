@@ -8,7 +8,7 @@
 //! What it cannot do: two people who come closer to each other than the person moves between two frames may be
 //! confused, as no motion is predicted.
 
-use super::detector::size_px;
+use super::layouts::size_px;
 use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;

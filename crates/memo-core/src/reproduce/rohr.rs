@@ -5,15 +5,15 @@
 //! the tracker runs. Everything follows from the seed. What the paper shows of its image sequences is not here:
 //! they are not public.
 
-use super::kalman::{ConstantVelocity, FilterOptions, Noise};
-use super::score::{EdgeLine, ModelLine, SimilarityOptions, similarity};
-use super::search::{Grid, Hypothesis};
-use super::tracker::TrackerOptions;
+use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise};
 use crate::image::{Frame, fit_norms};
 use crate::model::body::PART_COUNT;
 use crate::model::spline::PeriodicCubic;
 use crate::model::{Camera, Gait, GaitStyle, Midpoints, PositionOptions, position_from_rectangle};
 use crate::synth::Random;
+use crate::track::options::TrackerOptions;
+use crate::track::score::{EdgeLine, ModelLine, SimilarityOptions, similarity};
+use crate::track::search::{Grid, Hypothesis};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, SVector, Vector4};
 
@@ -32,7 +32,7 @@ pub fn numbers() -> Vec<(&'static str, f64)> {
     let per_image = |noise: &Noise| noise.velocity_variance_per_s / RATE_HZ.powi(3);
     let around = Hypothesis { along_m: 0.0, height_m: 1.0, phase: 0.5 };
     let (printed, whole) = (Grid::printed(&around), Grid::whole_cycle(0.0, 1.0));
-    let span = |axis: &super::search::Axis| axis.step * (axis.count - 1) as f64;
+    let span = |axis: &crate::track::search::Axis| axis.step * (axis.count - 1) as f64;
     vec![
         ("parts", PART_COUNT as f64),
         ("arm_and_leg_parts", (2..PART_COUNT as u8).len() as f64),

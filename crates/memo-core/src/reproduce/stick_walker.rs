@@ -16,9 +16,9 @@ use thiserror::Error;
 use crate::model::camera::Camera;
 use crate::model::distortion::Distortion;
 use crate::model::gait::{Gait, GaitStyle, SideAngles};
+use crate::model::skeleton::{Joint, RigidDistance, SegmentLengths, Side, StickFigure};
 use crate::posture::head::HeadModel;
 use crate::posture::lift::JointRays;
-use crate::posture::skeleton::{Joint, RigidDistance, SegmentLengths, Side, StickFigure};
 
 /// Seconds between two frames of the paper.
 pub const FRAME_S: f64 = 0.2;
@@ -277,7 +277,7 @@ impl StickCamera {
     /// The view of a walker in a frame, counted from 0.
     pub fn view(&self, walker: &StickWalker, frame: usize) -> StickView {
         let in_camera = |point| self.camera_from_head(point);
-        let figure = crate::posture::skeleton::PerJoint(walker.figure(frame).0.map(in_camera));
+        let figure = crate::model::skeleton::PerJoint(walker.figure(frame).0.map(in_camera));
         let head = walker.head(frame).map(in_camera);
         StickView {
             figure,
@@ -315,7 +315,7 @@ fn world_rotation() -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posture::angles::{elbow_rad, hip_axes, knee_rad, swing_rad, trunk_axes};
+    use crate::model::angles::{elbow_rad, hip_axes, knee_rad, swing_rad, trunk_axes};
     use proptest::prelude::*;
 
     fn worst_length(figure: &StickFigure, lengths: &SegmentLengths) -> f64 {

@@ -1,7 +1,118 @@
 //! What a point is called: one name here, and the spellings of detectors, motion capture and tables that lead to
 //! it.
 
-use super::{DetectorError, SwapGroup};
+use thiserror::Error;
+
+use crate::wording::counted;
+
+/// Names of the stick figure's joints in the order of the paper's tree, the root first.
+pub const STICK_JOINTS: [&str; 14] = [
+    "neck",
+    "right_shoulder",
+    "left_shoulder",
+    "pelvis",
+    "right_hip",
+    "left_hip",
+    "right_elbow",
+    "left_elbow",
+    "right_wrist",
+    "left_wrist",
+    "right_knee",
+    "left_knee",
+    "right_ankle",
+    "left_ankle",
+];
+
+/// Why points were refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DetectorError {
+    /// No layout of this name.
+    #[error("unknown keypoint layout `{name}`{}; known are {}", hint(nearest), known.join(", "))]
+    UnknownLayout {
+        /// The name given.
+        name: String,
+        /// The known name most like it, if one is.
+        nearest: Option<&'static str>,
+        /// The known names.
+        known: Vec<&'static str>,
+    },
+    /// No point of this name.
+    #[error("unknown joint `{name}`{}; known are {}", hint(nearest), joint_names().join(", "))]
+    UnknownJoint {
+        /// The name given.
+        name: String,
+        /// The known name most like it, if one is.
+        nearest: Option<&'static str>,
+    },
+    /// Two points of one name.
+    #[error("joint `{name}` is named twice, at places {first} and {second}")]
+    RepeatedJoint {
+        /// The joint.
+        name: &'static str,
+        /// Its first place.
+        first: usize,
+        /// Its second place.
+        second: usize,
+    },
+    /// Not as many points or scores as names.
+    #[error("expected {expected} {what}, got {got}")]
+    Count {
+        /// Points or scores.
+        what: &'static str,
+        /// The number of names.
+        expected: usize,
+        /// The number that came.
+        got: usize,
+    },
+    /// No layout has so many points.
+    #[error("no keypoint layout has {}; known are {}", counted(*count, "point"), known.join(", "))]
+    UnknownCount {
+        /// The number of points.
+        count: usize,
+        /// The known numbers, each with its layout.
+        known: Vec<String>,
+    },
+    /// Two layouts have so many points and the points do not tell which.
+    #[error(
+        "{count} points may be {} or {}, and they do not tell which{}: name the layout",
+        names[0], names[1], distance.map_or(String::new(), |far| format!(" (middle test {far:.3})"))
+    )]
+    UnclearLayout {
+        /// The number of points.
+        count: usize,
+        /// The layouts that have it.
+        names: [&'static str; 2],
+        /// Result of the middle test, if a frame allowed it; see [`Layout::from_points`](super::layouts::Layout::from_points).
+        distance: Option<f64>,
+    },
+}
+
+fn hint(nearest: &Option<&'static str>) -> String {
+    nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
+}
+
+/// Points that change sides together when a detector confuses right and left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SwapGroup {
+    /// Hip, knee, ankle, heel and toes.
+    Legs,
+    /// Shoulder, elbow, wrist and fingers.
+    Arms,
+    /// Eyes, ears and mouth.
+    Head,
+}
+
+impl SwapGroup {
+    /// Its name in files: "legs", "arms" or "head".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Legs => "legs",
+            Self::Arms => "arms",
+            Self::Head => "head",
+        }
+    }
+}
 
 /// Points without a side, with their other spellings (lower case, nothing but letters and digits).
 const MIDDLE_PARTS: [(&str, &[&str]); 6] = [

@@ -25,37 +25,10 @@
 //! the line of the shoulders, which a middle of two points cannot know. Detectors place hips and shoulders by
 //! habit, not by anatomy.
 
-mod layout;
-mod name;
-
-use crate::wording::counted;
 use glam::DVec2;
-use thiserror::Error;
 
-use self::layout::{layout_counts, layout_names};
-use self::name::SIDE_PARTS;
-
-pub(super) use self::layout::size_px;
-pub use self::layout::{LAYOUTS, Layout, MIDDLE_FAR, MIDDLE_NEAR};
-pub use self::name::{joint_name, joint_names};
-
-/// Names of the stick figure's joints in the order of the paper's tree, the root first.
-pub const STICK_JOINTS: [&str; 14] = [
-    "neck",
-    "right_shoulder",
-    "left_shoulder",
-    "pelvis",
-    "right_hip",
-    "left_hip",
-    "right_elbow",
-    "left_elbow",
-    "right_wrist",
-    "left_wrist",
-    "right_knee",
-    "left_knee",
-    "right_ankle",
-    "left_ankle",
-];
+use super::layouts::{LAYOUTS, Layout};
+use super::names::{DetectorError, SIDE_PARTS, STICK_JOINTS, SwapGroup, joint_name};
 
 /// Names of the head points in the order of table A.2.
 pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "right_ear", "left_ear"];
@@ -63,93 +36,6 @@ pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "ri
 /// Where the pelvis joint lies on the way from the middle of the hips to the middle of the shoulders: from the
 /// lengths of table A.1 as a rigid trunk.
 pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
-
-/// Why points were refused.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum DetectorError {
-    /// No layout of this name.
-    #[error("unknown keypoint layout `{name}`{}; known are {}", hint(nearest), layout_names().join(", "))]
-    UnknownLayout {
-        /// The name given.
-        name: String,
-        /// The known name most like it, if one is.
-        nearest: Option<&'static str>,
-    },
-    /// No point of this name.
-    #[error("unknown joint `{name}`{}; known are {}", hint(nearest), joint_names().join(", "))]
-    UnknownJoint {
-        /// The name given.
-        name: String,
-        /// The known name most like it, if one is.
-        nearest: Option<&'static str>,
-    },
-    /// Two points of one name.
-    #[error("joint `{name}` is named twice, at places {first} and {second}")]
-    RepeatedJoint {
-        /// The joint.
-        name: &'static str,
-        /// Its first place.
-        first: usize,
-        /// Its second place.
-        second: usize,
-    },
-    /// Not as many points or scores as names.
-    #[error("expected {expected} {what}, got {got}")]
-    Count {
-        /// Points or scores.
-        what: &'static str,
-        /// The number of names.
-        expected: usize,
-        /// The number that came.
-        got: usize,
-    },
-    /// No layout has so many points.
-    #[error("no keypoint layout has {}; known are {}", counted(*count, "point"), layout_counts().join(", "))]
-    UnknownCount {
-        /// The number of points.
-        count: usize,
-    },
-    /// Two layouts have so many points and the points do not tell which.
-    #[error(
-        "{count} points may be {} or {}, and they do not tell which{}: name the layout",
-        names[0], names[1], distance.map_or(String::new(), |far| format!(" (middle test {far:.3})"))
-    )]
-    UnclearLayout {
-        /// The number of points.
-        count: usize,
-        /// The layouts that have it.
-        names: [&'static str; 2],
-        /// Result of the middle test, if a frame allowed it; see [`Layout::from_points`].
-        distance: Option<f64>,
-    },
-}
-
-fn hint(nearest: &Option<&'static str>) -> String {
-    nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
-}
-
-/// Points that change sides together when a detector confuses right and left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum SwapGroup {
-    /// Hip, knee, ankle, heel and toes.
-    Legs,
-    /// Shoulder, elbow, wrist and fingers.
-    Arms,
-    /// Eyes, ears and mouth.
-    Head,
-}
-
-impl SwapGroup {
-    /// Its name in files: "legs", "arms" or "head".
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Legs => "legs",
-            Self::Arms => "arms",
-            Self::Head => "head",
-        }
-    }
-}
 
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -314,6 +200,7 @@ fn usable_score(score: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::keypoints::names::joint_names;
     use crate::synth::random::Random;
     use proptest::prelude::*;
 

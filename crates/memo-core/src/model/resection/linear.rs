@@ -13,9 +13,9 @@
 //!
 //! Nothing makes `[R]` a rotation, and small heads magnify noise: printed to five digits, the paper's own input
 //! puts the camera 4 cm off. With 1 px of noise on a head at 4 m and 480 px/m nearly half the solutions are
-//! refused and the others are off by some 3 m: in images, use [`super::head_pose`].
+//! refused and the others are off by some 3 m: in images, use [`super::resect`].
 
-use super::{HeadError, MIN_SHAPE_RATIO, Shape};
+use super::{MIN_SHAPE_RATIO, ResectionError, Shape};
 use super::{centroid_and_spread, checked_shape, nearest_rotation, right_svd};
 use glam::{DMat3, DVec2, DVec3, DVec4};
 use nalgebra::DMatrix;
@@ -37,7 +37,7 @@ pub enum Conditioning {
 
 /// The linear solution in the paper's letters, axes (left-handed, y up, origin on the image plane) and units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearHead {
+pub struct LinearResection {
     /// `[T]`: its columns are the coefficients of X, Y and H for (x, y, z, 1).
     pub transform: [DVec4; 3],
     /// `[R]` by eq. (4): columns (a, g, p), (b, h, q), (c, i, r). Orthonormal only without noise.
@@ -66,21 +66,21 @@ pub struct PaperView {
 /// Eqs. (1)-(5) on six or more points.
 ///
 /// `points_in_head` in any unit; `image_points` (x' right, **y' up**) relative to the principal point, in the
-/// same unit if [`LinearHead::camera_position`] is to make sense. k of eq. (4) comes from the first column,
+/// same unit if [`LinearResection::camera_position`] is to make sense. k of eq. (4) comes from the first column,
 /// its sign such that H > 0.
 ///
 /// # Errors
 ///
 /// Bad or too few points, coplanar ones, configurations that leave `[T]` undetermined, and solutions that put
 /// points behind the camera or mirror the head, which noise can bring about.
-pub fn linear_head(
+pub fn linear_resection(
     points_in_head: &[DVec3],
     image_points: &[DVec2],
     conditioning: Conditioning,
-) -> Result<LinearHead, HeadError> {
+) -> Result<LinearResection, ResectionError> {
     let shape = checked_shape("the linear solution", LINEAR_POINTS, points_in_head, image_points)?;
     if shape.ratios[1] < MIN_SHAPE_RATIO {
-        return Err(HeadError::Coplanar { ratio: shape.ratios[1] });
+        return Err(ResectionError::Coplanar { ratio: shape.ratios[1] });
     }
     let [head_change, image_change] = match conditioning {
         Conditioning::Normalised => normalisations(&shape, image_points),
@@ -118,7 +118,7 @@ fn normalisations(shape: &Shape, image_points: &[DVec2]) -> [Change; 2] {
 }
 
 /// The columns of `[S]` with A W = 0, eq. (3), and the ratio that tells whether it is the only one.
-fn null_vector(head: &[DVec3], image: &[DVec2]) -> Result<([DVec4; 3], f64), HeadError> {
+fn null_vector(head: &[DVec3], image: &[DVec2]) -> Result<([DVec4; 3], f64), ResectionError> {
     let mut equations = DMatrix::zeros(2 * head.len(), 12);
     for (i, (point, image)) in head.iter().zip(image).enumerate() {
         let homogeneous = point.extend(1.0).to_array();
@@ -130,7 +130,7 @@ fn null_vector(head: &[DVec3], image: &[DVec2]) -> Result<([DVec4; 3], f64), Hea
             equations[(2 * i + 1, 3 * row + 2)] = -x * image.y;
         }
     }
-    let undetermined = |ratio| HeadError::Undetermined { ratio, needed: MIN_RATIO };
+    let undetermined = |ratio| ResectionError::Undetermined { ratio, needed: MIN_RATIO };
     let (sigma, v_t) = right_svd(equations).ok_or_else(|| undetermined(0.0))?;
     let ratio = sigma[10] / sigma[0];
     if ratio.is_nan() || ratio < MIN_RATIO {
@@ -156,33 +156,33 @@ fn interpret(
     columns: [DVec4; 3],
     points_in_head: &[DVec3],
     singular_ratio: f64,
-) -> Result<LinearHead, HeadError> {
+) -> Result<LinearResection, ResectionError> {
     let scale_of = |p: &DVec3| columns[2].dot(p.extend(1.0));
     let sum: f64 = points_in_head.iter().map(scale_of).sum();
     let k = sum.signum() / columns[0].truncate().length();
     let transform = columns.map(|column| column * k);
     let focal = transform[2].truncate().length().recip();
     if !(k.is_finite() && focal.is_finite()) {
-        return Err(HeadError::Undetermined { ratio: 0.0, needed: MIN_RATIO });
+        return Err(ResectionError::Undetermined { ratio: 0.0, needed: MIN_RATIO });
     }
     for (index, point) in points_in_head.iter().enumerate() {
         let scale = k * scale_of(point);
         if scale <= 0.0 {
-            return Err(HeadError::BehindCamera { index, scale });
+            return Err(ResectionError::BehindCamera { index, scale });
         }
     }
     let [first, second, third] = transform.map(|column| column.truncate());
     let rotation = DMat3::from_cols(first, second, -focal * third);
     let determinant = rotation.determinant();
     if determinant.is_nan() || determinant <= 0.0 {
-        return Err(HeadError::Mirrored { determinant });
+        return Err(ResectionError::Mirrored { determinant });
     }
     let [t41, t42, t44] = transform.map(|column| column.w);
     let camera_position = rotation * DVec3::new(-t41, -t42, (t44 - 1.0) * focal);
-    Ok(LinearHead { transform, rotation, focal, camera_position, singular_ratio, determinant })
+    Ok(LinearResection { transform, rotation, focal, camera_position, singular_ratio, determinant })
 }
 
-impl LinearHead {
+impl LinearResection {
     /// A head point in the paper's camera frame, as Table 2(d).
     pub fn point_in_paper_camera(&self, point_in_head: DVec3) -> DVec3 {
         self.view().point_in_paper_camera(point_in_head)
@@ -281,14 +281,17 @@ mod tests {
     fn bad_points_are_refused_with_their_values() {
         let points = box_corners();
         let image = seen(&points, (DMat3::IDENTITY, DVec3::Z * 8.0), 1.0);
-        let solve = |points: &[DVec3], image: &[DVec2]| linear_head(points, image, Conditioning::Normalised);
+        let solve =
+            |points: &[DVec3], image: &[DVec2]| linear_resection(points, image, Conditioning::Normalised);
         assert!(matches!(
             solve(&points[..5], &image[..5]),
-            Err(HeadError::TooFewPoints { count: 5, needed: 6, .. })
+            Err(ResectionError::TooFewPoints { count: 5, needed: 6, .. })
         ));
         let flat: Vec<DVec3> = (0..7).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 1.0)).collect();
         let flat_image = seen(&flat, (DMat3::from_rotation_x(0.3), DVec3::Z * 99.0), 1.0);
-        assert!(matches!(solve(&flat, &flat_image), Err(HeadError::Coplanar { ratio }) if ratio < 1e-12));
+        assert!(
+            matches!(solve(&flat, &flat_image), Err(ResectionError::Coplanar { ratio }) if ratio < 1e-12)
+        );
     }
 
     /// Points on a twisted cubic through the centre of projection: every camera on it sees the same image.
@@ -300,8 +303,11 @@ mod tests {
         let right = forward.cross(DVec3::Y).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
         let error =
-            linear_head(&points, &seen(&points, (rotation, DVec3::ZERO), 1.0), Conditioning::Normalised);
-        assert!(matches!(error, Err(HeadError::Undetermined { ratio, .. }) if ratio < 1e-12), "{error:?}");
+            linear_resection(&points, &seen(&points, (rotation, DVec3::ZERO), 1.0), Conditioning::Normalised);
+        assert!(
+            matches!(error, Err(ResectionError::Undetermined { ratio, .. }) if ratio < 1e-12),
+            "{error:?}"
+        );
     }
 
     /// A mirrored image of points is not an image of the points.
@@ -310,8 +316,11 @@ mod tests {
         let points = box_corners();
         let pose = (DMat3::from_rotation_y(0.4), DVec3::Z * 8.0);
         let image: Vec<DVec2> = seen(&points, pose, 1.0).iter().map(|q| DVec2::new(-q.x, q.y)).collect();
-        let error = linear_head(&points, &image, Conditioning::Normalised);
-        assert!(matches!(error, Err(HeadError::Mirrored { determinant }) if determinant < -0.9), "{error:?}");
+        let error = linear_resection(&points, &image, Conditioning::Normalised);
+        assert!(
+            matches!(error, Err(ResectionError::Mirrored { determinant }) if determinant < -0.9),
+            "{error:?}"
+        );
     }
 
     /// Points seen through the centre of projection by a camera in their midst.
@@ -320,8 +329,8 @@ mod tests {
         let points: Vec<DVec3> =
             box_corners().iter().map(|p| *p * DVec3::new(1.0, 1.2, 1.0) + DVec3::Z * 0.3 * p.x).collect();
         let pose = (DMat3::from_rotation_y(0.4), DVec3::new(0.1, 0.05, 0.2));
-        let error = linear_head(&points, &seen(&points, pose, 1.0), Conditioning::Normalised);
-        assert!(matches!(error, Err(HeadError::BehindCamera { scale, .. }) if scale < 0.0), "{error:?}");
+        let error = linear_resection(&points, &seen(&points, pose, 1.0), Conditioning::Normalised);
+        assert!(matches!(error, Err(ResectionError::BehindCamera { scale, .. }) if scale < 0.0), "{error:?}");
     }
 
     proptest! {
@@ -341,7 +350,7 @@ mod tests {
             let truth = (rotation, DVec3::new(x, y, depth));
             let image = seen(&points, truth, focal);
             for conditioning in [Conditioning::Normalised, Conditioning::AsPrinted] {
-                let linear = linear_head(&points, &image, conditioning);
+                let linear = linear_resection(&points, &image, conditioning);
                 // Six points can come near a critical curve by chance.
                 prop_assume!(linear.as_ref().is_ok_and(|l| l.singular_ratio > 1e-5));
                 let linear = linear.unwrap();

@@ -5,13 +5,13 @@
 //! distance at which two roots are one ([`MERGE_M`]), the tolerances of the rules ([`Reading`]). The joint
 //! coordinates being other ones, counts can be near the printed ones, not the same by right.
 
-use super::Bearings;
-use super::constraint::Constraint;
-use super::group::{DEFAULT_GROUP_M, PostureGroup, group};
-use super::rules::{MotionModel, Rule, Tolerance};
-use super::skeleton::{JOINT_COUNT, Joint, Side, StickFigure};
-use super::tree::{Interpretations, Path, TreeError, TreeOptions, View};
-use crate::synth::{StickCamera, StickWalker};
+use crate::model::skeleton::{JOINT_COUNT, Joint, Side, StickFigure};
+use crate::posture::Bearings;
+use crate::posture::constraint::Constraint;
+use crate::posture::group::{DEFAULT_GROUP_M, PostureGroup, group};
+use crate::posture::rules::{MotionModel, Rule, Tolerance};
+use crate::posture::tree::{Interpretations, Path, TreeError, TreeOptions, View};
+use crate::reproduce::stick_walker::{StickCamera, StickWalker};
 use glam::{DMat3, DVec3};
 
 /// The frames of Tables 3 and 4, counted from 0; the paper counts them 1, 3, 5.
@@ -390,8 +390,8 @@ pub fn frame_survivors(
 
 #[cfg(test)]
 mod tests {
-    use super::super::group::figure_distance;
     use super::*;
+    use crate::posture::group::figure_distance;
 
     fn median(mut values: Vec<usize>) -> f64 {
         values.sort_unstable();

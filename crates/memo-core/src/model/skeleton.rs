@@ -5,6 +5,7 @@
 //! hip part (pelvis, hips) are rigid, so beside the 13 segments from starting to ending joint there are four
 //! distances within them.
 
+use crate::estimate::median::median;
 use glam::DVec3;
 use thiserror::Error;
 
@@ -333,22 +334,18 @@ impl SegmentLengths {
 
     /// Medians over figures of known joints, such as motion capture.
     pub fn from_figures(figures: &[StickFigure]) -> Result<Self, LengthError> {
-        let median = |name: &str, length: &dyn Fn(&StickFigure) -> f64| {
+        let typical = |name: &str, length: &dyn Fn(&StickFigure) -> f64| {
             let mut lengths: Vec<f64> = figures.iter().map(length).filter(|l| l.is_finite()).collect();
-            if lengths.is_empty() {
-                return Err(LengthError::NeverSeen { segment: name.to_owned() });
-            }
-            lengths.sort_by(f64::total_cmp);
-            Ok(0.5 * (lengths[(lengths.len() - 1) / 2] + lengths[lengths.len() / 2]))
+            median(&mut lengths).ok_or_else(|| LengthError::NeverSeen { segment: name.to_owned() })
         };
         let mut lengths = Self { to: PerJoint::default(), rigid: [0.0; 4] };
         for joint in Joint::ALL.into_iter().skip(1) {
-            lengths.to[joint] = median(&segment_name(joint), &|figure| figure.segment(joint).length())?;
+            lengths.to[joint] = typical(&segment_name(joint), &|figure| figure.segment(joint).length())?;
         }
         for distance in RigidDistance::ALL {
             let [a, b] = distance.joints();
             lengths.rigid[distance as usize] =
-                median(distance.name(), &|figure| figure[a].distance(figure[b]))?;
+                typical(distance.name(), &|figure| figure[a].distance(figure[b]))?;
         }
         lengths.validated()
     }

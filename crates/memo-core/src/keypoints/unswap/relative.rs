@@ -4,6 +4,7 @@
 //! leaves m alone. So m gives the noise whatever the labels, and the labels are right where the signs make d
 //! smooth.
 
+use crate::estimate::median::median;
 use glam::DVec2;
 
 /// A pair seen on both sides.
@@ -78,7 +79,11 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
         let seen: Vec<usize> = (0..track.len()).filter(|&t| track[t].is_some()).collect();
         let off = distances_from_line(times_s, track, &seen);
         let lengths = seen.iter().filter_map(|&t| track[t]).map(|s| s.difference.length());
-        let (Some(typical), Some(length)) = (median(off.clone()), median(lengths.collect())) else { break };
+        let (Some(typical), Some(length)) =
+            (median(&mut off.clone()), median(&mut lengths.collect::<Vec<_>>()))
+        else {
+            break;
+        };
         let limit = (OUTLIER_MEDIANS * typical).max(0.3 * length);
         let at = |i: usize| off.get(i).copied().unwrap_or(0.0);
         let worst =
@@ -100,7 +105,8 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
 ///
 /// Divided by how much further apart than usual the neighbours are, since a bend grows with h1 h2.
 fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f64> {
-    let Some(step) = median(seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect()) else {
+    let Some(step) = median(&mut seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect::<Vec<_>>())
+    else {
         return Vec::new();
     };
     let distance = |w: &[usize]| {
@@ -121,13 +127,13 @@ fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f6
 ///
 /// `signs` are those of a path found before; without them the smoothest of the four patterns is taken.
 pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>]>) -> Vec<Scale> {
-    let steps = times_s.windows(2).map(|w| w[1] - w[0]).collect();
-    let step_s = median(steps).unwrap_or(1.0);
+    let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let step_s = median(&mut steps).unwrap_or(1.0);
     let lag = ((LAG_S / step_s).round() as usize).clamp(1, 50);
     let of_means: Vec<[f64; 2]> = tracks.iter().map(|t| noise_and_bend(times_s, t, step_s, lag)).collect();
-    let noise_sq = median(of_means.iter().map(|m| m[0]).collect()).unwrap_or(0.0);
+    let noise_sq = median(&mut of_means.iter().map(|m| m[0]).collect::<Vec<_>>()).unwrap_or(0.0);
     let lengths = tracks.iter().flatten().flatten().map(|s| s.difference.length());
-    let floor_sq = (0.005 * median(lengths.collect()).unwrap_or(0.0)).powi(2) + 1e-12;
+    let floor_sq = (0.005 * median(&mut lengths.collect::<Vec<_>>()).unwrap_or(0.0)).powi(2) + 1e-12;
     let scale = |(i, track): (usize, &Track)| {
         let lag = if signs.is_some() { lag } else { 1 };
         let r_sq = |w: [usize; 3]| {
@@ -184,18 +190,8 @@ fn second_difference_variance(
         .map(|t| [t - 2 * lag, t - lag, t])
         .filter(|w| even(w[0], w[1]) && even(w[1], w[2]))
         .filter_map(r_sq);
-    median(values.collect()).map(|m| m / MEDIAN_CHI2)
+    median(&mut values.collect::<Vec<_>>()).map(|m| m / MEDIAN_CHI2)
 }
-
-/// The median; `None` of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! Smoothing of one quantity over time by the frames before and after: a constant-velocity Kalman filter and
 //! the Rauch-Tung-Striebel pass backwards, uneven times and missing values allowed.
 
-use crate::track::kalman::{ConstantVelocity, Noise, smooth};
+use crate::estimate::kalman::{ConstantVelocity, Noise, smooth};
 
 /// A value with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]

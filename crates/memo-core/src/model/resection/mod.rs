@@ -1,10 +1,13 @@
-//! Where the head is and faces, from its feature points in one image (Lee and Chen 1985, section 2.1).
+//! The pose of known points from their image: resection.
+//!
+//! Lee and Chen (1985, section 2.1) find a head by it, from six feature points; a camera is calibrated by it, from
+//! measured places.
 //!
 //! | function | needs | gives |
 //! |---|---|---|
-//! | [`linear_head`] | 6 points, not coplanar | eqs. (1)-(5): `[T]`, `[R]`, f and position, no uncertainty |
-//! | [`head_pose`] | 4 points with f known, 6 with f free | every least-squares pose, with covariance |
-//! | [`head_pose_in_image`] | a [`Camera`](crate::model::Camera), 4 pixels | the same, through its lens |
+//! | [`linear_resection`] | 6 points, not coplanar | eqs. (1)-(5): `[T]`, `[R]`, f and position, no uncertainty |
+//! | [`resect`] | 4 points with f known, 6 with f free | every least-squares pose, with covariance |
+//! | [`resect_in_image`] | a [`Camera`](crate::model::Camera), 4 pixels | the same, through its lens |
 //!
 //! # Frames
 //!
@@ -19,27 +22,23 @@
 //! ```
 //!
 //! Its "camera position" is that origin, which presupposes that image and head have the same unit. Only
-//! [`LinearHead`], [`PaperView`] and [`HeadTable`] speak the paper's axes.
+//! [`LinearResection`], [`PaperView`] and what reproduces Table 2 use the paper's axes.
 //!
 //! # What it cannot do
 //!
 //! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 5 to 7 cm for each pixel of
 //! noise and its facing by 1 to 3 degrees; with f free the depth is next to undetermined. Points are taken as
 //! matched and independent, with one standard deviation: outliers are not searched for, but show in
-//! [`HeadPose::chi_squared`] if that is given.
+//! [`ResectedPose::chi_squared`] if that is given.
 
 mod linear;
-mod model;
 mod pose;
 mod search;
-mod table;
 mod three_points;
 
-pub use linear::{Conditioning, LinearHead, PaperView, linear_head};
-pub use model::{HeadModel, HeadPoint, LEE_CHEN_BODY_HEIGHT_M};
-pub use pose::{Facing, HeadPose, PointEstimate};
-pub use search::{Focal, HeadOptions, HeadSolution, head_pose, head_pose_in_image};
-pub use table::{HeadTable, HeadTableColumn, exact_projections, table_2};
+pub use linear::{Conditioning, LinearResection, PaperView, linear_resection};
+pub use pose::{Facing, PointEstimate, ResectedPose};
+pub use search::{Focal, Resection, ResectionOptions, resect, resect_in_image};
 
 use crate::model::body::BodyError;
 use crate::model::camera::CameraError;
@@ -57,7 +56,7 @@ pub const MIN_SHAPE_RATIO: f64 = 1e-6;
 
 /// Why the head could not be found.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum HeadError {
+pub enum ResectionError {
     /// Not enough points.
     #[error("{method} needs at least {needed} points, got {count}")]
     TooFewPoints {
@@ -176,24 +175,24 @@ fn checked_shape(
     needed: usize,
     points_in_head: &[DVec3],
     image_points: &[DVec2],
-) -> Result<Shape, HeadError> {
+) -> Result<Shape, ResectionError> {
     let (head, image) = (points_in_head.len(), image_points.len());
     if head != image {
-        return Err(HeadError::Unpaired { head, image });
+        return Err(ResectionError::Unpaired { head, image });
     }
     if head < needed {
-        return Err(HeadError::TooFewPoints { method, count: head, needed });
+        return Err(ResectionError::TooFewPoints { method, count: head, needed });
     }
     check_coordinates("head", points_in_head.iter().map(DVec3::to_array))?;
     check_coordinates("image", image_points.iter().map(DVec2::to_array))?;
     let shape = shape_of(points_in_head)?;
     check_duplicates(points_in_head, shape.radius)?;
     if shape.ratios[0] < MIN_SHAPE_RATIO {
-        return Err(HeadError::Collinear { ratio: shape.ratios[0] });
+        return Err(ResectionError::Collinear { ratio: shape.ratios[0] });
     }
     let (_, spread) = centroid_and_spread(image_points);
     if spread < MIN_SPREAD {
-        return Err(HeadError::ImageSpread { spread });
+        return Err(ResectionError::ImageSpread { spread });
     }
     Ok(shape)
 }
@@ -201,34 +200,34 @@ fn checked_shape(
 fn check_coordinates<const N: usize>(
     kind: &'static str,
     points: impl Iterator<Item = [f64; N]>,
-) -> Result<(), HeadError> {
+) -> Result<(), ResectionError> {
     for (index, point) in points.enumerate() {
         if let Some(&value) = point.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-            return Err(HeadError::Coordinate { kind, index, value });
+            return Err(ResectionError::Coordinate { kind, index, value });
         }
     }
     Ok(())
 }
 
-fn check_duplicates(points: &[DVec3], radius: f64) -> Result<(), HeadError> {
+fn check_duplicates(points: &[DVec3], radius: f64) -> Result<(), ResectionError> {
     for (first, a) in points.iter().enumerate() {
         if let Some(gap) = points[first + 1..].iter().position(|b| a.distance(*b) <= 1e-9 * radius) {
-            return Err(HeadError::Duplicate { first, second: first + 1 + gap });
+            return Err(ResectionError::Duplicate { first, second: first + 1 + gap });
         }
     }
     Ok(())
 }
 
-fn shape_of(points: &[DVec3]) -> Result<Shape, HeadError> {
+fn shape_of(points: &[DVec3]) -> Result<Shape, ResectionError> {
     let centroid = points.iter().sum::<DVec3>() / points.len() as f64;
     let centred: Vec<DVec3> = points.iter().map(|p| *p - centroid).collect();
     let radius = (centred.iter().map(|p| p.length_squared()).sum::<f64>() / points.len() as f64).sqrt();
     if radius <= MIN_SPREAD {
-        return Err(HeadError::Duplicate { first: 0, second: 1 });
+        return Err(ResectionError::Duplicate { first: 0, second: 1 });
     }
     let matrix =
         DMatrix::from_fn(points.len().max(3), 3, |i, j| centred.get(i).map_or(0.0, |p| p[j] / radius));
-    let (sigma, v_t) = right_svd(matrix).ok_or(HeadError::Collinear { ratio: 0.0 })?;
+    let (sigma, v_t) = right_svd(matrix).ok_or(ResectionError::Collinear { ratio: 0.0 })?;
     let ratios = [sigma[1] / sigma[0], sigma[2] / sigma[0]];
     let thin_axis = DVec3::new(v_t[(2, 0)], v_t[(2, 1)], v_t[(2, 2)]);
     Ok(Shape { centroid, radius, ratios, thin_axis })

@@ -1,0 +1,8 @@
+//! Estimation that knows nothing of walkers: filters, paths and least squares.
+
+pub mod kalman;
+pub(crate) mod least_squares;
+pub(crate) mod line;
+pub(crate) mod median;
+pub mod smooth;
+pub mod viterbi;

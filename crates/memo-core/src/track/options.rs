@@ -1,0 +1,85 @@
+//! What the tracker is told.
+
+use super::evidence::EvidenceOptions;
+use super::person::PersonOptions;
+use super::start::CadenceRange;
+use super::walk::WalkOptions;
+use crate::model::body::BodyError;
+use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
+
+/// Which average gait the model walks with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum GaitChoice {
+    /// Fifty samples a curve.
+    #[default]
+    Dense,
+    /// Ten samples a curve, the paper's form.
+    Sampled10,
+    /// Boulic's formulas at the speed of the start: amplitude follows speed.
+    Boulic,
+}
+
+impl GaitChoice {
+    /// The gait of a body at a speed; Boulic's is held to the speeds its formulas cover.
+    fn gait(self, body: &Body, speed_mps: f64) -> Gait {
+        match self {
+            Self::Dense => Gait::dense(),
+            Self::Sampled10 => Gait::sampled_10(),
+            Self::Boulic => {
+                let leg_m = body.leg_length_m();
+                let held = speed_mps.clamp(0.5 * leg_m, 3.0 * leg_m);
+                Gait::boulic(held, leg_m).unwrap_or_else(|_| Gait::dense())
+            }
+        }
+    }
+}
+
+/// What the tracker knows beforehand and how it works.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackerOptions {
+    /// Body height of the person, metres.
+    pub height_m: f64,
+    /// The camera; without one it is guessed from field of view and height.
+    pub camera: Option<Camera>,
+    /// Horizontal field of view of a guessed camera, radians.
+    pub field_of_view_rad: f64,
+    /// Average gait.
+    pub gait: GaitChoice,
+    /// Frames of the starting phase. Printed: images 2 to 14.
+    pub start_frames: usize,
+    /// Fit of the person's deviation from the average; `None` stays on the average.
+    pub person: Option<PersonOptions>,
+    /// Frames that must be followed before the person is fitted. 40: a stride and a half at 25 images a
+    /// second.
+    pub person_frames: usize,
+    /// Cadences that are considered.
+    pub cadence: CadenceRange,
+    /// From pixels to regions and edges.
+    pub evidence: EvidenceOptions,
+    /// Search and filter.
+    pub walk: WalkOptions,
+}
+
+impl TrackerOptions {
+    /// Defaults for a person of the given height.
+    pub fn for_height(height_m: f64) -> Self {
+        Self {
+            height_m,
+            camera: None,
+            field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
+            gait: GaitChoice::default(),
+            start_frames: 13,
+            person: Some(PersonOptions::default()),
+            person_frames: 40,
+            cadence: CadenceRange::default(),
+            evidence: EvidenceOptions::default(),
+            walk: WalkOptions::default(),
+        }
+    }
+
+    /// The average walker of the given height; the gait is made for a speed, metres a second.
+    pub fn walker(&self, gait_speed_mps: f64) -> Result<Walker, BodyError> {
+        let body = Body::from_height(self.height_m)?;
+        Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })
+    }
+}
