@@ -270,10 +270,10 @@ def similarity(
     lines: npt.NDArray[np.float64],
     edges: npt.NDArray[np.float64],
     *,
-    c_l: float = 1.0,
-    c_d: float = 0.5,
-    c_r: float = 0.25,
-    sigma_phi_rad: float = 0.20943951,
+    c_l: float = ...,
+    c_d: float = ...,
+    c_r: float = ...,
+    sigma_phi_rad: float = ...,
 ) -> tuple[float, npt.NDArray[np.float64]]: ...
 def edge_segments(
     frame: npt.NDArray[np.uint8],

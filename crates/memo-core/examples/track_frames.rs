@@ -2,11 +2,10 @@
 //!
 //! `cargo run --release -p memo-core --example track_frames -- FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]`
 
-use memo_core::image::Image;
-use memo_core::model::{Camera, CameraFileOptions, SideJoints};
-use memo_core::track::options::TrackerOptions;
-use memo_core::track::result::{Row, TrackedWalk};
-use memo_core::track::tracker::{SeekReport, Tracker};
+use memo_core::model::{CameraFileOptions, SideJoints};
+use memo_core::track::result::Row;
+use memo_core::track::tracker::SeekReport;
+use memo_core::{Camera, Frame, TrackedWalk, Tracker, TrackerOptions};
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -42,9 +41,7 @@ fn tracked(arguments: &[String]) -> Result<(Vec<TrackedWalk>, SeekReport), Box<d
     let mut tracker = Tracker::new(options)?;
     for (index, file) in files.iter().enumerate() {
         let grey = image::open(file)?.to_luma8();
-        let (width, height) = (grey.width() as usize, grey.height() as usize);
-        let frame = Image::from_vec(width, height, grey.into_raw())?;
-        tracker.update(&frame.as_frame(), index as f64 / rate_hz)?;
+        tracker.update(&Frame::try_from(&grey)?, index as f64 / rate_hz)?;
     }
     tracker.finish()?;
     Ok((tracker.take_finished(), tracker.seek_report()))

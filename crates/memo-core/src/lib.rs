@@ -10,8 +10,7 @@
 //!
 //! ```
 //! use memo_core::synth::{SceneOptions, SynthScene};
-//! use memo_core::track::options::TrackerOptions;
-//! use memo_core::track::tracker::Tracker;
+//! use memo_core::{Tracker, TrackerOptions};
 //!
 //! let scene = SynthScene::new(SceneOptions::default())?;
 //! let height_m = scene.walker.body.height_m;
@@ -43,12 +42,10 @@
 //!
 //! ```
 //! use memo_core::glam::DVec2;
-//! use memo_core::model::Camera;
-//! use memo_core::keypoints::detector::Detector;
-//! use memo_core::posture::sequence::{KeypointSequence, SequenceOptions, postures};
-//! use memo_core::model::skeleton::{Joint, PerJoint};
 //! use memo_core::synth::{WalkOptions, sampled_walk};
-//! use memo_core::track::options::TrackerOptions;
+//! use memo_core::{
+//!     Camera, Detector, Joint, KeypointSequence, PerJoint, SequenceOptions, TrackerOptions, postures,
+//! };
 //!
 //! // A walk seen from its side, its points called RSH, REL and so on; of a known detector it is
 //! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
@@ -88,9 +85,8 @@
 //! [`planar::interpret_figure`] finds which dots are linked, and in which planes they swing.
 //!
 //! ```
-//! use memo_core::planar::{FigureOptions, interpret_figure};
 //! use memo_core::synth::{PointLightOptions, WalkOptions, limbs_of, point_light_display, sampled_walk};
-//! use memo_core::track::options::TrackerOptions;
+//! use memo_core::{FigureOptions, TrackerOptions, interpret_figure};
 //!
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
 //! let walk = sampled_walk(&walker, &WalkOptions::default())?;
@@ -131,6 +127,7 @@ pub mod estimate;
 pub mod image;
 pub mod keypoints;
 pub mod model;
+pub mod option_error;
 pub mod planar;
 pub mod posture;
 pub mod progress;
@@ -139,6 +136,23 @@ pub mod reproduce;
 pub mod synth;
 pub mod track;
 pub mod wording;
+
+// What most callers need, by one short path; each wing has the rest.
+pub use calibrate::{camera_from_points, camera_from_walker};
+pub use image::{Frame, Image, Mask};
+pub use keypoints::unswap::{UnswapOptions, unswap};
+pub use keypoints::{Detector, Layout};
+pub use model::skeleton::{Joint, PerJoint, SegmentLengths, Side, StickFigure};
+pub use model::{Body, Camera, Gait, Walker};
+pub use option_error::OptionError;
+pub use planar::{FigureOptions, interpret_figure, interpret_named_figure};
+pub use posture::sequence::{KeypointSequence, PostureSequence, SequenceError, SequenceOptions, postures};
+pub use progress::Progress;
+pub use synth::{ClothedScene, PointLightOptions, SynthScene, point_light_display, sampled_walk};
+pub use track::gait_parameters::{GaitParameter, GaitQuantity};
+pub use track::options::TrackerOptions;
+pub use track::result::TrackedWalk;
+pub use track::tracker::{TrackError, Tracker};
 
 #[cfg(test)]
 mod tests {

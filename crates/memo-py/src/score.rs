@@ -1,6 +1,7 @@
 //! Similarity of model contours and image edges.
 
 use crate::array::{numpy_from_rows, segments_from_numpy};
+use crate::error::value_error;
 use memo_core::track::score::{EdgeLine, ModelLine, SimilarityOptions, similarity as core_similarity};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -8,7 +9,10 @@ use pyo3::prelude::*;
 /// Similarity (eqs. 7 and 11) of model lines (N, 2, 2) and edges (M, 2, 2) in pixels: the value, and per
 /// answered line a row of line, edge, overlap l, distance d, angle (radians), s_i.
 #[pyfunction]
-#[pyo3(signature = (lines, edges, *, c_l=1.0, c_d=0.5, c_r=0.25, sigma_phi_rad=0.209_439_51))]
+#[pyo3(signature = (
+    lines, edges, *, c_l=SimilarityOptions::DEFAULT.c_l, c_d=SimilarityOptions::DEFAULT.c_d,
+    c_r=SimilarityOptions::DEFAULT.c_r, sigma_phi_rad=SimilarityOptions::DEFAULT.sigma_phi_rad
+))]
 pub fn similarity<'py>(
     py: Python<'py>,
     lines: &Bound<'py, PyAny>,
@@ -26,7 +30,8 @@ pub fn similarity<'py>(
         .into_iter()
         .map(|[start, end]| EdgeLine { start, end, gradient: 0.0, velocity: 0.0 })
         .collect();
-    let options = SimilarityOptions { c_l, c_d, c_r, sigma_phi_rad, ..SimilarityOptions::default() };
+    let options = SimilarityOptions { c_l, c_d, c_r, sigma_phi_rad, ..SimilarityOptions::DEFAULT };
+    options.check().map_err(value_error)?;
     let found = py.detach(|| core_similarity(&lines, &edges, &options));
     let row = |m: &memo_core::track::score::Match| {
         [

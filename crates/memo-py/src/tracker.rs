@@ -164,15 +164,9 @@ impl PyTracker {
             "lowe" => Measure::Lowe,
             other => return Err(choice_error("measure", "'rohr' or 'lowe'", other)),
         };
-        similarity.full_gradient = positive("full_gradient", full_gradient)?;
-        similarity.full_velocity = positive("full_velocity", full_velocity)?;
-        if let Some(weights) = part_weights {
-            if weights.iter().any(|w| !(w.is_finite() && *w >= 0.0)) || weights.iter().all(|w| *w == 0.0) {
-                let message = format!("part_weights must be 14 numbers from 0, not all 0, got {weights:?}");
-                return Err(PyValueError::new_err(message));
-            }
-            similarity.part_weights = weights;
-        }
+        similarity.full_gradient = full_gradient;
+        similarity.full_velocity = full_velocity;
+        similarity.part_weights = part_weights.unwrap_or(similarity.part_weights);
         options.person = adapt.then(PersonOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
         let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
@@ -225,15 +219,6 @@ impl PyTracker {
 
 fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
     PyValueError::new_err(format!("{name} must be {wanted}, got {got:?}"))
-}
-
-fn positive(name: &str, value: Option<f32>) -> PyResult<Option<f32>> {
-    match value {
-        Some(v) if !(v > 0.0 && v.is_finite()) => {
-            Err(PyValueError::new_err(format!("{name} must be a positive number, got {v}")))
-        }
-        _ => Ok(value),
-    }
 }
 
 /// One walk that has ended.

@@ -5,6 +5,8 @@
 //! one of them. Seconds take the place of the paper's images, so that any frame rate and uneven time stamps
 //! work.
 
+use crate::option_error::OptionError;
+
 /// Process and measurement noise of one coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
@@ -37,6 +39,17 @@ impl Default for FilterOptions {
             vertical: Noise { velocity_variance_per_s: 0.0, measurement_variance: 0.01 },
             phase: Noise { velocity_variance_per_s: per_s(0.3 * 0.04), measurement_variance: 0.04 },
         }
+    }
+}
+
+impl FilterOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        for noise in [self.along, self.vertical, self.phase] {
+            OptionError::unless_at_least_0("velocity_variance_per_s", noise.velocity_variance_per_s)?;
+            OptionError::unless_positive("measurement_variance", noise.measurement_variance)?;
+        }
+        Ok(())
     }
 }
 

@@ -12,6 +12,7 @@
 use super::change::{ChangeOptions, pair_changes};
 use super::clean::fill_holes;
 use super::frame::{Frame, FrameError, Image, Mask};
+use crate::option_error::OptionError;
 use thiserror::Error;
 
 /// How the background follows the scene.
@@ -33,6 +34,15 @@ impl Default for BackgroundOptions {
     fn default() -> Self {
         let change = ChangeOptions { min_threshold: 8.0, ..ChangeOptions::default() };
         Self { rate: 0.05, first_step: 64.0, change }
+    }
+}
+
+impl BackgroundOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless_positive("rate", self.rate)?;
+        OptionError::unless_positive("first_step", self.first_step)?;
+        self.change.check()
     }
 }
 

@@ -22,6 +22,7 @@
 use super::fit::{BORDER, NORM_SCALE, WINDOW, for_each_window, window_norm};
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
+use crate::option_error::OptionError;
 
 /// How far beyond the visible edge of a moving thing eq. (1) marks pixels, because a window sees the edge
 /// from two pixels away.
@@ -58,6 +59,17 @@ pub struct ChangeOptions {
 impl Default for ChangeOptions {
     fn default() -> Self {
         Self { threshold: None, false_rate: 1e-6, min_threshold: 4.0, compensate_gain: false }
+    }
+}
+
+impl ChangeOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        let threshold = self.threshold.unwrap_or(0.0);
+        OptionError::unless(!threshold.is_nan(), "threshold", "a number of grey levels", threshold)?;
+        let is_rate = self.false_rate > 0.0 && self.false_rate < 1.0;
+        OptionError::unless(is_rate, "false_rate", "between 0 and 1", self.false_rate)?;
+        OptionError::unless_at_least_0("min_threshold", self.min_threshold)
     }
 }
 

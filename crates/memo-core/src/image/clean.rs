@@ -15,8 +15,8 @@
 use super::frame::{Image, Mask};
 use super::region::{self, Rectangle};
 use super::runs::{Connectivity, connected_runs, runs};
+use crate::option_error::OptionError;
 use std::collections::VecDeque;
-use thiserror::Error;
 
 /// Neighbour numbers at which a pixel changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,27 +35,18 @@ impl Default for CleanOptions {
     }
 }
 
-/// Why a mask was not cleaned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum CleanError {
-    /// With these thresholds the recursion could run for ever.
-    #[error("pixels are deleted at up to {few} neighbours and marked from {many}: the first must be smaller")]
-    ThresholdsMeet {
-        /// The deleting threshold.
-        few: u8,
-        /// The marking threshold.
-        many: u8,
-    },
+impl CleanOptions {
+    /// Refuses thresholds with which the recursion could run for ever.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless(self.few < self.many, "few", "less than many", f64::from(self.few))
+    }
 }
 
 /// Deletes pixels with few neighbours and marks pixels with many until neither is left. Pixels outside
 /// the mask count as unmarked.
-pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, CleanError> {
-    let CleanOptions { few, many } = *options;
-    if few >= many {
-        return Err(CleanError::ThresholdsMeet { few, many });
-    }
+pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, OptionError> {
+    options.check()?;
+    let many = options.many;
     let Some(marked) = region::enclosing(&runs(mask, true)) else { return Ok(mask.clone()) };
     // A pixel outside the rectangle has 3 marked neighbours at most, so it stays unmarked.
     let area = if many > 3 { marked } else { whole(mask) };
@@ -300,7 +291,7 @@ mod tests {
     fn thresholds_that_meet_are_refused() {
         let mask = mask_of(&["#"]);
         let error = clean(&mask, &CleanOptions { few: 4, many: 4 }).unwrap_err();
-        assert_eq!(error, CleanError::ThresholdsMeet { few: 4, many: 4 });
+        assert_eq!(error, OptionError { name: "few", wanted: "less than many", got: 4.0 });
     }
 
     /// Pixels with up to two of eight neighbours go: lines of one pixel from end to end, and what sticks out.

@@ -13,6 +13,7 @@
 //! edges.
 
 use super::frame::{Frame, FrameError, Mask};
+use crate::option_error::OptionError;
 use glam::Vec2;
 use std::ops::Range;
 use thiserror::Error;
@@ -21,20 +22,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EdgeError {
-    /// The scale is not a number, too small to be sampled on the pixel grid, or absurdly large.
-    #[error("sigma of {sigma_px} px: must lie between {min} and {max}", min = SIGMA_PX.0, max = SIGMA_PX.1)]
-    BadSigma {
-        /// The scale asked for.
-        sigma_px: f32,
-    },
-    /// The thresholds are not numbers, not positive, or in the wrong order.
-    #[error("gradient thresholds of {low} and {high} grey/px: must satisfy 0 < low <= high")]
-    BadThresholds {
-        /// The threshold every edge point passes.
-        low: f32,
-        /// The threshold one point of an edge passes.
-        high: f32,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The mask does not fit the frame.
     #[error(transparent)]
     Mask(#[from] FrameError),
@@ -63,15 +53,14 @@ impl Default for EdgeOptions {
 }
 
 impl EdgeOptions {
-    fn check(&self) -> Result<(), EdgeError> {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
         let Self { sigma_px, low, high } = *self;
-        if !(SIGMA_PX.0..=SIGMA_PX.1).contains(&sigma_px) {
-            return Err(EdgeError::BadSigma { sigma_px });
-        }
-        if !(low > 0.0 && low <= high && high.is_finite()) {
-            return Err(EdgeError::BadThresholds { low, high });
-        }
-        Ok(())
+        let is_sampled = (SIGMA_PX.0..=SIGMA_PX.1).contains(&sigma_px);
+        OptionError::unless(is_sampled, "sigma_px", "between 0.4 and 50 px", f64::from(sigma_px))?;
+        OptionError::unless_positive("low", f64::from(low))?;
+        let is_above = low <= high && high.is_finite();
+        OptionError::unless(is_above, "high", "at least low, and finite", f64::from(high))
     }
 }
 

@@ -32,6 +32,7 @@ use self::domain::Domain;
 use self::multigrid::{Goal, Multigrid, Vectors};
 use super::edge::Window;
 use super::frame::{Frame, FrameError, Image, Mask};
+use crate::option_error::OptionError;
 use glam::{DVec2, Vec2};
 use thiserror::Error;
 
@@ -45,14 +46,9 @@ pub enum FlowError {
     /// The region has no pixel.
     #[error("the region is empty")]
     EmptyRegion,
-    /// An option is not a number or outside its range.
-    #[error("{name} = {value}: must be positive and finite")]
-    BadOption {
-        /// Name of the field.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// How the velocity field is computed.
@@ -91,7 +87,8 @@ impl Default for FlowOptions {
 }
 
 impl FlowOptions {
-    fn check(&self) -> Result<(), FlowError> {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
         let fields = [
             ("smoothness", self.smoothness),
             ("levels", self.levels as f64),
@@ -100,10 +97,10 @@ impl FlowOptions {
             ("max_iterations", self.max_iterations as f64),
             ("min_gradient", self.min_gradient),
         ];
-        match fields.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            Some((name, value)) => Err(FlowError::BadOption { name, value }),
-            None => Ok(()),
+        for (name, value) in fields {
+            OptionError::unless_positive(name, value)?;
         }
+        Ok(())
     }
 }
 

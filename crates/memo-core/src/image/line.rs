@@ -8,6 +8,7 @@
 
 use super::edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, edge_chains};
 use super::frame::Frame;
+use crate::option_error::OptionError;
 use glam::DVec2;
 use std::ops::Range;
 use thiserror::Error;
@@ -16,18 +17,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The tolerance is not a positive number.
-    #[error("line tolerance of {max_deviation_px} px: must be positive")]
-    BadTolerance {
-        /// The tolerance asked for.
-        max_deviation_px: f64,
-    },
-    /// The shortest length is not a number or negative.
-    #[error("minimum length of {min_length_px} px: must not be negative")]
-    BadLength {
-        /// The length asked for.
-        min_length_px: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The edge points were refused.
     #[error(transparent)]
     Edge(#[from] EdgeError),
@@ -51,15 +43,11 @@ impl Default for LineOptions {
 }
 
 impl LineOptions {
-    fn check(&self) -> Result<(), LineError> {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
         let Self { max_deviation_px, min_length_px } = *self;
-        if max_deviation_px.is_nan() || max_deviation_px <= 0.0 {
-            return Err(LineError::BadTolerance { max_deviation_px });
-        }
-        if min_length_px.is_nan() || min_length_px < 0.0 {
-            return Err(LineError::BadLength { min_length_px });
-        }
-        Ok(())
+        OptionError::unless(max_deviation_px > 0.0, "max_deviation_px", "positive", max_deviation_px)?;
+        OptionError::unless(min_length_px >= 0.0, "min_length_px", "0 or more", min_length_px)
     }
 }
 

@@ -1,6 +1,8 @@
 //! What the pixels say: from grey frames to moving regions, velocities and straight edges.
 
 pub mod background;
+#[cfg(feature = "image")]
+mod buffers;
 pub mod change;
 pub mod clean;
 pub mod edge;
@@ -19,7 +21,7 @@ pub use change::{
     CHANGE_REACH_PX, ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold,
     threshold_for_noise,
 };
-pub use clean::{CleanError, CleanOptions, clean, dilate, fill_holes};
+pub use clean::{CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
 pub use flow::{Evidence, FlowComponent, FlowError, FlowField, FlowOptions, velocity_field};
 pub use frame::{Frame, FrameError, Image, Mask};

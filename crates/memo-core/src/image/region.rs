@@ -13,6 +13,7 @@ use super::change::CHANGE_REACH_PX;
 use super::frame::{Image, Mask};
 use super::outline::{Outline, outlines};
 use super::runs::{Connectivity, Run, connected_runs, runs};
+use crate::option_error::OptionError;
 use std::cmp::Reverse;
 
 /// An upright rectangle of whole pixels; all four sides belong to it.
@@ -175,6 +176,15 @@ pub struct GroupOptions {
 impl Default for GroupOptions {
     fn default() -> Self {
         Self { min_part_area: 16, min_area: 150, gap_y: 0.3, gap_x: 0.05, max_aspect: 0.75 }
+    }
+}
+
+impl GroupOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless_at_least_0("gap_y", self.gap_y)?;
+        OptionError::unless_at_least_0("gap_x", self.gap_x)?;
+        OptionError::unless_positive("max_aspect", self.max_aspect)
     }
 }
 

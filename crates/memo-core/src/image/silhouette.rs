@@ -5,9 +5,10 @@
 //! lost; soft shadows are not.
 
 use super::background::{Background, BackgroundError, BackgroundOptions};
-use super::clean::{CleanError, CleanOptions, clean, fill_holes};
+use super::clean::{CleanOptions, clean, fill_holes};
 use super::frame::{Frame, FrameError, Mask};
 use super::region::{GroupOptions, group_regions, regions};
+use crate::option_error::OptionError;
 use thiserror::Error;
 
 /// Why no silhouettes were made.
@@ -28,7 +29,7 @@ pub enum SilhouetteError {
     Frame(#[from] FrameError),
     /// The binary operations were refused.
     #[error(transparent)]
-    Clean(#[from] CleanError),
+    Option(#[from] OptionError),
 }
 
 /// The silhouette of the largest candidate in each frame; empty masks where there is none.

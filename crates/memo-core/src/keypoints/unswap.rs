@@ -22,6 +22,7 @@ mod chain;
 mod relative;
 
 use crate::estimate::median::median;
+use crate::option_error::OptionError;
 use crate::wording::counted;
 use chain::{Chain, Posterior, Prior, Step};
 use relative::{Sample, Scale, Track};
@@ -188,16 +189,9 @@ pub enum UnswapError {
         /// Index given twice.
         joint: usize,
     },
-    /// An option out of range.
-    #[error("wanted {wanted}, got {name} = {value}")]
-    Option {
-        /// Name of the option.
-        name: &'static str,
-        /// What would do.
-        wanted: &'static str,
-        /// What came.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Why a frame's labels are what they are.
@@ -698,14 +692,10 @@ fn check_options(options: &UnswapOptions) -> Result<(), UnswapError> {
         ("partial_stay_nats", options.partial_stay_nats),
     ];
     for (name, value) in nats {
-        if !(0.0..=100.0).contains(&value) {
-            return Err(UnswapError::Option { name, wanted: "0 to 100 nats", value });
-        }
+        OptionError::unless((0.0..=100.0).contains(&value), name, "0 to 100 nats", value)?;
     }
     let value = options.decided_at;
-    if !(value > 0.5 && value < 1.0) {
-        return Err(UnswapError::Option { name: "decided_at", wanted: "a probability in (0.5, 1)", value });
-    }
+    OptionError::unless(value > 0.5 && value < 1.0, "decided_at", "a probability in (0.5, 1)", value)?;
     Ok(())
 }
 

@@ -16,6 +16,7 @@
 //!
 //! One rectangle only: nothing is filtered over time, and a stooped or seated person is placed wrongly.
 
+use crate::option_error::OptionError;
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use thiserror::Error;
 
@@ -102,16 +103,9 @@ pub enum PositionError {
         /// The height, metres.
         height_m: f64,
     },
-    /// An option is out of its range.
-    #[error("{option} must be {expected}, got {value}")]
-    Option {
-        /// Field of [`PositionOptions`].
-        option: &'static str,
-        /// Its range.
-        expected: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// A midpoint is NaN or infinite.
     #[error("midpoints must be finite, got bottom {bottom_px}, top {top_px}")]
     NotFinite {
@@ -460,16 +454,12 @@ fn check_weight(value: f64) -> Result<(), PositionError> {
 }
 
 fn check_option(
-    option: &'static str,
-    expected: &'static str,
-    value: f64,
+    name: &'static str,
+    wanted: &'static str,
+    got: f64,
     is_in_range: bool,
 ) -> Result<(), PositionError> {
-    if is_in_range && value.is_finite() {
-        Ok(())
-    } else {
-        Err(PositionError::Option { option, expected, value })
-    }
+    Ok(OptionError::unless(is_in_range && got.is_finite(), name, wanted, got)?)
 }
 
 #[cfg(test)]

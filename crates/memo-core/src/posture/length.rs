@@ -11,6 +11,7 @@
 //! in one view: it comes from body height, from the ground or a given distance, or is assumed ([`ScaleFrom`]).
 
 use crate::estimate::median::median;
+use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
@@ -128,12 +129,9 @@ pub enum LengthFitError {
     /// The prior's or the resulting lengths make no sense.
     #[error(transparent)]
     Length(#[from] LengthError),
-    /// A standard deviation is not usable.
-    #[error("the prior's scale_sd must be positive and finite, got {scale_sd}")]
-    ScaleSd {
-        /// The value.
-        scale_sd: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Frames that are needed at least.
@@ -200,9 +198,7 @@ pub fn estimate(
     if rays.len() != anchors.len() {
         return Err(LengthFitError::Counts { frames: rays.len(), anchors: anchors.len() });
     }
-    if !(prior.scale_sd > 0.0 && prior.scale_sd.is_finite()) {
-        return Err(LengthFitError::ScaleSd { scale_sd: prior.scale_sd });
-    }
+    OptionError::unless_positive("the prior's scale_sd", prior.scale_sd)?;
     prior.lengths.validated()?;
     let frames: Vec<(&JointRays, &Anchor)> =
         rays.iter().zip(anchors).filter_map(|(r, a)| Some((r, a.as_ref()?))).collect();

@@ -10,6 +10,7 @@ use crate::image::{Image, Window};
 use crate::model::body::Part;
 use crate::model::surface::{NO_PART, SurfaceMap, surface_map};
 use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
+use crate::option_error::OptionError;
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;
@@ -28,16 +29,9 @@ pub enum SceneError {
         /// Width and height, pixels.
         size: [u32; 2],
     },
-    /// An option makes no sense.
-    #[error("{name} must be {wanted}, got {got}")]
-    Option {
-        /// Its name.
-        name: &'static str,
-        /// What is accepted.
-        wanted: &'static str,
-        /// What was given.
-        got: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Steps drawn one by one, some fifteen hours; whoever walks on does so as in the last.
@@ -128,10 +122,10 @@ pub(super) fn check_size(size: [u32; 2]) -> Result<(), SceneError> {
 pub(super) type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>, &'static str);
 
 pub(super) fn check_ranges(options: &[Ranged]) -> Result<(), SceneError> {
-    match options.iter().find(|(_, got, range, _)| !range.contains(got)) {
-        Some(&(name, got, _, wanted)) => Err(SceneError::Option { name, wanted, got }),
-        None => Ok(()),
+    for (name, got, range, wanted) in options {
+        OptionError::unless(range.contains(got), name, wanted, *got)?;
     }
+    Ok(())
 }
 
 /// The truth of one frame with a walker.
@@ -210,10 +204,8 @@ impl SynthScene {
     /// A body and style whose feet do not move: strides of less than 0.1 m.
     pub fn with_walker(mut self, walker: Walker) -> Result<Self, SceneError> {
         let stride_m = stride_length_m(&walker);
-        if !(0.1..=10.0).contains(&stride_m) {
-            let (name, wanted) = ("the walker's stride", "0.1 to 10 m");
-            return Err(SceneError::Option { name, wanted, got: stride_m });
-        }
+        let is_a_walk = (0.1..=10.0).contains(&stride_m);
+        OptionError::unless(is_a_walk, "the walker's stride", "0.1 to 10 m", stride_m)?;
         self.cycle_hz = self.speed_mps / stride_m;
         self.start.height_m = walker.level_torso_height_m();
         self.steps = drawn_steps(&self.options, self.start.phase, self.cycle_hz, self.speed_mps);

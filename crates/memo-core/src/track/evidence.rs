@@ -9,11 +9,11 @@ use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chain
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
 use crate::image::{
-    Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanError, CleanOptions, Frame,
-    FrameError, GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions,
-    regions,
+    Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanOptions, Frame, FrameError,
+    GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions, regions,
 };
 use crate::model::Camera;
+use crate::option_error::OptionError;
 use glam::DVec2;
 use thiserror::Error;
 
@@ -24,9 +24,9 @@ pub enum EvidenceError {
     /// The frame does not fit the ones before.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// The options of the binary operations make no sense.
+    /// An option is outside its range.
     #[error(transparent)]
-    Clean(#[from] CleanError),
+    Option(#[from] OptionError),
     /// The options of edge or line finding make no sense.
     #[error(transparent)]
     Line(#[from] LineError),
@@ -81,6 +81,20 @@ impl Default for EvidenceOptions {
             edge: EdgeOptions::default(),
             line: LineOptions::default(),
         }
+    }
+}
+
+impl EvidenceOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        self.change.check()?;
+        OptionError::unless_at_least_0("rectangle_threshold", self.rectangle_threshold)?;
+        self.clean.check()?;
+        self.background.map_or(Ok(()), |background| background.check())?;
+        self.flow.map_or(Ok(()), |flow| flow.check())?;
+        self.group.check()?;
+        self.edge.check()?;
+        self.line.check()
     }
 }
 
@@ -212,7 +226,7 @@ impl EvidenceStream {
             return Ok(None);
         };
         self.add_foreground(&grey, &mut low, &mut firm)?;
-        let tidy = |mask: &Mask| Ok::<Mask, CleanError>(fill_holes(&clean(mask, &self.options.clean)?));
+        let tidy = |mask: &Mask| Ok::<Mask, OptionError>(fill_holes(&clean(mask, &self.options.clean)?));
         let (mask, firm_mask) = (tidy(&low)?, tidy(&firm)?);
         let velocity = match (&self.options.flow, next) {
             (Some(options), Some(next)) => velocity_field(&grey.as_frame(), next, &mask, options).ok(),

@@ -6,6 +6,7 @@ use super::start::CadenceRange;
 use super::walk::WalkOptions;
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
+use crate::option_error::OptionError;
 
 /// Which average gait the model walks with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -75,6 +76,32 @@ impl TrackerOptions {
             evidence: EvidenceOptions::default(),
             walk: WalkOptions::default(),
         }
+    }
+
+    /// Refuses options outside their ranges; [`Tracker::new`](super::tracker::Tracker::new) asks it first.
+    pub fn check(&self) -> Result<(), OptionError> {
+        let fov_deg = self.field_of_view_rad.to_degrees();
+        let is_seen = (5.0..=170.0).contains(&fov_deg);
+        OptionError::unless(is_seen, "field of view", "between 5 and 170 degrees", fov_deg)?;
+        let is_enough = (5..=100).contains(&self.start_frames);
+        OptionError::unless(is_enough, "start_frames", "between 5 and 100", self.start_frames as f64)?;
+        if let Some(person) = &self.person {
+            for (name, got) in [
+                ("angle_sd_rad", person.angle_sd_rad),
+                ("height_sd", person.height_sd),
+                ("distance_sd_m", person.distance_sd_m),
+                ("frames of the fit", person.frames as f64),
+            ] {
+                OptionError::unless_positive(name, got)?;
+            }
+            OptionError::unless_at_least_0("loss_per_sd", person.loss_per_sd)?;
+            OptionError::unless_at_least_0("min_gain", person.min_gain)?;
+        }
+        OptionError::unless_positive("low_hz", self.cadence.low_hz)?;
+        let is_above = self.cadence.high_hz >= self.cadence.low_hz && self.cadence.high_hz <= 100.0;
+        OptionError::unless(is_above, "high_hz", "at least low_hz and at most 100", self.cadence.high_hz)?;
+        self.evidence.check()?;
+        self.walk.check()
     }
 
     /// The average walker of the given height; the gait is made for a speed, metres a second.

@@ -8,6 +8,7 @@
 //! 1e-7, geometry stays f64 until it is projected.
 
 use crate::model::body::PART_COUNT;
+use crate::option_error::OptionError;
 
 /// Which measure compares one model line with one edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -46,18 +47,43 @@ pub struct SimilarityOptions {
     pub measure: Measure,
 }
 
+impl SimilarityOptions {
+    /// The defaults.
+    pub const DEFAULT: Self = Self {
+        c_l: 1.0,
+        c_d: 0.5,
+        c_r: 0.25,
+        sigma_phi_rad: 12.0 * std::f32::consts::PI / 180.0,
+        part_weights: [1.0; PART_COUNT],
+        full_gradient: None,
+        full_velocity: None,
+        measure: Measure::Rohr,
+    };
+}
+
 impl Default for SimilarityOptions {
     fn default() -> Self {
-        Self {
-            c_l: 1.0,
-            c_d: 0.5,
-            c_r: 0.25,
-            sigma_phi_rad: 12.0 * std::f32::consts::PI / 180.0,
-            part_weights: [1.0; PART_COUNT],
-            full_gradient: None,
-            full_velocity: None,
-            measure: Measure::Rohr,
+        Self::DEFAULT
+    }
+}
+
+impl SimilarityOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        for (name, got) in [
+            ("c_l", Some(self.c_l)),
+            ("c_d", Some(self.c_d)),
+            ("c_r", Some(self.c_r)),
+            ("sigma_phi_rad", Some(self.sigma_phi_rad)),
+            ("full_gradient", self.full_gradient),
+            ("full_velocity", self.full_velocity),
+        ] {
+            got.map_or(Ok(()), |got| OptionError::unless_positive(name, f64::from(got)))?;
         }
+        let (name, wanted) = ("part_weights", "14 numbers from 0, not all 0");
+        let refused = self.part_weights.into_iter().find(|w| !(w.is_finite() && *w >= 0.0));
+        OptionError::unless(refused.is_none(), name, wanted, f64::from(refused.unwrap_or_default()))?;
+        OptionError::unless(self.part_weights.into_iter().any(|w| w > 0.0), name, wanted, 0.0)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which of two half-cycle twins is the true one: how sure right and left are.
 
+use crate::option_error::OptionError;
+
 /// How the margin between the twins behaves, after a handful of real and motion-captured walks: probabilities
 /// far from 1/2 mean "sure", their size is not a rate that was counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +20,16 @@ pub struct SwapModel {
 impl Default for SwapModel {
     fn default() -> Self {
         Self { margin: 0.13, glimpse_sd: 0.16, person_sd: 0.05, glimpse_s: 0.2 }
+    }
+}
+
+impl SwapModel {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless_at_least_0("margin", self.margin)?;
+        OptionError::unless_positive("glimpse_sd", self.glimpse_sd)?;
+        OptionError::unless_at_least_0("person_sd", self.person_sd)?;
+        OptionError::unless_positive("glimpse_s", self.glimpse_s)
     }
 }
 

@@ -24,6 +24,7 @@ use super::walk::{FrameEdges, Walk};
 use crate::image::{Frame, Rectangle};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera};
+use crate::option_error::OptionError;
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
@@ -37,16 +38,9 @@ pub enum TrackError {
     /// A frame or an option was refused.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
-    /// An option makes no sense.
-    #[error("{name} must be {wanted}, got {got}")]
-    Option {
-        /// Name of the option.
-        name: &'static str,
-        /// What is accepted.
-        wanted: &'static str,
-        /// What was given.
-        got: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The stream has been ended.
     #[error("the stream has ended: make a new tracker for further frames")]
     Finished,
@@ -133,7 +127,7 @@ impl Tracker {
     /// A tracker that has seen no frame.
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
         Body::from_height(options.height_m)?;
-        check_options(&options)?;
+        options.check()?;
         let stream = EvidenceStream::new(options.evidence);
         Ok(Self {
             options,
@@ -399,22 +393,6 @@ impl Tracker {
             });
         }
     }
-}
-
-fn check_options(options: &TrackerOptions) -> Result<(), TrackError> {
-    let fov = options.field_of_view_rad.to_degrees();
-    if !(5.0..=170.0).contains(&fov) {
-        return Err(TrackError::Option {
-            name: "field of view",
-            wanted: "between 5 and 170 degrees",
-            got: fov,
-        });
-    }
-    if !(5..=100).contains(&options.start_frames) {
-        let got = options.start_frames as f64;
-        return Err(TrackError::Option { name: "start_frames", wanted: "between 5 and 100", got });
-    }
-    Ok(())
 }
 
 /// Bounding box of the body in the image, pixels.

@@ -10,6 +10,7 @@ use super::swap::{SwapModel, swap_probability};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
 use crate::image::Rectangle;
 use crate::model::{Camera, Walker};
+use crate::option_error::OptionError;
 
 /// Options of the following stage.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -22,6 +23,15 @@ pub struct WalkOptions {
     pub swap: SwapModel,
     /// How often hidden lines are removed in the search.
     pub hidden_lines: HiddenLines,
+}
+
+impl WalkOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        self.similarity.check()?;
+        self.filter.check()?;
+        self.swap.check()
+    }
 }
 
 /// Smallest and largest half widths of the search: along the path, in height (metres) and in phase. The

@@ -135,15 +135,17 @@ fn bad_options_and_masks_are_refused_with_their_values() {
         |options: EdgeOptions| edge_chains(&image.as_frame(), &EdgeDomain::default(), &options).unwrap_err();
     for sigma_px in [0.0, -1.0, 51.0, f32::INFINITY] {
         let error = refusal(EdgeOptions { sigma_px, ..Default::default() });
-        assert_eq!(error, EdgeError::BadSigma { sigma_px });
+        let wanted = "between 0.4 and 50 px";
+        let refused = OptionError { name: "sigma_px", wanted, got: f64::from(sigma_px) };
+        assert_eq!(error, EdgeError::Option(refused));
     }
     assert!(matches!(
         refusal(EdgeOptions { sigma_px: f32::NAN, ..Default::default() }),
-        EdgeError::BadSigma { .. }
+        EdgeError::Option(OptionError { name: "sigma_px", .. })
     ));
-    for (low, high) in [(0.0, 1.0), (6.0, 5.0), (1.0, f32::INFINITY)] {
+    for (low, high, name) in [(0.0, 1.0, "low"), (6.0, 5.0, "high"), (1.0, f32::INFINITY, "high")] {
         let error = refusal(EdgeOptions { low, high, ..Default::default() });
-        assert_eq!(error, EdgeError::BadThresholds { low, high });
+        assert!(matches!(error, EdgeError::Option(refused) if refused.name == name), "{error}");
     }
     let mask = Mask::filled(19, 20, true);
     let domain = EdgeDomain { mask: Some(&mask), window: None };

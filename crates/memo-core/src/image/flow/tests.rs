@@ -191,7 +191,10 @@ fn bad_input_is_refused_with_its_values() {
     assert_eq!(run(&none, FlowOptions::default()), Err(FlowError::EmptyRegion));
     let all = Mask::filled(8, 8, true);
     let error = run(&all, FlowOptions { smoothness: 0.0, ..Default::default() });
-    assert_eq!(error, Err(FlowError::BadOption { name: "smoothness", value: 0.0 }));
+    assert_eq!(
+        error,
+        Err(FlowError::Option(OptionError { name: "smoothness", wanted: "positive and finite", got: 0.0 }))
+    );
     let error = run(&Mask::filled(7, 8, true), FlowOptions::default()).unwrap_err();
     assert!(matches!(error, FlowError::Size(FrameError::SizeChanged { width: 7, .. })));
     let other = Image::filled(9, 8, 1u8);

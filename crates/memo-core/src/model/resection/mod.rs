@@ -42,6 +42,7 @@ pub use search::{Focal, Resection, ResectionOptions, resect, resect_in_image};
 
 use crate::model::body::BodyError;
 use crate::model::camera::CameraError;
+use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3};
@@ -139,16 +140,9 @@ pub enum ResectionError {
         /// Poses tried.
         starts: usize,
     },
-    /// An option is out of its range.
-    #[error("{option} must be {expected}, got {value}")]
-    Option {
-        /// Its name.
-        option: &'static str,
-        /// Its range.
-        expected: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The camera is invalid or does not image a pixel.
     #[error(transparent)]
     Camera(#[from] CameraError),

@@ -26,6 +26,7 @@ use super::{
 };
 use super::{centroid_and_spread, right_svd};
 use crate::model::Camera;
+use crate::option_error::OptionError;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
 
@@ -162,21 +163,16 @@ pub fn resect(
 }
 
 fn check_options(focal: Focal, options: &ResectionOptions) -> Result<(), ResectionError> {
-    let positive = |option, value: f64| {
-        let expected = "positive and at most 1e9";
-        let is_good = value > 0.0 && value <= MAX_COORDINATE;
-        if is_good { Ok(()) } else { Err(ResectionError::Option { option, expected, value }) }
+    let positive = |name, got: f64| {
+        OptionError::unless(got > 0.0 && got <= MAX_COORDINATE, name, "positive and at most 1e9", got)
     };
     if let Focal::Known(focal) = focal {
         positive("focal length along u", focal.x)?;
         positive("focal length along v", focal.y)?;
     }
     options.image_sd.map_or(Ok(()), |sd| positive("image_sd", sd))?;
-    let value = options.min_probability;
-    if value > 0.0 && value < 1.0 {
-        return Ok(());
-    }
-    Err(ResectionError::Option { option: "min_probability", expected: "between 0 and 1", value })
+    let got = options.min_probability;
+    Ok(OptionError::unless(got > 0.0 && got < 1.0, "min_probability", "between 0 and 1", got)?)
 }
 
 /// The linear solution if there is one; with the focal length known, also the poses of three points, each three

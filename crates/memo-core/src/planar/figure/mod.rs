@@ -33,6 +33,7 @@ pub use reflection::joint_of;
 
 use super::{EvidenceOptions, FitOptions, Verdict};
 use crate::model::skeleton::Joint;
+use crate::option_error::OptionError;
 use crate::progress::{Progress, Stopped};
 use crate::wording::counted;
 use depth::depth_over_time;
@@ -101,16 +102,9 @@ pub enum FigureError {
     /// All points are in one place, or none is ever seen.
     #[error("the points have no extent: nothing to link")]
     NoExtent,
-    /// An option makes no sense.
-    #[error("{option} must be {wanted}, got {value}")]
-    Option {
-        /// Its name.
-        option: &'static str,
-        /// What it may be.
-        wanted: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// Somebody wished it to end.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -335,27 +329,22 @@ fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Res
         return Err(FigureError::Times { frame });
     }
     let c = &options.costs;
-    for (option, value) in [
+    for (name, value) in [
         ("length cost", c.length),
         ("rod cost", c.rod),
         ("cost of a point alone", c.alone),
         ("cost of a detached group", c.detached),
         ("share of the noise", c.noise),
     ] {
-        if !(0.0..=1e6).contains(&value) {
-            return Err(FigureError::Option { option, wanted: "between 0 and 1,000,000", value });
-        }
+        OptionError::unless((0.0..=1e6).contains(&value), name, "between 0 and 1,000,000", value)?;
     }
-    for (option, value) in [("temperature", c.temperature), ("window_s", options.window_s)] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(FigureError::Option { option, wanted: "positive and finite", value });
-        }
-    }
-    if let Some(value) = options.size.filter(|size| !SIZES.contains(size)) {
-        return Err(FigureError::Option { option: "size", wanted: "between 1e-9 and 1e12", value });
+    OptionError::unless_positive("temperature", c.temperature)?;
+    OptionError::unless_positive("window_s", options.window_s)?;
+    if let Some(size) = options.size {
+        OptionError::unless(SIZES.contains(&size), "size", "between 1e-9 and 1e12", size)?;
     }
     let f = &options.fit;
-    for (option, wanted, value, is_good) in [
+    for (name, wanted, value, is_good) in [
         ("noise_sd", "finite and not negative", f.noise_sd, (0.0..=1e9).contains(&f.noise_sd)),
         ("max_tilt_deg", "between 0 and 90", f.max_tilt_deg, f.max_tilt_deg > 0.0 && f.max_tilt_deg < 90.0),
         ("outlier_sd", "positive", f.outlier_sd, f.outlier_sd > 0.0 && f.outlier_sd.is_finite()),
@@ -366,9 +355,7 @@ fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Res
             (0.0..=0.5).contains(&f.max_outlier_fraction),
         ),
     ] {
-        if !is_good {
-            return Err(FigureError::Option { option, wanted, value });
-        }
+        OptionError::unless(is_good, name, wanted, value)?;
     }
     Ok(())
 }
@@ -485,10 +472,10 @@ mod tests {
         assert_eq!(refused(&one_place, &times_s, fresh()), FigureError::NoExtent);
         for bad in [f64::NAN, f64::INFINITY, -1.0] {
             let options = FigureOptions { window_s: bad, ..fresh() };
-            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option(_)));
             let options =
                 FigureOptions { fit: FitOptions { noise_sd: bad, ..FitOptions::default() }, ..fresh() };
-            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option { .. }));
+            assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option(_)));
         }
         // With noise beside so small a size, costs would be infinite.
         let fit = FitOptions { noise_sd: 3.0, ..FitOptions::default() };
@@ -496,7 +483,7 @@ mod tests {
             let options = FigureOptions { size: Some(size), fit, ..fresh() };
             assert!(matches!(
                 refused(&tracks, &times_s, options),
-                FigureError::Option { option: "size", .. }
+                FigureError::Option(OptionError { name: "size", .. })
             ));
         }
         let tiny: Vec<Vec<DVec2>> = tracks.iter().map(|t| t.iter().map(|p| *p * 1e-310).collect()).collect();

@@ -1,5 +1,6 @@
 //! Options of the fits, and why points cannot be fitted.
 
+use crate::option_error::OptionError;
 use thiserror::Error;
 
 /// Why points in several views could not be fitted.
@@ -40,16 +41,9 @@ pub enum FitError {
         /// RMS motion of the least moving rod.
         motion: f64,
     },
-    /// An option makes no sense.
-    #[error("{option} must be {demand}, got {value}")]
-    Option {
-        /// Its name.
-        option: &'static str,
-        /// What it must be.
-        demand: &'static str,
-        /// What it was.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Options of the fits over many views.
@@ -92,10 +86,8 @@ impl FitOptions {
                 (0.0..=0.5).contains(&self.max_outlier_fraction),
             ),
         ];
-        for (option, demand, value, good) in checks {
-            if !good || !value.is_finite() {
-                return Err(FitError::Option { option, demand, value });
-            }
+        for (name, wanted, value, is_good) in checks {
+            OptionError::unless(is_good && value.is_finite(), name, wanted, value)?;
         }
         Ok(())
     }

@@ -18,6 +18,7 @@ mod neck;
 mod options;
 mod warning;
 
+use crate::option_error::OptionError;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -81,16 +82,9 @@ pub enum SequenceError {
         /// The time before.
         before_s: f64,
     },
-    /// A number is not usable.
-    #[error("{name} must be {wanted}, got {value}")]
-    Quantity {
-        /// Its name.
-        name: &'static str,
-        /// What is wanted.
-        wanted: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The moving direction has no level part.
     #[error("moving_direction must be finite and not vertical, got {value}")]
     Direction {
@@ -263,7 +257,7 @@ fn check(sequence: &KeypointSequence, options: &SequenceOptions) -> Result<(), S
         }
     }
     if frames == 1 && !sequence.times_s[0].is_finite() {
-        return Err(SequenceError::Quantity { name: "time_s", wanted: "finite", value: sequence.times_s[0] });
+        return Err(OptionError { name: "time_s", wanted: "finite", got: sequence.times_s[0] }.into());
     }
     for (before, pair) in sequence.times_s.windows(2).enumerate() {
         let [before_s, time_s] = [pair[0], pair[1]];

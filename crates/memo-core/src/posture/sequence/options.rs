@@ -1,6 +1,7 @@
 //! How postures of a sequence are found: the motion, the strength of its limits, where the neck's distance comes
 //! from, and what of it is refused.
 
+use crate::option_error::OptionError;
 use glam::DVec3;
 
 use super::SequenceError;
@@ -195,19 +196,15 @@ pub(super) fn check_options(options: &SequenceOptions) -> Result<(), SequenceErr
         ("group_m", options.group_m),
     ];
     for (name, value) in at_least_0 {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(SequenceError::Quantity { name, wanted: "finite and not negative", value });
-        }
+        OptionError::unless_at_least_0(name, value)?;
     }
     if let AnchorChoice::Given { distance_m, sd_m } = &options.anchor {
         if let Some(&value) = distance_m.iter().find(|d| !(d.is_nan() || DISTANCES_M.contains(d))) {
             let wanted = "a distance of 0.1 to 1000 m (NaN: unknown)";
-            return Err(SequenceError::Quantity { name: "distance_m", wanted, value });
+            return Err(OptionError { name: "distance_m", wanted, got: value }.into());
         }
-        if !(*sd_m > 0.0 && sd_m <= DISTANCES_M.end()) {
-            let wanted = "positive and at most 1000 m";
-            return Err(SequenceError::Quantity { name: "distance_sd_m", wanted, value: *sd_m });
-        }
+        let is_good = *sd_m > 0.0 && sd_m <= DISTANCES_M.end();
+        OptionError::unless(is_good, "distance_sd_m", "positive and at most 1000 m", *sd_m)?;
     }
     if let Some(lengths) = options.lengths {
         lengths.validated()?;

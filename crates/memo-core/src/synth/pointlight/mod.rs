@@ -23,6 +23,7 @@ pub use options::{
 
 use super::motion::Motion;
 use super::random::Random;
+use crate::option_error::OptionError;
 use dots::{Layer, all_points, beside, limbs, limited, noise_layer};
 use figure::Figure;
 use glam::DVec2;
@@ -130,7 +131,9 @@ fn below(random: &mut Random, count: usize) -> usize {
 }
 
 fn checked(motion: &Motion, options: &PointLightOptions) -> Result<(), PointLightError> {
-    let refuse = |parameter, wanted, value| Err(PointLightError::Parameter { parameter, wanted, value });
+    let refuse = |parameter, wanted, value| {
+        Err(PointLightError::Option(OptionError { name: parameter, wanted, got: value }))
+    };
     if let View::Orthographic { azimuth_rad, elevation_rad, px_per_m } = options.view {
         if !azimuth_rad.is_finite() {
             return refuse("azimuth", "finite radians", azimuth_rad);

@@ -1,6 +1,7 @@
 //! What happens to the motion in space before it is seen: its advance, and shifts in time.
 
 use super::{Locomotion, PhaseScramble, PointLightError, below};
+use crate::option_error::OptionError;
 use crate::synth::Random;
 use crate::synth::motion::Motion;
 use glam::DVec3;
@@ -33,7 +34,7 @@ pub(super) fn phase_scrambled(
     let in_frames = |parameter, seconds: f64| {
         if !(seconds >= 0.0 && seconds.is_finite()) {
             let wanted = "a duration in seconds";
-            return Err(PointLightError::Parameter { parameter, wanted, value: seconds });
+            return Err(PointLightError::Option(OptionError { name: parameter, wanted, got: seconds }));
         }
         let available_s = interval_s * frames as f64;
         if seconds > available_s * (1.0 + 1e-9) {

@@ -1,6 +1,7 @@
 //! Which display is made, and why one could not be.
 
 use crate::model::Camera;
+use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::{DVec2, DVec3};
 use thiserror::Error;
@@ -9,16 +10,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PointLightError {
-    /// A number is out of its range.
-    #[error("{parameter} must be {wanted}, got {value}")]
-    Parameter {
-        /// Its name.
-        parameter: &'static str,
-        /// What it may be.
-        wanted: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
     /// The recording is shorter than the period or shift asked for.
     #[error("{parameter} of {wanted_s} s needs a longer motion: it lasts {available_s} s")]
     TooShort {

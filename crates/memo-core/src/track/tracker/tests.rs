@@ -9,7 +9,10 @@ use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Step};
 use super::*;
 use crate::estimate::kalman::ConstantVelocity;
-use crate::image::Image;
+use crate::image::flow::FlowOptions;
+use crate::image::{BackgroundOptions, CleanOptions, Image};
+use crate::model::body::PART_COUNT;
+use crate::track::person::PersonOptions;
 
 const SIZE: [usize; 2] = [640, 480];
 
@@ -129,13 +132,51 @@ fn a_grown_rectangle_stays_inside_the_picture() {
     assert_eq!(grown(&r, &evidence, 16.0), Rectangle { left: 0, top: 0, right: 639, bottom: 479 });
 }
 
+/// A change to each option that makes it senseless, and the option's name.
+fn every_wrong_option() -> Vec<(fn(&mut TrackerOptions), &'static str)> {
+    vec![
+        (|o| o.walk.similarity.c_l = 0.0, "c_l"),
+        (|o| o.walk.similarity.c_d = -1.0, "c_d"),
+        (|o| o.walk.similarity.c_r = f32::NAN, "c_r"),
+        (|o| o.walk.similarity.sigma_phi_rad = f32::INFINITY, "sigma_phi_rad"),
+        (|o| o.walk.similarity.full_gradient = Some(0.0), "full_gradient"),
+        (|o| o.walk.similarity.full_velocity = Some(f32::NAN), "full_velocity"),
+        (|o| o.walk.similarity.part_weights[3] = -0.1, "part_weights"),
+        (|o| o.walk.similarity.part_weights = [0.0; PART_COUNT], "part_weights"),
+        (|o| o.walk.filter.along.measurement_variance = 0.0, "measurement_variance"),
+        (|o| o.walk.filter.phase.velocity_variance_per_s = f64::NAN, "velocity_variance_per_s"),
+        (|o| o.walk.swap.margin = -0.1, "margin"),
+        (|o| o.walk.swap.glimpse_sd = 0.0, "glimpse_sd"),
+        (|o| o.walk.swap.person_sd = f64::NAN, "person_sd"),
+        (|o| o.walk.swap.glimpse_s = 0.0, "glimpse_s"),
+        (|o| o.cadence.low_hz = 0.0, "low_hz"),
+        (|o| o.cadence.high_hz = 0.1, "high_hz"),
+        (|o| o.person = Some(PersonOptions { frames: 0, ..Default::default() }), "frames of the fit"),
+        (|o| o.person = Some(PersonOptions { angle_sd_rad: 0.0, ..Default::default() }), "angle_sd_rad"),
+        (|o| o.person = Some(PersonOptions { min_gain: f64::NAN, ..Default::default() }), "min_gain"),
+        (|o| o.evidence.change.threshold = Some(f64::NAN), "threshold"),
+        (|o| o.evidence.change.false_rate = 1.0, "false_rate"),
+        (|o| o.evidence.change.min_threshold = -1.0, "min_threshold"),
+        (|o| o.evidence.rectangle_threshold = f64::INFINITY, "rectangle_threshold"),
+        (|o| o.evidence.clean = CleanOptions { few: 5, many: 5 }, "few"),
+        (|o| o.evidence.background = Some(BackgroundOptions { rate: 0.0, ..Default::default() }), "rate"),
+        (|o| o.evidence.flow = Some(FlowOptions { levels: 0, ..Default::default() }), "levels"),
+        (|o| o.evidence.group.gap_x = -0.1, "gap_x"),
+        (|o| o.evidence.group.max_aspect = 0.0, "max_aspect"),
+        (|o| o.evidence.edge.sigma_px = 0.1, "sigma_px"),
+        (|o| o.evidence.edge.high = 1.0, "high"),
+        (|o| o.evidence.line.max_deviation_px = 0.0, "max_deviation_px"),
+        (|o| o.evidence.line.min_length_px = f64::NAN, "min_length_px"),
+    ]
+}
+
 #[test]
 fn options_out_of_range_are_refused_by_name() {
     let refused = |change: fn(&mut TrackerOptions)| {
         let mut options = options();
         change(&mut options);
         match Tracker::new(options) {
-            Err(TrackError::Option { name, .. }) => Some(name),
+            Err(TrackError::Option(error)) => Some(error.name),
             _ => None,
         }
     };
@@ -144,6 +185,9 @@ fn options_out_of_range_are_refused_by_name() {
     assert_eq!(refused(|o| o.field_of_view_rad = 4f64.to_radians()), Some("field of view"));
     assert_eq!(refused(|o| o.field_of_view_rad = 171f64.to_radians()), Some("field of view"));
     assert_eq!(refused(|o| (o.start_frames, o.field_of_view_rad) = (5, 0.1)), None);
+    for (change, name) in every_wrong_option() {
+        assert_eq!(refused(change), Some(name));
+    }
     assert_eq!(refused(|o| o.start_frames = 100), None);
 }
 

@@ -283,11 +283,11 @@ fn bad_input_is_refused_with_its_values() {
     assert!(matches!(free, Err(ResectionError::TooFewPoints { needed: 6, .. })));
     for focal in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = resect(&points, &image, known(focal), &ResectionOptions::default());
-        assert!(matches!(error, Err(ResectionError::Option { .. })));
+        assert!(matches!(error, Err(ResectionError::Option(_))));
     }
     for sd in [0.0, -1.0, f64::NAN] {
         let error = resect(&points, &image, known(1.0), &with_sd(sd));
-        assert!(matches!(error, Err(ResectionError::Option { option: "image_sd", .. })));
+        assert!(matches!(error, Err(ResectionError::Option(OptionError { name: "image_sd", .. }))));
     }
 }
 
