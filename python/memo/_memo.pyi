@@ -80,6 +80,21 @@ def _panic(message: str, way: str) -> None: ...
 class Camera:
     """A calibrated camera: OpenCV axes, world Z up, metres."""
 
+    def __new__(
+        cls,
+        matrix: npt.ArrayLike,
+        rotation: npt.ArrayLike,
+        translation: npt.ArrayLike,
+        size: tuple[int, int],
+        *,
+        distortion: npt.ArrayLike | None = None,
+    ) -> Self: ...
+    @property
+    def matrix(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def rotation(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def translation(self) -> npt.NDArray[np.float64]: ...
     @staticmethod
     def from_toml(path: str | PathLike[str], name: str | None = None) -> Camera: ...
     @staticmethod

@@ -141,6 +141,18 @@ pub fn pixels_from_numpy(pixels: &Bound<'_, PyAny>) -> PyResult<Vec<DVec2>> {
 /// What numpy makes of the object, as rows of N numbers.
 fn numbers_from_numpy<const N: usize>(object: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<[f64; N]>> {
     let wanted = format!("wanted {what}: numpy array of shape (N, {N})");
+    let (rows, shape) = vectors_from_numpy(object, &wanted)?;
+    if rows.is_empty() || shape.len() == 1 {
+        return Ok(rows);
+    }
+    Err(PyValueError::new_err(format!("{wanted}; got {}", describe(object)?)))
+}
+
+/// Numbers of shape (..., N) as rows of N, and the shape before the last axis; an empty list is no row.
+pub fn vectors_from_numpy<const N: usize>(
+    object: &Bound<'_, PyAny>,
+    wanted: &str,
+) -> PyResult<(Vec<[f64; N]>, Vec<usize>)> {
     let array = object.py().import("numpy")?.call_method1("asarray", (object,)).ok();
     let described = || describe(array.as_ref().unwrap_or(object));
     let kind =
@@ -149,15 +161,26 @@ fn numbers_from_numpy<const N: usize>(object: &Bound<'_, PyAny>, what: &str) -> 
         return Err(PyTypeError::new_err(format!("{wanted} of numbers; got {}", described()?)));
     };
     let numbers = array.call_method1("astype", ("float64",))?;
-    if numbers.len()? == 0 {
-        return Ok(Vec::new());
-    }
-    let rows = numbers.cast::<PyArray2<f64>>().ok().filter(|rows| rows.shape()[1] == N);
-    let Some(rows) = rows else {
-        return Err(PyValueError::new_err(format!("{wanted}; got {}", described()?)));
+    let refused = || Ok::<_, PyErr>(PyValueError::new_err(format!("{wanted}; got {}", described()?)));
+    let Ok(numbers) = numbers.cast::<PyArrayDyn<f64>>() else { return Err(refused()?) };
+    let shape = match numbers.shape() {
+        [0] => return Ok((Vec::new(), vec![0])),
+        [before @ .., last] if *last == N => before.to_vec(),
+        _ => return Err(refused()?),
     };
-    let rows = rows.try_readonly()?;
-    Ok(rows.as_array().rows().into_iter().map(|row| std::array::from_fn(|i| row[i])).collect())
+    let numbers = numbers.try_readonly()?;
+    let flat: Vec<f64> = numbers.as_array().iter().copied().collect();
+    Ok((flat.chunks_exact(N).map(|row| std::array::from_fn(|i| row[i])).collect(), shape))
+}
+
+/// Rows of N numbers as an array of shape (..., N), `shape` standing before the last axis.
+pub fn numpy_of_shape<const N: usize>(
+    py: Python<'_>,
+    rows: impl Iterator<Item = [f64; N]>,
+    mut shape: Vec<usize>,
+) -> PyResult<Bound<'_, PyArrayDyn<f64>>> {
+    shape.push(N);
+    rows.flatten().collect::<Vec<f64>>().into_pyarray(py).reshape(shape)
 }
 
 /// Line segments of shape (N, 2, 2).

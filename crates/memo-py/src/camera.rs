@@ -1,6 +1,6 @@
 //! `Camera`.
 
-use crate::array::{numpy_from_rows, pixels_from_numpy, points_from_numpy};
+use crate::array::{numpy_from_column, numpy_from_rows, numpy_of_shape, vectors_from_numpy};
 use crate::error::value_error;
 use glam::{DMat3, DVec2, DVec3};
 use memo_core::model::position::{position_from_rectangle, position_on_ground};
@@ -9,8 +9,8 @@ use memo_core::model::{
     PositionError, PositionOptions, TsaiParameters,
 };
 use memo_core::wording::counted;
-use numpy::PyArray2;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use numpy::{PyArray1, PyArray2, PyArrayDyn};
+use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -22,6 +22,8 @@ pub struct PyCamera(pub Camera);
 /// All that a camera is, to the last bit, for pickling: size, (fx, fy), (cx, cy), lens with its coefficients, the rotation
 /// column by column, translation.
 type Parameters = ((u32, u32), (f64, f64), (f64, f64), (String, Vec<f64>), Vec<f64>, (f64, f64, f64));
+
+const POINTS: &str = "wanted points: numpy array of shape (..., 3)";
 
 /// The camera of `Camera.__reduce__`.
 #[pyfunction(name = "_camera")]
@@ -58,6 +60,76 @@ pub fn camera_of_parameters(
 
 #[pymethods]
 impl PyCamera {
+    /// From K (3, 3), R and t of x_camera = R x_world + t, t in metres, as OpenCV's `calibrateCamera` and `solvePnP`
+    /// give them: `rotation` is R (3, 3) or the vector of axis times angle (3,), `distortion` k1, k2, p1, p2 and k3.
+    #[new]
+    #[pyo3(signature = (matrix, rotation, translation, size, *, distortion=None))]
+    fn new(
+        matrix: &Bound<'_, PyAny>,
+        rotation: &Bound<'_, PyAny>,
+        translation: &Bound<'_, PyAny>,
+        size: (u32, u32),
+        distortion: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let k = square(matrix, "matrix")?;
+        if k[1][0] != 0.0 || k[2] != [0.0, 0.0, 1.0] || k[0][1] != 0.0 {
+            let message = format!("matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], got {k:?}");
+            return Err(PyValueError::new_err(message));
+        }
+        let numbers = flat(rotation, "rotation")?;
+        let rotation = match numbers.len() {
+            3 => Camera::rotation_of_vector(DVec3::from_slice(&numbers)),
+            _ => {
+                let [x, y, z] = square(rotation, "rotation")?;
+                DMat3::from_cols_array_2d(&[x, y, z]).transpose()
+            }
+        };
+        let t = flat(translation, "translation")?;
+        let Ok(translation) = <[f64; 3]>::try_from(t.as_slice()) else {
+            return Err(PyValueError::new_err(format!("translation must be 3 numbers, got {}", t.len())));
+        };
+        let lens = distortion.map_or(Ok(vec![0.0; 5]), |lens| flat(lens, "distortion"))?;
+        let coefficients = match lens.as_slice() {
+            &[k1, k2, p1, p2] => [k1, k2, p1, p2, 0.0],
+            &[k1, k2, p1, p2, k3] => [k1, k2, p1, p2, k3],
+            _ => {
+                let message = format!(
+                    "distortion must be 4 or 5 coefficients (k1, k2, p1, p2, k3), got {}",
+                    lens.len()
+                );
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        let camera = Camera {
+            size: size.into(),
+            focal_px: DVec2::new(k[0][0], k[1][1]),
+            centre_px: DVec2::new(k[0][2], k[1][2]),
+            distortion: Distortion::from_opencv(coefficients),
+            rotation,
+            translation: DVec3::from_array(translation),
+        };
+        camera.validated().map(Self).map_err(value_error)
+    }
+
+    /// K of pixels: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]].
+    #[getter]
+    fn matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let Camera { focal_px: f, centre_px: c, .. } = &self.0;
+        numpy_from_rows(py, vec![[f.x, 0.0, c.x], [0.0, f.y, c.y], [0.0, 0.0, 1.0]])
+    }
+
+    /// R of x_camera = R x_world + t, (3, 3).
+    #[getter]
+    fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        numpy_from_rows(py, self.0.rotation.transpose().to_cols_array_2d().to_vec())
+    }
+
+    /// t of x_camera = R x_world + t, metres, (3,).
+    #[getter]
+    fn translation<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        numpy_from_column(py, self.0.translation.to_array().to_vec())
+    }
+
     /// Reads a Pose2Sim/anipose TOML file; `name` chooses one of several cameras.
     #[staticmethod]
     #[pyo3(signature = (path, name=None))]
@@ -202,40 +274,43 @@ impl PyCamera {
         self.0.position().into()
     }
 
-    /// Pixels (N, 2) of world points (N, 3); NaN for points the camera cannot see.
+    /// Pixels (..., 2) of world points (..., 3), metres; NaN for points the camera cannot see.
     fn project<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (points, shape) = vectors_from_numpy(points, POINTS)?;
         let pixel = |p: [f64; 3]| self.0.project(DVec3::from(p)).unwrap_or(DVec2::NAN).to_array();
-        numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(pixel).collect())
+        numpy_of_shape(py, points.into_iter().map(pixel), shape)
     }
 
-    /// World points (N, 3), metres, in the camera's axes: x right, y down, z forward.
+    /// World points (..., 3), metres, in the camera's axes: x right, y down, z forward.
     fn camera_from_world<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (points, shape) = vectors_from_numpy(points, POINTS)?;
         let in_camera = |p: [f64; 3]| self.0.camera_from_world(DVec3::from(p)).to_array();
-        numpy_from_rows(py, points_from_numpy(points)?.into_iter().map(in_camera).collect())
+        numpy_of_shape(py, points.into_iter().map(in_camera), shape)
     }
 
-    /// Where the rays of pixels (N, 2) meet the plane `z_m` metres above the ground, (N, 3); NaN where they
-    /// do not.
+    /// Where the rays of pixels (..., 2) meet the plane `z_m` metres above the ground, (..., 3), metres; NaN where
+    /// they do not.
     #[pyo3(signature = (pixels, z_m=0.0))]
     fn ground_points<'py>(
         &self,
         py: Python<'py>,
         pixels: &Bound<'py, PyAny>,
         z_m: f64,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let point = |pixel: DVec2| {
-            let ideal = self.0.undistort(pixel).ok();
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let (pixels, shape) = vectors_from_numpy(pixels, "wanted pixels: numpy array of shape (..., 2)")?;
+        let point = |pixel: [f64; 2]| {
+            let ideal = self.0.undistort(DVec2::from(pixel)).ok();
             ideal.and_then(|p| self.0.point_at_height(p, z_m)).unwrap_or(DVec3::NAN).to_array()
         };
-        numpy_from_rows(py, pixels_from_numpy(pixels)?.into_iter().map(point).collect())
+        numpy_of_shape(py, pixels.into_iter().map(point), shape)
     }
 
     /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6).
@@ -287,6 +362,27 @@ impl PyCamera {
             self.0.focal_px.x, p.x, p.y, p.z
         )
     }
+}
+
+/// The numbers of an array of any shape, row by row.
+fn flat(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    let numbers = object.py().import("numpy")?.call_method1("ravel", (object,))?;
+    let kind: char = numbers.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !matches!(kind, 'f' | 'i' | 'u') {
+        return Err(PyTypeError::new_err(format!(
+            "{name} must be numbers, got {}",
+            object.get_type().name()?
+        )));
+    }
+    numbers.call_method1("astype", ("float64",))?.extract()
+}
+
+fn square(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; 3]> {
+    let (rows, _) = vectors_from_numpy::<3>(object, &format!("wanted {name}: numpy array of shape (3, 3)"))?;
+    let count = rows.len();
+    let refused =
+        |_| PyValueError::new_err(format!("wanted {name}: numpy array of shape (3, 3); got {count} rows"));
+    <[[f64; 3]; 3]>::try_from(rows).map_err(refused)
 }
 
 fn parameter<'py, T: FromPyObjectOwned<'py>>(parameters: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
