@@ -359,7 +359,7 @@ def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     arguments = (path, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
     code, said, _ = memo_posture(*arguments, "--rules", "standing", "--out", tmp_path / "out")
     document = json.loads((tmp_path / "out" / "postures.json").read_text())
-    assert code == 3 and "postures left in 0: what is nearest to one" in said
+    assert code == 3 and "postures left in 0: in the first, the nearest posture breaks" in said
     assert all(frame["cut_all"] and not frame["groups_m"] for frame in document["per_frame"])
     assert document["frames_in_motion"] == len(document["per_frame"]) > 3
     assert all(
@@ -568,8 +568,8 @@ def test_nothing_is_decided_about_limbs_that_are_not_seen(scene, tmp_path, memo_
         return tmp_path / "some.csv"
 
     code, said, complaint = memo_posture(emptied(trunk), *options)
-    assert (code, complaint) == (0, "") and "nothing is decided about limbs" in said
-    assert "which way the limbs point" not in said
+    assert (code, complaint) == (0, "") and "the limbs are undetermined" in said
+    assert "depth directions of the limbs" not in said
     path = write_table(tmp_path / "neck.csv", truth, names=JOINTS)
     rows = [line.split(",") for line in path.read_text().splitlines()]
     rows[1:] = [[*row[:3], *[""] * (len(row) - 3)] for row in rows[1:]]
@@ -609,7 +609,7 @@ def test_it_is_told_that_one_of_several_people_was_followed(scene, tmp_path, mem
     arguments = [tmp_path / "crowd.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--no-plots"]
     arguments += ["--lengths", folder / "lengths.csv", "--out", tmp_path / "out"]
     _, said, _ = memo_posture(*arguments)
-    assert "Up to 2 people in 7 of 40 frames: one was followed; --person takes another." in said
+    assert "Up to 2 people in 7 of 40 frames: one was followed; --person selects another." in said
     assert "people" not in memo_posture(*arguments, "--person", 0)[1]
 
 
@@ -626,10 +626,10 @@ def test_one_frame_has_no_way(scene, tmp_path):
 def test_the_scale_is_said_to_be_of_the_ground_or_of_a_distance(scene, tmp_path, memo_posture):
     folder, truth = scene
     arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--out", tmp_path)
-    assert "by the feet on the ground;" in memo_posture(*arguments, "--no-plots")[1]
+    assert "from the feet on the ground;" in memo_posture(*arguments, "--no-plots")[1]
     distance_m = np.linalg.norm(truth[:, AT["neck"]] - CAMERA_AT, axis=1).mean()
     said = memo_posture(*arguments, "--no-plots", "--distance", distance_m)[1]
-    assert "Sizes rest on the distance from the camera that was given;" in said
+    assert "Sizes are based on the distance given;" in said
 
 
 def test_bodies_that_cannot_be_are_told_whatever_the_rules(scene, tmp_path):
