@@ -191,7 +191,7 @@ def test_points_from_the_command_line(memo_command, tmp_path):
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,4,nan\n": "line 2: v_px must be a finite number, got 'nan'",
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,4\n": "line 2: v_px must be a finite number, got None",
         "": "line 1: missing columns",
-        "x_m;y_m;z_m;u_px;v_px\n1;2;3;4;5\n": "line 1: missing columns .*; commas are wanted between columns",
+        "x_m;y_m;z_m;u_px;v_px\n1;2;3;4;5\n": "line 1: missing columns .*; columns must be separated by",
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,2000,5\n": "1 of 1 point outside a picture of 1280x720 pixels",
         "x_m,y_m,z_m,u_px,v_px\n0,0,0,9,5\n0,2e3,0,9,9\n": "x_m, y_m and z_m are spread over 2000 m: are",
     }.items():
