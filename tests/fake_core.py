@@ -75,9 +75,7 @@ class Track:
         }
         self.sentences = [self.summary["message"]]
         if status == "tracked":
-            self.sentences.append(
-                "Left and right may be swapped (probability 40%): look before you use them."
-            )
+            self.sentences.append("Left and right may be swapped (probability 40%): check them before use.")
         self.gait_parameters = gait_table(
             [[("speed", "", SPEED_MPS, "m/s", 1.2, 1.4, 3)]] if len(times_s) else []
         )

@@ -287,7 +287,7 @@ def test_all_problems_are_told_together_with_their_lines(tmp_path):
     rows = [
         ("nobody-has-it.mp4,,,,", "nobody-has-it.mp4: no such video"),
         ("a.mp4,168,,,", "height_m 168 looks like centimetres: give height_m 1.68"),
-        ('a.mp4,"1,68",,,', "height_m '1,68' is not a number: write a point"),
+        ('a.mp4,"1,68",,,', "height_m '1,68' is not a number: write a decimal point"),
         ("a.mp4,1.7,bad.toml,,", "bad.toml: "),
         ("a.mp4,1.7,none.toml,,", "none.toml: no such camera file"),
         ("a.mp4,1.7,,9:3,", "frames 9:3 is not A:B"),
@@ -336,7 +336,7 @@ def test_what_is_no_csv_manifest(tmp_path, text, expected):
         ),
         ("[all]\n[[video]]\nvideo = 'a'\n", "m.toml, line 1: unknown key 'all'"),
         ("[defaults]\nname = 'x'\n[[video]]\nvideo = 'a'\n", "m.toml, line 2: unknown key 'name'"),
-        ("[video]\nvideo = 'a'\n", "m.toml: each video is a table"),
+        ("[video]\nvideo = 'a'\n", "m.toml: each video must be a table"),
         ("[[video]]\nvideo = 3\n", "m.toml, line 1: video 3 is not a path"),
         ("[[video]]\nvideo = 'm.toml'\nheight_m = true\n", "m.toml, line 1: height_m True is not a number"),
     ],
@@ -399,7 +399,7 @@ def test_names_follow_from_paths_and_differ(tmp_path):
     (tmp_path / "m.csv").write_text("video,name\ns2/run.mp4,\ns1/walk.mp4,RUN\n")
     assert [row.name for row in batch.read_manifest(tmp_path / "m.csv").rows] == ["s2-run", "RUN"]
     (tmp_path / "m.csv").write_text("video,frames\ns2/run.mp4,:9\ns1/walk.mp4,\ns2/run.mp4,9:\n")
-    assert "line 2: the name 'run' is that of line 4 too" in problems_of(tmp_path / "m.csv")[0]
+    assert "line 2: the name 'run' is also used in line 4" in problems_of(tmp_path / "m.csv")[0]
     for name in ("..", "a/b", ".x", "logs", "status.csv", "x" * 200, "a\x07"):
         assert (
             "cannot be the name of a folder"
@@ -480,9 +480,8 @@ def test_every_walk_is_counted_and_told(lab):
     assert [row["walks"] for row in others] == ["1", "0", ""] and not any(row["remarks"] for row in others)
     assert result.walks == 3
     sentences = list(described(result))
-    assert "3 walks; several in 1 video (v00): gait_parameters.csv has a row for each, whoever walks." in (
-        sentences
-    )
+    several = "gait_parameters.csv has one row per walk, possibly of different people."
+    assert f"3 walks; several in 1 video (v00): {several}" in sentences
     assert "Remarks on 1 video (v00): see status.csv." in sentences
     line = next(_line(now.record) for now in told if now.record is not None and now.record.name == "v00")
     assert ": done, 2 walks, " in line and line.endswith("1: Goes. 2: Comes. (remarks: status.csv)")
@@ -565,7 +564,7 @@ def test_where_it_does_not_start(lab, monkeypatch):
     lab.videos("ok")
     (lab.folder / "other").mkdir()
     (lab.folder / "other" / "thesis.tex").write_text("years of work")
-    with pytest.raises(batch.BatchError, match="holds files that are not"):
+    with pytest.raises(batch.BatchError, match="holds files that"):
         lab.run(lab.folder / "other", resume=True)
     with pytest.raises(batch.BatchError, match="is a file"):
         lab.run(lab.manifest)
@@ -658,7 +657,7 @@ def test_children_end_with_a_killed_run_and_the_lock_with_it(lab):
     wait_for(
         lambda: len([line for _, line in lab.processes() if "--out" in line]) == 2 and lab_done(lab, "v02")
     )
-    with pytest.raises(batch.BatchError, match="another run is at work here"):
+    with pytest.raises(batch.BatchError, match="another run uses this folder"):
         lab.run(resume=True)
     run.kill()
     run.communicate()
@@ -722,7 +721,7 @@ def test_shards_do_every_video_once_and_their_tables_are_one(lab):
 def test_shards_of_another_division_are_refused_meanwhile(lab):
     lab.videos("ok", "ok")
     with OutFolder(lab.out, (1, 2)).taken():
-        with pytest.raises(batch.BatchError, match="shard 1/2 is at work here"):
+        with pytest.raises(batch.BatchError, match="shard 1/2 runs here"):
             lab.run(shard=(1, 3))
         assert lab.run(shard=(2, 2)).done_now == 1
     assert lab.run(resume=True).done_now == 1
@@ -749,7 +748,7 @@ def test_a_broken_pool_is_told_and_loses_nothing_for_good(lab):
     lab.videos("ok", f"kills-its-worker {lab.folder / 'killed'}", "sleeps 0.2", "ok", "ok")
     with ProcessPoolExecutor(2) as pool:
         result = lab.run(executor=pool)
-    assert result.left and any("The executor broke" in note for note in result.notes)
+    assert result.left and any("The executor failed" in note for note in result.notes)
     assert len(result.left) + len(result.records) == 5 and result.unfinished == len(result.left)
     assert not lab.strays()
     lab.run(resume=True)
@@ -780,7 +779,7 @@ def test_a_ray_worker_that_is_killed_loses_its_video_alone(lab, monkeypatch):
     finally:
         ray.shutdown()
     assert list(lab.states().values()) == ["done", "crashed", "done", "nobody", "crashed", "done"]
-    assert "3 workers were lost over it" in result.records[1].message
+    assert "3 workers were lost with this video" in result.records[1].message
     assert any("Workers were lost 4 times" in note for note in result.notes)
     assert not lab.processes() and not lab.strays()
 
@@ -816,7 +815,7 @@ def test_memory_is_limited(lab):
     lab.videos("grows", "ok")
     result = lab.run(memory_mb=100)
     assert [record.state for record in result.records] == ["crashed", "done"]
-    assert result.records[0].message == "ended for more than 100 MB of memory"
+    assert result.records[0].message == "ended because it used more than 100 MB of memory"
 
 
 def test_ray_out_of_reach_is_told(lab):

@@ -191,7 +191,7 @@ def test_points_from_the_command_line(memo_command, tmp_path):
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,4,nan\n": "line 2: v_px must be a finite number, got 'nan'",
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,4\n": "line 2: v_px must be a finite number, got None",
         "": "line 1: missing columns",
-        "x_m;y_m;z_m;u_px;v_px\n1;2;3;4;5\n": "line 1: missing columns .*; commas are wanted between columns",
+        "x_m;y_m;z_m;u_px;v_px\n1;2;3;4;5\n": "line 1: missing columns .*; columns must be separated by",
         "x_m,y_m,z_m,u_px,v_px\n1,2,3,2000,5\n": "1 of 1 point outside a picture of 1280x720 pixels",
         "x_m,y_m,z_m,u_px,v_px\n0,0,0,9,5\n0,2e3,0,9,9\n": "x_m, y_m and z_m are spread over 2000 m: are",
     }.items():
@@ -408,7 +408,7 @@ def test_a_video_has_its_own_size(memo_command, tmp_path):
     code, _, complaint = memo_command(*arguments, "--size", "1280x960")
     assert code == 1 and "1280x960 and 640x480 pixels" in complaint
     code, _, complaint = memo_command(*arguments, "--layout", "BODY_25")
-    assert code == 1 and "--layout: means nothing for a video" in complaint
+    assert code == 1 and "--layout: has no meaning for a video" in complaint
 
 
 def test_points_are_taken_as_numpy_takes_them():
@@ -474,7 +474,11 @@ def test_rendered_boards(memo_command, tmp_path):
     camera = memo.Camera.from_file(out / "camera.toml")
     assert camera.position[2] == pytest.approx(0.35, abs=5e-3)
     code, said, complaint = memo_command(*arguments, "--squares", "9x6")
-    assert code == 0 and "9x6 are inner corners, not squares" in said and "give lens.toml as --lens" in said
+    assert (
+        code == 0
+        and "9x6 counts the inner corners, not the squares" in said
+        and "give lens.toml as --lens" in said
+    )
     code, _, complaint = memo_command(*arguments, "--squares", "5x4")
     assert code == 1 and complaint.count("\n") == 1  # too few boards, or corners too near to one another
 

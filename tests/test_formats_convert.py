@@ -88,9 +88,9 @@ def test_keypoints_of_a_track(tmp_path, memo_command):
         assert said in out
         assert (tmp_path / target).exists()
     code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.txt", "--rate", 50)
-    assert (code, err) == (1, "memo: --rate: means nothing for MOTChallenge rows")
+    assert (code, err) == (1, "memo: --rate: has no meaning for MOTChallenge rows")
     code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.json", "--up", "y")
-    assert (code, err) == (1, "memo: --up: means nothing for COCO results")
+    assert (code, err) == (1, "memo: --up: has no meaning for COCO results")
     code, _, err = memo_command("convert", tmp_path / "nobody", tmp_path / "b.txt")
     assert code == 1 and "no such file or folder" in err
     code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "b.txt")
@@ -160,7 +160,7 @@ def test_postures_are_converted_with_short_gaps_filled(tmp_path, memo_command):
     target = tmp_path / "postures.bvh"
     assert memo_command("convert", tmp_path / "run", target)[0] == 1
     code, out, _ = memo_command("convert", tmp_path / "run", target, "--fill", 0.1)
-    assert code == 0 and "Filled by straight lines: 2 missing values." in out
+    assert code == 0 and "Interpolated linearly: 2 missing values." in out
     assert read_motion(target).metadata["up"] == "y"
 
 

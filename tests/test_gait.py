@@ -140,7 +140,8 @@ def test_steps_hardly_seen_are_said_to_be():
 
     assert said(90.0, 110.0) == [] == said(np.nan, np.nan, np.nan)
     assert said(-2.0, 202.0) == [
-        "Its steps were hardly seen (95 % interval 0 to 202 a minute): use no gait parameter of it."
+        "Its steps were hardly visible (95 % interval 0 to 202 per minute): use no gait parameter of this "
+        "walk."
     ]
 
 

@@ -104,10 +104,10 @@ def test_a_file_called_like_a_url_is_read(command, tmp_path, write_video, luma_f
         ("batch nothere.csv", "nothere.csv: no such file"),
         ("report nothere", "nothere: no such folder"),
         ("calibrate points nothere.csv --size 640x480", "nothere.csv: no such file"),
-        ("pointlight --dots 3", "--dots is used with --lifetime only"),
-        ("pointlight --on joints", "--on is used with --lifetime only"),
-        ("pointlight --noise-kind linear", "--noise-kind is used with --noise-dots only"),
-        ("pointlight a.csv --seconds 2", "--seconds is used without MOTION only"),
+        ("pointlight --dots 3", "--dots needs --lifetime"),
+        ("pointlight --on joints", "--on needs --lifetime"),
+        ("pointlight --noise-kind linear", "--noise-kind needs --noise-dots"),
+        ("pointlight a.csv --seconds 2", "--seconds cannot be used with MOTION"),
     ],
 )
 def test_what_is_not_there_or_has_no_effect_is_refused(command, tmp_path, line, says):

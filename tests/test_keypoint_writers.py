@@ -436,7 +436,7 @@ def test_unswap_writes_the_format_asked_for(tmp_path, memo_command):
         for joint in common:
             np.testing.assert_array_equal(point(found, joint), point(expected, joint))
         if chosen in ("openpose", "coco"):
-            assert f"{chosen} has no place for upper_neck, head_top" in said
+            assert f"{chosen} cannot store upper_neck, head_top" in said
     points, _ = in_pose_format(tmp_path / "openpose" / "cam02_json")
     np.testing.assert_allclose(
         points[:, BODY_25.index("right_knee")], point(expected, "right_knee"), rtol=1e-6

@@ -140,7 +140,7 @@ def test_chains_that_are_not_planar_are_left_out():
     assert found.verdicts() == {(0, 1): {"planar": 2, "not planar": 1, "edge-on": 1}}
     assert _about_links(found, ["a", "b"]) == [
         "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1 of 4 windows",
-        "Left out, their motion is not planar: a - b (in 1 of 4 windows).",
+        "Left out because their motion is not planar: a - b (in 1 of 4 windows).",
     ]
     assert found_with(["not planar"]).links() == []
 

@@ -359,7 +359,7 @@ def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     arguments = (path, "--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
     code, said, _ = memo_posture(*arguments, "--rules", "standing", "--out", tmp_path / "out")
     document = json.loads((tmp_path / "out" / "postures.json").read_text())
-    assert code == 3 and "postures left in 0: what is nearest to one" in said
+    assert code == 3 and "postures left in 0: in the first, the nearest posture breaks" in said
     assert all(frame["cut_all"] and not frame["groups_m"] for frame in document["per_frame"])
     assert document["frames_in_motion"] == len(document["per_frame"]) > 3
     assert all(
@@ -405,7 +405,7 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["walk.csv", "--lengths", "missing.csv"], "1 of 17 lengths missing: neck_to_pelvis"),
         (["walk.csv", "--lengths", "unknown.json"], "no segment tail"),
         (["walk.csv", "--lengths", "broken.json"], "broken.json: not JSON"),
-        (["walk.csv", "--lengths", "twice.csv"], "neck_to_pelvis stands there twice"),
+        (["walk.csv", "--lengths", "twice.csv"], "neck_to_pelvis appears twice"),
         (["walk.csv", "--lengths", "short.csv"], "row 2 has no length beside the name"),
         (["walk.csv", "--lengths", "image.png"], "not a text file"),
         (["walk.csv", "--lengths", "lengths.csv", "--height", "1.8"], "leave --height out"),
@@ -478,7 +478,7 @@ def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
         ({"distance_m": 1e-300}, "distance_m must be 0.1 to 1000 m"),
         ({"distance_m": math.nan}, "distance_m must be a distance"),
         ({"distance_m": 5.0, "distance_sd_m": -5.0}, "distance_sd_m must be positive"),
-        ({"distance_sd_m": -5.0}, "distance_sd_m goes with distance_m, got -5 alone"),
+        ({"distance_sd_m": -5.0}, "distance_sd_m needs distance_m, got -5 alone"),
         ({"max_groups": -1}, "max_groups must be 0 to"),
         ({"moving_direction": (1.0, 0.0)}, "moving_direction must be three numbers"),
     ],
@@ -496,7 +496,7 @@ def test_mistakes_in_python(scene, options, reason):
     ("options", "reason"),
     [
         ({"max_groups": 1.5}, "max_groups must be a whole number, got 1.5"),
-        ({"distance_m": "a"}, "distance_m must be a number or one for each frame, got a"),
+        ({"distance_m": "a"}, "distance_m must be a number or one per frame, got a"),
         ({"distance_m": [[4.0], [5.0, 6.0]]}, "distance_m must be a number or one"),
         ({"distance_m": 4.0, "distance_sd_m": "b"}, "distance_sd_m must be a number, got b"),
         ({"rules": None}, "rules must be a name, one of physical"),
@@ -546,7 +546,7 @@ def test_a_distance_less_sure_than_long_is_none(scene, tmp_path, memo_posture):
     code, said, complaint = memo_posture(*arguments, "--out", tmp_path / "out")
     assert (code, complaint) == (3, "")
     assert "postures left in 0: in the first, the distance of the neck is not known: " in said
-    assert "m says nothing" in said and "m away" not in said and "which way the limbs" not in said
+    assert "m says nothing" in said and "m away" not in said and "depth directions of the limbs" not in said
     document = json.loads((tmp_path / "out" / "postures.json").read_text())
     for frame in document["per_frame"]:
         assert frame["anchor_m"] is None and "not known" in frame["problem"] and frame["cut_all"] is None
@@ -568,8 +568,8 @@ def test_nothing_is_decided_about_limbs_that_are_not_seen(scene, tmp_path, memo_
         return tmp_path / "some.csv"
 
     code, said, complaint = memo_posture(emptied(trunk), *options)
-    assert (code, complaint) == (0, "") and "nothing is decided about limbs" in said
-    assert "which way the limbs point" not in said
+    assert (code, complaint) == (0, "") and "the limbs are undetermined" in said
+    assert "depth directions of the limbs" not in said
     path = write_table(tmp_path / "neck.csv", truth, names=JOINTS)
     rows = [line.split(",") for line in path.read_text().splitlines()]
     rows[1:] = [[*row[:3], *[""] * (len(row) - 3)] for row in rows[1:]]
@@ -595,7 +595,7 @@ def test_a_figure_on_its_head_is_noticed(found, scene, tmp_path):
     camera = memo.Camera.from_toml(folder / "camera.toml")
     path = write_table(tmp_path / "upwards.csv", truth, change=lambda pixels: [0, SIZE[1]] + pixels * [1, -1])
     upwards = memo.posture(path, camera, true_lengths(truth), fps=RATE_HZ, anchor="given", distance_m=5.0)
-    said = "the neck is below the pelvis in 40 of 40 frames: v of the keypoints must be counted downwards"
+    said = "the neck is below the pelvis in 40 of 40 frames: v of the keypoints must increase downwards"
     assert upwards.warnings[0] == said
     assert not any("below the pelvis" in warning for warning in found.warnings)
 
@@ -609,7 +609,7 @@ def test_it_is_told_that_one_of_several_people_was_followed(scene, tmp_path, mem
     arguments = [tmp_path / "crowd.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--no-plots"]
     arguments += ["--lengths", folder / "lengths.csv", "--out", tmp_path / "out"]
     _, said, _ = memo_posture(*arguments)
-    assert "Up to 2 people in 7 of 40 frames: one was followed; --person takes another." in said
+    assert "Up to 2 people in 7 of 40 frames: one was followed; --person selects another." in said
     assert "people" not in memo_posture(*arguments, "--person", 0)[1]
 
 
@@ -626,10 +626,10 @@ def test_one_frame_has_no_way(scene, tmp_path):
 def test_the_scale_is_said_to_be_of_the_ground_or_of_a_distance(scene, tmp_path, memo_posture):
     folder, truth = scene
     arguments = (folder / "walk.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--out", tmp_path)
-    assert "by the feet on the ground;" in memo_posture(*arguments, "--no-plots")[1]
+    assert "from the feet on the ground;" in memo_posture(*arguments, "--no-plots")[1]
     distance_m = np.linalg.norm(truth[:, AT["neck"]] - CAMERA_AT, axis=1).mean()
     said = memo_posture(*arguments, "--no-plots", "--distance", distance_m)[1]
-    assert "Sizes rest on the distance from the camera that was given;" in said
+    assert "Sizes are based on the distance given;" in said
 
 
 def test_bodies_that_cannot_be_are_told_whatever_the_rules(scene, tmp_path):
@@ -711,7 +711,7 @@ def test_keypoints_read_before_are_taken_too(scene):
     first = memo.posture(keypoints, camera, true_lengths(truth))
     again = memo.posture(folder / "walk.csv", camera, true_lengths(truth), fps=RATE_HZ)
     np.testing.assert_array_equal(first.smoothed_m, again.smoothed_m)
-    with pytest.raises(ValueError, match="still to be read"):
+    with pytest.raises(ValueError, match="read from a file only"):
         memo.posture(keypoints, camera, fps=RATE_HZ)
 
 

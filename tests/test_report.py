@@ -112,7 +112,7 @@ def test_the_page_holds_the_tables_as_they_are(run_folder):
         DEFINITIONS["cadence"],
         "101.5 to 115.0",
         "108.2",
-        "The camera was guessed",
+        "The camera was assumed",
     ):
         assert told in written
     assert report.contents["pictures"] == report.contents["explained"] == 20
@@ -160,7 +160,7 @@ def test_frames_are_chosen_and_the_choice_is_told(run_folder):
     folder = run_folder()
     written, data, report = page_of(folder, frames=(4, 12), every=3)
     assert data["pictures"]["frame"] == [why["frame"] for why in data["why"]] == [4, 7, 10]
-    assert "Every 3rd frame is in this page, as asked" in written and "4 to 11 were asked for" in written
+    assert "Every 3rd frame is in this page, as requested" in written and "4 to 11 were requested" in written
     assert len(report.contents["notes"]) == 2
     _, data, _ = page_of(folder, why=False)
     assert data["why"] == []
@@ -281,7 +281,7 @@ def test_a_video_named_by_hand_must_be_the_one(run_folder, write_video, luma_fra
     code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--video", other)
     assert code == 1 and complaint == f"memo: {other}: it has 32x24 pixels, the run 64x48\n"
     code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--frames", "500:600")
-    assert code == 1 and complaint.endswith("among those asked for; it read 0 to 19\n")
+    assert code == 1 and complaint.endswith("among those requested; it read 0 to 19\n")
     assert (folder / "report.html").read_bytes() == older
 
 
@@ -330,7 +330,7 @@ def test_many_walks_leave_the_picture_in_sight(run_folder):
 def test_an_interrupted_run_says_so(run_folder):
     written, _, _ = page_of(run_folder(interrupted=True, frames_read=12))
     assert '<span class="status fair">tracked, interrupted</span>' in written
-    assert "The run was interrupted after 12 frames: what came later was not looked at." in written
+    assert "The run was interrupted after 12 frames: later frames were not read." in written
     assert "interrupted after" not in page_of(run_folder())[0]
 
 

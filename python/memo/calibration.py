@@ -1,6 +1,6 @@
-"""Around calibration: tables of points, people and boards in pictures, and the ground drawn over a picture.
+"""For calibration: tables of points, people and boards in pictures, and the ground drawn over a picture.
 
-Needs the `app` extra; looking for checkerboards needs the `checkerboard` extra.
+Needs the `app` extra; the search for checkerboards needs the `checkerboard` extra.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ Luma = npt.NDArray[np.uint8]
 
 PERSON_M = 1.7
 POINT_COLUMNS = ("x_m", "y_m", "z_m", "u_px", "v_px")
-"""Columns that a table of points must have; others are passed over."""
+"""Columns that a table of points must have; others are ignored."""
 
 _X, _Y, _Z, _GRID, _PERSON = (230, 60, 60), (60, 200, 60), (90, 140, 255), (255, 255, 255), (240, 228, 66)
-_REACH_M = 25.0  # the grid is drawn so far from what the picture's lower half shows
+_REACH_M = 25.0  # reach of the drawn grid from the ground in the picture's lower half
 _MOST_LINES = 80
 
 
@@ -62,7 +62,7 @@ class PointTable:
 
 
 def read_points_csv(path: str | PathLike[str]) -> PointTable:
-    """Reads `x_m,y_m,z_m,u_px,v_px`; every fault names file, line and column."""
+    """Reads `x_m,y_m,z_m,u_px,v_px`; every error names file, line and column."""
     rows: list[list[float]] = []
     lines: list[int] = []
     try:
@@ -71,7 +71,7 @@ def read_points_csv(path: str | PathLike[str]) -> PointTable:
             header = next(table, [])
             absent = [name for name in POINT_COLUMNS if name not in header]
             if absent:
-                hint = "" if len(header) > 1 else "; commas are wanted between columns"
+                hint = "" if len(header) > 1 else "; columns must be separated by commas"
                 raise ValueError(f"{path}: line 1: missing columns {', '.join(absent)}{hint}")
             for cells in table:
                 if not any(cells):
@@ -119,10 +119,10 @@ def read_picture(path: str | PathLike[str]) -> Luma:
 
 
 def rectangles(frames: Sequence[Luma]) -> tuple[Array, Array]:
-    """Feet and heads (N, 2), pixels, of the silhouettes that stand clear of the picture's border.
+    """Feet and heads (N, 2), pixels, of the silhouettes that do not touch the picture's border.
 
-    The middles of the lowest and of the highest tenth of rows: a rectangle's own would be those of arms and
-    legs.
+    They are the middles of the lowest and of the highest tenth of rows: arms and legs would shift the
+    middle of the bounding box.
     """
     feet, heads = [], []
     for mask in memo.silhouettes(list(frames)):
@@ -133,7 +133,7 @@ def rectangles(frames: Sequence[Luma]) -> tuple[Array, Array]:
             continue
         tall = rows[-1] - rows[0] + 1
         if tall < 20 or tall < 1.5 * (columns[-1] - columns[0] + 1):
-            continue  # legs apart, or nobody
+            continue  # legs apart, or nobody visible
         low, high = (
             np.flatnonzero(mask[rows[0] + int(first * tall) : rows[0] + max(int(last * tall), 1)].any(axis=0))
             for first, last in ((0.9, 1.0), (0.0, 0.1))
@@ -144,11 +144,11 @@ def rectangles(frames: Sequence[Luma]) -> tuple[Array, Array]:
     return np.array(feet, np.float64).reshape(-1, 2), np.array(heads, np.float64).reshape(-1, 2)
 
 
-# The ground over a picture.
+# The ground drawn over a picture.
 
 
 def standing_place(camera: memo.Camera) -> tuple[tuple[float, float, float], str] | None:
-    """A place on the ground in the picture and its name: the origin, else what the lower middle shows."""
+    """A place on the ground in the picture and its name: the origin, else a place in the lower middle."""
     width, height = camera.size
     pixels = [(width / 2, height * share) for share in (0.6, 0.7, 0.8, 0.9, 0.97, 0.5)]
     shown = [(float(x), float(y), float(z)) for x, y, z in camera.ground_points(pixels)]
@@ -190,7 +190,7 @@ def draw_ground(luma: Luma, camera: memo.Camera, marks: Array | None = None) -> 
 
 
 def _grid(camera: memo.Camera) -> list[Array]:
-    """Lines on the ground a metre apart, over what the picture shows of it."""
+    """Lines on the ground at a spacing of one metre, over the visible ground."""
     width, height = camera.size
     u, v = np.meshgrid(np.linspace(0, width - 1, 15), np.linspace(0, height - 1, 25))
     ground = camera.ground_points(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
@@ -212,7 +212,7 @@ def _grid(camera: memo.Camera) -> list[Array]:
 
 
 def _person(camera: memo.Camera, foot: Array) -> list[Array]:
-    """A figure of lines that faces the camera: legs, trunk, arms, head."""
+    """A line figure that faces the camera: legs, trunk, arms, head."""
     to_camera = np.array(camera.position) - foot
     side = np.array([-to_camera[1], to_camera[0], 0.0])
     side /= max(np.hypot(*side[:2]), 1e-9)
@@ -234,7 +234,7 @@ def _projected(camera: memo.Camera, lines: Iterable[Array]) -> Array:
     """Lines of world points as segments (N, 2, 2) in pixels."""
     pieces = [np.zeros((0, 2, 2))]
     for line in lines:
-        # Cut finely, so that a lens bends what is straight and what lies behind the camera drops out.
+        # Short pieces, so that a lens bends straight lines and pieces behind the camera can be left out.
         share = np.linspace(0, 1, 9)[:-1, None]
         fine = [start + (end - start) * share for start, end in pairwise(line)]
         pixels = camera.project(np.ascontiguousarray(np.concatenate([*fine, line[-1:]])))
@@ -258,18 +258,18 @@ def write_picture(path: Path, rgb: npt.NDArray[np.uint8]) -> Path:
 
 @dataclass(frozen=True)
 class Boards:
-    """Boards found in pictures of one size."""
+    """Boards found in pictures of the same size."""
 
     size: tuple[int, int]
     """Width and height of the pictures, pixels."""
     corners: tuple[int, int]
     """Inner corners along both sides of the board."""
     found: dict[Path, Array]
-    """Of each picture the corners (N, 2), row by row, pixels."""
+    """The corners (N, 2) in each picture, row by row, pixels."""
     without: dict[Path, str]
     """Pictures that are not used, with the reason."""
     are_squares: bool
-    """Whether the given numbers were squares, else inner corners."""
+    """Whether the given numbers were squares; else they were inner corners."""
 
 
 def _cv2() -> Any:
@@ -286,9 +286,9 @@ def find_boards(
     squares: tuple[int, int],
     progress: Callable[[int, int], object] | None = None,
 ) -> Boards:
-    """Looks for a board of so many squares, then for one of so many inner corners, in pictures.
+    """Searches pictures for a board of this many squares, then for one of this many inner corners.
 
-    `progress` is called with the pictures looked at and in all, anew for the inner corners.
+    `progress` is called with the pictures searched and the total, again from 0 for the inner corners.
     """
     without: dict[Path, str] = {}
     pictures: dict[Path, Luma] = {}
@@ -337,7 +337,7 @@ def board_places(corners: tuple[int, int], square_m: float) -> Array:
 
 @dataclass(frozen=True)
 class BoardLens:
-    """What boards tell of a lens."""
+    """A lens calibrated from boards."""
 
     text: str
     """The lens as a TOML section without rotation and translation."""
@@ -345,7 +345,7 @@ class BoardLens:
     focal_px: tuple[float, float]
     focal_sd_px: tuple[float, float]
     error_px: dict[Path, float]
-    """Root mean square distance of each picture's corners."""
+    """Root mean square distance of the corners in each picture."""
 
 
 def lens_from_boards(boards: Boards, square_m: float) -> BoardLens:
@@ -354,7 +354,7 @@ def lens_from_boards(boards: Boards, square_m: float) -> BoardLens:
     if len(boards.found) < 3:
         raise ValueError(
             f"the board was found in {counted(len(boards.found), 'picture')}:"
-            " 3 are needed, in which it is tilted differently"
+            " 3 are needed, with different tilts of the board"
         )
     places = board_places(boards.corners, square_m).astype(np.float32)
     pixels = [found.astype(np.float32).reshape(-1, 1, 2) for found in boards.found.values()]
@@ -365,8 +365,8 @@ def lens_from_boards(boards: Boards, square_m: float) -> BoardLens:
     focal, focal_sd = (float(matrix[0, 0]), float(matrix[1, 1])), (float(sd[0]), float(sd[1]))
     if not np.isfinite(matrix).all() or max(focal_sd) > 0.25 * min(focal):
         raise ValueError(
-            f"the boards do not tell the focal length ({focal[0]:.0f} ± {focal_sd[0]:.0f} px):"
-            " tilt the board towards the camera, differently in every picture"
+            f"the boards do not determine the focal length ({focal[0]:.0f} ± {focal_sd[0]:.0f} px):"
+            " tilt the board towards the camera, by another angle in every picture"
         )
     rows = ", ".join(str([float(x) for x in row]) for row in matrix)
     text = (

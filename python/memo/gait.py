@@ -1,9 +1,9 @@
-"""Gait parameters of walks: the table, what its lines mean, and what they say in plain words.
+"""Gait parameters of walks: the table, the definitions of its rows, and sentences about them.
 
-The numbers come from the core (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
-the height that was given, known to 2 cm: lengths scale with it. They are for the person's walking, of which
-the steps seen are a sample; the mean of just these steps is known better. How often they hold the truth is
-counted on drawn people who vary as real ones do (`tests/gait_parameters.rs` of the core).
+The core computes the numbers (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
+the given height, known to 2 cm: lengths scale with it. They describe the person's walking, of which
+the visible steps are a sample; the mean of just these steps is known better. Their coverage is
+measured on drawn people who vary as real people do (`tests/gait_parameters.rs` of the core).
 """
 
 from __future__ import annotations
@@ -28,40 +28,39 @@ __all__ = [
 ]
 
 GAIT_COLUMNS = ("walk", "parameter", "side", "value", "unit", "ci_low", "ci_high", "n")
-"""Columns of `gait_parameters.csv`, in order; an empty cell is not known."""
+"""Columns of `gait_parameters.csv`, in order; an empty cell means unknown."""
 
 DEFINITIONS: dict[str, str] = {
-    "cadence": "Steps a minute. Measured: the rate of the gait phase over all frames of the walk. "
-    "Interval: scatter of the frames about that rate, a step counting as one independent observation, or "
+    "cadence": "Steps per minute. Measured: the rate of the gait phase over all frames of the walk. "
+    "Interval: scatter of the frames about that rate, each step one independent observation, or "
     "that of steps that vary by 3 %, whichever is larger.",
     "speed": "Speed of the trunk along its straight path, negative when walking backwards. Measured: the "
-    "rate of its place over all frames. Interval: scatter as for cadence, and the scale (distance from "
-    "the camera as the person's height in the picture tells it; without a camera file also the assumed "
+    "rate of its position over all frames. Interval: scatter as for cadence, and the scale (distance from "
+    "the camera, estimated from the person's height in the picture; without a camera file also the assumed "
     "field of view, as far as the path runs along the line of sight).",
     "stride_time": "Duration of a cycle of two steps, 120 / cadence. Measured.",
-    "stride_length": "Way of the trunk in a cycle, speed times stride time. Measured; interval with the "
-    "scale.",
+    "stride_length": "Distance covered by the trunk in a cycle, speed times stride time. Measured; interval "
+    "with the scale.",
     "step_time": "From the other foot's heel strike to this side's; without a side, half the stride "
     "time. Measured where the phase of the model fitted to single frames passes heel strike, before "
-    "smoothing, which would even the sides out; so it can differ by some hundredths of a second from the "
-    "times in events.csv. Interval: scatter over the steps (Student's t, held by a scatter of 3 % "
-    "expected beforehand that counts as 4 steps), and how differently people strike right and left "
-    "against the average gait.",
-    "step_length": "Way of the trunk from the other foot's heel strike to this side's; without a side, "
-    "half the stride length. The model's feet land equally far ahead of the trunk, so a difference in "
-    "how far the two feet reach is not seen; the interval allows for 1.2 cm of it, beside what step_time "
-    "and speed allow for.",
+    "smoothing, which would make the sides equal; so it can differ by some hundredths of a second from the "
+    "times in events.csv. Interval: scatter over the steps (Student's t, with a prior scatter of 3 % "
+    "that counts as 4 steps), and the asymmetry of people's heel strikes relative to the average gait.",
+    "step_length": "Distance covered by the trunk from the other foot's heel strike to this side's; without "
+    "a side, half the stride length. The model's feet land equally far ahead of the trunk, so a difference "
+    "in the reach of the two feet is not measured; the interval allows for 1.2 cm of it, besides the "
+    "intervals of step_time and speed.",
     "step_time_symmetry": "100 (right - left) / mean of the two step times; 0 is symmetric, positive "
     "when the right step takes longer. Interval as for the sides; small asymmetries are not resolved.",
     "step_length_symmetry": "100 (right - left) / mean of the two step lengths; 0 is symmetric, positive "
-    "when the right step is longer. Of a difference only what shows in the timing of the steps is "
+    "when the right step is longer. Only the part of a difference that affects the timing of the steps is "
     "measured.",
-    "stance": "Share of the cycle in which a foot stands. Assumed, not measured: 61 %, adults at free "
-    "speed; n is 0 and there is no interval.",
-    "double_support": "Share of the cycle in which both feet stand. Assumed, not measured: 22 %; n is 0 "
-    "and there is no interval.",
+    "stance": "Share of the cycle in which a foot is on the ground. Assumed, not measured: 61 %, adults at "
+    "free speed; n is 0 and there is no interval.",
+    "double_support": "Share of the cycle in which both feet are on the ground. Assumed, not measured: 22 %; "
+    "n is 0 and there is no interval.",
 }
-"""One sentence or more on every parameter: what it is, whether it is measured, what its interval holds."""
+"""Definition of every parameter: what it is, whether it is measured, and what its interval covers."""
 
 SYMMETRY = "step_time_symmetry", "step_length_symmetry"
 
@@ -69,7 +68,7 @@ Table = dict[str, npt.NDArray[Any]]
 
 
 def gait_table(walks: Iterable[Iterable[tuple[str, str, float, str, float, float, int]]]) -> Table:
-    """The columns of `gait_parameters.csv` from the core's lines, walk after walk."""
+    """The columns of `gait_parameters.csv` from the core's rows, one walk after another."""
     lines = [
         (walk, parameter, side, value, unit, low, high, n)
         for walk, table in enumerate(walks)
@@ -86,7 +85,7 @@ def gait_table(walks: Iterable[Iterable[tuple[str, str, float, str, float, float
 def lookup(
     table: Mapping[str, npt.NDArray[Any]], walk: int, parameter: str, side: str = ""
 ) -> dict[str, Any]:
-    """One line of the table as a dict of its columns."""
+    """One row of the table as a dict of its columns."""
     here = (table["walk"] == walk) & (table["parameter"] == parameter) & (table["side"] == side)
     return {name: table[name][here][0] for name in GAIT_COLUMNS}
 
@@ -95,19 +94,19 @@ _STEADY = 0.2
 
 
 def cadence_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:
-    """What is said of a walk whose steps were hardly seen: cadence known to no better than a fifth."""
+    """Warns of a walk whose steps were hardly visible: its cadence is known to no better than a fifth."""
     cadence = lookup(table, walk, "cadence")
     value, low, high = (float(cadence[name]) for name in ("value", "ci_low", "ci_high"))
-    if not high - low > 2 * _STEADY * value:  # also where it is not known at all
+    if not high - low > 2 * _STEADY * value:  # also if it is unknown
         return []
     return [
-        f"Its steps were hardly seen (95 % interval {max(low, 0):.0f} to {high:.0f} a minute): use no gait "
-        "parameter of it."
+        f"Its steps were hardly visible (95 % interval {max(low, 0):.0f} to {high:.0f} per minute): use no "
+        "gait parameter of this walk."
     ]
 
 
 def symmetry_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:
-    """What is said of a walk's sides: a difference only where its interval leaves zero out."""
+    """Reports a difference between the sides, only if its interval excludes zero."""
     said = []
     for parameter, unit, per_unit, digits in (("step_length", "cm", 100, 0), ("step_time", "s", 1, 2)):
         symmetry = lookup(table, walk, f"{parameter}_symmetry")

@@ -1,6 +1,6 @@
-"""What is given to commands and manifests, checked before any work.
+"""Input of commands and manifests, checked before any work.
 
-Messages name the options of the command line; a manifest puts its columns in their place.
+Messages name the options of the command line; a manifest replaces them with its columns.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A mistake in what the user gave; the message is one line."""
+    """A mistake in the user's input; the message is one line."""
 
 
-# Two letters at least: one is a drive of Windows. `Path` leaves one of the two slashes.
+# At least two letters: one letter is a Windows drive. `Path` removes one of the two slashes.
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
 
 
 def is_url(path: str | PathLike[str]) -> bool:
-    """Whether a path is written like the address of something elsewhere."""
+    """Whether a path looks like a URL."""
     return _URL.fullmatch(os.fspath(path)) is not None
 
 
 def nothing_at(path: str | PathLike[str], what: str = "file") -> str:
-    """What is said of a path where nothing is: of an address, that it must be downloaded first."""
+    """The message for a path that does not exist; for a URL, that it must be downloaded first."""
     address = _URL.fullmatch(os.fspath(path))
     if address is None:
         return f"{path}: no such {what}"
@@ -96,7 +96,7 @@ def checked_height(height_m: float) -> float:
 def tracker_options(
     height_m: float, camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None
 ) -> dict[str, Any]:
-    """Options of `Tracker`; `reading` says how the camera's file is read: `name`, `unit`, `size`, `v_up`."""
+    """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
     options: dict[str, Any] = {"height_m": checked_height(height_m)}
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
@@ -111,7 +111,7 @@ def tracker_options(
 
 
 def frame_range(text: str) -> tuple[int, int | None]:
-    """`--frames A:B` as first frame and the one after the last, None for the end."""
+    """`--frames A:B` as the first frame and one past the last, None for the end."""
     start, colon, stop = text.partition(":")
     try:
         first, end = int(start or 0), int(stop) if stop else None
@@ -123,7 +123,7 @@ def frame_range(text: str) -> tuple[int, int | None]:
 
 
 def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
-    """Refuses to write over what is read, by whatever name or link, or into a folder that is read."""
+    """Refuses to overwrite the input, under any name or link, or to write into an input folder."""
     for file in written:
         for source in read:
             if source is None:
@@ -131,16 +131,16 @@ def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
             if file.resolve() == source.resolve() or (
                 file.exists() and source.exists() and file.samefile(source)
             ):
-                raise InputError(f"{file}: is what was read; write to another place")
+                raise InputError(f"{file}: is the input; write to another place")
             if source.is_dir() and file.parent.resolve() == source.resolve():
-                raise InputError(f"{source}: is the folder that was read; write to another place")
+                raise InputError(f"{source}: is the input folder; write to another place")
 
 
 _LEAST_FREE_BYTES = 4 << 20  # tables and pictures of a short video
 
 
 def check_writable(out: Path) -> None:
-    """Makes the folder, and refuses one that cannot be written to or whose disk is full."""
+    """Makes the folder; refuses a folder that cannot be written to or whose disk is full."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as file:

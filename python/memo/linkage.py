@@ -1,6 +1,6 @@
 """Point-light displays, and the linkage found in unnamed tracks (Hoffman and Flinchbaugh 1982).
 
-Arrays in, arrays out; the numbers come from the core. Tracks are (T, K, 2) pixels with NaN for unseen.
+Input and output are arrays; the core computes them. Tracks are (T, K, 2) pixels with NaN for unseen points.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ _SHORT = {
 
 
 JOINT_NAMES = frozenset(_SHORT.values())
-"""Names that `read_points_csv` gives to points that are joints."""
+"""Names of joints that `read_points_csv` gives to points."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Points:
-    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen.
+    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen points.
 
-    `scales` (T,): scale of each frame, where a person comes nearer or goes away.
+    `scales` (T,): scale of each frame, if a person approaches or recedes.
     """
 
     names: list[str]
@@ -81,7 +81,7 @@ class Points:
         return f"Points({counted(count, 'point')} in {dimensions}D, {counted(frames, 'frame')})"
 
     def at_one_scale(self) -> Points:
-        """The same points with the scales divided out, as depths are."""
+        """The same points divided by the scales, like depths."""
         if self.scales is None:
             return self
         bad = np.flatnonzero(~((self.scales > 0) & np.isfinite(self.scales)))
@@ -94,15 +94,15 @@ class Points:
 class PlanarFigure:
     """The linkage found in tracks, window by window.
 
-    `windows` holds a dict each: start and end frame, status ("interpreted", "lost", "still", "unseen",
-    or "nothing linked" where points are seen but none joined),
+    `windows` holds one dict each: start and end frame, status ("interpreted", "lost", "still", "unseen",
+    or "nothing linked" if points are visible but none linked),
     the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
     (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
     motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
-    where it is open). `depth` (T, K) is each point's depth against the first point of its chain
-    in pixels, NaN where not known, up to a reflection of each open chain; `sources` says by frame where it
-    comes from. `perspective_px`: by how much perspective moves a point at most, if a focal length was given.
-    `points`: the tracks as they were given, with the names of the points or their numbers.
+    if it is undecided). `depth` (T, K) is each point's depth relative to the first point of its chain
+    in pixels, NaN if unknown, up to a reflection of each undecided chain; `sources` gives its source per
+    frame. `perspective_px`: the largest displacement of a point by perspective, if a focal length was given.
+    `points`: the tracks as given, with the names of the points or their numbers.
     """
 
     windows: list[dict[str, Any]]
@@ -113,13 +113,13 @@ class PlanarFigure:
 
     @property
     def interpreted(self) -> list[dict[str, Any]]:
-        """The windows that could be read."""
+        """The windows that could be interpreted."""
         return [window for window in self.windows if window["status"] == "interpreted"]
 
     def links(self) -> list[tuple[int, int, float, float, int]]:
         """Links of the interpreted windows: two points, mean length, mean confidence, number of windows.
 
-        Those of chains whose motion is not planar are left out.
+        Links of chains whose motion is not planar are left out.
         """
         found: dict[tuple[int, int], list[tuple[float, float]]] = {}
         for link, verdict in self._judged():
@@ -129,7 +129,7 @@ class PlanarFigure:
         return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
 
     def verdicts(self) -> dict[tuple[int, int], dict[str, int]]:
-        """Of each link in the interpreted windows, how many windows give its chain each verdict."""
+        """For each link in the interpreted windows, the number of windows with each verdict on its chain."""
         counts: dict[tuple[int, int], Counter[str]] = {}
         for link, verdict in self._judged():
             counts.setdefault(link["points"], Counter())[verdict] += 1
@@ -153,7 +153,7 @@ class PlanarFigure:
         )
 
     def plot(self, window: int | None = None, ax: Axes | None = None) -> Axes:
-        """Draws the linkage of a window, by default the first interpreted one, into `ax`, or Axes of its own,
+        """Draws the linkage of a window, by default the first interpreted one, into `ax`, or new Axes,
         and returns them. Needs matplotlib."""
         from memo.linkage_plot import plot_linkage, telling_window
         from memo.plot import new_axes
@@ -163,7 +163,7 @@ class PlanarFigure:
         if window is None:
             window = telling_window(self)
         if not 0 <= window < len(self.windows):
-            raise IndexError(f"window {window} of {len(self.windows)}")
+            raise IndexError(f"no window {window}: there are {counted(len(self.windows), 'window')}")
         return plot_linkage(new_axes() if ax is None else ax, self.points, self, window)
 
     def __repr__(self) -> str:
@@ -174,7 +174,7 @@ class PlanarFigure:
         )
 
     def _judged(self) -> list[tuple[dict[str, Any], str]]:
-        """Links of the interpreted windows with the verdicts of their chains."""
+        """Links of the interpreted windows with the verdicts on their chains."""
         chains = (chain for window in self.interpreted for chain in window["chains"])
         return [(link, chain["verdict"]) for chain in chains for link in chain["links"]]
 
@@ -191,9 +191,9 @@ def planar(
 
     `noise_px`: standard deviation of each coordinate. Options: `window_s` (1.2), `size_px` (size of the
     figure, by default that of the points), `carry` (lengths through windows in which the figure is lost),
-    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points where they are joints
-    (`RKN`, `right_knee`): joint limits then tell limbs from their mirrors; `scales` (T,) of the frames;
-    `focal_px`, to be told what perspective costs. `progress` is called with the windows done and in all.
+    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points if they are joints
+    (`RKN`, `right_knee`): joint limits then tell limbs from their mirror images; `scales` (T,) of the frames;
+    `focal_px`, to report the error due to perspective. `progress` is called with the windows done and in all.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
     at_s = np.asarray(times_s, dtype=np.float64)
@@ -208,12 +208,12 @@ def planar(
 
 
 def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float | None = None) -> Points:
-    """Points from a CSV file with a header: 2 or 3 columns a point, and `time_s` or a frame rate.
+    """Points from a CSV file with a header: 2 or 3 columns per point, and `time_s` or a frame rate.
 
     With 2 `dimensions` the columns of a point are NAME_u_px, NAME_v_px (or NAME_u, NAME_v), with 3 they are
     NAME_x_m, NAME_y_m, NAME_z_m (or NAME_x, NAME_y, NAME_z). A comment line before the header may hold the
-    frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` where there is that. Empty cells
-    are unseen.
+    frame rate ("100 Hz"), or `rate_hz` gives it; it must agree with `time_s` if that exists. Empty cells
+    are unseen points.
     """
     table = read_number_table(path)
     names, positions = table.points(dimensions)
@@ -222,10 +222,11 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
 
 
 def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Points:
-    """Image points to look for limbs in: of a CSV file as `read_points_csv` takes it, or of keypoints.
+    """Image points to search for limbs: from a CSV file for `read_points_csv`, or from keypoints.
 
-    Keypoints are what `read_keypoints` takes; of a CSV file their scores, a column `joint` or columns NAME_x
-    without NAME_z tell. Of one person the shoulders, elbows, wrists, hips, knees and ankles are taken.
+    Keypoints are anything that `read_keypoints` accepts; a CSV file of keypoints is recognised by its
+    scores, a column `joint`, or columns NAME_x without NAME_z. Only the shoulders, elbows, wrists, hips,
+    knees and ankles of one person are used.
     """
     path = Path(path)
     if not path.exists():
@@ -259,7 +260,7 @@ def _holds_keypoints(path: Path) -> bool:
 
 
 def write_points_csv(path: str | PathLike[str], points: Points) -> None:
-    """Writes points so that `read_points_csv` reads them."""
+    """Writes points in the format of `read_points_csv`."""
     axes = ("u_px", "v_px") if points.positions.shape[2] == 2 else ("x", "y", "z")
     header = ["frame", "time_s", *(f"{name}_{axis}" for name in points.names for axis in axes)]
     rows = [

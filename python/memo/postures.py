@@ -1,9 +1,9 @@
-"""Postures from one view: keypoints and a camera in, all possible postures and the likeliest motion out.
+"""Postures from one view: from keypoints and a camera, all possible postures and the most probable motion.
 
-The postures are the core's (Lee and Chen 1985, with what makes them usable on a detector's points). This file
-hands it the keypoints as 14 joints, names what comes back, and writes it.
+The postures are computed by the core (Lee and Chen 1985, with additions for a detector's points). This module
+passes the keypoints on as 14 joints, names the results, and writes them.
 
-What it cannot do: measure sizes without a scale. Without lengths, height, ground or distance there is none.
+Limit: sizes need a scale. Without lengths, height, ground or distance there is none.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ class Reason(NamedTuple):
 
     constraint: str
     joint: str
-    """The joint at whose level of the tree it cut."""
+    """The joint at whose level of the tree the constraint cut branches."""
     branches: int
-    """How many branches, each with all that would have hung on it."""
+    """Number of branches cut, each with its whole subtree."""
 
 
 class ReasonTotal(NamedTuple):
@@ -69,18 +69,18 @@ class ReasonTotal(NamedTuple):
 
     constraint: str
     kind: str
-    """What sort of constraint: an angle, a distance, a collision or a rule."""
+    """Kind of constraint: an angle, a distance, a collision or a rule."""
     joint: str
     branches: int
     frames: int
-    """In how many frames it cut any."""
+    """Number of frames in which it cut a branch."""
     sentence: str
-    """What the constraint is."""
+    """Description of the constraint."""
 
 
 @dataclass(frozen=True, repr=False)
 class SecondBest:
-    """The likeliest other motion: where it differs, and how much less likely it is."""
+    """The second most probable motion: where it differs, and how much less probable it is."""
 
     joints: tuple[str, ...]
     """The joints at the ends of the segments mirrored in depth."""
@@ -90,9 +90,9 @@ class SecondBest:
     postures_m: Array
     """(n, 14, 3) world, metres, in the frames from first to last."""
     margin_nats: float
-    """Natural logarithm of how many times likelier the best motion is."""
+    """Natural logarithm of the probability ratio of the best motion to this one."""
     p: float
-    """Probability of this one against the best."""
+    """Probability of this motion compared with the best."""
 
     def __repr__(self) -> str:
         where = f"frames {self.first_frame}-{self.last_frame}"
@@ -111,7 +111,7 @@ class Postures:
     """Names of the 14 joints, in the order of the levels of the tree and of every axis of 14."""
     camera: _memo.Camera
     points_px: Array
-    """(T, 14, 2) what was seen: pixels, u right, v down; NaN where not."""
+    """(T, 14, 2) image points: pixels, u right, v down; NaN if not visible."""
     weights: Array
     """(T, 14) the detector's confidence, 0 to 1."""
     lengths_m: dict[str, float]
@@ -119,43 +119,43 @@ class Postures:
     length_sd_m: dict[str, float]
     """Their standard deviations, metres."""
     length_basis: dict[str, str]
-    """What each length rests on."""
+    """Source of each length."""
     scale_from: str
-    """What the size of everything rests on."""
+    """Source of the scale."""
     anchor_m: Array
-    """(T,) distance of the neck from the camera's centre, where the tree begins, metres."""
+    """(T,) distance of the neck, the root of the tree, from the camera's centre, metres."""
     anchor_sd_m: Array
     """(T,) its standard deviation, metres."""
     anchor_source: tuple[str, ...]
-    """(T,) where it comes from."""
+    """(T,) its source."""
     anchor_conflicts: tuple[str, ...]
-    """Where sources of the distance contradict each other, in sentences."""
+    """Contradictions between sources of the distance, in sentences."""
     level_reached: Whole
     """(T, 14) nodes of the tree at each level that no constraint cut."""
     level_survived: Whole
-    """(T, 14) those of them that lead to a posture left."""
+    """(T, 14) number of these that lead to a posture left."""
     level_without_root: Whole
-    """(T, 14) nodes whose segment is too short to reach the joint's ray: the nearest point is taken."""
+    """(T, 14) nodes whose segment is too short to reach the joint's ray: the nearest point is used."""
     reasons: tuple[tuple[Reason, ...], ...]
-    """(T,) what was cut in each frame, and by what."""
+    """(T,) what was cut in each frame, and by which constraint."""
     reason_totals: tuple[ReasonTotal, ...]
-    """The same over all frames."""
+    """The same, summed over all frames."""
     survivors: Whole
     """(T,) postures left in each frame."""
     groups_m: tuple[Array, ...]
-    """(T,) of (G, 14, 3) metres: one posture of each group of similar ones, at most the `max_groups` largest
-    groups; where more than 1024 postures are left, groups of up to 1024 of them, evenly spaced."""
+    """(T,) of (G, 14, 3) metres: one posture per group of similar postures, for the `max_groups` largest
+    groups; if more than 1024 postures are left, groups of up to 1024 of them, evenly spaced."""
     group_sizes: tuple[Whole, ...]
-    """(T,) of (G,): how many of the postures that were grouped each group holds."""
+    """(T,) of (G,): number of grouped postures in each group."""
     group_counts: tuple[int | None, ...]
-    """(T,) how many groups there are, given or not; None where more than 1024 postures are left."""
+    """(T,) total number of groups; None if more than 1024 postures are left."""
     cut_all: tuple[tuple[str, ...] | None, ...]
-    """(T,) where nothing is left: what the least violating posture violates, in sentences; else None."""
+    """(T,) if no posture is left: what the least violating posture violates, as sentences; else None."""
     problems: tuple[str | None, ...]
-    """(T,) why a frame says nothing, such as a neck that is not seen; else None."""
+    """(T,) why a frame cannot be used, such as a neck that is not visible; else None."""
     linked_m: Array
-    """(T, 14, 3) metres: the likeliest motion. It takes either root of every segment and may pass limits at a
-    price, so that a frame's posture need not be among those left."""
+    """(T, 14, 3) metres: the most probable motion. It uses either root of every segment and may break limits
+    at a cost, so a frame's posture need not be among those left."""
     linked_breaks: tuple[tuple[str, ...], ...]
     """(T,) names of the constraints that the posture in the motion breaks."""
     smoothed_m: Array
@@ -163,20 +163,20 @@ class Postures:
     sd_m: Array
     """(T, 14) standard deviation of each joint of the smoothed motion, metres."""
     gap_m: Array
-    """(T, 14) by how much a segment was too short to reach the joint's ray, metres."""
+    """(T, 14) amount by which a segment was too short to reach the joint's ray, metres."""
     margin_nats: Array
-    """(T,) how much likelier the motion is than the best other one in this frame; infinite without one."""
+    """(T,) how much more probable the motion is than the best other one in this frame; else infinite."""
     p_mirrored: Array
-    """(T, 14) probability that the segment ending at a joint is mirrored in depth, and what hangs on it with
-    it; measured on walks, so for other motion a rough one."""
+    """(T, 14) probability that the segment ending at a joint, with its subtree, is mirrored in depth;
+    measured on walks, so only approximate for other motion."""
     second: SecondBest | None
-    """The likeliest other motion, if there is one to speak of."""
+    """The second most probable motion, if there is a relevant one."""
     heading_source: str
-    """Where the direction of walking comes from."""
+    """Source of the direction of walking."""
     warnings: tuple[str, ...]
-    """What should be known before the numbers are used."""
+    """Warnings to read before the numbers are used."""
     repair: sides.SideRepair | None
-    """What was done to right and left before; None where nobody asked."""
+    """Exchanges of right and left made beforehand; None if they were not requested."""
 
     @property
     def found(self) -> npt.NDArray[np.bool_]:
@@ -186,24 +186,24 @@ class Postures:
 
     @property
     def is_possible(self) -> bool:
-        """Whether any posture in the motion breaks no constraint. If none is so, it is no sequence that the
-        rules and the limits of bodies allow, whatever postures are left in single frames."""
+        """Whether any posture in the motion breaks no constraint. Otherwise the rules and the limits of
+        bodies allow no such sequence, whatever postures are left in single frames."""
         return any(there and not breaks for there, breaks in zip(self.found, self.linked_breaks, strict=True))
 
     @property
     def all_groups_given(self) -> npt.NDArray[np.bool_]:
-        """(T,) whether there are no more groups than those given."""
+        """(T,) whether all groups are given."""
         given = [len(sizes) for sizes in self.group_sizes]
         return np.array([own == count for own, count in zip(given, self.group_counts, strict=True)], np.bool_)
 
     @property
     def undecided(self) -> npt.NDArray[np.bool_]:
-        """(T,) whether some joint may well be elsewhere: another motion has a probability over 0.2."""
+        """(T,) whether a joint is undecided: another motion has a probability over 0.2."""
         return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
 
     @property
     def limbs_known(self) -> bool:
-        """Whether the motion has the end of any limb's segment: an elbow, wrist, knee or ankle."""
+        """Whether the motion has the end of a limb segment: an elbow, wrist, knee or ankle."""
         limbs = [place for place, name in enumerate(self.joints) if name.endswith(_LIMB_ENDS)]
         return bool(np.isfinite(self.smoothed_m[:, limbs]).any())
 
@@ -213,7 +213,7 @@ class Postures:
         return self.camera.camera_from_world(flat).reshape(np.shape(points_m))
 
     def typical_row(self) -> int:
-        """The first row with as many survivors as the median frame, of those with a posture."""
+        """The first row with as many postures left as the median frame, of those with a posture."""
         rows = np.flatnonzero(self.found & (self.survivors > 0))
         if not len(rows):
             rows = np.flatnonzero(self.found)
@@ -223,11 +223,11 @@ class Postures:
         return int(rows[np.argmin(np.abs(counts - np.median(counts)))])
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The columns of `postures.csv` as a `pandas.DataFrame`, a row a frame."""
+        """The columns of `postures.csv` as a `pandas.DataFrame`, one row per frame."""
         return data_frame(_posture_columns(self))
 
     def plot(self, row: int | None = None, ax: Axes | None = None) -> Axes:
-        """Draws into `ax`, or Axes of its own, and returns them: the motion as a strip of stick figures, or
+        """Draws into `ax`, or new Axes, and returns them: the motion as a strip of stick figures, or
         all groups of postures of one row from the side. Needs matplotlib."""
         from memo.plot import new_axes
         from memo.posture_plot import plot_from_the_side, plot_strip
@@ -251,7 +251,7 @@ class Postures:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The figures of the whole: counts, medians, scale, the second best, warnings."""
+        """The overall figures: counts, medians, scale, the second best motion, warnings."""
         left = self.survivors[self.survivors > 0]
         most = max(self.reason_totals, key=lambda total: total.branches, default=None)
         second = self.second
@@ -302,26 +302,26 @@ def posture(
     person: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Postures:
-    """All postures of a person that a view allows, and the likeliest motion.
+    """All postures of a person that one view allows, and the most probable motion.
 
-    A segment can end at either of two places on its joint's line of sight. The motion takes one of them in
-    each frame; limits it may pass at a price, so it is not bound to the postures left (see `linked_breaks`).
+    A segment can end at either of two places on its joint's line of sight. The motion uses one of them
+    in each frame; it may break limits at a cost, so it need not use the postures left (`linked_breaks`).
 
-    `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
+    `keypoints`: the result of `read_keypoints`, or a file or folder for it, with `fps`, `layout`, `person`.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
     to sole, refined by the frames; with neither they are estimated, with the ground as scale.
-    `rules`: "physical", "walking", "walking-general" (what people do who walk in whatever way), "running" or
-    "standing"; `strength`: "measured" limits or those of the "paper".
-    `anchor`: where the distance of the neck comes from, "auto", "ground", "trunk", "extent", "head" or
-    "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN where unknown, with its standard
+    `rules`: "physical", "walking", "walking-general" (holds for any way of walking), "running"
+    or "standing"; `strength`: "measured" limits or those of the "paper".
+    `anchor`: source of the distance of the neck, "auto", "ground", "trunk", "extent", "head" or
+    "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN if unknown, with its standard
     deviation `distance_sd_m` (0.05).
-    `moving_direction`: (3,) world, where the person walks; else seen from the motion.
-    `unswap`: exchange right and left first where a detector confused them.
-    `noise_px`: standard deviation of a keypoint. `group_m`: postures are one group if no joint differs by
-    more; `max_groups`: so many groups a frame are given, the largest; `group_counts` says how many there are.
-    `progress` is called with the work done and in all, now and then.
+    `moving_direction`: (3,) world, direction of walking; by default taken from the motion.
+    `unswap`: first exchange right and left where a detector confused them.
+    `noise_px`: standard deviation of a keypoint. `group_m`: postures form one group if no joint differs by
+    more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
+    `progress` is called at intervals with the work done and the total.
 
-    Raises ValueError or TypeError, with one line, for what cannot be used.
+    Raises ValueError or TypeError, with one line, for unusable input.
     """
     _check_known("rules", rules, RULES)
     _check_known("strength", strength, STRENGTHS)
@@ -336,7 +336,7 @@ def posture(
     if lengths is not None and height_m is not None:
         raise ValueError("give either lengths or a height")
     if distance_m is None and anchor == "given":
-        raise ValueError("the anchor given needs a distance")
+        raise ValueError("the anchor 'given' needs a distance")
     if distance_m is not None and anchor not in ("auto", "given"):
         raise ValueError(f"a distance is given: leave the anchor {anchor} out")
     if isinstance(lengths, str | PathLike):
@@ -346,7 +346,7 @@ def posture(
     if not isinstance(keypoints, Keypoints):
         keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
     elif not fps is layout is person is None:
-        raise ValueError("fps, layout and person are for keypoints that are still to be read")
+        raise ValueError("fps, layout and person apply to keypoints read from a file only")
     _check_joints_there(keypoints)
     keypoints.check_pixels()
     _check_camera_fits(keypoints, camera)
@@ -398,14 +398,14 @@ def _checked_count(what: str, value: int) -> int:
 
 
 def _checked_numbers(what: str, value: Any, dimensions: int) -> Array:
-    """Numbers in an array of at most so many dimensions."""
+    """Numbers in an array of at most this many dimensions."""
     try:
         numbers = np.asarray(value)
         is_numeric = numbers.dtype.kind in "iuf"
     except ValueError:  # rows of different lengths
         is_numeric = False
     if not is_numeric or numbers.ndim > dimensions:
-        wanted = "a number or one for each frame" if dimensions else "a number"
+        wanted = "a number or one per frame" if dimensions else "a number"
         raise TypeError(f"{what} must be {wanted}, got {_shown(value)}")
     return numbers.astype(np.float64)
 
@@ -414,7 +414,7 @@ def _checked_distances(distance_m: Any, distance_sd_m: float | None) -> tuple[An
     if distance_sd_m is not None:
         sd_m = float(_checked_numbers("distance_sd_m", distance_sd_m, dimensions=0))
         if distance_m is None:
-            raise ValueError(f"distance_sd_m goes with distance_m, got {sd_m:g} alone")
+            raise ValueError(f"distance_sd_m needs distance_m, got {sd_m:g} alone")
         if not 0 < sd_m <= _DISTANCES_M[1]:
             raise ValueError(
                 f"distance_sd_m must be positive and at most {_DISTANCES_M[1]:g} m, got {sd_m:g}"
@@ -446,7 +446,7 @@ def _detector(keypoints: Keypoints) -> str | list[str]:
 
 
 def _check_joints_there(keypoints: Keypoints) -> None:
-    """Refuses keypoints in which a joint of the figure has no point to come from."""
+    """Refuses keypoints in which a joint of the figure has no corresponding point."""
     count = len(keypoints.names)
     everywhere, _ = _memo.stick_joints(_detector(keypoints), np.ones((1, count, 2)), np.ones((1, count)))
     joints = _memo.joint_names()
@@ -462,12 +462,12 @@ def _check_camera_fits(keypoints: Keypoints, camera: _memo.Camera) -> None:
         return
     (width, height), (own_width, own_height) = camera.size, keypoints.image_size
     raise ValueError(
-        f"the camera is for {width}x{height} pixels, the keypoints are of {own_width}x{own_height}"
+        f"the camera is for {width}x{height} pixels, the keypoints are for {own_width}x{own_height}"
     )
 
 
 def _head_down(linked_m: Array) -> list[str]:
-    """A warning where the motion found has its neck below its pelvis, as v counted upwards gives."""
+    """A warning if the neck is below the pelvis in the motion found, as happens if v increases upwards."""
     joints = _memo.joint_names()
     above_m = linked_m[:, joints.index("neck"), 2] - linked_m[:, joints.index("pelvis"), 2]
     known = np.isfinite(above_m)
@@ -476,13 +476,13 @@ def _head_down(linked_m: Array) -> list[str]:
         return []
     return [
         f"the neck is below the pelvis in {upside_down} of {counted(int(known.sum()), 'frame')}: "
-        "v of the keypoints must be counted downwards"
+        "v of the keypoints must increase downwards"
     ]
 
 
 def _stick_points(keypoints: Keypoints) -> tuple[Array, Array, Array | None]:
-    """The 14 joints (T, 14, 2), their weights (T, 14), and the points of the head, where any is seen."""
-    # AlphaPose's older scores go to 6; the core weights within 0 to 1.
+    """The 14 joints (T, 14, 2), their weights (T, 14), and the points of the head, if any is visible."""
+    # Older AlphaPose scores go up to 6; the core takes weights from 0 to 1.
     scores = np.clip(keypoints.scores, 0, 1)
     points_px, weights = _memo.stick_joints(_detector(keypoints), keypoints.points, scores)
     head_px, _ = _memo.head_points(_detector(keypoints), keypoints.points, scores)
@@ -558,7 +558,7 @@ def read_lengths(path: str | PathLike[str]) -> dict[str, float]:
     """The 17 segment lengths of a file, metres, by name, such as `right_hip_to_right_knee`.
 
     A table (CSV) with a name and a length in each row, or JSON `{name: length}`; also a `postures.json`,
-    whose lengths then serve for other sequences of the same person.
+    whose lengths can be used for other sequences of the same person.
     """
     path = Path(path)
     try:
@@ -601,7 +601,7 @@ def _csv_lengths(path: Path, text: str) -> dict[str, Any]:
         if len(cells) < 2:
             raise ValueError(f"{path}: row {line} has no length beside the name")
         if cells[0] in named:
-            raise ValueError(f"{path}: row {line}: {cells[0]} stands there twice")
+            raise ValueError(f"{path}: row {line}: {cells[0]} appears twice")
         named[cells[0]] = cells[1]
     return named
 
@@ -611,7 +611,7 @@ def _checked_lengths(where: str, lengths: Mapping[str, Any]) -> dict[str, float]
     absent = [name for name in names if name not in lengths]
     unknown = [str(name)[:60] for name in lengths if name not in names]
     if unknown:
-        raise ValueError(f"{where}: no segment {', '.join(unknown[:3])}; there are {', '.join(names)}")
+        raise ValueError(f"{where}: no segment {', '.join(unknown[:3])}; the names are {', '.join(names)}")
     if absent:
         raise ValueError(f"{where}: {len(absent)} of 17 lengths missing: {', '.join(absent)}")
     return {name: _length_m(where, name, lengths[name]) for name in names}
@@ -627,13 +627,13 @@ def _length_m(where: str, name: str, value: Any) -> float:
     return length_m
 
 
-# What is written.
+# Files written.
 
 _TENTH_MM = 4
 """Digits of metres in postures.json."""
 
 
-#: What `write_postures` writes.
+#: The files of `write_postures`.
 WRITTEN = ("postures.csv", "postures_camera.csv", "levels.csv", "reasons.csv", "postures.json")
 
 
@@ -653,7 +653,7 @@ def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
 
 
 def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """A row a frame: the smoothed motion in the world, and how sure it is; `groups` empty where unknown."""
+    """One row per frame: the smoothed motion in the world and its uncertainty; `groups` empty if unknown."""
     columns: dict[str, npt.ArrayLike] = {
         "frame": postures.frames,
         "time_s": postures.times_s,
@@ -672,7 +672,7 @@ def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
 
 
 def _camera_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """A row a frame: the smoothed motion in the camera's axes (x right, y down, z forward)."""
+    """One row per frame: the smoothed motion in the camera's axes (x right, y down, z forward)."""
     in_camera = postures.in_camera(postures.smoothed_m)
     columns: dict[str, npt.ArrayLike] = {"frame": postures.frames, "time_s": postures.times_s}
     for k, joint in enumerate(postures.joints):
@@ -681,7 +681,7 @@ def _camera_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
 
 
 def _level_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """A row a frame and level of the tree."""
+    """One row per frame and level of the tree."""
     count = len(postures.joints)
     return {
         "frame": np.repeat(postures.frames, count),
@@ -695,14 +695,14 @@ def _level_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
 
 
 def _reason_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """A row a constraint, what cut most first."""
+    """One row per constraint, the one that cut most first."""
     totals = sorted(postures.reason_totals, key=lambda total: -total.branches)
     columns = {name: [getattr(total, name) for total in totals] for name in ReasonTotal._fields}
     return {name: np.array(values, dtype=object) for name, values in columns.items()}
 
 
 def _document(postures: Postures) -> dict[str, Any]:
-    """Everything, as postures.json has it."""
+    """All results, as in postures.json."""
     second = postures.second
     return {
         **postures.summary,

@@ -1,8 +1,8 @@
-"""A video tracked into a folder of results: what `memo track` and the processes of `memo batch` do.
+"""Tracks a video into a folder of results, for `memo track` and the processes of `memo batch`.
 
-Frames go to the tracker; tables, overlay, plots and page are written. What is doubtful about the video goes
-to `remark`, how far the work is to `progress`; nothing is printed. Results are in pixels of the video, also
-where its pictures were averaged down. Needs `av`, and matplotlib for what is drawn.
+Frames go to the tracker; tables, overlay, plots and page are written. Doubts about the video go to `remark`,
+progress goes to `progress`; nothing is printed. Results are in pixels of the video, even if its pictures were
+averaged down. Needs `av`, and matplotlib for plots.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 __all__ = ["Recorded", "Recording", "Stop", "follow", "track_recording", "write_results", "write_tables"]
 
 _DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
-_LARGEST_PX = 1920  # of a side; a walk enlarged to 2560 and more lost the way it faces
+_LARGEST_PX = 1920  # longest tested side; for a walk enlarged to 2560 or more, the facing direction was wrong
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 Progress = Callable[[str, int, "int | None"], object]
-"""Is called with the step, and how much of it is done and of how much."""
+"""Called with the name of the step, the amount done and the total."""
 
 Stop = AbstractContextManager[Any]
-"""Gives an object with `requested`: whether the frame that was taken last shall be the last."""
+"""Yields an object with `requested`: whether to stop after the frame that was taken last."""
 
 
 def _unseen(step: str, done: int, total: int | None) -> None:
-    """The progress of one who does not ask."""
+    """The progress for callers that want none."""
 
 
 def _never() -> Stop:
@@ -51,17 +51,17 @@ def _never() -> Stop:
 
 @dataclass(frozen=True)
 class Recording:
-    """A video, what is known of it, and what is to be written."""
+    """A video, its known parameters, and what to write."""
 
     video: Path
     options: Mapping[str, Any]
-    """Of `Tracker`; the camera is that of the whole picture."""
+    """Options of `Tracker`; the camera is that of the whole picture."""
     frames: tuple[int, int | None] = (0, None)
-    """First frame and the one after the last; None for the end."""
+    """First frame and one past the last; None for the end."""
     fps: float | None = None
-    """The rate in place of the time stamps."""
+    """Frame rate in place of the time stamps."""
     shrink: int | None = None
-    """How many pixels, each way, are averaged to one; None for what `VideoReader` chooses."""
+    """Pixels averaged to one, per axis; None: chosen by `VideoReader`."""
     overlay: bool = True
     plots: bool = True
     page: bool = False
@@ -69,7 +69,7 @@ class Recording:
 
 @dataclass
 class Recorded:
-    """A track with its tables read once, frames numbered as in the video, and what was written of it."""
+    """A track with its tables read once, frames numbered as in the video, and the files written for it."""
 
     columns: dict[str, Any]
     events: list[dict[str, Any]]
@@ -83,12 +83,12 @@ class Recorded:
     shrink: int
     records: list[dict[str, Any]]
     run: tuple[Mapping[str, Any], Source, int, bool]
-    """Options, source, frames read and whether frames were left: what `write_run` is given."""
+    """Options, source, frames read and whether frames were left: the input of `write_run`."""
     written: list[Path] = field(default_factory=list)
 
     @property
     def interrupted(self) -> bool:
-        """Whether frames that were asked for were left unread."""
+        """Whether requested frames were left unread."""
         return self.run[3]
 
     @property
@@ -98,12 +98,12 @@ class Recorded:
 
     @property
     def exit(self) -> Exit:
-        """The exit code that tells whether anybody was tracked."""
+        """The exit code that reports whether anybody was tracked."""
         return Exit.TRACKED if len(self.columns["frame"]) else Exit.NOBODY
 
     @property
     def document(self) -> dict[str, Any]:
-        """What was found, for JSON: the figures of the longest walk, and each walk."""
+        """The findings for JSON: the figures of the longest walk, and each walk."""
         return {
             **self.summary,
             "rows": len(self.columns["frame"]),
@@ -122,12 +122,12 @@ def track_recording(
 ) -> Recorded:
     """Tracks a video and writes the results into the folder `out`.
 
-    Stopped after a frame, it writes the tables of what was tracked until then, and draws nothing.
+    If stopped after a frame, it writes the tables of what was tracked until then, and draws nothing.
     """
     from memo.video import VideoDamageWarning
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", VideoDamageWarning)  # damage is a remark
+        warnings.simplefilter("ignore", VideoDamageWarning)  # damage becomes a remark
         return _track_recording(recording, out, progress, remark, stop)
 
 
@@ -194,9 +194,9 @@ def follow(
     progress: Progress = _unseen,
     stop: Stop | None = None,
 ) -> Recorded:
-    """Gives all frames to the tracker; a stop ends it after the current frame.
+    """Passes all frames to the tracker; a stop ends it after the current frame.
 
-    An error in the middle is raised again once the tables hold what was tracked until then.
+    An error in between is raised again after the tables of what was tracked until then are written.
     """
     frames_read = 0
     try:
@@ -225,7 +225,7 @@ def write_results(
     plots: bool = True,
     progress: Progress = _unseen,
 ) -> None:
-    """Writes the tables and, where anybody was tracked, what is drawn; the frames are those tracked."""
+    """Writes the tables and, if anybody was tracked, the pictures; the frames are those tracked."""
     write_tables(recorded, out)
     if not len(recorded.columns["frame"]):
         return
@@ -243,7 +243,7 @@ def write_results(
 
 
 def _told(frames: Iterable[Frame], step: str, count: int | None, progress: Progress) -> Iterator[Frame]:
-    """The same frames, each told when it is done with."""
+    """Yields the same frames, and reports each when it is done."""
     progress(step, 0, count)
     for done, frame in enumerate(frames, 1):
         yield frame
@@ -251,14 +251,18 @@ def _told(frames: Iterable[Frame], step: str, count: int | None, progress: Progr
 
 
 def _fitted(options: Mapping[str, Any], reader: VideoReader) -> dict[str, Any]:
-    """The options with the camera of the frames as they are read."""
+    """The options with the camera for the frames as they are read."""
     camera = options.get("camera")
     if camera is None:
         return dict(options)
     if tuple(camera.size) == reader.full_size:
         return {**options, "camera": camera.shrunk(reader.shrink)}
     (width, height), (video_width, video_height) = camera.size, reader.full_size
-    turned = "; was it calibrated turned?" if (width, height) == (video_height, video_width) else ""
+    turned = (
+        "; was it calibrated in the other orientation?"
+        if (width, height) == (video_height, video_width)
+        else ""
+    )
     raise InputError(
         f"{reader.path}: the camera is for {width}x{height} pixels, the video has "
         f"{video_width}x{video_height}{turned}"
@@ -266,12 +270,12 @@ def _fitted(options: Mapping[str, Any], reader: VideoReader) -> dict[str, Any]:
 
 
 def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:
-    """What may make the results wrong, in sentences."""
+    """Reports what may make the results wrong, in sentences."""
     if max(reader.size) > _LARGEST_PX:
         width, height = reader.size
         yield (
-            f"{width}x{height} pixels are more than memo was tested on: which way the person faces and "
-            "which leg is which may be wrong; leave --shrink out"
+            f"{width}x{height} pixels are more than memo was tested on: the direction in which the person "
+            "faces and which leg is which may be wrong; leave --shrink out"
         )
     if not camera_given and reader.pixel_aspect != 1:
         yield f"pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera"
@@ -304,8 +308,8 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
 
 
 def write_tables(recorded: Recorded, out: Path) -> None:
-    """Writes track.csv, events.csv, gait_parameters.csv and run.json; removes what an earlier run drew."""
-    for stale in _DRAWN:  # of an earlier run: they would stand beside tables they do not belong to
+    """Writes track.csv, events.csv, gait_parameters.csv and run.json; removes pictures of an earlier run."""
+    for stale in _DRAWN:  # from an earlier run: they do not match the new tables
         (out / stale).unlink(missing_ok=True)
     table, events, gait = (out / name for name in ("track.csv", "events.csv", "gait_parameters.csv"))
     write_track_csv(table, recorded.columns)

@@ -1,4 +1,4 @@
-"""Tracking as it is called from Python: `track` for files, `Tracker` for streams, `Track` for the result."""
+"""Tracking from Python: `track` for files, `Tracker` for streams, `Track` for the result."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Track", "Tracker", "track"]
 
 LIKELY_SWAPPED = 0.2
-"""From one in five on, left and right should be looked at before they are used."""
+"""From this probability on, check left and right before use."""
 
 _log = logging.getLogger(__name__)
 
@@ -32,19 +32,19 @@ _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
 
 
 class Tracker:
-    """Tracks one walker at a time through a stream of frames, with memory that does not grow.
+    """Tracks one walker at a time through a stream of frames, in bounded memory.
 
-    `height_m` is the body height crown to sole. Without `camera` one is guessed from the image size, the
-    horizontal field of view `fov_deg` and the height. What a frame shows is known one frame later.
+    `height_m` is the body height from crown to sole. Without `camera`, one is assumed from the image size,
+    the horizontal field of view `fov_deg` and the height. The results lag one frame behind the input.
 
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
-    `adapt=False` stays on the average gait, body and the first estimate of distance.
-    `start_frames`: frames of the starting phase.
+    `adapt=False` keeps the average gait, the average body and the first estimate of distance.
+    `start_frames`: number of frames in the starting phase.
     `compensate_gain`: follow exposure drift between frames.
     `background`: keep a slowly varying background, for people who stop.
     `measure`: "rohr" (eq. 7) or "lowe" (eq. 10).
     `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
-    per frame) count in proportion, w_G and w_V of eq. 11; None weighs all alike.
+    per frame) are weighted in proportion, w_G and w_V of eq. 11; None weights all equally.
     `part_weights`: w_K, 14 numbers in the order of `Track.contour_parts`.
     """
 
@@ -86,17 +86,17 @@ class Tracker:
         """Takes the next frame, (H, W) uint8; times must increase.
 
         Returns the filtered state of the walker being followed (keys `frame, time_s, x_m, y_m, z_m,
-        heading_rad, phase, p_swapped, speed_mps`), or None while nobody is.
+        heading_rad, phase, p_swapped, speed_mps`), or None if there is none.
         """
         self._core.update(frame, time_s)
         return self._core.current()
 
     def take_finished(self) -> list[_memo.Walk]:
-        """The walks that have ended since this was last asked; on an endless stream, ask now and then."""
+        """The walks that have ended since the last call; on an endless stream, call it regularly."""
         return self._core.take_finished()
 
     def finish(self) -> Track:
-        """Ends the stream and returns all walks that were not taken before."""
+        """Ends the stream and returns all walks not returned before."""
         self._core.finish()
         self._walks += self._core.take_finished()
         found = Track(self._walks, self._core.seek_report(), self._camera)
@@ -123,8 +123,8 @@ def track(
 ) -> Track:
     """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
-    `progress` is called with the number of frames done and that of all, None where `frames` has no length;
-    `options` are those of `Tracker`. Pixels in the answer are those of the frames given. An interrupt
+    `progress` is called with the number of frames done and the total, None if `frames` has no length;
+    `options` are those of `Tracker`. Pixels in the result are those of the given frames. An interrupt
     (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):
@@ -141,7 +141,7 @@ def track(
                 time_s = float(next(times))
             except StopIteration:
                 raise ValueError(
-                    f"times_s has {counted(index, 'value')}, but there are more frames"
+                    f"times_s has {counted(index, 'value')}, but there are more frames than that"
                 ) from None
         else:
             time_s = index / float(fps or 1)
@@ -155,7 +155,7 @@ def track(
 
 @dataclass(frozen=True)
 class StoredWalk:
-    """A walk that went through a file or to another process: all that `_memo.Walk` answers, read out."""
+    """A walk read from a file or from another process: all values of `_memo.Walk`."""
 
     tables: dict[str, Any]
     camera: _memo.Camera
@@ -166,7 +166,7 @@ class StoredWalk:
 
     @classmethod
     def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
-        """The walk, read out."""
+        """Reads all values of a walk."""
         tables: dict[str, Any] = {name: getattr(walk, name)() for name in _TABLES}
         tables["contours"] = [walk.contours(row) for row in range(len(walk))]
         single = {name: getattr(walk, name) for name in cls.__dataclass_fields__ if name != "tables"}
@@ -204,10 +204,10 @@ _TABLES = ("columns", "events", "measured", "start", "gait_parameters", "record"
 
 
 class Track:
-    """All walks of a video: what `track.csv` and `events.csv` hold, and everything that led there.
+    """All walks of a video: the contents of `track.csv` and `events.csv`, and all intermediate results.
 
-    Pixels are those of the frames that were given to the tracker, or those of the video they were made of
-    (`of_video`). It can be pickled, and then holds what its walks say instead of the walks themselves.
+    Pixels are those of the frames given to the tracker, or those of the video from which they were averaged
+    (`of_video`). A track can be pickled; it then holds the values of its walks, not the walks themselves.
     """
 
     def __init__(
@@ -222,7 +222,7 @@ class Track:
         self.walks: list[_memo.Walk | StoredWalk] = list(walks)
         self.seek_report: dict[str, int] = seek_report
         self.shrink: int = shrink
-        """How many of its pixels, each way, make one of a frame that was given: 1 unless `of_video` says."""
+        """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
         self._camera = camera
         self._video_size = video_size
 
@@ -236,7 +236,7 @@ class Track:
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """One array per column of `track.csv`; walk after walk."""
+        """One array per column of `track.csv`; one walk after another."""
         if not self.walks:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
         tables = [{**walk.columns(), "walk": np.full(len(walk), k)} for k, walk in enumerate(self.walks)]
@@ -251,12 +251,12 @@ class Track:
 
     @property
     def gait_parameters(self) -> dict[str, npt.NDArray[Any]]:
-        """The columns of `gait_parameters.csv`, see `memo.gait.DEFINITIONS`; walk after walk."""
+        """The columns of `gait_parameters.csv`, see `memo.gait.DEFINITIONS`; one walk after another."""
         return gait_table(walk.gait_parameters() for walk in self.walks)
 
     @property
     def sentences(self) -> list[str]:
-        """What was seen, walk after walk, in plain words."""
+        """The findings in sentences, one walk after another."""
         if not self.walks:
             return [self.summary["message"]]
         said = []
@@ -264,7 +264,7 @@ class Track:
             told = [self._message(walk), *cadence_sentences(self.gait_parameters, index)]
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
-                told.append(f"Left and right may be swapped ({chance}): look before you use them.")
+                told.append(f"Left and right may be swapped ({chance}): check them before use.")
             told += symmetry_sentences(self.gait_parameters, index)
             several = f"Walk {index + 1} of {len(self.walks)}: " if len(self.walks) > 1 else ""
             said += [several + sentence for sentence in told]
@@ -272,7 +272,7 @@ class Track:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Every walk: when, which way, how sure, and what `memo.explain` needs beside the video."""
+        """Every walk: its times, direction and certainty, and what `memo.explain` needs besides the video."""
         return [
             {
                 "message": self._message(walk),
@@ -288,7 +288,7 @@ class Track:
 
     @property
     def camera(self) -> _memo.Camera | None:
-        """The camera given, or the one guessed for the longest walk."""
+        """The camera given, or the one assumed for the longest walk."""
         main = self._main
         camera = main.camera if main is not None else self._camera
         if camera is None or self.shrink == 1:
@@ -304,7 +304,7 @@ class Track:
 
     @property
     def measured(self) -> dict[str, npt.NDArray[Any]]:
-        """Raw measurements `x`, `z` (metres) and `phase` before filtering, one per row; NaN where none."""
+        """Raw measurements `x`, `z` (metres) and `phase` before filtering, one per row; NaN if missing."""
         tables = [walk.measured() for walk in self.walks]
         x, z, phase = np.concatenate(tables).T if tables else np.empty((3, 0))
         return {"x": x, "z": z, "phase": phase}
@@ -333,8 +333,8 @@ class Track:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What was seen: `status` ("tracked", "walking backwards", "never fully visible", "not walking" or
-        "nobody"), `message` in plain words, and the figures of the longest walk."""
+        """The findings: `status` ("tracked", "walking backwards", "never fully visible", "not walking" or
+        "nobody"), `message` as a sentence, and the figures of the longest walk."""
         main = self._main
         if main is None:
             return {"status": self._why_nobody(), "message": _NOBODY[self._why_nobody()], "walks": 0}
@@ -360,13 +360,13 @@ class Track:
         sure = walk.p_other_direction < 0.1
         return (
             f"Somebody {manner} {cls._way(walk)} for {times_s[-1] - times_s[0]:.1f} s at {speed:.2f} m/s"
-            + (f", {cadence:.0f} steps a minute" if np.isfinite(cadence) else "")
-            + ("." if sure else f"; which way round is not certain (p = {1 - walk.p_other_direction:.2f}).")
+            + (f", {cadence:.0f} steps per minute" if np.isfinite(cadence) else "")
+            + ("." if sure else f"; the direction is not certain (p = {1 - walk.p_other_direction:.2f}).")
         )
 
     @staticmethod
     def _pace(walk: _memo.Walk | StoredWalk) -> tuple[float, float]:
-        """Speed, m/s, never negative, and cadence, steps a minute; of a walk too short for it NaN."""
+        """Speed, m/s, never negative, and cadence, steps per minute; NaN for a walk that is too short."""
         table = gait_table([walk.gait_parameters()])
         speed, cadence = (float(lookup(table, 0, name)["value"]) for name in ("speed", "cadence"))
         if np.isnan(speed):
@@ -389,11 +389,11 @@ class Track:
         return "nobody"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The columns of `track.csv` as a `pandas.DataFrame`, a row a frame."""
+        """The columns of `track.csv` as a `pandas.DataFrame`, one row per frame."""
         return data_frame(self.columns)
 
     def plot(self, what: str = "knee", ax: Axes | None = None) -> Axes:
-        """Draws a quantity over time into `ax`, or Axes of its own, and returns them.
+        """Draws a quantity over time into `ax`, or new Axes, and returns them.
 
         `what`: "hip", "knee", "shoulder" or "elbow" (flexion of both sides, degrees, with the heel strikes),
         or a column of `track.csv`, with one standard deviation where it has one. Needs matplotlib.
@@ -415,7 +415,7 @@ class Track:
 
 _NOBODY = {
     "nobody": "Nobody was seen walking.",
-    "not walking": "Something moves, but not as a person of this height walks before this camera.",
+    "not walking": "Something moves, but not like a walking person of this height seen by this camera.",
     "never fully visible": "Somebody moves, but is never fully visible for long enough to start.",
 }
 

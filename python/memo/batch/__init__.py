@@ -1,9 +1,9 @@
-"""Many videos: a manifest in, a folder of results a video and two tables out, and none is lost on the way.
+"""Tracks many videos: from a manifest to one folder of results per video and two tables over all videos.
 
-Every video is tracked by a process of its own (`task`, `leash`), so what kills one costs that one alone.
-Results are renamed into place when complete and remembered in small records (`folder`), so a run can be
-killed at any moment and resumed. Who runs the processes is an executor (`engine`): threads here, or the
-workers of a cluster (`on_ray`, or any other).
+Every video is tracked in its own process (`task`, `leash`), so a crash does not affect the other videos.
+Results are renamed into place when complete and recorded in small files (`folder`), so a run can be
+killed at any moment and resumed. An executor runs the processes (`engine`): threads on this machine, or
+the workers of a cluster (`on_ray`, or any other).
 """
 
 from memo.batch.engine import BatchResult, Progress, run

@@ -1,4 +1,4 @@
-"""A run over a manifest: what is to be done, who does it, what became of it."""
+"""A run over a manifest: plans the work, has it done, and reports the result of each video."""
 
 from __future__ import annotations
 
@@ -24,61 +24,61 @@ from memo.wording import counted
 
 __all__ = ["BatchResult", "Progress", "prepared", "run"]
 
-_ATTEMPTS_OF_WORKERS = 3  # a worker may be lost for no fault of the video, so others try
-_BYTES_A_VIDEO = 1 << 20  # of results without an overlay
-_RESERVE_BYTES = 50 << 20  # with less on the disk, errors are not the videos'
+_ATTEMPTS_OF_WORKERS = 3  # a worker may be lost for reasons unrelated to the video, so others try
+_BYTES_A_VIDEO = 1 << 20  # size of results without an overlay
+_RESERVE_BYTES = 50 << 20  # with less free space, errors are blamed on the disk
 _TELL_S = 0.5
-_FEW = 3  # names that stand for many
+_FEW = 3  # names given as examples
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is."""
+    """Progress of a run."""
 
     total: int
     """Videos of this shard."""
     counts: Mapping[str, int]
-    """How many of them are in each of `STATES`, those of earlier runs included."""
+    """Number of videos in each of `STATES`, including those of earlier runs."""
     running: int
     record: Record | None
-    """The video that has just come to an end, if this tells of one."""
+    """The video that has just ended, if this call reports one."""
 
     @property
     def ended(self) -> int:
-        """How many have come to an end, good or bad."""
+        """Number of videos that have ended, with or without results."""
         return sum(self.counts.values())
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What a run has led to."""
+    """The result of a run."""
 
     out: Path
     records: list[Record]
-    """Of the videos of this shard, in the order of the manifest, those of earlier runs included."""
+    """One per video of this shard, in the order of the manifest, including those of earlier runs."""
     left: list[str]
-    """Names of the videos that have not come to an end."""
+    """Names of the videos that have not ended."""
     seconds: float
     """Wall time of this run."""
     done_now: int
-    """How many videos came to an end in this run."""
+    """Number of videos that ended in this run."""
     notes: list[str] = field(default_factory=list)
-    """Sentences about what the user should know."""
+    """Sentences with notes for the user."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many videos are in each of `STATES`."""
+        """Number of videos in each of `STATES`."""
         counted = Counter(record.state for record in self.records)
         return {state: counted[state] for state in STATES}
 
     @property
     def walks(self) -> int:
-        """How many walks were tracked in all videos."""
+        """Number of walks tracked in all videos."""
         return sum(record.walks or 0 for record in self.records)
 
     @property
     def unfinished(self) -> int:
-        """How many videos have no results: failed, crashed, too slow, or left."""
+        """Number of videos without results: failed, crashed, timed out, or left."""
         return len(self.left) + sum(not record.finished for record in self.records)
 
     @property
@@ -105,25 +105,25 @@ def run(
     command: Sequence[str] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> BatchResult:
-    """Tracks the videos of a manifest, each in a process of its own, with results in `out/NAME`.
+    """Tracks the videos of a manifest, each in its own process, with results in `out/NAME`.
 
-    `out` is `memo-out/` and the name of the manifest's file if not given.
+    If not given, `out` is `memo-out/` and the name of the manifest's file.
 
-    `jobs` videos at a time (as many as there are processors), or as many as the `executor` takes: any of
-    `concurrent.futures`, Dask's `client.get_executor()`, `memo.batch.RayExecutor`; its workers need memo and
-    the same paths. `shard=(2, 4)` does the second of four parts of the manifest; parts may run at the same
-    time on machines that share `out`.
+    `jobs` videos run at a time (default: the number of processors), or as many as the `executor` accepts: any
+    of `concurrent.futures`, Dask's `client.get_executor()`, `memo.batch.RayExecutor`; its workers need memo
+    and the same paths. `shard=(2, 4)` does the second of four parts of the manifest; parts may run at the
+    same time on machines that share `out`.
 
-    A run in a folder that holds results needs `resume`: what was done stays, what a kill left undone is done,
-    and what has changed since, in the manifest or on the disk, is done again. `retry_failed` also does again
-    what failed. Rows that cannot be tracked as they stand are refused, or recorded as failed if `skip_bad`.
+    A run in a folder that holds results needs `resume`: finished videos stay, unfinished ones are done, and
+    those that changed since, in the manifest or on the disk, are done again. `retry_failed` also repeats
+    failed videos. Rows that cannot be tracked as written are refused, or recorded as failed if `skip_bad`.
 
-    `timeout_s` and `memory_mb` (resident, on Linux) are for each video. `command` replaces
-    `python -m memo.batch.leash`, which is given the arguments of `memo`; it must end when its standard input
-    does. `progress` is called for each video, and in between.
+    `timeout_s` and `memory_mb` (resident, on Linux) apply to each video. `command` replaces
+    `python -m memo.batch.leash`; it receives the arguments of `memo` and must end when its standard input
+    closes. `progress` is called for each video, and in between.
 
-    Raises `ManifestError` (with all problems) or `BatchError` before anything is done, and `BatchError` when
-    the disk is full. When interrupted, ends the running processes, writes the tables and raises
+    Raises `ManifestError` (with all problems) or `BatchError` before any work, and `BatchError` when
+    the disk is full. When interrupted, it ends the running processes, writes the tables and raises
     `KeyboardInterrupt`.
     """
     read = prepared(manifest, skip_bad=skip_bad, overlay=overlay, plots=plots, report=report)
@@ -187,7 +187,7 @@ def run(
 
 
 def default_out(manifest: object) -> Path:
-    """Where results go if nothing is said."""
+    """Default folder of the results."""
     return Path("memo-out") / (Path(manifest).stem if isinstance(manifest, str | PathLike) else "batch")
 
 
@@ -199,7 +199,7 @@ def prepared(
     plots: bool = False,
     report: bool = False,
 ) -> Manifest:
-    """The manifest, read and checked; raises `ManifestError` with all that is in the way of a run."""
+    """The manifest, read and checked; raises `ManifestError` with all problems that prevent a run."""
     read = read_manifest(manifest, {"overlay": overlay, "plots": plots, "report": report})
     problems = read.problems + [problem for row in read.rows for problem in row.problems if not skip_bad]
     if problems:
@@ -214,7 +214,7 @@ def _check_numbers(
     jobs: int | None, shard: tuple[int, int], timeout_s: float | None, memory_mb: int | None
 ) -> None:
     if jobs is not None and jobs < 1:
-        raise BatchError(f"at least one video at a time is wanted, got {jobs}")
+        raise BatchError(f"the number of videos at a time must be at least 1, got {jobs}")
     if not 1 <= shard[0] <= shard[1]:
         raise BatchError(f"shard {shard[0]}/{shard[1]} is not one of 1/{shard[1]} to {shard[1]}/{shard[1]}")
     if timeout_s is not None and not timeout_s > 0:
@@ -230,15 +230,15 @@ def _is_to_do(record: Record | None, fingerprint: dict[str, Any], retry_failed: 
 
 
 def _attempt(record: Record | None, fingerprint: dict[str, Any]) -> int:
-    """Which attempt comes now."""
+    """Number of the next attempt."""
     same = record is not None and record.fingerprint == fingerprint
     return record.attempt + 1 if record is not None and same else 1
 
 
 def notes_on(rows: Sequence[Row]) -> list[str]:
-    """What the user should know of the manifest."""
+    """Notes on the manifest for the user."""
     without = sum("height_m" not in row.options for row in rows)
-    return [f"{counted(without, 'video')} without height_m: 1.75 m is taken."] if without else []
+    return [f"{counted(without, 'video')} without height_m: 1.75 m is assumed."] if without else []
 
 
 def _notes(
@@ -248,7 +248,7 @@ def _notes(
     to_do: Sequence[Row],
     fingerprints: Mapping[str, dict[str, Any]],
 ) -> list[str]:
-    """What the user should know of the plan."""
+    """Notes on the plan for the user."""
     notes = notes_on(manifest.rows)
     changed = [row for row in to_do if (record := known[row.name]) is not None and record.finished]
     if changed:
@@ -264,7 +264,7 @@ def _notes(
     if strange:
         example = min(strange)
         notes.append(
-            f"{counted(len(strange), 'video')} no longer in the manifest ({example}, ...): left as they are."
+            f"{counted(len(strange), 'video')} no longer in the manifest ({example}, ...): left unchanged."
         )
     older = {record.memo for record in known.values() if record is not None} - {__version__}
     if older:
@@ -273,9 +273,9 @@ def _notes(
 
 
 def check_folder(out: Path, to_do: Sequence[Row]) -> None:
-    """Refuses a folder of other files, and a disk that will not hold the results.
+    """Refuses a folder of other files, and a disk without room for the results.
 
-    An overlay is taken to be as large as its video.
+    An overlay is assumed to be as large as its video.
     """
     check_ours(out)
     there = next(folder for folder in [out, *out.absolute().parents] if folder.exists())
@@ -299,7 +299,7 @@ def _processors() -> int:
 
 
 class _Teller:
-    """Counts what came to an end, tells of it, and keeps `status.csv` young."""
+    """Counts videos that ended, reports them, and keeps `status.csv` up to date."""
 
     def __init__(
         self,
@@ -312,10 +312,10 @@ class _Teller:
         self._counts: Counter[str] = Counter()
         self._next_status_s = 0.0
         self.told = 0
-        """How many videos came to an end."""
+        """Number of videos that ended."""
 
     def expect(self, tasks: Iterable[Task]) -> None:
-        """Counts the videos of earlier runs: all but those that are done now."""
+        """Counts the videos of earlier runs: all except those done in this run."""
         names = {task.name for task in tasks}
         for row in self._mine:
             record = self._folder.record(row.name)
@@ -323,7 +323,7 @@ class _Teller:
                 self._counts[record.state] += 1
 
     def tell(self, record: Record | None = None) -> None:
-        """Tells how far the run is, and of a video that came to an end."""
+        """Reports the progress of the run, and a video that ended."""
         if record is not None:
             self.told += 1
             self._counts[record.state] += 1
@@ -338,7 +338,7 @@ class _Teller:
 
 
 def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: _Teller) -> list[str]:
-    """Has the executor do all tasks; gives sentences about what went wrong beyond single videos."""
+    """Has the executor do all tasks; returns sentences about problems beyond single videos."""
     waiting: dict[Future[Record | None], Task] = {}
     ended: SimpleQueue[Future[Record | None]] = SimpleQueue()
     losses: Counter[str] = Counter()
@@ -364,7 +364,7 @@ def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: 
             except BrokenExecutor as error:
                 broken = error
                 record = _own_record(task)
-            except Exception as error:  # of the executor: the worker is lost, and whatever it was doing
+            except Exception as error:  # of the executor: the worker is lost, and its work too
                 record = _own_record(task)
                 losses[task.name] += 1
                 if record is None and losses[task.name] < _ATTEMPTS_OF_WORKERS:
@@ -384,7 +384,7 @@ def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: 
         raise
     notes = []
     if broken is not None:
-        notes.append(f"The executor broke: {broken} What is left can be resumed.")
+        notes.append(f"The executor failed: {broken} Resume to do the videos that are left.")
     if losses:
         notes.append(
             f"Workers were lost {counted(losses.total(), 'time')}; their videos were given to others."
@@ -402,16 +402,16 @@ def _submit_all(tasks: Iterable[Task], submit: Callable[[Task], None]) -> Broken
 
 
 def _own_record(task: Task) -> Record | None:
-    """The record that a worker wrote before it was lost, if it got that far."""
+    """The record that a worker wrote before it was lost, if it did."""
     record = task.folder.record(task.name)
     return record if record is not None and record.fingerprint == task.fingerprint else None
 
 
 def _record_loss(task: Task, error: Exception) -> Record:
-    """Keeps that a video has cost one worker after the other."""
+    """Records that one worker after another was lost with a video."""
     task.folder.forget(task.name)
     text = " ".join(str(error).split())[:200]
-    message = f"{_ATTEMPTS_OF_WORKERS} workers were lost over it: {type(error).__name__}: {text}"
+    message = f"{_ATTEMPTS_OF_WORKERS} workers were lost with this video: {type(error).__name__}: {text}"
     record = Record(task.name, "crashed", message, 0.0, task.attempt, __version__, task.fingerprint)
     task.folder.write_record(record)
     return record
@@ -427,7 +427,7 @@ def _write_tables(folder: OutFolder, rows: Sequence[Row], status_only: bool) -> 
 
 
 def described(result: BatchResult) -> Iterator[str]:
-    """What came out, in sentences."""
+    """The result in sentences."""
     counts = result.counts
     told = {
         "done": "tracked",
@@ -444,18 +444,18 @@ def described(result: BatchResult) -> Iterator[str]:
     yield from _of_walks(result.records)
     if result.done_now:
         each = result.seconds / result.done_now
-        yield f"{result.done_now} in this run, {result.seconds:.0f} s, {each:.2f} s a video."
+        yield f"{result.done_now} in this run, {result.seconds:.0f} s, {each:.2f} s per video."
     yield from result.notes
 
 
 def _of_walks(records: Sequence[Record]) -> Iterator[str]:
-    """How many walks there are, where there are several, and where more is said."""
+    """Reports the number of walks, if a video has several, and the number of remarks."""
     several = [record for record in records if (record.walks or 0) > 1]
     if several:
         walks = sum(record.walks or 0 for record in records)
         yield (
             f"{counted(walks, 'walk')}; several in {counted(len(several), 'video')} ({_named(several)}): "
-            "gait_parameters.csv has a row for each, whoever walks."
+            "gait_parameters.csv has one row per walk, possibly of different people."
         )
     remarked = [record for record in records if record.remarks]
     if remarked:
@@ -463,6 +463,6 @@ def _of_walks(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _named(records: Sequence[Record]) -> str:
-    """The first names of many."""
+    """The first names, as examples."""
     names = ", ".join(record.name for record in records[:_FEW])
     return names + ", ..." * (len(records) > _FEW)

@@ -1,16 +1,17 @@
-"""The folder of a run: what lies where, one run at a time, and records that survive a kill at any byte.
+"""The folder of a run: its layout, one run at a time, and records that survive a kill at any byte.
 
 ```
 OUT/NAME/              results of one video; the folder appears when it is complete
 OUT/status.csv         every video of the manifest and its state
 OUT/gait_parameters.csv
-OUT/logs/NAME.log      what the last attempt complained of
-OUT/.batch/records/    one small file a video: the truth that `status.csv` shows
+OUT/logs/NAME.log      messages of the last attempt
+OUT/.batch/records/    one small file per video, the source of `status.csv`
 OUT/.batch/K-of-N.lock held while shard K of N runs     K-of-N.run  the run that holds it
 OUT/.batch/K-of-N.work unfinished files; emptied before and after each run
 ```
-Every file is written among the unfinished ones and renamed. Locks are the system's and go with the process;
-on a network file system they hold where it supports them (NFS does, unless mounted with `nolock`).
+Every file is written among the unfinished files and then renamed. Locks belong to the operating system and
+end with the process; on a network file system they work if it supports them (NFS does, unless mounted with
+`nolock`).
 """
 
 from __future__ import annotations
@@ -32,16 +33,16 @@ from memo.unfinished import complete_file, new_folder
 __all__ = ["STATES", "BatchError", "OutFolder", "Record", "check_ours"]
 
 STATES = ("done", "nobody", "failed", "crashed", "timeout")
-"""A walker was tracked; there is none in the video; the input cannot be used; the process died; too long."""
+"""A walker was tracked; there is none in the video; the input cannot be used; the process died; timeout."""
 
 
 class BatchError(ValueError):
-    """A run that cannot start here, and why."""
+    """A run cannot start here, and why."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """What became of a video."""
+    """The outcome of a video."""
 
     name: str
     state: str
@@ -50,25 +51,25 @@ class Record:
     seconds: float
     """Wall time of the last attempt."""
     attempt: int
-    """Which attempt it was, from 1, since the row or the video last changed."""
+    """Number of the attempt, from 1, since the row or the video last changed."""
     memo: str
     """Version of memo."""
     fingerprint: dict[str, Any]
     """What the result depends on, see `Row.fingerprint`."""
     walks: int | None = None
-    """How many walks were tracked; `None` where that is not known."""
+    """Number of walks tracked; `None` if unknown."""
     remarks: tuple[str, ...] | list[str] = ()
-    """What else is said of the results: doubts, damage of the video, differences of the sides."""
+    """Other remarks on the results: doubts, damage of the video, differences of the sides."""
 
     @property
     def finished(self) -> bool:
-        """Whether there are results: a walker, or the knowledge that there is none."""
+        """Whether there are results: a walker, or the finding that there is none."""
         return self.state in ("done", "nobody")
 
 
 @dataclass(frozen=True)
 class OutFolder:
-    """The folder of a run as one shard of it sees it; `shard` is (1, 1) where one machine does all."""
+    """The folder of a run as one shard uses it; `shard` is (1, 1) if one machine does all."""
 
     out: Path
     shard: tuple[int, int] = (1, 1)
@@ -87,7 +88,7 @@ class OutFolder:
 
     @property
     def work(self) -> Path:
-        """Where this shard's unfinished files are."""
+        """Folder of this shard's unfinished files."""
         return self._state / f"{self._shard_name}.work"
 
     def results(self, name: str) -> Path:
@@ -95,7 +96,7 @@ class OutFolder:
         return self.out / name
 
     def log(self, name: str) -> Path:
-        """What the last attempt at a video complained of."""
+        """Messages of the last attempt at a video."""
         return self.out / "logs" / f"{name}.log"
 
     # Records.
@@ -104,7 +105,7 @@ class OutFolder:
         return self._state / "records" / f"{name}.json"
 
     def record(self, name: str) -> Record | None:
-        """What became of a video, if anything did and its results are still there."""
+        """The outcome of a video, if there is one and its results still exist."""
         try:
             record = Record(**json.loads(self._record_file(name).read_text(encoding="utf-8")))
         except (FileNotFoundError, NotADirectoryError, TypeError, ValueError):
@@ -112,16 +113,16 @@ class OutFolder:
         return None if record.finished and not self.results(name).is_dir() else record
 
     def write_record(self, record: Record) -> None:
-        """Keeps what became of a video."""
+        """Stores the outcome of a video."""
         with self.replaced(self._record_file(record.name)) as temporary:
             temporary.write_text(json.dumps(asdict(record), indent=1), encoding="utf-8")
 
     def names(self) -> list[str]:
-        """All videos there are records of."""
+        """All videos that have records."""
         return sorted(file.stem for file in (self._state / "records").glob("*.json"))
 
     def forget(self, name: str) -> None:
-        """Removes a video's record, then its results: what is left without a record is not believed."""
+        """Removes a video's record, then its results: results without a record do not count."""
         self._record_file(name).unlink(missing_ok=True)
         _remove(self.results(name))
 
@@ -135,7 +136,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def replaced(self, path: Path) -> Iterator[Path]:
-        """Gives a name among the unfinished files; what is written there takes the name `path`."""
+        """Yields a name among the unfinished files; the file written there is then renamed to `path`."""
         with complete_file(path, within=self.work) as temporary:
             yield temporary
             _settle(temporary)
@@ -145,7 +146,7 @@ class OutFolder:
         return new_folder(self.work)
 
     def running(self) -> int:
-        """How many videos this shard is at, on whatever machine."""
+        """Number of videos that this shard is working on, on any machine."""
         with contextlib.suppress(OSError):
             return sum(entry.is_dir() for entry in os.scandir(self.work))
         return 0
@@ -154,7 +155,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def taken(self) -> Iterator[str]:
-        """Takes the folder for one run, whose name it gives; raises `BatchError` while another has it."""
+        """Locks the folder for one run and yields the run's name; raises `BatchError` if it is locked."""
         check_ours(self.out)
         lock = self._state / f"{self._shard_name}.lock"
         try:
@@ -165,7 +166,7 @@ class OutFolder:
             raise BatchError(f"{self.out}: cannot be written to: {error.strerror}") from None
         with _locked(lock) as free:
             if not free:
-                raise BatchError(f"{self.out}: another run is at work here")
+                raise BatchError(f"{self.out}: another run uses this folder")
             self._check_other_shards()
             _empty(self.work)
             run = uuid.uuid4().hex
@@ -178,7 +179,7 @@ class OutFolder:
                 _empty(self.work)
 
     def _check_other_shards(self) -> None:
-        """Refuses to run beside a run that divided the videos in another way, and clears up after such."""
+        """Refuses to run beside a run with other shards, and removes leftovers of ended ones."""
         for lock in self._state.glob("*-of-*.lock"):
             shards = re.fullmatch(r"(\d+)-of-(\d+)", lock.stem)
             if shards is None or int(shards[2]) == self.shard[1]:
@@ -186,16 +187,16 @@ class OutFolder:
             with _locked(lock) as free:
                 if not free:
                     raise BatchError(
-                        f"{self.out}: shard {shards[1]}/{shards[2]} is at work here; divide alike"
+                        f"{self.out}: shard {shards[1]}/{shards[2]} runs here; use as many shards"
                     )
                 _empty(lock.with_suffix(".work"))
 
     def stop(self) -> None:
-        """Tells every process of this shard's run, on whatever machine, to leave its video."""
+        """Tells every process of this shard's run, on any machine, to abandon its video."""
         self._run_file.unlink(missing_ok=True)
 
     def is_current(self, run: str) -> bool:
-        """Whether a run is the one that has this shard."""
+        """Whether a run is the one that holds this shard."""
         try:
             return self._run_file.read_text() == run
         except OSError:
@@ -203,7 +204,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def merging(self) -> Iterator[None]:
-        """Holds the tables of all shards for as long as one of them reads the records and writes."""
+        """Locks the tables of all shards while one of them reads the records and writes."""
         path = self._state / "tables.lock"
         while True:
             with _locked(path) as free:
@@ -214,14 +215,14 @@ class OutFolder:
 
 
 def check_ours(out: Path) -> None:
-    """Refuses to write into a folder that holds other files than those of an earlier run."""
+    """Refuses to write into a folder that holds files other than those of an earlier run."""
     if out.exists() and not out.is_dir():
         raise BatchError(f"{out}: is a file")
     if out.is_dir() and not (out / ".batch").is_dir() and any(out.iterdir()):
-        raise BatchError(f"{out}: holds files that are not of `memo batch`; give an empty folder")
+        raise BatchError(f"{out}: holds files that `memo batch` did not write; give an empty folder")
 
 
-# Files open for a lock. A forked process would hold the lock beyond the life of the one that took it.
+# Files open for a lock. A forked process would hold the lock longer than the process that took it.
 _LOCKS: set[int] = set()
 
 
@@ -237,7 +238,7 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[bool]:
-    """Locks a file for as long as this process lives or the block lasts; gives whether that was possible."""
+    """Locks a file until the block or this process ends; yields whether that was possible."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     _LOCKS.add(descriptor)
     try:
@@ -263,7 +264,7 @@ def _lock(descriptor: int) -> bool:
 
 
 def _settle(path: Path) -> None:
-    """Has the system write a file or folder to the disk, so that a rename never outlives its content."""
+    """Has the system write a file or folder to the disk, so that a rename never precedes its content."""
     if os.name == "nt" and path.is_dir():
         return
     descriptor = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
@@ -279,7 +280,7 @@ def _remove(folder: Path) -> None:
 
 
 def _empty(work: Path) -> None:
-    """Removes what killed processes left; those that are still dying may write a moment longer."""
+    """Removes files of killed processes; those that are still ending may write for another moment."""
     for _ in range(50):
         shutil.rmtree(work, ignore_errors=True)
         if not work.exists():

@@ -1,9 +1,9 @@
-"""The child's side of a run: `python -m memo.batch.leash track ARGUMENTS --out FOLDER --json`.
+"""The child process of a run: `python -m memo.batch.leash track ARGUMENTS --out FOLDER --json`.
 
-Tracks one video as `memo track` does, but ends with the process that started it, however that ended: the
-kernel kills it where it knows how (Linux), and everywhere its standard input, a pipe, reports the other end
-closed. It needs nothing of the command line's: `av`, and matplotlib for what is drawn. What is no mistake in
-the input ends with an exit code of its own.
+Tracks one video as `memo track` does, but ends with its parent process, however that ended: where the kernel
+supports it (Linux), the kernel kills the child; everywhere, its standard input, a pipe, reports that the
+other end is closed. It needs nothing of the command line: only `av`, and matplotlib for plots. An error that
+is not a mistake in the input has its own exit code.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ _READING = ("name", "unit", "size", "v_up")
 
 
 def main() -> None:
-    """Does what the arguments of this process say."""
+    """Runs the arguments of this process."""
     _hold_on_to_parent()
     _go_first_when_memory_ends()
     try:
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def _track(arguments: Sequence[str]) -> Exit:
-    """Tracks a video; prints what was found as JSON, and remarks and mistakes of the input as lines."""
+    """Tracks a video; prints the findings as JSON, and remarks and mistakes of the input as lines."""
     if absent := [name for name in ("av", "matplotlib") if find_spec(name) is None]:
         _complain(f"a video needs {', '.join(absent)}: {install('app', *absent)}")
         return Exit.NO_EXTRA
@@ -51,7 +51,7 @@ def _track(arguments: Sequence[str]) -> Exit:
 
     command, *given, flag, out, as_json = arguments
     if (command, flag, as_json) != ("track", "--out", "--json"):
-        raise RuntimeError(f"wanted track ARGUMENTS --out FOLDER --json, got {arguments}")
+        raise RuntimeError(f"expected track ARGUMENTS --out FOLDER --json, got {arguments}")
     video, found = Row.of_arguments(given)
     options: dict[str, Any] = dict(found)
     try:
@@ -89,7 +89,7 @@ def _hold_on_to_parent() -> None:
 
 
 def _end_with_stdin() -> None:
-    """Waits for the other end of standard input to close, as it does whenever the parent ends."""
+    """Waits for the other end of standard input to close, which happens whenever the parent ends."""
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
@@ -97,7 +97,7 @@ def _end_with_stdin() -> None:
 
 
 def _go_first_when_memory_ends() -> None:
-    """Where the machine runs out of memory, the kernel shall end this process, not its parent."""
+    """If the machine runs out of memory, the kernel ends this process rather than its parent."""
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("500")
 

@@ -1,8 +1,8 @@
-"""The manifest: which videos, and what is known of each, as CSV or TOML; all of it checked before any work.
+"""The manifest: the videos and their options, as CSV or TOML, all checked before any work.
 
-CSV has a header row and one row a video; TOML has a table `[[video]]` a video and may have `[defaults]` for
-all. Both know the same names: `video`, `name` and the options of `memo track` in `OPTIONS`. Relative paths
-are relative to the manifest; an empty cell is an option not given.
+CSV has a header row and one row per video; TOML has one table `[[video]]` per video and may have `[defaults]`
+for all. Both use the same names: `video`, `name` and the options of `memo track` in `OPTIONS`. Relative paths
+are relative to the manifest; an empty cell means that the option is not given.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ Value = str | float | bool | Path
 
 
 class Option(NamedTuple):
-    """How a column is given to `memo track`."""
+    """How a column is passed to `memo track`."""
 
     flag: str
     kind: type
     off: str = ""
-    """What says no, where that is not `--no-` before the name."""
+    """The flag for false, if it is not `--no-` and the name."""
 
 
 OPTIONS = {
@@ -59,12 +59,12 @@ OPTIONS = {
 
 _KNOWN = ("video", "name", *OPTIONS)
 _TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-_TAKEN = ("logs", "status.csv", "gait_parameters.csv")  # names in the results' folder that are no video's
-_LONGEST_NAME = 150  # bytes; file systems take 255, and temporary names are a little longer
+_TAKEN = ("logs", "status.csv", "gait_parameters.csv")  # reserved names in the folder of results
+_LONGEST_NAME = 150  # bytes; file systems allow 255, and temporary names are a little longer
 
 
 class ManifestError(ValueError):
-    """What is wrong with a manifest: every problem in a line of its own, in `problems` too."""
+    """The errors of a manifest: one problem per line, also in `problems`."""
 
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems: list[str] = list(problems)
@@ -80,11 +80,11 @@ class Row:
     video: Path
     """Absolute path."""
     options: Mapping[str, Value]
-    """What was given, by column; paths are absolute."""
+    """The values given, by column; paths are absolute."""
     place: str
-    """Where it stands: `walks.csv, line 3`."""
+    """Place of the row: `walks.csv, line 3`."""
     problems: tuple[str, ...] = ()
-    """Why the video cannot be tracked as it stands, each with the place; empty if nothing is wrong."""
+    """Why the video cannot be tracked as written, each with the place; empty if nothing is wrong."""
 
     @property
     def arguments(self) -> list[str]:
@@ -100,7 +100,7 @@ class Row:
 
     @staticmethod
     def of_arguments(arguments: Sequence[str]) -> tuple[Path, dict[str, Value]]:
-        """The video and the options that became these `arguments`."""
+        """The video and the options that gave these `arguments`."""
         switches = {option.flag: (name, True) for name, option in OPTIONS.items() if option.kind is bool}
         switches |= {
             option.off or option.flag.replace("--", "--no-", 1): (name, False)
@@ -140,11 +140,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The rows, in order, and what concerns none or several of them."""
+    """The rows, in order, and problems that concern none or several of them."""
 
     rows: list[Row]
     problems: list[str] = field(default_factory=list)
-    """What must be mended before anything can be run: unknown columns, names given twice."""
+    """What must be corrected before anything can run: unknown columns, names used twice."""
 
 
 class _Given(NamedTuple):
@@ -159,8 +159,8 @@ def read_manifest(
 ) -> Manifest:
     """Reads and checks a manifest: a CSV or TOML file, or mappings with the same keys (`None`: not given).
 
-    `defaults` are options for rows that do not give them. Videos are looked at from outside only: whether
-    they are there. Raises `ManifestError` for a file that is no manifest at all.
+    `defaults` are options for rows that do not give them. Videos are not opened; only their existence is
+    checked. Raises `ManifestError` for a file that is not a manifest at all.
     """
     problems: list[str] = []
     if isinstance(manifest, str | PathLike):
@@ -183,7 +183,7 @@ def read_manifest(
     return Manifest(rows, problems + _name_problems(rows))
 
 
-# The two notations.
+# The two formats.
 
 
 def _read_csv(path: Path) -> list[_Given]:
@@ -231,9 +231,9 @@ def _read_toml(path: Path, problems: list[str]) -> list[_Given]:
             problems.append(f"{path}{_line_of(lines, key)}: unknown key {key!r}; videos are tables [[video]]")
     videos, defaults = tables.get("video", []), tables.get("defaults", {})
     if not (isinstance(videos, list) and all(isinstance(video, dict) for video in videos)):
-        raise ManifestError([f"{path}: each video is a table [[video]]"])
+        raise ManifestError([f"{path}: each video must be a table [[video]]"])
     if not isinstance(defaults, dict):
-        raise ManifestError([f"{path}: [defaults] is a table"])
+        raise ManifestError([f"{path}: [defaults] must be a table"])
     starts = [k for k, line in enumerate(lines) if re.match(r"\s*\[\[\s*video\s*\]\]", line)]
     for key in defaults:
         if key not in OPTIONS:
@@ -296,13 +296,13 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
     if not isinstance(name, str):
         problems.append(f"{given.place}: name {name!r} is not text")
         name = ""
-    # a missing video has the path of the folder's parent, which `_checked` does not look at again
+    # a missing video has the path of the folder's parent; `_checked` ignores it
     path = base if video is None else _located(video, base)
     return Row(name, path, options, given.place, tuple(problems))
 
 
 def _converted(value: Any, kind: type, base: Path) -> Value:
-    """A cell's text, or a value of TOML, as the option wants it."""
+    """A cell's text, or a TOML value, converted to the type of the option."""
     if kind is bool:
         truth = value if isinstance(value, bool) else _TRUTHS.get(str(value).lower())
         if truth is None:
@@ -314,7 +314,7 @@ def _converted(value: Any, kind: type, base: Path) -> Value:
                 raise ValueError
             return float(value)
         except (TypeError, ValueError):
-            hint = ": write a point" if re.fullmatch(r"\d+,\d+", str(value)) else ""
+            hint = ": write a decimal point" if re.fullmatch(r"\d+,\d+", str(value)) else ""
             raise ValueError(f"{value!r} is not a number{hint}") from None
     if kind is int:
         if not re.fullmatch(r"[1-9]\d{0,3}", str(value)):
@@ -331,7 +331,7 @@ def _located(path: str | PathLike[str], base: Path) -> Path:
 
 
 def _named(rows: list[Row]) -> list[Row]:
-    """Gives nameless rows the video's name, with as many folders before it as set it apart: `s01-walk`."""
+    """Gives nameless rows the video's name, with enough folders before it to make it unique: `s01-walk`."""
     depth = [1] * len(rows)
 
     def name(k: int) -> str:
@@ -361,7 +361,7 @@ def _named(rows: list[Row]) -> list[Row]:
 
 
 def _name_problems(rows: list[Row]) -> list[str]:
-    """Names that cannot be a folder's, and names that several rows have."""
+    """Reports names that cannot be a folder's, and names of several rows."""
     problems = []
     alike = defaultdict(list)
     for row in rows:
@@ -375,13 +375,13 @@ def _name_problems(rows: list[Row]) -> list[str]:
         if len(several) > 1:
             others = ", ".join(row.place.rpartition(", ")[2] for row in several[1:])
             problems.append(
-                f"{several[0].place}: the name {several[0].name!r} is that of {others} too; give other names"
+                f"{several[0].place}: the name {several[0].name!r} is also used in {others}; give other names"
             )
     return problems
 
 
 def _checked(row: Row) -> Row:
-    """The row with everything that can be known to be wrong before the video is opened."""
+    """The row with all errors that can be found before the video is opened."""
     problems = list(row.problems)
     if not problems:
         for check in (_check_video, _check_options):
@@ -432,11 +432,11 @@ def _check_camera(
 
 
 def _files(video: Path) -> list[Path]:
-    """The files that a video consists of, as far as they are there and can be looked at."""
+    """The files of a video, as far as they exist and can be accessed."""
     with contextlib.suppress(OSError, ValueError):
         return [file for file in (video.iterdir() if video.is_dir() else [video]) if file.is_file()]
     return []
 
 
 def _is_folder(path: Path) -> bool:
-    return os.path.isdir(path)  # unlike `Path.is_dir`, no error for what is no name of a file
+    return os.path.isdir(path)  # unlike `Path.is_dir`, no error for an invalid file name

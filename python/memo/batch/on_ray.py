@@ -1,6 +1,6 @@
 """Ray as an executor: `memo.batch.run(manifest, out, executor=RayExecutor())`.
 
-Each video is a task of one processor. A worker that is lost loses its video alone, which goes to another.
+Each video is a task with one processor. If a worker is lost, only its video goes to another worker.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class RayExecutor(Executor):
         remote = self._ray.remote(num_cpus=self._processors, max_retries=0)(work)
         reference = remote.remote(*arguments, **named)
         future: Future[Any] = reference.future()
-        self._references[future] = reference  # Ray forgets tasks that nobody refers to
+        self._references[future] = reference  # Ray drops tasks without a reference
         future.add_done_callback(lambda ended: self._references.pop(ended, None))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Ends the tasks that have not begun if so wished, and the connection if it was made here."""
+        """Cancels tasks that have not started, if requested; closes the connection if it was made here."""
         if cancel_futures:
             for reference in list(self._references.values()):
                 self._ray.cancel(reference)
@@ -58,7 +58,7 @@ class RayExecutor(Executor):
 
 
 def _check_reachable(address: str | None) -> None:
-    """Ray itself waits for a cluster that is not there until it ends the process."""
+    """Checks the address: Ray itself waits for a missing cluster and then ends the process."""
     host, colon, port = (address or "").removeprefix("ray://").rpartition(":")
     if colon and port.isdecimal():
         try:

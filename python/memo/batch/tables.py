@@ -1,4 +1,4 @@
-"""The tables over all videos: what became of each, and the gait parameters of every walk."""
+"""The tables over all videos: the state of each, and the gait parameters of every walk."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
 
 
 def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
-    """Writes the `gait_parameters.csv` of all videos: one row a walk, and one for each video without a walk.
+    """Writes the `gait_parameters.csv` of all videos: one row per walk, or one for a video without walks.
 
     A parameter has columns such as `stride_time_right_s`, and with `_ci_low`, `_ci_high` (95 %) and `_n`.
     """
@@ -52,7 +52,7 @@ def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
 
 
 def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
-    """One dict a walk of the video, by column; one without a walk if it has none."""
+    """One dict per walk of the video, by column; one without a walk if it has none."""
     record = folder.record(row.name)
     state = "waiting" if record is None else record.state
     if record is None or not record.finished:
@@ -70,7 +70,7 @@ def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
 
 
 def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """What holds for all walks of a video; and when and which way each goes, by its number."""
+    """Values common to all walks of a video; and times and direction of each walk, by its number."""
     try:
         run = json.loads(path.read_text(encoding="utf-8"))
         given = {
@@ -88,7 +88,7 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         }
         return given, seen
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise BatchError(f"{path}: not as memo track writes it: {error!r}") from None
+        raise BatchError(f"{path}: not in the format of memo track: {error!r}") from None
 
 
 def _seconds(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""One video in a process of its own: whatever happens to it there happens to this video alone."""
+"""Tracks one video in its own process, so that no failure affects other videos."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ __all__ = ["DEFECT", "OUT_OF_MEMORY", "Task", "perform"]
 
 DEFECT = 70
 OUT_OF_MEMORY = 71
-"""Exit codes of the child beside those of `memo`: an exception that nobody expected, memory ran out."""
+"""Exit codes of the child besides those of `memo`: an unexpected exception; out of memory."""
 
 _THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 _COMMAND = (sys.executable, "-m", "memo.batch.leash")
 _LOOK_AT_MEMORY_S = 0.1
-_LOOK_S = 0.5  # how often a waiting process looks whether its run is still wanted
+_LOOK_S = 0.5  # interval at which a waiting process checks that its run still exists
 
 
 @dataclass(frozen=True)
 class Task:
-    """All that a worker, perhaps on another machine, must know to do one video."""
+    """All that a worker, perhaps on another machine, needs to do one video."""
 
     name: str
     arguments: tuple[str, ...]
-    """Of `memo track`, without where results go."""
+    """Arguments of `memo track`, without the folder of results."""
     fingerprint: dict[str, Any]
     attempt: int
     folder: OutFolder
@@ -49,21 +49,21 @@ class Task:
 
 
 class _Stopped(Exception):
-    """The run this video belongs to has ended."""
+    """The run of this video has ended."""
 
 
 def perform(task: Task) -> Record | None:
-    """Does one video and keeps what became of it; `None` if the run was stopped before.
+    """Does one video and records its outcome; `None` if the run was stopped before.
 
-    On success the folder of results stands complete under its final name before there is a record of it; with
-    any other end there is no such folder. Raises `BatchError` if the disk or the system does not allow it.
+    On success the folder of results is complete under its final name before a record of it exists; otherwise
+    there is no such folder. Raises `BatchError` if the disk or the system does not allow it.
     """
     try:
         return _perform(task)
     except OSError as error:
         if task.folder.is_current(task.run):
             raise BatchError(f"{task.name}: {' '.join(str(error).split())}") from None
-        return None  # the run has ended and swept up
+        return None  # the run has ended and removed its files
 
 
 def _perform(task: Task) -> Record | None:
@@ -73,12 +73,12 @@ def _perform(task: Task) -> Record | None:
     unfinished = task.folder.unfinished()
     try:
         return _tracked(task, unfinished / "results")
-    finally:  # also where the run has ended meanwhile, and has swept up before this folder was there
+    finally:  # also if the run has ended and cleaned up before this folder existed
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
 def _tracked(task: Task, results: Path) -> Record | None:
-    """Runs the child, and puts its results and the record of it in their places."""
+    """Runs the child, and moves its results and its record into place."""
     start = time.monotonic()
     with tempfile.TemporaryFile() as said, open(task.folder.log(task.name), "w+b") as complaints:
         command = [*(task.command or _COMMAND), "track", *task.arguments, "--out", str(results), "--json"]
@@ -118,7 +118,7 @@ def _tracked(task: Task, results: Path) -> Record | None:
 def _watch(
     task: Task, command: Sequence[str], said: IO[bytes], complaints: IO[bytes], start: float
 ) -> int | str:
-    """Runs the command; gives its exit code, minus the signal that killed it, or the limit that it broke."""
+    """Runs the command; returns its exit code, minus the signal that killed it, or the limit it exceeded."""
     threads = dict.fromkeys(_THREADS, str(task.threads))
     look_s = _LOOK_S if task.memory_mb is None else _LOOK_AT_MEMORY_S
     with _started(command, said, complaints, {**os.environ, **threads}) as child:
@@ -135,7 +135,7 @@ def _watch(
 
 
 def _resident_mb(pid: int) -> float:
-    """Memory that a process occupies; 0 where that cannot be known."""
+    """Memory that a process occupies; 0 if unknown."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError):
@@ -147,7 +147,7 @@ def _resident_mb(pid: int) -> float:
 def _started(
     command: Sequence[str], said: IO[bytes], complaints: IO[bytes], environment: dict[str, str]
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A child in a process group of its own, whose standard input is open for as long as it is wanted."""
+    """A child in its own process group, whose standard input stays open while it should run."""
     child = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -170,17 +170,17 @@ def _started(
 
 
 def _verdict(task: Task, code: int | str, complaints: str) -> tuple[str, str]:
-    """The state of a video and a line that says why, from how its process ended."""
+    """The state of a video and one line with the reason, from how its process ended."""
     lines = [line.strip() for line in complaints.splitlines()]
     lines = [line for line in lines if line and not line.startswith(("note:", "stack backtrace:"))]  # Rust's
     last = lines[-1].removeprefix("memo: ") if lines else ""
     if code == "timeout":
         return "timeout", f"ended after {task.timeout_s:g} s"
     if code == "memory":
-        return "crashed", f"ended for more than {task.memory_mb} MB of memory"
+        return "crashed", f"ended because it used more than {task.memory_mb} MB of memory"
     assert isinstance(code, int)
     if code in (0, 3):
-        return ("done" if code == 0 else "nobody"), ""  # `_told` knows more
+        return ("done" if code == 0 else "nobody"), ""  # `_told` adds the message
     if code == OUT_OF_MEMORY:
         return "crashed", "out of memory"
     if code < 0:
@@ -193,9 +193,9 @@ def _verdict(task: Task, code: int | str, complaints: str) -> tuple[str, str]:
 
 
 def _told(said: str, complaints: str) -> tuple[int | None, str, list[str]]:
-    """How many walks there are, what is said of each, and what else is said.
+    """The number of walks, the message about each, and other remarks.
 
-    `said` is the JSON of the child; its `sentences` hold the message of each walk and what else there is.
+    `said` is the JSON of the child; its `sentences` hold the message of each walk and the other remarks.
     """
     complained = [
         line.removeprefix("memo: ") for line in complaints.splitlines() if line.startswith("memo: ")

@@ -1,9 +1,9 @@
-"""The command line: a command a file of this package.
+"""The command line: one command per file of this package.
 
-This package alone knows how results are delivered: what is checked before work starts, what is written,
-what is said and which exit code says it. A command is a file. The base install has numpy alone, so everything
-from the `app` extra is imported inside functions, after `main` has looked for it. (Typer reads annotations
-where they stand, hence no `from __future__ import annotations` in the commands.)
+This package alone decides how results are delivered: what is checked before work starts, which files are
+written, which messages are printed and which exit code is returned. The base install needs only numpy, so
+everything from the `app` extra is imported inside functions, after `main` has checked that it is installed.
+(Typer evaluates annotations in their module, so commands do not use `from __future__ import annotations`.)
 """
 
 import contextlib
@@ -36,7 +36,7 @@ EPILOG = """Examples:
   memo track walk.mp4 --height 1.68
   memo report memo-out/walk
 
-Exit codes of every command: its own --help; and 141 where the reader of what is printed has ended, as in
+Exit codes: see the --help of each command; 141 if the program that reads the output has ended, as in
 memo ... | head."""
 
 EXTRA = ("av", "matplotlib", "rich", "typer")
@@ -48,10 +48,10 @@ def main() -> None:
         try:
             _run()
         finally:
-            sys.stdout.flush()  # what is still held back may meet a closed pipe, too
+            sys.stdout.flush()  # buffered output may meet a closed pipe, too
     except BrokenPipeError:
         _end_unread()
-    except SystemExit as ended:  # click and rich make one of it
+    except SystemExit as ended:  # click and rich raise SystemExit for a closed pipe
         if isinstance(ended.__context__, BrokenPipeError):
             _end_unread()
         raise
@@ -69,7 +69,7 @@ def _run() -> None:
 
 
 def _end_unread() -> NoReturn:
-    """Ends as a program does whose reader has gone, as in `memo ... | head`: silently."""
+    """Ends silently, as usual for a program whose reader has ended, as in `memo ... | head`."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

@@ -1,6 +1,6 @@
-"""`memo batch`: the videos of a manifest, each in a process of its own.
+"""`memo batch`: tracks the videos of a manifest, each in its own process.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import contextlib
@@ -31,16 +31,16 @@ EPILOG = """Examples:
   memo batch trials.csv --out trials --resume
   memo batch trials.csv --out trials --shard 2/4
 
-Exit codes: 0 every video was tracked or has nobody in it; 1 the manifest or the folder cannot \
+Exit codes: 0 every video was tracked or shows nobody; 1 the manifest or the folder cannot \
 be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are left, see status.csv; \
 130 interrupted."""
 
-_FEW = 5  # videos that are named where there are many
-_LONGEST_LINE = 300  # characters of a message; status.csv has all of it
+_FEW = 5  # videos named in a message if there are many
+_LONGEST_LINE = 300  # characters of a printed message; status.csv has the whole message
 
 
 class Backend(StrEnum):
-    """Who runs the processes."""
+    """What runs the processes."""
 
     LOCAL = "local"
     RAY = "ray"
@@ -59,37 +59,42 @@ def add_batch(app: "typer.Typer") -> None:
             ),
         ],
         jobs: Annotated[
-            int | None, typer.Option(help="Videos at a time; as many as processors.", min=1)
+            int | None, typer.Option(help="Videos tracked at a time; default: number of processors.", min=1)
         ] = None,
         resume: Annotated[
-            bool, typer.Option("--resume", help="Go on where a run ended or was killed.")
+            bool, typer.Option("--resume", help="Continue a run that ended or was killed.")
         ] = False,
         retry_failed: Annotated[
-            bool, typer.Option("--retry-failed", help="Go on, and try again what failed.")
+            bool, typer.Option("--retry-failed", help="Continue, and repeat videos that failed.")
         ] = False,
         check: Annotated[
-            bool, typer.Option("--check", help="Only say what is wrong in the manifest.")
+            bool, typer.Option("--check", help="Only report what is wrong in the manifest.")
         ] = False,
         skip_bad: Annotated[
             bool, typer.Option("--skip-bad", help="Record bad rows as failed instead of refusing to start.")
         ] = False,
         shard: Annotated[
-            str, typer.Option(help="Part I of N, for several machines on one folder.", metavar="I/N")
+            str, typer.Option(help="Part I of N, for several machines that share one folder.", metavar="I/N")
         ] = "1/1",
-        timeout: Annotated[float | None, typer.Option(help="Longest time for a video, seconds.")] = None,
-        max_memory: Annotated[int | None, typer.Option(help="Most memory for a video, MB (Linux).")] = None,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/MANIFEST.")] = None,
-        overlay: Annotated[bool, typer.Option(help="Write overlay.mp4; a row may say otherwise.")] = False,
-        plots: Annotated[bool, typer.Option(help="Write plots; a row may say otherwise.")] = False,
-        report: Annotated[bool, typer.Option(help="Write report.html; a row may say otherwise.")] = False,
-        backend: Annotated[Backend, typer.Option(help="Who runs the processes.")] = Backend.LOCAL,
+        timeout: Annotated[float | None, typer.Option(help="Maximum time per video, seconds.")] = None,
+        max_memory: Annotated[int | None, typer.Option(help="Maximum memory per video, MB (Linux).")] = None,
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for the results; default: memo-out/MANIFEST.")
+        ] = None,
+        overlay: Annotated[bool, typer.Option(help="Write overlay.mp4; a row can override it.")] = False,
+        plots: Annotated[bool, typer.Option(help="Write plots; a row can override it.")] = False,
+        report: Annotated[bool, typer.Option(help="Write report.html; a row can override it.")] = False,
+        backend: Annotated[Backend, typer.Option(help="What runs the processes.")] = Backend.LOCAL,
         ray_address: Annotated[
-            str | None, typer.Option(help="Of the Ray cluster; without, the one at hand or a local one.")
+            str | None, typer.Option(help="Address of the Ray cluster; default: a running or a local one.")
         ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Tracks the videos of MANIFEST. Any may fail or crash, and the run be killed: none is lost."""
+        """Tracks the videos of MANIFEST. A video that fails or crashes does not affect the others.
+
+        A run that was killed continues with --resume.
+        """
         delivery = Delivery(out or default_out(manifest), overlay, plots, as_json, quiet)
 
         def work() -> Exit:
@@ -133,7 +138,7 @@ def _parsed_shard(text: str) -> tuple[int, int]:
 
 
 def _check(manifest: Path, delivery: Delivery) -> Exit:
-    """Says what is wrong with the manifest, and where results would go."""
+    """Reports what is wrong with the manifest, and where results would be written."""
     read = prepared(manifest, overlay=delivery.overlay, plots=delivery.plots)
     check_folder(delivery.out, read.rows)
     if delivery.as_json:
@@ -151,7 +156,7 @@ def _batch(
     manifest: Path, delivery: Delivery, options: dict[str, Any], backend: Backend, ray_address: str | None
 ) -> Exit:
     if backend is Backend.RAY:
-        prepared(manifest, skip_bad=options["skip_bad"])  # a mistake is told before a cluster is looked for
+        prepared(manifest, skip_bad=options["skip_bad"])  # report mistakes before looking for a cluster
     try:
         with (
             _termination_as_interrupt(),
@@ -169,7 +174,7 @@ def _batch(
             )
     except KeyboardInterrupt:
         again = [argument for argument in sys.argv[1:] if argument != "--resume"]
-        complain("interrupted: what was finished is kept, the rest is done by")
+        complain("interrupted: finished videos are kept; to do the rest, run")
         complain(f"  memo {shlex.join([*again, '--resume'])}")
         return Exit.INTERRUPTED
     _tell(result, delivery)
@@ -184,7 +189,7 @@ def _executor(
 
 @contextlib.contextmanager
 def _termination_as_interrupt() -> Iterator[None]:
-    """Schedulers of clusters announce the end with SIGTERM: it is treated as Ctrl-C."""
+    """Cluster schedulers send SIGTERM before they end a job: treat it as Ctrl-C."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -206,14 +211,14 @@ def _tell(result: BatchResult, delivery: Delivery) -> None:
 
 
 def _failures(result: BatchResult) -> Iterator[str]:
-    """The first videos without results, and how to try again."""
+    """Names the first videos without results, and how to repeat them."""
     failed = [record for record in result.records if not record.finished]
     for record in failed[:_FEW]:
         yield f"  {_line(record)}"
     if len(failed) > _FEW:
         yield f"  and {len(failed) - _FEW} more: see status.csv and logs/"
     if failed:
-        yield "--retry-failed tries them again."
+        yield "--retry-failed repeats them."
 
 
 def _line(record: Record) -> str:
@@ -230,7 +235,7 @@ def _line(record: Record) -> str:
 
 @contextlib.contextmanager
 def _shown(delivery: Delivery) -> Iterator[Callable[[Progress], None] | None]:
-    """Shows how far the run is: a bar on a terminal, else a line a video."""
+    """Shows the progress of the run: a bar on a terminal, else one line per video."""
     console = terminal(delivery)
     if delivery.quiet:
         yield None
@@ -254,7 +259,7 @@ def _shown(delivery: Delivery) -> Iterator[Callable[[Progress], None] | None]:
             task = bar.add_task("", total=None)
 
             def show(now: Progress) -> None:
-                if bar.tasks[task].total is None:  # what earlier runs did says nothing of the speed
+                if bar.tasks[task].total is None:  # earlier runs do not count for the speed
                     bar.reset(task, total=now.total, completed=now.ended)
                 bar.update(task, completed=now.ended, description=_counted(now))
                 if now.record is not None and not now.record.finished:
@@ -269,7 +274,7 @@ def _counted(now: Progress) -> str:
 
 
 class _Lines:
-    """A line for each video that comes to an end, for logs."""
+    """Prints one line per finished video, for logs."""
 
     def __init__(self) -> None:
         self._start_s: float | None = None

@@ -1,6 +1,6 @@
 """`memo calibrate`: a camera from measured points, a walker or a checkerboard.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import math
@@ -48,8 +48,8 @@ CHECKERBOARD_EPILOG = f"""Examples:
 {EXIT_CODES}"""
 
 _KEYPOINT_SUFFIXES = (".json", ".csv", ".trc", ".parquet")
-_WIDEST_M = 500.0  # no points farther apart than this are measured for one camera
-_MOST_FRAMES = 150  # a background needs no more, and memory holds them all
+_WIDEST_M = 500.0  # largest plausible spread of the points of one camera
+_MOST_FRAMES = 150  # enough for a background; all are in memory at once
 
 
 def add_calibrate(app: "typer.Typer") -> None:
@@ -58,9 +58,11 @@ def add_calibrate(app: "typer.Typer") -> None:
     from memo.cli.camera_options import FovDeg, Lens, Picture, Size
     from memo.cli.keypoint_options import LayoutName, Person
 
-    ways = typer.Typer(no_args_is_help=True, help="Finds where the camera stands and how it images.")
+    ways = typer.Typer(
+        no_args_is_help=True, help="Finds the position, the orientation and the lens of a camera."
+    )
     app.add_typer(ways, name="calibrate")
-    out_option = typer.Option(help="Folder for the results; memo-out/NAME.")
+    out_option = typer.Option(help="Folder for the results; default: memo-out/NAME.")
     json_option = typer.Option("--json", help="Print the summary as JSON.")
     quiet_option = typer.Option("--quiet", help="Print nothing but errors.")
 
@@ -75,7 +77,7 @@ def add_calibrate(app: "typer.Typer") -> None:
         as_json: Annotated[bool, json_option] = False,
         quiet: Annotated[bool, quiet_option] = False,
     ) -> None:
-        """From six measured points, or four on the floor: where they are and where the picture shows them."""
+        """From at least six measured points, or four on the floor: positions in metres and in the picture."""
         delivery = Delivery(out or Path("memo-out") / table.stem, as_json=as_json, quiet=quiet)
 
         def work() -> Exit:
@@ -98,7 +100,7 @@ def add_calibrate(app: "typer.Typer") -> None:
         picture: Picture = None,
         fov_deg: FovDeg = None,
         lens: Lens = None,
-        fps: Annotated[float | None, typer.Option(help="Frame rate, where the source does not say.")] = None,
+        fps: Annotated[float | None, typer.Option(help="Frame rate, if the source has none.")] = None,
         layout: LayoutName = None,
         person: Person = None,
         out: Annotated[Path | None, out_option] = None,
@@ -120,18 +122,18 @@ def add_calibrate(app: "typer.Typer") -> None:
     def checkerboard(
         folder: Annotated[
             Path,
-            typer.Argument(metavar="FOLDER", help="Folder of pictures of the board, tilted differently."),
+            typer.Argument(metavar="FOLDER", help="Folder of pictures of the board at different tilts."),
         ],
         squares: Annotated[str, typer.Option(help="Squares along both sides.", metavar="9x6")],
         square_mm: Annotated[float, typer.Option(help="Side of a square, millimetres.")],
         floor: Annotated[
-            Path | None, typer.Option(help="A picture with the board lying on the ground: where z is 0.")
+            Path | None, typer.Option(help="A picture of the board lying on the ground, where z is 0.")
         ] = None,
         out: Annotated[Path | None, out_option] = None,
         as_json: Annotated[bool, json_option] = False,
         quiet: Annotated[bool, quiet_option] = False,
     ) -> None:
-        """From pictures of a checkerboard; with --floor also where the camera stands."""
+        """From pictures of a checkerboard; with --floor also the position and orientation of the camera."""
         delivery = Delivery(out or Path("memo-out") / folder.resolve().name, as_json=as_json, quiet=quiet)
 
         def work() -> Exit:
@@ -152,7 +154,7 @@ def _view(
     lens: Path | None,
     source_size: tuple[int, int] | None = None,
 ) -> dict[str, Any]:
-    """Size, luma and what is known of the lens, from the options and what the source says of its size."""
+    """Size, luma and known lens parameters, from the options and the size of the source."""
     from memo.calibration import read_picture
 
     if fov_deg is not None and lens is not None:
@@ -179,13 +181,13 @@ def _view(
 
 
 def _check_inside(source: Path, pixels: Any, size: tuple[int, int]) -> None:
-    """Refuses a size that more than a tenth of the points lie outside of."""
+    """Refuses a size if more than a tenth of the points lie outside it."""
     outside = ((pixels < 0) | (pixels >= size)).any(axis=1)
     if outside.mean() > 0.1:
         u, v = pixels[outside][0]
         raise InputError(
             f"{source}: {outside.sum()} of {counted(len(pixels), 'point')} outside a picture of"
-            f" {size[0]}x{size[1]} pixels, the first at ({u:.0f}, {v:.0f}): is that its size?"
+            f" {size[0]}x{size[1]} pixels, the first at ({u:.0f}, {v:.0f}): is the size right?"
         )
 
 
@@ -208,18 +210,18 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
                 table.places, table.pixels, view["size"], focal_px=view["focal_px"], lens=view["lens"]
             )
         except ValueError as error:
-            from_0 = " (points are counted from 0)" if re.search(r"points? \d", str(error)) else ""
+            from_0 = " (point numbers start at 0)" if re.search(r"points? \d", str(error)) else ""
             raise InputError(f"{path}: {error}{from_0}") from None
     off = np.hypot(*found["residuals_px"].T)
     kept = len(off) - len(found["outliers"])
     lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {counted(kept, 'point')}."]
     if found["outliers"]:
         left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found["outliers"])
-        lines.append(f"Left out, as chance would not put them there: {left_out}.")
+        lines.append(f"Left out as outliers: {left_out}.")
     if found["is_planar"] and view["lens"] is None:
-        lines.append("All points lie in a plane: square pixels were taken for granted.")
+        lines.append("All points lie in a plane: square pixels were assumed.")
     if "centre_u_px" not in found["estimates"] and view["lens"] is None:
-        lines.append("The points ask for no principal point but the picture's centre.")
+        lines.append("The principal point is the picture's centre; the points do not contradict it.")
     marks = np.stack([table.pixels, table.pixels + found["residuals_px"]], axis=1)
     summary = {"points": len(off), "left_out_lines": [table.lines[i] for i in found["outliers"]]}
     return _deliver(found, view, lines, summary, marks, delivery)
@@ -240,7 +242,7 @@ def _walker(
     )
     shares: dict[str, Any] = {}
     if is_keypoints:
-        # The fit asks for no times; a rate is only needed to read what has none.
+        # The fit uses no times; a rate is only needed to read a source without times.
         keypoints = memo.read_keypoints(source, **{**reading, "fps": reading["fps"] or 25.0})
         view = _view(*options, keypoints.image_size)
         points = np.where(keypoints.scores[..., None] > 0, keypoints.points, np.nan)
@@ -253,7 +255,7 @@ def _walker(
     else:
         unused = [f"--{name}" for name in ("layout", "person") if reading[name] is not None]
         if unused:
-            raise InputError(f"{', '.join(unused)}: means nothing for a video")
+            raise InputError(f"{', '.join(unused)}: has no meaning for a video")
         feet, heads, luma = _video_sightings(source, reading["fps"], delivery)
         view = _view(*options, (luma.shape[1], luma.shape[0]))
         view["luma"] = luma if view["luma"] is None else view["luma"]
@@ -269,7 +271,7 @@ def _walker(
         f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
         f" {found['rms_px'] / found['person_px']:.1%}"
         f" of the person's height, over {kept} of {counted(len(feet), 'sighting')}.",
-        f"All lengths rest on the person's height of {height_m:g} m.",
+        f"All lengths are based on the person's height of {height_m:g} m.",
     ]
     if view["focal_px"] is not None:
         lines.append("The focal length was given by --fov-deg.")
@@ -292,7 +294,7 @@ def _video_sightings(source: Path, fps: float | None, delivery: Delivery) -> tup
     with with_elapsed("looking for the walker", delivery):
         feet, heads = rectangles(frames)
     if not len(feet):
-        raise InputError(f"{source}: nobody is seen from head to feet, clear of the border")
+        raise InputError(f"{source}: nobody is visible from head to feet and away from the border")
     return feet, heads, frames[len(frames) // 2]
 
 
@@ -321,7 +323,9 @@ def _checkerboard(
         f" reprojection error {lens.rms_px:.2f} px RMS."
     ]
     if not boards.are_squares:
-        lines.append(f"--squares {squares[0]}x{squares[1]} are inner corners, not squares, of this board.")
+        lines.append(
+            f"--squares {squares[0]}x{squares[1]} counts the inner corners, not the squares, of this board."
+        )
     lines += [f"Not used: {path.name}: {why}." for path, why in boards.without.items()]
     lines.append(f"Focal length {lens.focal_px[0]:.1f} ± {lens.focal_sd_px[0]:.1f} px.")
     summary = {
@@ -336,7 +340,7 @@ def _checkerboard(
     write_complete(lens_file, lens.text)
     known = memo.Camera.from_file(lens_file, lens_only=True)
     if floor is None:
-        lines.append("Without --floor it is not known where the camera stands: give lens.toml as --lens.")
+        lines.append("Without --floor the camera's position is unknown: give lens.toml as --lens.")
         delivery.tell(summary, lines, [lens_file])
         return Exit.DONE
     board = find_boards([floor], (columns + 1, rows + 1)).found.get(floor)
@@ -345,7 +349,7 @@ def _checkerboard(
     places = board_places(boards.corners, square_mm / 1000)
     try:
         found = memo.calibrate_points(places, board, boards.size, lens=known)
-    except ValueError:  # from below: the corners are counted the other way round
+    except ValueError:  # seen from below: the corners are in the opposite order
         places = places * np.array([1.0, -1.0, 1.0])
         found = memo.calibrate_points(places, board, boards.size, lens=known)
     lines.append(f"On the floor: reprojection error {found['rms_px']:.2f} px RMS.")
@@ -356,7 +360,7 @@ def _checkerboard(
     )
 
 
-# What is written and said.
+# What is written and printed.
 
 
 def _deliver(
@@ -413,6 +417,6 @@ def _pitch_deg(camera: Any) -> float:
 
 def _rounded(value: float, sd: float) -> str:
     if not math.isfinite(sd) or sd <= 0:
-        return f"{value:.6g} (no deviation known)"
+        return f"{value:.6g} (standard deviation unknown)"
     digits = max(0, 1 - math.floor(math.log10(sd)))
     return f"{value:.{min(digits, 9)}f} ± {sd:.{min(digits, 9)}f}"

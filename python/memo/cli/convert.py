@@ -1,6 +1,6 @@
 """`memo convert`: results and motion files in the formats of other programs.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import json
@@ -44,7 +44,7 @@ def add_convert(app: "typer.Typer") -> None:
             typer.Argument(
                 metavar="SOURCE",
                 help="A folder of `memo track` or `memo posture`, or a motion file:"
-                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints those of a detector as well.",
+                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints also a detector's files.",
             ),
         ],
         target: Annotated[
@@ -53,25 +53,29 @@ def add_convert(app: "typer.Typer") -> None:
                 metavar="TARGET",
                 help=".trc, .csv, .parquet: joints; .mot, .sto: joint angles;"
                 " .c3d: joints, angles and events; .bvh: a skeleton; .json: keypoints as COCO results;"
-                " no ending: a folder of OpenPose's keypoints; .txt: a track as MOTChallenge rows.",
+                " no ending: a folder of OpenPose keypoints; .txt: a track as MOTChallenge rows.",
             ),
         ],
         up: Annotated[
             Axis | None,
-            typer.Option(help="Up axis of TARGET; its usual one: y of .trc, .mot, .sto and .bvh, else z."),
+            typer.Option(help="Up axis of TARGET; default: y for .trc, .mot, .sto and .bvh, else z."),
         ] = None,
-        from_up: Annotated[Axis | None, typer.Option(help="Up axis of SOURCE, whatever it says.")] = None,
+        from_up: Annotated[
+            Axis | None, typer.Option(help="Up axis of SOURCE, in place of the one it names.")
+        ] = None,
         rate: Annotated[
-            float | None, typer.Option(help="Frame rate of TARGET, Hz: linear between frames.")
+            float | None, typer.Option(help="Frame rate of TARGET, Hz, interpolated linearly.")
         ] = None,
         fill: Annotated[
-            float | None, typer.Option(help="Bridge gaps up to this long, seconds, by straight lines.")
+            float | None, typer.Option(help="Longest gap to interpolate linearly, seconds.")
         ] = None,
-        walk: Annotated[int | None, typer.Option(help="One walk of a track, from 0; all of them.")] = None,
+        walk: Annotated[
+            int | None, typer.Option(help="One walk of a track, counted from 0; default: all.")
+        ] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate of a table without times.")] = None,
         unit: Annotated[
             str | None,
-            typer.Option(help="Unit of a SOURCE that names none: m, cm, mm, or metres in one unit."),
+            typer.Option(help="Unit of a SOURCE that names none: m, cm, mm, or its length in metres."),
         ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -117,7 +121,7 @@ def _convert(
         notes = [*motion.notes]
         if fill_s is not None:
             motion, filled = motion.filled(fill_s)
-            notes.append(f"Filled by straight lines: {counted(filled, 'missing value')}.")
+            notes.append(f"Interpolated linearly: {counted(filled, 'missing value')}.")
         if rate_hz is not None:
             motion = motion.resampled(rate_hz)
         target_up = usual_up(target) if up is None else up.value
@@ -139,7 +143,7 @@ def _convert(
     return Exit.DONE
 
 
-# What is in the picture rather than in the world: boxes and keypoints.
+# Data in the picture rather than in the world: boxes and keypoints.
 
 _IN_PICTURE = (".txt", ".json", "")
 
@@ -147,14 +151,14 @@ _IN_PICTURE = (".txt", ".json", "")
 def _convert_picture(
     source: Path, target: Path, up: Axis | None, fps: float | None, asked: dict[str, Any], delivery: Delivery
 ) -> Exit:
-    """Writes boxes of a track (.txt), or keypoints: COCO results (.json), OpenPose's folder (no ending)."""
-    kind = {".txt": "MOTChallenge rows", ".json": "COCO results", "": "OpenPose's keypoints"}[
+    """Writes boxes of a track (.txt), or keypoints: COCO results (.json), an OpenPose folder (no ending)."""
+    kind = {".txt": "MOTChallenge rows", ".json": "COCO results", "": "OpenPose keypoints"}[
         target.suffix.lower()
     ]
     unused = [name for name, value in asked.items() if value is not None]
     unused += ["--up"] * (up is not None and target.suffix.lower() != ".txt")
     if unused:
-        raise InputError(f"{', '.join(unused)}: means nothing for {kind}")
+        raise InputError(f"{', '.join(unused)}: has no meaning for {kind}")
     if not source.exists():
         raise InputError(nothing_at(source, "file or folder"))
     check_writable(target.parent)
@@ -165,7 +169,7 @@ def _convert_picture(
         try:
             rows = write_motchallenge(target, source, up="z" if up is None else up.value)
         except UnicodeDecodeError:
-            raise InputError(f"{source}: not a track of `memo track` (no text in UTF-8)") from None
+            raise InputError(f"{source}: not a track of `memo track` (not UTF-8 text)") from None
         summary: dict[str, Any] = {"rows": rows, "notes": []}
         told = f"{counted(summary['rows'], 'row')} of the track"
     else:
@@ -174,7 +178,7 @@ def _convert_picture(
 
         keypoints = read_keypoints(source, fps=fps)
         left_out = write_keypoints(target, keypoints, "coco" if target.suffix else "openpose")
-        notes = [f"No place for {', '.join(left_out)}: left out."] if left_out else []
+        notes = [f"Left out, the format cannot store them: {', '.join(left_out)}."] if left_out else []
         summary = {"frames": len(keypoints.frames), "points": list(keypoints.names), "notes": notes}
         told = f"{counted(len(keypoints.frames), 'frame')}, {counted(len(keypoints.names), 'point')}"
     summary = {"source": str(source), "target": str(target), **summary}
@@ -200,7 +204,7 @@ def _tell(summary: dict[str, Any], target: Path, delivery: Delivery) -> None:
         print(f"Written to {target}, {summary['up'].upper()} up.")
 
 
-# What the user gave, checked before any work.
+# Options, checked before any work.
 
 
 def _checked(value: float | None, option: str) -> float | None:

@@ -1,6 +1,6 @@
-"""How a command delivers: exit codes, where results go, what is said, progress, interrupts.
+"""How a command delivers: exit codes, folders of results, messages, progress, interrupts.
 
-The base install has numpy alone, so everything from the `app` extra is imported inside functions.
+The base install needs only numpy, so everything from the `app` extra is imported inside functions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Delivery:
-    """Where results go, which of them, and how much is said."""
+    """Where results are written, which of them, and how much is printed."""
 
     out: Path
     overlay: bool = True
@@ -37,7 +37,7 @@ class Delivery:
 
     @property
     def talks(self) -> bool:
-        """Whether results are told in sentences."""
+        """Whether results are printed as sentences."""
         return not (self.quiet or self.as_json)
 
     def tell(
@@ -47,9 +47,9 @@ class Delivery:
         written: Sequence[Path],
         alarm: str | None = None,
     ) -> None:
-        """Says what was found and written: as JSON, in `lines` and the names of the files, or not at all.
+        """Prints what was found and written: as JSON, as `lines` and file names, or not at all.
 
-        An `alarm` comes before the lines, in red on a terminal.
+        An `alarm` is printed before the lines, in red on a terminal.
         """
         if self.as_json:
             print(json.dumps(plain({**summary, "files": [str(path) for path in written]})))
@@ -68,15 +68,15 @@ def _print_red(line: str) -> None:
 
 
 def guarded(work: Callable[[], Exit]) -> Exit:
-    """Runs a command; a user's mistake becomes one line. With MEMO_DEBUG set the traceback is kept.
+    """Runs a command and prints a user's mistake as one line. With MEMO_DEBUG set, the traceback is kept.
 
-    A closed pipe passes through: `main` knows what to do.
+    A closed pipe passes through to `main`, which handles it.
     """
     from memo.video import VideoDamageWarning
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", VideoDamageWarning)  # damage is told in one line instead
+            warnings.simplefilter("ignore", VideoDamageWarning)  # damage is reported in one line instead
             return work()
     except BrokenPipeError:
         raise
@@ -97,7 +97,7 @@ def complain(message: str) -> None:
 def with_progress(
     frames: Iterable[Frame], what: str, count: int | None, delivery: Delivery
 ) -> Iterator[Frame]:
-    """The same frames; on a terminal, a bar with the time left."""
+    """Yields the same frames; on a terminal, shows a bar with the time left."""
     from rich.progress import track
 
     console = terminal(delivery)
@@ -105,7 +105,7 @@ def with_progress(
 
 
 def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextManager[object]:
-    """While one step of unknown length lasts; on a terminal, what it is and for how long already."""
+    """During one step of unknown length: on a terminal, shows its name and the time elapsed."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = terminal(delivery)
@@ -119,7 +119,7 @@ def with_elapsed(what: str, delivery: Delivery) -> contextlib.AbstractContextMan
 
 @contextlib.contextmanager
 def with_count(what: str, delivery: Delivery) -> Iterator[Callable[[int, int | None], None]]:
-    """Gives a callback for the `progress` of a long call; on a terminal, a bar with the time left."""
+    """Yields a callback for the `progress` of a long call; on a terminal, shows a bar with the time left."""
     from rich.progress import Progress
 
     console = terminal(delivery)
@@ -130,8 +130,8 @@ def with_count(what: str, delivery: Delivery) -> Iterator[Callable[[int, int | N
 
 @contextlib.contextmanager
 def with_steps(delivery: Delivery) -> Iterator[Callable[..., None]]:
-    """Gives a callback for the `progress` of a call of several steps: the name of the step and, where known,
-    how much of it is done and of how much; on a terminal, these and the time since the start."""
+    """Yields a callback for the `progress` of a call of several steps. It takes the name of the step and, if
+    known, the amount done and the total; on a terminal, these and the time since the start are shown."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = terminal(delivery)
@@ -140,7 +140,7 @@ def with_steps(delivery: Delivery) -> Iterator[Callable[..., None]]:
         task = progress.add_task("", total=None)
 
         def show(step: str, done: int = 0, total: int | None = None) -> None:
-            # Through the task: `update` keeps a total once known.
+            # Set on the task: `update` cannot reset a total once known.
             progress.tasks[0].total = total
             progress.update(task, description=step, completed=done)
 
@@ -148,7 +148,7 @@ def with_steps(delivery: Delivery) -> Iterator[Callable[..., None]]:
 
 
 def terminal(delivery: Delivery) -> Console | None:
-    """The terminal progress is shown on, if there is one and it is wanted."""
+    """The terminal that shows progress, if there is one and progress is wanted."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -156,7 +156,7 @@ def terminal(delivery: Delivery) -> Console | None:
 
 
 class Interrupt(contextlib.AbstractContextManager["Interrupt"]):
-    """Turns the first Ctrl-C into a request, so that no frame is left half way; the second is raised."""
+    """Turns the first Ctrl-C into a request, so that no frame is half processed; the second is raised."""
 
     def __init__(self) -> None:
         self.requested: bool = False

@@ -1,6 +1,6 @@
-"""`memo demo`: a drawn person whose motion is known, tracked and compared.
+"""`memo demo`: draws a person with known motion, tracks it and compares.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import math
@@ -35,7 +35,7 @@ Exit codes: 0 the person was tracked; 1 the results cannot be written; 2 wrong u
 (what was tracked until then is written)."""
 
 
-#: A heel strike farther from the drawn one was not found: about a sixth of a cycle, seconds.
+#: A heel strike farther from the drawn one counts as missed: about a sixth of a cycle, seconds.
 NEAR_S = 0.15
 
 
@@ -44,12 +44,12 @@ def add_demo(app: "typer.Typer") -> None:
 
     @app.command(epilog=EPILOG)
     def demo(
-        seed: Annotated[int, typer.Option(help="Which scene is drawn.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of the drawn scene.", min=0)] = 0,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/demo"),
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Draws a person whose motion is known, tracks it and compares."""
+        """Draws a person whose motion is known, tracks the person and compares."""
         delivery = Delivery(out, as_json=as_json, quiet=quiet)
         raise typer.Exit(guarded(lambda: _demo(delivery, seed)))
 
@@ -87,7 +87,7 @@ def _draw_scene(seed: int) -> tuple[Any, "list[Frame]"]:
 
 
 def from_truth(columns: dict[str, Any], truth: dict[str, Any]) -> dict[str, float]:
-    """Root mean square differences from the scene's truth over all tracked frames; empty without one."""
+    """Root mean square differences from the scene's truth over all tracked frames; empty if none."""
     rows = np.searchsorted(truth["frame"], columns["frame"])
     if not len(rows):
         return {}
@@ -128,7 +128,7 @@ def strikes_from_truth(recorded: Recorded, drawn: dict[str, Any]) -> dict[str, f
 
 
 def _described(differences: dict[str, float]) -> list[str]:
-    """The differences in sentences."""
+    """Reports the differences in sentences."""
     if not differences:
         return []
     torso = ", ".join(f"{axis} {100 * differences[f'{axis}_m']:.1f} cm" for axis in "xyz")

@@ -1,4 +1,4 @@
-"""What commands on keypoints ask alike. Needs typer, so that it is imported where commands are made."""
+"""Options that the commands on keypoints share. Needs typer, so import it only where commands are made."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,11 +15,12 @@ KeypointsPath = Annotated[
 ]
 Fps = Annotated[
     float | None,
-    typer.Option(help="Frame rate; needed where no times are given, and taken instead of time_s."),
+    typer.Option(help="Frame rate; needed if there are no times, and used in place of time_s."),
 ]
 LayoutName = Annotated[
-    str | None, typer.Option(help="Order of the points, such as BODY_25B, if it is seen wrongly.")
+    str | None, typer.Option(help="Order of the points, such as BODY_25B, if detected wrongly.")
 ]
 Person = Annotated[
-    int | None, typer.Option(help="Place of the person in each frame's list; else followed.", min=0)
+    int | None,
+    typer.Option(help="Index of the person in each frame's list; default: one is followed.", min=0),
 ]

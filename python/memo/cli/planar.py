@@ -1,6 +1,6 @@
-"""`memo planar`: limbs found in unnamed tracks.
+"""`memo planar`: finds limbs in unnamed tracks.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import math
@@ -39,9 +39,9 @@ def add_planar(app: "typer.Typer") -> None:
         ],
         noise_px: Annotated[float, typer.Option(help="Standard deviation of a coordinate, pixels.")] = 0.5,
         window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
-        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has no time_s.")] = None,
+        fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has no time_s.")] = None,
         carry: Annotated[
-            bool, typer.Option("--carry", help="Carry lengths through windows in which no plane fits.")
+            bool, typer.Option("--carry", help="Carry lengths through windows that no plane fits.")
         ] = False,
         names: Annotated[
             bool,
@@ -50,13 +50,17 @@ def add_planar(app: "typer.Typer") -> None:
             ),
         ] = False,
         focal_px: Annotated[
-            float | None, typer.Option(help="Focal length, pixels: says what perspective costs.")
+            float | None, typer.Option(help="Focal length, pixels: reports the error due to perspective.")
         ] = None,
         turn_deg: Annotated[
             float, typer.Option(help="Viewpoint of turned.mp4 and turned.png, degrees.")
         ] = 50.0,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/TRACKS.")] = None,
-        video: Annotated[bool, typer.Option(help="Write turned.mp4, the limbs from a new side.")] = True,
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for the results; default: memo-out/TRACKS.")
+        ] = None,
+        video: Annotated[
+            bool, typer.Option(help="Write turned.mp4, the limbs from another viewpoint.")
+        ] = True,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
@@ -128,15 +132,15 @@ def _check(focal_px: float | None, turn_deg: float) -> None:
 
 
 def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
-    """What was found, in sentences."""
+    """Reports the findings in sentences."""
     if not figure.windows:
-        return ["No window: pauses in the times leave no stretch long enough. Nothing is claimed."]
+        return ["No window: no stretch between pauses is long enough. Nothing is claimed."]
     states = [window["status"] for window in figure.windows]
     told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     lines = [f"Windows: {', '.join(told)}."]
     if any(window.get("method") == "forest" and window["chains"] for window in figure.windows):
         lines.append(
-            f"{len(points.names)} are too many points to be weighed against each other (at most 16): "
+            f"{len(points.names)} are too many points to compare all links (at most 16): "
             "a spanning tree links them, without confidences, and false links are likely."
         )
     if not figure.interpreted:
@@ -151,20 +155,18 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     chains = [chain for window in figure.interpreted for chain in window["chains"]]
     fixed = sum(chain["reflection_margin_deg"] is not None for chain in chains)
     if fixed:
-        lines.append(
-            f"Front and back told by what joints can do in {fixed} of {counted(len(chains), 'chain')}."
-        )
+        lines.append(f"Front and back decided by joint limits in {fixed} of {counted(len(chains), 'chain')}.")
     if fixed < len(chains):
         lines.append(
             "Every other chain may also be its mirror image in depth."
             if fixed
             else "Every chain may also be its mirror image in depth."
         )
-    return [*lines, "Depths of chains against each other are open."]
+    return [*lines, "The depth of one chain relative to another is undetermined."]
 
 
 def _about_links(figure: Any, names: list[str]) -> list[str]:
-    """A line for each link, and one for the links of chains that are not planar."""
+    """One line for each link, and one for the links of chains that are not planar."""
     from memo.linkage import REFUTED
 
     verdicts, windows, lines = figure.verdicts(), len(figure.interpreted), []
@@ -183,5 +185,5 @@ def _about_links(figure: Any, names: list[str]) -> list[str]:
         if REFUTED in counts
     ]
     if refuted:
-        lines.append(f"Left out, their motion is not planar: {', '.join(refuted)}.")
+        lines.append(f"Left out because their motion is not planar: {', '.join(refuted)}.")
     return lines

@@ -1,6 +1,6 @@
-"""`memo pointlight`: a motion as moving dots.
+"""`memo pointlight`: shows a motion as moving dots.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import math
@@ -30,7 +30,7 @@ Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage
 4 the app extra is not installed."""
 
 FEWEST_FRAMES = 8
-"""Fewer are not linked by `memo planar`."""
+"""`memo planar` does not link fewer dots."""
 
 
 def add_pointlight(app: "typer.Typer") -> None:
@@ -43,42 +43,43 @@ def add_pointlight(app: "typer.Typer") -> None:
             typer.Argument(
                 metavar="MOTION",
                 help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
-                " (.c3d, .bvh, .trc); without, an average walker.",
+                " (.c3d, .bvh, .trc); default: an average walker.",
             ),
         ] = None,
         azimuth_deg: Annotated[
-            float, typer.Option(help="Viewer about the vertical, degrees; 90 looks from +x.")
+            float, typer.Option(help="Azimuth of the viewer, degrees; 90 looks from +x.")
         ] = 0.0,
-        elevation_deg: Annotated[float, typer.Option(help="Viewer above the horizontal, degrees.")] = 0.0,
-        px_per_m: Annotated[float, typer.Option(help="Scale, pixels a metre.")] = 200.0,
+        elevation_deg: Annotated[float, typer.Option(help="Elevation of the viewer, degrees.")] = 0.0,
+        px_per_m: Annotated[float, typer.Option(help="Scale, pixels per metre.")] = 200.0,
         locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
         inverted: Annotated[bool, typer.Option("--inverted", help="Upside down.")] = False,
         mirrored: Annotated[bool, typer.Option("--mirrored", help="Facing the other way.")] = False,
         reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
         scramble_position: Annotated[
-            bool, typer.Option("--scramble-position", help="Every dot's motion at a random place.")
+            bool, typer.Option("--scramble-position", help="Move each dot's motion to a random place.")
         ] = False,
         scramble_phase: Annotated[
-            bool, typer.Option("--scramble-phase", help="Every dot's motion shifted in time.")
+            bool, typer.Option("--scramble-phase", help="Shift each dot's motion in time.")
         ] = False,
         period: Annotated[
-            float | None, typer.Option(help="Period of the motion, seconds; else its whole length.")
+            float | None, typer.Option(help="Period of the motion, seconds; default: its whole length.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
-        dots: Annotated[int | None, typer.Option(help="With --lifetime: dots shown; 8.")] = None,
+        dots: Annotated[int | None, typer.Option(help="With --lifetime: dots shown; default: 8.")] = None,
         on: Annotated[
-            str | None, typer.Option(help="With --lifetime: limbs or joints; limbs.", metavar="TEXT")
+            str | None, typer.Option(help="With --lifetime: limbs or joints; default: limbs.", metavar="TEXT")
         ] = None,
         noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
         noise_kind: Annotated[
-            str | None, typer.Option(help="With --noise-dots: scrambled, linear or flicker; scrambled.")
+            str | None,
+            typer.Option(help="With --noise-dots: scrambled, linear or flicker; default: scrambled."),
         ] = None,
-        noise_px: Annotated[
-            float, typer.Option(help="Standard deviation of the noise of dots, pixels.")
-        ] = 0.0,
-        seconds: Annotated[float | None, typer.Option(help="Without MOTION: duration, seconds; 2.4.")] = None,
-        fps: Annotated[float | None, typer.Option(help="Frame rate where the file has none.")] = None,
-        seed: Annotated[int, typer.Option(help="Of all that is random.", min=0)] = 0,
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of the dots' noise, pixels.")] = 0.0,
+        seconds: Annotated[
+            float | None, typer.Option(help="Without MOTION: duration, seconds; default: 2.4.")
+        ] = None,
+        fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has none.")] = None,
+        seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 0,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -105,10 +106,10 @@ def add_pointlight(app: "typer.Typer") -> None:
         }
         delivery = Delivery(out, as_json=as_json, quiet=quiet)
         idle = {
-            "--dots is used with --lifetime only": dots is not None and lifetime is None,
-            "--on is used with --lifetime only": on is not None and lifetime is None,
-            "--noise-kind is used with --noise-dots only": noise_kind is not None and not noise_dots,
-            "--seconds is used without MOTION only": seconds is not None and motion is not None,
+            "--dots needs --lifetime": dots is not None and lifetime is None,
+            "--on needs --lifetime": on is not None and lifetime is None,
+            "--noise-kind needs --noise-dots": noise_kind is not None and not noise_dots,
+            "--seconds cannot be used with MOTION": seconds is not None and motion is not None,
         }
 
         def work() -> Exit:
@@ -154,7 +155,7 @@ def _pointlight(
 
 
 def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
-    """All points of a table; of a motion file or the folder of a track the joints alone."""
+    """All points of a table; of a motion file or the folder of a track, only the joints."""
     from memo.formats import READERS, FormatError, read_motion
     from memo.formats.names import joint_points
     from memo.linkage import Points, read_points_csv
@@ -165,7 +166,7 @@ def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
         return read_points_csv(path, 3, fps), ()
     motion = read_motion(path)
     if fps is not None:
-        raise InputError(f"{path}: has times of its own: leave --fps out")
+        raise InputError(f"{path}: already has times: leave --fps out")
     try:
         joints = joint_points(motion)
     except FormatError as error:
@@ -179,11 +180,11 @@ def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
     if not (period_s > 0 and math.isfinite(period_s)):
         raise InputError(f"--period {period_s:g} must be positive and finite")
     if not scrambles_phase:
-        raise InputError("--period is used with --scramble-phase only")
+        raise InputError("--period needs --scramble-phase")
 
 
 def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
-    """A row for each frame and dot: the joint, or both ends of the limb, or "noise"."""
+    """One row per frame and dot: the joint, or both ends of the limb, or "noise"."""
     rows = []
     for frame, row in enumerate(display["labels"]):
         for dot, label in enumerate(row):
@@ -203,6 +204,6 @@ def _walker_points(seconds: float, rate_hz: float) -> Any:
     from memo.linkage import Points
 
     if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
-        raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames a second cannot be shown")
+        raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
     walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz)
     return Points(walk["names"], walk["times_s"], walk["positions"])

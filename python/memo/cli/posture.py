@@ -1,6 +1,6 @@
-"""`memo posture`: all postures that one view leaves, and the likeliest motion, from keypoints.
+"""`memo posture`: all postures that one view allows, and the most probable motion, from keypoints.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 from collections import Counter
@@ -26,9 +26,9 @@ EPILOG = """Examples:
   memo posture joints.csv --camera camera.toml --lengths lengths.csv --rules physical
 
 Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage; \
-3 no posture is left in any frame (the tables say why); 4 the app extra is not installed; \
+3 no posture is left in any frame (the tables give the reasons); 4 the app extra is not installed; \
 6 postures are left, but every one in the motion breaks a constraint: no possible sequence by these \
-rules (all is written); 130 interrupted (no file is left half written)."""
+rules (all files are written); 130 interrupted (no file is left half written)."""
 
 _DRAWN = "postures.png"
 _MOST_BREAKS = 3
@@ -36,23 +36,23 @@ _MOST_BREAKS = 3
 _SCALES = {
     "lengths": "the lengths given",
     "height": "the height given",
-    "ground": "the distance from the camera by the feet on the ground",
-    "distance": "the distance from the camera that was given",
+    "ground": "the distance from the camera, from the feet on the ground",
+    "distance": "the distance given",
     "assumed": "the height of an average adult, assumed",
 }
 _SOURCES = {
     "given": "as given",
-    "ground": "by the ground",
-    "trunk": "by the trunk",
-    "extent": "by the whole figure",
-    "head": "by the head",
-    "combined": "by several sources together",
-    "neighbours": "by the frames around",
+    "ground": "from the ground",
+    "trunk": "from the trunk",
+    "extent": "from the whole figure",
+    "head": "from the head",
+    "combined": "from several sources combined",
+    "neighbours": "from neighbouring frames",
 }
 
 
 class Rules(StrEnum):
-    """What a posture must satisfy beside the body: `memo.postures.RULES`."""
+    """Constraints on a posture beyond those of the body: `memo.postures.RULES`."""
 
     PHYSICAL = "physical"
     WALKING = "walking"
@@ -69,7 +69,7 @@ class Strength(StrEnum):
 
 
 class Anchor(StrEnum):
-    """Where the distance comes from: `memo.postures.ANCHORS`."""
+    """Source of the distance: `memo.postures.ANCHORS`."""
 
     AUTO = "auto"
     GROUND = "ground"
@@ -99,13 +99,13 @@ def add_posture(app: "typer.Typer") -> None:
         height: Annotated[
             float | None, typer.Option(help="Without --lengths: height of the person, metres.")
         ] = None,
-        rules: Annotated[Rules, typer.Option(help="What the person does.")] = Rules.WALKING,
+        rules: Annotated[Rules, typer.Option(help="Constraints for what the person does.")] = Rules.WALKING,
         strength: Annotated[
             Strength, typer.Option(help="Limits as measured on people, or as printed in the paper.")
         ] = Strength.MEASURED,
-        anchor: Annotated[Anchor, typer.Option(help="What the distance is taken from.")] = Anchor.AUTO,
+        anchor: Annotated[Anchor, typer.Option(help="Source of the distance.")] = Anchor.AUTO,
         distance: Annotated[
-            float | None, typer.Option(help="Distance of the neck from the camera, metres, where known.")
+            float | None, typer.Option(help="Distance of the neck from the camera, metres, if known.")
         ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
@@ -114,19 +114,21 @@ def add_posture(app: "typer.Typer") -> None:
         layout: LayoutName = None,
         person: Person = None,
         unswap: Annotated[
-            bool, typer.Option(help="First exchange right and left where they were confused.")
+            bool, typer.Option(help="First exchange right and left where the detector confused them.")
         ] = True,
         frame: Annotated[
-            int | None, typer.Option(help="Which frame is drawn; else one with as many as most.")
+            int | None, typer.Option(help="Frame to draw; default: one with a typical number of postures.")
         ] = None,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for the results; default: memo-out/KEYPOINTS.")
+        ] = None,
         plots: Annotated[bool, typer.Option(help="Write postures.png.")] = True,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Finds the postures in 3D that KEYPOINTS allow, and the likeliest motion.
+        """Finds the 3D postures that KEYPOINTS allow, and the most probable motion.
 
-        The motion may break a limit at a price: it need not go through the postures that are left.
+        The motion may break a limit at a cost, so it need not consist of the postures that are left.
         """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
@@ -161,7 +163,9 @@ def _posture(
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)
         postures = memo.posture(keypoints, camera, **options, progress=progress)
-        (delivery.out / _DRAWN).unlink(missing_ok=True)  # of an earlier run: it would belong to other tables
+        (delivery.out / _DRAWN).unlink(
+            missing_ok=True
+        )  # from an earlier run: it does not match the new tables
         written = write_postures(postures, delivery.out)
         if delivery.plots and postures.found.any():
             from memo.posture_plot import write_posture_plot
@@ -176,7 +180,7 @@ def _posture(
     return Exit.DONE if postures.is_possible else Exit.IMPOSSIBLE
 
 
-# What the user gave, checked before any work.
+# Options, checked before any work.
 
 
 def _scale(lengths: Path | None, height_m: float | None) -> dict[str, Any]:
@@ -200,11 +204,11 @@ def _row(keypoints: memo.Keypoints, frame: int) -> int:
     return frame - first
 
 
-# What is said.
+# What is printed.
 
 
 def _impossible(postures: memo.Postures, rules: str) -> str | None:
-    """That the motion is no possible one, and what it breaks most; None where there is no motion."""
+    """States that the motion is impossible, and what it breaks most; None if there is no motion."""
     breaks = Counter(name for names in postures.linked_breaks for name in names)
     if not breaks:
         return None
@@ -218,9 +222,9 @@ def _impossible(postures: memo.Postures, rules: str) -> str | None:
 
 
 def _lines(postures: memo.Postures) -> list[str]:
-    """At most five lines; before them stands that the motion is impossible, after them the files."""
+    """At most five lines; the alarm is printed before them and the files after them."""
     lines = [_frames_line(postures), *_reason_line(postures), _scale_line(postures), _second_line(postures)]
-    return lines + [f"Look before use: {'; '.join(postures.warnings)}"] * bool(postures.warnings)
+    return lines + [f"Check before use: {'; '.join(postures.warnings)}"] * bool(postures.warnings)
 
 
 def _frames_line(postures: memo.Postures) -> str:
@@ -244,12 +248,12 @@ def _frames_line(postures: memo.Postures) -> str:
 
 
 def _why_none(postures: memo.Postures) -> str:
-    """Of frames without a posture: what is in the way in the first, where that is all there is to say."""
+    """For frames without a posture: what excludes the first, if it is the only reason."""
     if (postures.survivors > 0).any():
         return ""
     why = next((why for why in postures.cut_all if why), None)
     if why is not None:
-        return f": what is nearest to one, in the first, breaks {', '.join(why)}"
+        return f": in the first, the nearest posture breaks {', '.join(why)}"
     problem = next((problem for problem in postures.problems if problem), None)
     return "" if problem is None else f": in the first, {problem}"
 
@@ -260,12 +264,12 @@ def _reason_line(postures: memo.Postures) -> list[str]:
         return []
     name, sentence = most.constraint.replace("_", " "), most.sentence.rstrip(".")
     cut = f"{counted(most.branches, 'branch', 'branches')} in {counted(most.frames, 'frame')}"
-    return [f"Most is cut by {name}: {cut} ({sentence})."]
+    return [f"Most branches are cut by {name}: {cut} ({sentence})."]
 
 
 def _scale_line(postures: memo.Postures) -> str:
     known = np.isfinite(postures.anchor_m)
-    line = f"Sizes rest on {_SCALES.get(postures.scale_from, postures.scale_from)}"
+    line = f"Sizes are based on {_SCALES.get(postures.scale_from, postures.scale_from)}"
     if known.any():
         sources = [source for source, there in zip(postures.anchor_source, known, strict=True) if there]
         usual = max(dict.fromkeys(sources), key=sources.count)
@@ -277,9 +281,9 @@ def _scale_line(postures: memo.Postures) -> str:
 def _second_line(postures: memo.Postures) -> str:
     second = postures.second
     if not postures.limbs_known:
-        return "No elbow, wrist, knee or ankle is known: nothing is decided about limbs."
+        return "No elbow, wrist, knee or ankle is known: the limbs are undetermined."
     if second is None:
-        return "No other motion is there: which way the limbs point in depth is decided."
+        return "No other motion is possible: the depth directions of the limbs are determined."
     joints = " and ".join(joint.replace("_", " ") for joint in second.joints)
     undecided = f"{postures.undecided.sum()} of {counted(len(postures.frames), 'frame')}"
     where = f"frames {second.first_frame} to {second.last_frame}"

@@ -1,6 +1,6 @@
-"""`memo report`: the results of a run as one HTML file.
+"""`memo report`: writes the results of a run as one HTML file.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 import webbrowser
@@ -22,7 +22,7 @@ EPILOG = """Examples:
   memo report memo-out/walk --frames 45:146 --every 2
 
 Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage; \
-4 the app extra is not installed; 130 interrupted (an older page stays as it was)."""
+4 the app extra is not installed; 130 interrupted (an older page stays unchanged)."""
 
 
 def add_report(app: "typer.Typer") -> None:
@@ -31,20 +31,23 @@ def add_report(app: "typer.Typer") -> None:
     @app.command(epilog=EPILOG)
     def report(
         folder: Annotated[
-            Path, typer.Argument(metavar="DIR", help="What memo track, memo posture or memo planar left.")
+            Path,
+            typer.Argument(
+                metavar="DIR", help="Folder of results of memo track, memo posture or memo planar."
+            ),
         ],
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         every: Annotated[
-            int | None, typer.Option(help="Every N-th frame; else as many as fit in about 25 MB.", min=1)
+            int | None, typer.Option(help="Every N-th frame; default: as many as fit in about 25 MB.", min=1)
         ] = None,
-        why: Annotated[bool, typer.Option(help="Show what each frame was matched to.")] = True,
-        video: Annotated[Path | None, typer.Option(help="Where the video is now, if it was moved.")] = None,
-        out: Annotated[Path | None, typer.Option(help="The file to write; DIR/report.html.")] = None,
-        open_: Annotated[bool, typer.Option("--open", help="Show it in the browser.")] = False,
+        why: Annotated[bool, typer.Option(help="Show what the model was matched to in each frame.")] = True,
+        video: Annotated[Path | None, typer.Option(help="The video, if it was moved.")] = None,
+        out: Annotated[Path | None, typer.Option(help="The file to write; default: DIR/report.html.")] = None,
+        open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Makes one HTML file of the results in DIR, to be read without memo or a network."""
+        """Makes one HTML file of the results in DIR, readable without memo or a network."""
 
         def work() -> Exit:
             path = folder / "report.html" if out is None else _checked_file(out)
@@ -71,7 +74,7 @@ def write_page(folder: Path, path: Path, delivery: Delivery, **options: Any) -> 
 
 
 def _lines(report: "Report") -> list[str]:
-    """What is in the page, in sentences."""
+    """Describes the page in sentences."""
     contents = report.contents
     if report.kind == "memo track":
         line = f"{counted(contents['pictures'], 'frame')} with pictures, {contents['explained']} explained"

@@ -1,6 +1,6 @@
-"""`memo reproduce`: what the papers print, beside what memo has.
+"""`memo reproduce`: the numbers that the papers print, beside those of memo.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 from enum import StrEnum
@@ -32,7 +32,7 @@ EPILOG = """Examples:
   memo reproduce lee-chen --out tables
   memo reproduce rohr --video walk.mp4 --height 1.68
 
-Exit codes: 0 done, differences included; 1 the input cannot be used; 2 wrong usage; \
+Exit codes: 0 done, even if results differ; 1 the input cannot be used; 2 wrong usage; \
 3 nobody was tracked in --video; 4 the app extra is not installed; 130 interrupted."""
 
 HELP = "rohr: tracking (1994); lee-chen: postures (1985); hoffman-flinchbaugh: biological motion (1982)."
@@ -45,23 +45,27 @@ def add_reproduce(app: "typer.Typer") -> None:
     def reproduce(
         paper: Annotated[Paper, typer.Argument(metavar="PAPER", help=HELP)] = Paper.ALL,
         out: Annotated[
-            Path | None, typer.Option(help="Folder for rows and figures; memo-out/reproduce, or in it PAPER.")
+            Path | None,
+            typer.Option(help="Folder for rows and figures; default: memo-out/reproduce[/PAPER]."),
         ] = None,
         video: Annotated[
-            Path | None, typer.Option(help="rohr: figures of a real sequence, from this video of one walker.")
+            Path | None,
+            typer.Option(help="rohr: make figures of a real sequence from this video of one walker."),
         ] = None,
         height: Annotated[float | None, typer.Option(help="Height of the walker in --video, metres.")] = None,
         camera: Annotated[
             Path | None, typer.Option(help="Calibration of --video, as for memo track.")
         ] = None,
         camera_name: Annotated[str | None, typer.Option(help="Which camera of a file with several.")] = None,
-        fps: Annotated[float | None, typer.Option(help="True frame rate of --video (slow motion).")] = None,
+        fps: Annotated[
+            float | None, typer.Option(help="True frame rate of --video, for slow motion.")
+        ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Computes every table, figure and number of the papers again that can be, beside the printed ones.
+        """Computes the tables, figures and numbers of the papers again, beside the printed ones.
 
-        A row is the same, differs (and says why), is made in kind from other input, or cannot be made.
+        A row is the same, differs (with the reason), is made in kind from other input, or cannot be made.
         """
         folder = out or (Path("memo-out/reproduce") / ("" if paper is Paper.ALL else paper.value))
 
@@ -137,7 +141,7 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
 
 
 def _print(reproduction: "Reproduction") -> None:
-    """The rows as a table as wide as the terminal, and how many have which verdict."""
+    """Prints the rows as a table as wide as the terminal, and the number of rows per verdict."""
     from rich.console import Console
     from rich.table import Table
 
@@ -159,7 +163,7 @@ def _print(reproduction: "Reproduction") -> None:
 
 
 def _plain(text: str) -> str:
-    """Text in which rich sees no markup."""
+    """Text that rich does not read as markup."""
     from rich.markup import escape
 
     return escape(text)

@@ -1,4 +1,4 @@
-"""`memo track`: one person through a video.
+"""`memo track`: tracks one person through a video.
 
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
@@ -22,7 +22,7 @@ EPILOG = """Examples:
 
 Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
 3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted \
-(what was tracked until then is written)."""
+(results up to then are written)."""
 
 
 def add_track(app: "typer.Typer") -> None:
@@ -43,11 +43,11 @@ def add_track(app: "typer.Typer") -> None:
         camera_v_up: CameraVUp = None,
         height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
         fov_deg: Annotated[
-            float | None, typer.Option(help="Without --camera: horizontal field of view, degrees.")
+            float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
         ] = None,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         fps: Annotated[
-            float | None, typer.Option(help="True frame rate, in place of the time stamps (slow motion).")
+            float | None, typer.Option(help="True frame rate, in place of the time stamps, for slow motion.")
         ] = None,
         shrink: Annotated[
             int | None,
@@ -58,7 +58,9 @@ def add_track(app: "typer.Typer") -> None:
                 min=1,
             ),
         ] = None,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/VIDEO.")] = None,
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for the results; default: memo-out/VIDEO.")
+        ] = None,
         overlay: Annotated[bool, typer.Option(help="Write overlay.mp4.")] = True,
         plots: Annotated[bool, typer.Option(help="Write plots.")] = True,
         page: Annotated[
@@ -93,15 +95,17 @@ def _track(recording: Recording, delivery: Delivery) -> Exit:
         small = f"{width // source.shrink}x{height // source.shrink}"
         print(f"Tracked at {small} of the {width}x{height} pixels of the video (--shrink).")
     if not source.camera_given and delivery.talks and tracked:
-        print("No --camera: depths rest on the assumed field of view; heights and sideways positions do not.")
+        print(
+            "No --camera: depths depend on the assumed field of view; heights and sideways positions do not."
+        )
     return recorded.exit
 
 
-# What is said.
+# What is printed.
 
 
 def report(recorded: Recorded, delivery: Delivery, more: Mapping[str, Any] | None = None) -> None:
-    """Says what was found; the JSON has the figures of the longest walk, `each_walk`, and `more`."""
+    """Reports the findings; the JSON has the figures of the longest walk, `each_walk`, and `more`."""
     delivery.tell({**recorded.document, **(more or {})}, recorded.sentences, recorded.written)
 
 

@@ -1,6 +1,6 @@
-"""`memo unswap`: right and left put right in keypoints.
+"""`memo unswap`: corrects exchanged right and left labels in keypoints.
 
-(Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
+(Typer evaluates annotations in their module, so `from __future__ import annotations` is not used here.)
 """
 
 from enum import StrEnum
@@ -27,7 +27,7 @@ Exit codes: 0 the keypoints were written; 1 the input cannot be used; 2 wrong us
 
 
 class Written(StrEnum):
-    """What the keypoints are written as: like the file read, or one of `memo.keypoints.WRITERS`."""
+    """Format of the keypoints written: that of the file read, or one of `memo.keypoints.WRITERS`."""
 
     SAME = "same"
     OPENPOSE = "openpose"
@@ -53,17 +53,19 @@ def add_unswap(app: "typer.Typer") -> None:
             Written,
             typer.Option(
                 "--format",
-                help="Write the file as it was read but for the exchanges (same), or this person alone as "
+                help="Write the file unchanged except for the exchanges (same), or only this person as "
                 "OpenPose (BODY_25, a folder), COCO results (17 points) or a table.",
             ),
         ] = Written.SAME,
-        out: Annotated[Path | None, typer.Option(help="Folder for the results; memo-out/KEYPOINTS.")] = None,
+        out: Annotated[
+            Path | None, typer.Option(help="Folder for the results; default: memo-out/KEYPOINTS.")
+        ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Exchanges right and left in KEYPOINTS where a detector confused them for a time.
 
-        Labels that are exchanged in all frames, or most, cannot be seen by it.
+        Labels that are exchanged in all frames, or in most, cannot be detected.
         """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
         options = {"fps": fps, "layout": layout, "person": person}
@@ -81,9 +83,11 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
         written = [delivery.out / name, delivery.out / "flips.csv"]
         check_apart([path, source], written)
         if written[0].name == written[1].name:
-            raise InputError(f"{path}: is called as the table of changes; rename it")
+            raise InputError(f"{path}: has the name of the table of changes; rename it")
         if as_format is Written.SAME and repair.keypoints.source.write_like is None:
-            raise InputError(f"{path}: is not written as it was read; give --format openpose, coco or csv")
+            raise InputError(
+                f"{path}: cannot be written in its own format; give --format openpose, coco or csv"
+            )
         left_out: tuple[str, ...] = ()
         if as_format is Written.SAME:
             repair.keypoints.write(written[0])
@@ -104,27 +108,27 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
     ]
     lines[0] += one_of_several(keypoints, options["person"])
     if left_out:
-        lines.append(f"{as_format.value} has no place for {', '.join(left_out)}.")
+        lines.append(f"{as_format.value} cannot store {', '.join(left_out)}.")
     delivery.tell(summary, lines, written)
     return Exit.DONE
 
 
 def one_of_several(keypoints: memo.Keypoints, person: int | None) -> str:
-    """A sentence to go on with where nobody said which of several people is meant."""
+    """A sentence to append if it was not given which of several people is meant."""
     crowded = int((keypoints.people > 1).sum())
     if person is not None or not crowded:
         return ""
     frames = f"{crowded} of {counted(len(keypoints.frames), 'frame')}"
     people = counted(keypoints.people.max(), "person", "people")
-    return f" Up to {people} in {frames}: one was followed; --person takes another."
+    return f" Up to {people} in {frames}: one was followed; --person selects another."
 
 
 def exchanges(repair: memo.SideRepair) -> str:
-    """How many frames were exchanged and how many are in doubt, in words."""
+    """Describes how many frames were exchanged and how many are undecided."""
     done = _by_group(repair.exchanged)
     doubt = _by_group({group: frames for group, frames in repair.undecided.items() if frames})
     guessed = _by_group({group: frames for group, frames in repair.guessed.items() if frames})
-    doubt += f", exchanged as the best guess: {guessed}" if guessed else ""
+    doubt += f", exchanged by the best guess: {guessed}" if guessed else ""
     return f"{done} ({f'undecided: {doubt}' if doubt else 'none undecided'})"
 
 
@@ -133,6 +137,6 @@ def _by_group(frames: dict[str, int]) -> str:
 
 
 def _majority(repair: memo.SideRepair) -> str:
-    """What the repair takes for granted."""
+    """What the repair assumes."""
     sure = " and ".join(f"{group} {p:.0%}" for group, p in repair.p_global.items())
-    return f"which side is right is what most frames say (by their majority alone {sure})"
+    return f"the side is right that most frames say (probability by the majority alone: {sure})"

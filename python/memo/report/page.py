@@ -1,7 +1,7 @@
-"""One HTML file out of text, data and the assets beside this module; it asks nothing of any network.
+"""Builds one HTML file from text, data and the assets beside this module; it needs no network.
 
-Whatever comes from files is escaped: text by `text`, the data by `_json`. The page's own content security
-policy lets nothing but the script and the style written here run, and nothing be loaded from anywhere.
+Everything from files is escaped: text by `text`, data by `_json`. The page's content security policy
+allows only the script and the style written here, and loads nothing.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ UNKNOWN = "\N{EN DASH}"
 
 @dataclass
 class Page:
-    """What a page is made of."""
+    """The parts of a page."""
 
     title: str
     layout: str
-    """The asset with the page's body, NAME.html; NAME.js beside it brings it to life."""
+    """The asset with the page's body, NAME.html; NAME.js beside it is its script."""
     filled: dict[str, str]
-    """HTML for the places of the body, by name."""
+    """HTML for the placeholders of the body, by name."""
     data: dict[str, Any]
-    """What the script draws."""
+    """The data that the script draws."""
     scripts: Sequence[str] = field(default=("base.js", "view3d.js"))
     """Assets that come before NAME.js."""
 
@@ -63,12 +63,12 @@ def text(value: object) -> str:
 
 
 def number(value: object, digits: int = 2) -> str:
-    """A number with that many digits after the point; a dash for what is not known."""
+    """A number with that many digits after the point; a dash if unknown."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.generic):
         return text(value)
     try:
         value = float(value)
-    except OverflowError:  # a whole number beyond all
+    except OverflowError:  # a whole number too large for a float
         return UNKNOWN
     if not math.isfinite(value):
         return UNKNOWN
@@ -76,7 +76,7 @@ def number(value: object, digits: int = 2) -> str:
 
 
 def rows_table(caption: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of cells that are HTML already; the first cell of a row names it."""
+    """A table of cells that are already HTML; the first cell of a row names it."""
     head = "".join(f'<th scope="col">{name}</th>' for name in header)
     body = "".join(
         f'<tr><th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in rest) + "</tr>"
@@ -95,7 +95,7 @@ def columns(values: npt.ArrayLike, digits: int) -> list[Any]:
 
 
 def _filled(template: str, places: Mapping[str, str]) -> str:
-    """The template with every `@@name@@` replaced; each exactly once, and never inside what was put in."""
+    """The template with every `@@name@@` replaced, each exactly once, and none inside inserted text."""
     parts = template.split("@@")
     return "".join(places[part] if at % 2 else part for at, part in enumerate(parts))
 
@@ -109,6 +109,6 @@ def _hash(inline: str) -> str:
 
 
 def _json(value: Any) -> str:
-    """JSON that no parser of HTML can leave: no `<`, `>` or `&` in it."""
+    """JSON that cannot end its HTML element: it has no `<`, `>` or `&`."""
     dumped = json.dumps(plain(value), separators=(",", ":"), allow_nan=False)
     return dumped.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -38,20 +38,20 @@ class Picture:
     uri: str
     """The JPEG as a data URI."""
     moved: str | None = None
-    """What changed since the frame before, as a PNG of the tracked picture; None where nobody asked."""
+    """What changed since the previous frame, as a PNG of the tracked picture; None if not requested."""
     regions: tuple[tuple[int, ...], ...] = ()
-    """Left, top, right and bottom of what moved, largest first, pixels of the video."""
+    """Left, top, right and bottom of moving regions, largest first, pixels of the video."""
 
     @property
     def size_bytes(self) -> int:
-        """How much it adds to a page."""
+        """Size that it adds to a page."""
         return len(self.uri) + len(self.moved or "")
 
 
 class Thinned(Generic[Kept]):
-    """Every n-th of what is offered; n doubles, and every second is dropped, when the budget is passed.
+    """Every n-th of the items offered; if the budget is exceeded, n doubles and every second item is dropped.
 
-    So nothing need be known before of how many come and how large they are. With `every` given n stays.
+    So neither their number nor their size need be known in advance. With `every` given, n is fixed.
     """
 
     def __init__(self, budget_bytes: int, every: int | None = None) -> None:
@@ -62,12 +62,12 @@ class Thinned(Generic[Kept]):
         self._kept: dict[int, tuple[Kept, int]] = {}
 
     def wants_next(self) -> bool:
-        """Whether the next one offered is to be kept; counts it as offered."""
+        """Whether to keep the next item offered; counts it as offered."""
         self._offered += 1
         return (self._offered - 1) % self.every == 0
 
     def keep(self, item: Kept, size_bytes: int) -> None:
-        """Keeps the one last asked about."""
+        """Keeps the last item offered."""
         self._kept[self._offered - 1] = item, size_bytes
         while not self._fixed and len(self._kept) > 1 and self._bytes > self._budget_bytes:
             self.every *= 2
@@ -79,19 +79,19 @@ class Thinned(Generic[Kept]):
 
     @property
     def items(self) -> list[Kept]:
-        """What is kept, in order."""
+        """The items kept, in order."""
         return [item for item, _ in self._kept.values()]
 
 
 def jpeg_uri(pixels: npt.NDArray[np.uint8], longest_px: int = LONGEST_PX) -> str:
-    """(H, W) grey or (H, W, 3) RGB pixels as JPEG, made smaller where a side is longer than `longest_px`."""
+    """(H, W) grey or (H, W, 3) RGB pixels as JPEG, reduced if a side is longer than `longest_px`."""
     image = Image.fromarray(np.ascontiguousarray(pixels))
     image.thumbnail((longest_px, longest_px), Image.Resampling.BILINEAR)
     return _uri("jpeg", image, quality=_JPEG_QUALITY, optimize=True)
 
 
 def mask_uri(mask: npt.NDArray[np.bool_], colour: tuple[int, int, int]) -> str:
-    """(H, W) mask as a PNG of one bit a pixel: `colour` where it is true, transparent elsewhere."""
+    """(H, W) mask as a PNG of one bit per pixel: `colour` where it is true, transparent elsewhere."""
     image = Image.fromarray(np.ascontiguousarray(mask).astype(np.uint8), "P")
     image.putpalette([0, 0, 0, *colour])
     return _uri("png", image, transparency=0, bits=1)
@@ -105,7 +105,7 @@ def packed(points_px: npt.ArrayLike, shrink: int = 1) -> str:
 
 
 def colour_frames(path: str | PathLike[str]) -> Iterator[tuple[int, float, npt.NDArray[np.uint8]]]:
-    """Number, seconds since the first and (H, W, 3) RGB pixels of the frames of a video memo wrote."""
+    """Number, seconds since the first and (H, W, 3) RGB pixels of the frames of a video written by memo."""
     try:
         with av.open(str(Path(path).absolute())) as container:
             first_s: float | None = None

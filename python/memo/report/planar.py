@@ -31,7 +31,7 @@ Row = dict[str, Any]
 
 
 def planar_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
-    """The page of a folder of `memo planar`, and how many frames are in it and what could not be shown."""
+    """The page of a folder of `memo planar`, the number of frames in it and what could not be shown."""
     windows, links, chains = (_table(folder / name, columns) for name, columns in _TABLES.items())
     names, rows = _points(folder / "points3d.csv")
     thinned: Thinned[Row] = Thinned(_BYTES, choice.every)
@@ -61,7 +61,7 @@ def planar_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
 
 
 def _table(path: Path, columns: tuple[str, ...]) -> list[Row]:
-    """Rows of a table; numbers as float, None where empty. ValueError names the file and the row."""
+    """Rows of a table; numbers as float, None for empty cells. ValueError names the file and the row."""
     cells = read_text_columns(path, columns)
     return [
         {name: _cell(path, line, name, row[name], name in _NUMBERS) for name in columns}
@@ -70,7 +70,7 @@ def _table(path: Path, columns: tuple[str, ...]) -> list[Row]:
 
 
 def _points(path: Path) -> tuple[list[str], list[Row]]:
-    """Names of the points, and by frame u, v and depth of each, pixels; None where not known."""
+    """Names of the points, and for each frame their u, v and depth, pixels; None if unknown."""
     cells = read_text_columns(path)
     names = [name.removesuffix("_z_px") for name in cells if name.endswith("_z_px")]
     wanted = [f"{name}_{axis}_px" for name in names for axis in "uvz"]
@@ -82,7 +82,7 @@ def _points(path: Path) -> tuple[list[str], list[Row]]:
 
 
 def _rows(cells: dict[str, list[str]]) -> Iterator[tuple[int, dict[str, str]]]:
-    """Number of each row, the header being the first, and its cells by column."""
+    """Number of each row, counting the header as the first, and its cells by column."""
     for line, row in enumerate(zip(*cells.values(), strict=True), start=2):
         yield line, dict(zip(cells, row, strict=True))
 
@@ -123,12 +123,13 @@ def _sentences(windows: list[Row], links: list[Row], interpreted: int) -> list[s
     return [
         f"{counted(len(found), 'link swings', 'links swing')} in planes, in {interpreted} of "
         f"{counted(len(windows), 'window')}.",
-        "Each chain may also be its mirror image in depth; depths of chains against each other are open.",
+        "Each chain may also be its mirror image in depth; the depth of one chain relative to another is "
+        "undetermined.",
     ]
 
 
 def _shown(caption: str, rows: list[Row], columns: tuple[str, ...]) -> str:
-    """A table of the page; counts without digits."""
+    """A table of the page; counts without decimals."""
 
     def cell(name: str, value: Any) -> str:
         if name not in _NUMBERS:

@@ -1,4 +1,4 @@
-"""The page of `memo posture`: what was seen, the likeliest motion in 3D, and what else it may have been."""
+"""The page of `memo posture`: the image points, the most probable motion in 3D, and the alternatives."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _IMPOSSIBLE = "no possible sequence"
 
 
 def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
-    """The page of a folder of `memo posture`, and how many frames are in it and what could not be shown."""
+    """The page of a folder of `memo posture`, the number of frames in it and what could not be shown."""
     document = read_postures_json(folder / "postures.json")
     thinned: Thinned[dict[str, Any]] = Thinned(_BYTES, choice.every)
     for frame in document["per_frame"]:
@@ -49,7 +49,7 @@ def posture_page(folder: Path, choice: Choice) -> tuple[Page, dict[str, Any]]:
 
 
 def _second(second: dict[str, Any], frames: list[dict[str, Any]]) -> dict[str, Any]:
-    """The second-best motion, its postures by frame number."""
+    """The second most probable motion, its postures by frame number."""
     first, last = second["first_frame"], second["last_frame"]
     within = [frame["frame"] for frame in frames if first <= frame["frame"] <= last]
     at = dict(zip(map(str, within), second["postures_m"], strict=False))
@@ -73,7 +73,7 @@ def _filled(document: dict[str, Any], name: str, notes: list[str]) -> dict[str, 
 
 
 def _is_possible(document: dict[str, Any]) -> bool:
-    """Whether any posture in the motion breaks no constraint; older documents do not say it themselves."""
+    """Whether any posture in the motion breaks no constraint; older documents do not state it."""
     frames = document["per_frame"]
     found = [frame for frame in frames if any(None not in joint for joint in frame["smoothed_m"])]
     return not found or not all(frame.get("linked_breaks") for frame in found)
@@ -84,7 +84,7 @@ def _sentences(document: dict[str, Any]) -> list[str]:
     left = f"{document.get('frames_with_survivors', UNKNOWN)} of {counted(count, 'frame')}"
     told = [
         f"Postures are left in {left}, "
-        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the likeliest "
+        f"{number(document.get('survivors_median'), 0)} in the median; the posture in the most probable "
         f"motion breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
     ]
     if not _is_possible(document):
@@ -92,12 +92,12 @@ def _sentences(document: dict[str, Any]) -> list[str]:
     most = document.get("most_cut")
     if most:
         often = f"{counted(most['branches'], 'branch', 'branches')} in {counted(most['frames'], 'frame')}"
-        told.append(f"Most is cut by: {most.get('sentence')} ({often}).")
+        told.append(f"Most branches are cut by: {most.get('sentence')} ({often}).")
     second = document.get("second")
     if second:
         joints = " and ".join(joint.replace("_", " ") for joint in second["joints"])
         told.append(
-            f"The next likeliest motion mirrors {joints} in depth in frames {second['first_frame']} to "
+            f"The second most probable motion mirrors {joints} in depth in frames {second['first_frame']} to "
             f"{second['last_frame']}; its probability is {number(second.get('p'))}, its margin over the "
             f"whole sequence {number(second.get('margin_nats'))} nats. Some joint is undecided in "
             f"{document.get('undecided_frames', UNKNOWN)} of {counted(count, 'frame')}."
@@ -118,7 +118,9 @@ def _reasons(document: dict[str, Any]) -> str:
         )
         for total in totals
     ]
-    return rows_table("Constraints, what cut most first", ("constraint", "at", "branches", "frames"), rows)
+    return rows_table(
+        "Constraints, the one that cut most first", ("constraint", "at", "branches", "frames"), rows
+    )
 
 
 def _lengths(document: dict[str, Any]) -> str:
@@ -131,5 +133,5 @@ def _lengths(document: dict[str, Any]) -> str:
         )
         for name, length in document.get("lengths", {}).items()
     ]
-    caption = f"Lengths of the segments; the size rests on: {text(document.get('scale_from'))}"
+    caption = f"Lengths of the segments; scale from: {text(document.get('scale_from'))}"
     return rows_table(caption, ("segment", "length, cm", "sd, cm", "from"), rows)

@@ -1,4 +1,4 @@
-"""`postures.json` as `memo posture` writes it, checked for what the page shows of it."""
+"""Reads the `postures.json` of `memo posture` and checks the parts that the page shows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 __all__ = ["FRAME_SHAPES", "read_postures_json"]
 
-# The shape of the numbers of a frame; "joints" is as many as there are, None any number, () one number.
+# The shape of the numbers of a frame; "joints" means their number, None any number, () a single number.
 FRAME_SHAPES: dict[str, tuple[Any, ...]] = {
     "time_s": (),
     "anchor_m": (),
@@ -29,19 +29,19 @@ FRAME_SHAPES: dict[str, tuple[Any, ...]] = {
 
 
 def read_postures_json(path: Path) -> dict[str, Any]:
-    """The document; ValueError names the part of it that is not as it should be."""
+    """The document; ValueError names the part of it that is wrong."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
     wrong = next(_wrong(document), None)
     if wrong is not None:
-        raise ValueError(f"{path}: {wrong} is missing or not what memo posture writes")
+        raise ValueError(f"{path}: {wrong} is missing or not in the format of memo posture")
     return document  # type: ignore[no-any-return]
 
 
 def _wrong(document: Any) -> Iterator[str]:
-    """What is not as it should be, part by part."""
+    """Yields each part that is wrong."""
     if not (isinstance(document, dict) and document.get("joints") and _are_words(document["joints"])):
         yield "joints"
         return
@@ -98,7 +98,7 @@ def _wrong_in_second(second: Any, joints: int) -> Iterator[str]:
 
 
 def _has_shape(value: Any, shape: tuple[Any, ...], joints: int) -> bool:
-    """Whether a value is nested lists of numbers or null, as deep and as long as the shape says."""
+    """Whether a value is nested lists of numbers or null, with the depth and the lengths of the shape."""
     if not shape:
         return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
     count = joints if shape[0] == "joints" else shape[0]
@@ -116,7 +116,7 @@ def _are_words(value: Any) -> bool:
 
 
 def _is_total(total: Any) -> bool:
-    """Whether this says how often a constraint cut."""
+    """Whether this is the count of cuts of one constraint."""
     return isinstance(total, dict) and all(_is_whole(total.get(name)) for name in ("branches", "frames"))
 
 

@@ -1,6 +1,6 @@
-"""What `memo track` left in a folder, read for the page, with what is missing said in sentences.
+"""Reads a folder of `memo track` for the page; sentences report what is missing.
 
-The tables must be right where they are there: an error names the file. What other files would add
+The tables must be valid if they exist: an error names the file. Additional files
 (`run.json`, `gait_parameters.csv`, the overlay) may be absent, as in the folder of an older memo.
 """
 
@@ -25,17 +25,17 @@ class RunFolder:
 
     path: Path
     columns: dict[str, Any]
-    """`track.csv`: an array per column; no rows where nobody was tracked."""
+    """`track.csv`: one array per column; no rows if nobody was tracked."""
     events: list[dict[str, Any]]
     """`events.csv`."""
     parameters: dict[str, Any]
-    """`gait_parameters.csv`: an array per column; empty where it is not there."""
+    """`gait_parameters.csv`: one array per column; empty if the file is missing."""
     run: dict[str, Any]
-    """`run.json`; empty where it is not there."""
+    """`run.json`; empty if it is missing."""
     missing: list[str]
-    """Files of a run that are not there."""
+    """Files of a run that are missing."""
     video: Path | None
-    """The video that was tracked, as the run tells or the user; it need not be there any more."""
+    """The video that was tracked, named by the run or the user; it need not exist any more."""
 
     @property
     def overlay(self) -> Path | None:
@@ -55,19 +55,19 @@ class RunFolder:
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Width and height of the video, pixels, where the run has a camera."""
+        """Width and height of the video, pixels, if the run has a camera."""
         camera = self.run.get("camera") or {}
         size = camera.get("size")
         return (int(size[0]), int(size[1])) if size else None
 
     @property
     def name(self) -> str:
-        """What the run is called: the video's name, else the folder's."""
+        """Name of the run: the video's name, else the folder's."""
         return self.video.name if self.video else self.path.resolve().name
 
 
 def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
-    """Reads a folder of `memo track`; `video` is where its video is now, if not where `run.json` says.
+    """Reads a folder of `memo track`; `video` is the path of its video, if not that in `run.json`.
 
     ValueError names the file that cannot be used.
     """
@@ -97,7 +97,7 @@ def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
 
 
 def _checked(path: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """The run, where its camera is one: the page draws it."""
+    """Checks the camera of a run, which the page draws."""
     camera = run["camera"] or {}
     for name, count in (("size", 2), ("rotation", 3), ("translation", 3)):
         values = camera.get(name, [0] * count)

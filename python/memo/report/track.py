@@ -1,6 +1,6 @@
-"""The page of a run of `memo track`: pictures, the walker in 3D, curves, parameters, and why.
+"""The page of a run of `memo track`: pictures, the walker in 3D, curves, parameters, and explanations.
 
-Bookkeeping alone: what is drawn was computed by the core, in the run or when a frame is explained again.
+This module computes nothing: the core computed what is drawn, in the run or when a frame is explained.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MOST_EXPLAINED = 400
 _MOST_REGIONS = 5
 
 
-# What goes into the page of every row, with digits that no curve shows.
+# Columns of each row in the page, rounded below the resolution of a curve.
 _SHOWN = {
     "time_s": 4,
     "x_m": 4,
@@ -60,7 +60,7 @@ Progress = Callable[[str, int, "int | None"], object]
 def track_page(
     folder: Path, choice: Choice, progress: Progress | None, video: Path | None = None
 ) -> tuple[Page, dict[str, Any]]:
-    """The page of a run folder, and what went into it: how many pictures and explanations, and notes."""
+    """The page of a run folder, and its contents: the number of pictures and explanations, and notes."""
     run = read_run_folder(folder, video)
     notes: list[str] = []
     pictures, drawn, size, every = _pictures(run, choice, progress, notes, must_be_there=video is not None)
@@ -100,13 +100,13 @@ def track_page(
 
 
 class _NoFrames(ValueError):
-    """None of the frames asked for is there."""
+    """None of the requested frames exists."""
 
 
 def _counted(
     progress: Progress | None, step: str, items: Iterable[Item], total: int | None
 ) -> Iterator[Item]:
-    """The items; each is told when it is done with."""
+    """Yields the items, and reports each when it is done."""
     for done, item in enumerate(items, 1):
         yield item
         if progress is not None:
@@ -116,8 +116,8 @@ def _counted(
 def _pictures(
     run: RunFolder, choice: Choice, progress: Progress | None, notes: list[str], must_be_there: bool
 ) -> tuple[list[Picture], bool, Sequence[int] | None, int]:
-    """The frames as JPEG, whether the model is drawn on them already, the size in pixels that positions
-    refer to, and every how many-th frame they are. A video that must be there is one the user named."""
+    """The frames as JPEG, whether the model is already drawn on them, the size in pixels that positions
+    refer to, and every how many-th frame they are. A video that the user named must exist."""
     if run.video is not None:
         try:
             kept, every, size = _video_pictures(run, run.video, choice, progress, notes)
@@ -144,7 +144,7 @@ def _video_pictures(
 ) -> tuple[list[Picture], int, tuple[int, int]]:
     stop = run.first_frame + run.run["frames_read"] if run.run else None
     thinned: Thinned[Picture] = Thinned(_PICTURES_BYTES, choice.every)
-    nobody = not run.frames  # then what moves is shown, for that is where memo looks for a walker
+    nobody = not run.frames  # then moving regions are shown: memo looks for a walker there
     rate_hz, shrink = run.run.get("fps_given"), run.run.get("shrink", 1)
     with VideoReader(video, start=run.first_frame, stop=stop, rate_hz=rate_hz, shrink=shrink) as reader:
         size = run.size
@@ -159,15 +159,15 @@ def _video_pictures(
                 thinned.keep(picture, picture.size_bytes)
             before = frame.luma.copy() if nobody else None
         if not thinned.items and choice.chosen:
-            raise _NoFrames(f"{video}: no frame of the run is among those asked for; {_read(run)}")
+            raise _NoFrames(f"{video}: no frame of the run is among those requested; {_read(run)}")
         if reader.damage:
             notes.append(f"The video: {reader.damage}.")
-    # Of the video all but what is left over at the right and at the bottom, as averaged pictures show it.
+    # All of the video except a rest at the right and at the bottom that averaged pictures leave out.
     return thinned.items, thinned.every, (shrink * reader.size[0], shrink * reader.size[1])
 
 
 def _read(run: RunFolder) -> str:
-    """Which frames the run read."""
+    """States which frames the run read."""
     count = run.run.get("frames_read")
     return f"it read {run.first_frame} to {run.first_frame + count - 1}" if count else "it read none"
 
@@ -186,7 +186,7 @@ def _overlay_pictures(
 
 
 def _moved(before: Any, now: Any, shrink: int) -> tuple[str | None, tuple[tuple[int, ...], ...]]:
-    """What changed between two frames, and the regions of it in which a walker is looked for, in pixels of
+    """What changed between two frames, and the regions of it that are searched for a walker, in pixels of
     the video."""
     if before is None:
         return None, ()
@@ -199,7 +199,7 @@ def _moved(before: Any, now: Any, shrink: int) -> tuple[str | None, tuple[tuple[
 def _explained(
     run: RunFolder, pictures: list[Picture], choice: Choice, progress: Progress | None, notes: list[str]
 ) -> tuple[list[dict[str, Any]], int]:
-    """Frames with what was seen in them, and every how many-th of the tracked ones in the page they are."""
+    """Frames with their evidence, and every how many-th of the tracked frames in the page they are."""
     shown = {picture.frame for picture in pictures}
     frames = [frame for frame in run.frames if frame in shown]
     if not (choice.why and run.run and frames):

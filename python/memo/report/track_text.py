@@ -1,4 +1,4 @@
-"""The words and tables on the page of a run of `memo track`."""
+"""The texts and tables on the page of a run of `memo track`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOST_TABLES = 3
 
 
 def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dict[str, str]:
-    """HTML for the places of `track.html`."""
+    """HTML for the placeholders of `track.html`."""
     status, tone = _status(run)
     return {
         "version": text(memo.__version__),
@@ -47,7 +47,7 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
 
 
 def _status(run: RunFolder) -> tuple[str, str]:
-    """What became of the run in two words, and how it is coloured."""
+    """The state of the run in two words, and its colour."""
     status = (run.run.get("summary") or {}).get("status")
     told = str(status or ("tracked" if run.frames else "nobody tracked"))
     if run.run.get("interrupted"):
@@ -59,7 +59,7 @@ def _status(run: RunFolder) -> tuple[str, str]:
 
 
 def _folded(items: list[str], most: int, what: str) -> str:
-    """Pieces of HTML; where there are many, those after the first `most` wait to be unfolded."""
+    """Pieces of HTML; if there are many, those after the first `most` are folded."""
     shown, folded = items[:most], items[most:]
     if not folded:
         return "".join(shown)
@@ -68,7 +68,7 @@ def _folded(items: list[str], most: int, what: str) -> str:
 
 
 def _unsteady(run: RunFolder) -> bool:
-    """Whether the steps of a walk were hardly seen."""
+    """Whether the steps of a walk were hardly visible."""
     table = run.parameters
     if not table:
         return False
@@ -94,9 +94,9 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
     told = []
     if run.run.get("interrupted"):
         count = counted(run.run["frames_read"], "frame")
-        told.append(f"The run was interrupted after {count}: what came later was not looked at.")
+        told.append(f"The run was interrupted after {count}: later frames were not read.")
     swapped = {walk: p_swapped for walk, p_swapped in _swapped(run) if p_swapped > _LIKELY_SWAPPED}
-    if swapped and (not run.run or len(_sentences(run)) > _MOST_SENTENCES):  # else sentences in sight say so
+    if swapped and (not run.run or len(_sentences(run)) > _MOST_SENTENCES):  # else visible sentences state it
         up_to = "up to " * (len(swapped) > 1)
         told.append(
             f"Left and right may be swapped in {_numbered(list(swapped))} "
@@ -110,14 +110,14 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
         )
     if run.frames and not run.run.get("camera_given", True):
         told.append(
-            "The camera was guessed: depths rest on the assumed field of view; heights and sideways "
+            "The camera was assumed: depths depend on the assumed field of view; heights and sideways "
             "positions do not."
         )
     if run.missing:
         told.append(f"Not in the folder: {', '.join(run.missing)}. It may be from an older memo.")
     if run.overlay is None and run.frames:
         told.append(
-            "There is no overlay.mp4: it was not wanted, was removed, or its drawing was interrupted."
+            "There is no overlay.mp4: it was not requested, was removed, or its drawing was interrupted."
         )
     return "".join(f"<li>{text(warning)}</li>" for warning in told + notes)
 
@@ -129,25 +129,25 @@ def _numbered(walks: list[int]) -> str:
 
 
 def _swapped(run: RunFolder) -> list[tuple[int, float]]:
-    """The probability that the sides are interchanged, walk by walk: it is the same in all rows of one."""
+    """The probability that the sides are interchanged, by walk: it is the same in all rows of a walk."""
     walks, p_swapped = run.columns["walk"], run.columns["p_swapped"]
     return [(int(walk), float(p_swapped[walks == walk][0])) for walk in np.unique(walks)]
 
 
 def _backward(run: RunFolder) -> list[int]:
-    """The walks with a speed against the direction faced."""
+    """The walks with a speed opposite to the direction the person faces."""
     walks, speeds = run.columns["walk"], run.columns["speed_mps"]
     return [int(walk) for walk in np.unique(walks) if _middle(speeds[walks == walk]) < 0]
 
 
 def _middle(values: Any) -> float:
-    """The middle one of the known values; NaN without any."""
+    """The median of the known values; NaN if there are none."""
     known = np.sort(values[np.isfinite(values)])
     return float(known[len(known) // 2]) if len(known) else float("nan")
 
 
 def _moved_sentence(pictures: list[Picture]) -> str:
-    """How much moves, where nobody was tracked."""
+    """Describes how much moves, if nobody was tracked."""
     looked = [picture for picture in pictures if picture.moved is not None]
     if not looked:
         return ""
@@ -156,7 +156,7 @@ def _moved_sentence(pictures: list[Picture]) -> str:
         return f"Nothing moves in the {counted(len(looked), 'frame')} of this page."
     return (
         f"Something moves in {len(heights)} of the {counted(len(looked), 'frame')} of this page; the "
-        f"largest thing that does is up to {max(heights)} px high. What changed since the frame before is "
+        f"largest moving region is up to {max(heights)} px high. What changed since the previous frame is "
         "green, with a box around each moving region."
     )
 
@@ -184,9 +184,9 @@ def _walks(run: RunFolder) -> str:
 
 
 def _parameters(run: RunFolder) -> str:
-    """A table of gait parameters for each walk, and what they mean."""
+    """A table of gait parameters for each walk, and their definitions."""
     if not run.parameters or not len(run.parameters["walk"]):
-        return "<p>There are none: gait_parameters.csv is not there, or holds no line.</p>"
+        return "<p>There are none: gait_parameters.csv is missing or has no rows.</p>"
     columns = [run.parameters[name] for name in GAIT_COLUMNS]
     lines = [dict(zip(GAIT_COLUMNS, line, strict=True)) for line in zip(*columns, strict=True)]
     tables = []
@@ -204,12 +204,12 @@ def _parameters(run: RunFolder) -> str:
         tables.append(rows_table(f"Walk {walk + 1}: value, 95 % interval, number of steps", header, rows))
     named = dict.fromkeys(line["parameter"] for line in lines)
     meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
-    told = f"<details open><summary>What they are</summary>{_listed(meanings)}</details>"
+    told = f"<details open><summary>Definitions</summary>{_listed(meanings)}</details>"
     return _folded(tables, _MOST_TABLES, "walks") + told
 
 
 def _measured(line: dict[str, Any]) -> str:
-    """A value with its interval and how many steps it rests on, as HTML."""
+    """A value with its interval and the number of steps it is based on, as HTML."""
     digits = 1 if line["unit"] in ("%", "1/min") else 3
     value = number(line["value"], digits)
     if line["n"] == 0:
@@ -244,14 +244,14 @@ def _events(run: RunFolder) -> str:
 
 
 def _walk_at(run: RunFolder, frame: float) -> str:
-    """Number of the walk, from 1, a moment belongs to: that of the tracked frame next to it."""
+    """Number of the walk, from 1, that a moment belongs to: that of the nearest tracked frame."""
     return str(int(run.columns["walk"][np.argmin(np.abs(run.columns["frame"] - frame))]) + 1)
 
 
 def _how(run: RunFolder) -> str:
-    """How it was run, as a list of names and values."""
+    """The options of the run, as a list of names and values."""
     if not run.run:
-        return "<p>There is no run.json in the folder: with which options it was run is not known.</p>"
+        return "<p>There is no run.json in the folder: the options of the run are unknown.</p>"
     told = run.run
     first, stop = told["frames"]
     given = {
@@ -260,7 +260,7 @@ def _how(run: RunFolder) -> str:
         "frames": f"{first} to {'the end' if stop is None else stop - 1}, {told['frames_read']} read",
         "frames per second": _value(told.get("rate_hz")),
         "rate given": _value(told.get("fps_given")),
-        "camera": "as given" if told.get("camera_given") else "guessed",
+        "camera": "as given" if told.get("camera_given") else "assumed",
         **{f"option {name}": _value(value) for name, value in (told.get("options") or {}).items()},
         **{f"camera {name}": _value(value) for name, value in (told.get("camera") or {}).items()},
         **{f"result {name}": _value(value) for name, value in (told.get("summary") or {}).items()},
@@ -269,7 +269,7 @@ def _how(run: RunFolder) -> str:
 
 
 def _value(value: Any, depth: int = 0) -> str:
-    """A value of run.json in the fewest words."""
+    """A value of run.json as short text."""
     if depth > _DEEPEST:
         return "\N{HORIZONTAL ELLIPSIS}"
     if value is None:

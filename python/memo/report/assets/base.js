@@ -1,11 +1,11 @@
 "use strict";
-// What every page uses: the data, words and numbers, the player of frames, charts.
+// Shared by all pages: the data, texts and numbers, the player of frames, charts.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 
-/** A number with a true minus, or a dash for what is not known. */
+/** A number with a minus sign, or a dash if unknown. */
 function told(value, digits) {
   return isNumber(value) ? value.toFixed(digits).replace("-", "\u2212") : "\u2013";
 }
@@ -25,7 +25,7 @@ function shape(name, attributes, ...children) {
   return made;
 }
 
-// Colours of canvases: those of the style sheet's theme, and the light ones on paper.
+// Colours of canvases: those of the style sheet's theme; on paper, the light ones.
 
 const darkTheme = matchMedia("(prefers-color-scheme: dark)");
 let onPaper = false;
@@ -61,7 +61,7 @@ function drawnCanvas(canvas, aspect, draw) {
   return now;
 }
 
-// Pictures out of data URIs, loaded when wanted; the last few stay.
+// Pictures from data URIs, loaded on demand; the last few are kept.
 
 class Pictures {
   constructor(uris) {
@@ -69,7 +69,7 @@ class Pictures {
     this.loaded = new Map();
   }
 
-  /** The picture, or null while it is being decoded: then `ready` is called once it is there. */
+  /** The picture, or null while it is being decoded; `ready` is then called when it is done. */
   at(index, ready) {
     for (let ahead = index; ahead < Math.min(index + 6, this.uris.length); ahead += 1) this.load(ahead);
     const image = this.loaded.get(index);
@@ -88,7 +88,7 @@ class Pictures {
   }
 }
 
-// The player: which of the frames is shown, by slider, keys, charts or time.
+// The player: selects the frame shown by slider, keys, charts or time.
 
 class Player {
   constructor(times, label) {
@@ -162,7 +162,7 @@ class Player {
   }
 }
 
-// Charts: curves over one axis, with spreads, a band, marks and where we are.
+// Charts: curves over one axis, with spreads, a band, marks and the current position.
 
 const MARGIN = { left: 44, right: 10, top: 8, bottom: 32 };
 
@@ -179,7 +179,7 @@ function ticks(low, high, count) {
   return [found, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
 }
 
-/** `M x y L x y` through points; null starts anew. */
+/** `M x y L x y` through points; null starts a new line. */
 function path(points) {
   let pen = "M";
   let written = "";
@@ -191,7 +191,7 @@ function path(points) {
   return written;
 }
 
-/** The stretches of indices without a gap before them or an unknown value. */
+/** The runs of indices without a gap or an unknown value. */
 function stretches(xs, ys, gaps) {
   const found = [];
   let open = null;
@@ -206,7 +206,7 @@ function stretches(xs, ys, gaps) {
 
 /**
  * A chart in `host`. `spec`: title, unit, digits, xs, xLabel, xRange, yRange, curves [{name, ys, sds, gaps, look}],
- * band {xs, ys, sds}, marks [{x, look}], seek(x). Returns a function (x, values) that shows where we are.
+ * band {xs, ys, sds}, marks [{x, look}], seek(x). Returns a function (x, values) that shows the current position.
  */
 function chart(host, spec) {
   const value = element("span");

@@ -5,7 +5,7 @@ const at = new Map(names.map((name, index) => [name, index]));
 const player = new Player(frames.map(({ time_s: time }) => time), (index) => `frame ${frames[index].frame}, ${told(frames[index].time_s, 2)} s`);
 const now = () => frames[player.at];
 
-/** The window of this frame: of those that hold it, an interpreted one, the nearest to its middle. */
+/** The window of this frame: an interpreted one if possible, with the middle nearest to the frame. */
 function windowNow() {
   const time = now()?.time_s;
   const off = ({ start_s: start, end_s: end }) => Math.abs((start + end) / 2 - time);
@@ -49,7 +49,7 @@ const drawPoints = drawnCanvas($("points"), () => 4 / 3, (context, width, height
 });
 $("show-links").addEventListener("change", drawPoints);
 
-// In depth: u to the right, depth away, v down; as large as a person.
+// In depth: u to the right, depth away, v down; scaled to the size of a person.
 
 const mirrored = new Set();
 const chainNames = [...new Set(chains.map(({ chain }) => chain))];
@@ -64,7 +64,7 @@ for (const chain of chainNames) {
 }
 
 const scale = 1.7 / high;
-/** A point as [right, away, up], its depth mirrored where its chain is; without a depth in the plane of the picture. */
+/** A point as [right, away, up], with mirrored depth if its chain is mirrored; without a depth, in the plane of the picture. */
 function placed(index) {
   const [u, v, depth] = now().points[index] ?? [];
   if (!isNumber(u) || !isNumber(v)) return null;

@@ -1,4 +1,4 @@
-// The page of postures from one view: what was seen, the likeliest motion, and what else it may have been.
+// The page of postures from one view: the image points, the most probable motion, and the alternatives.
 
 const { joints, frames, second } = data;
 const player = new Player(frames.map(({ time_s: time }) => time), (index) => `frame ${frames[index].frame}, ${told(frames[index].time_s, 2)} s`);
@@ -8,7 +8,7 @@ const BONES = ["right", "left"].flatMap((side) => [["neck", "shoulder"], ["shoul
   .map((ends) => [side, ends.map((end) => (["neck", "pelvis"].includes(end) ? end : `${side}_${end}`))]))
   .concat([["body", ["neck", "pelvis"]]]);
 
-// What was seen, in pixels; the part of the picture that all frames need.
+// The image points, in pixels; the part of the picture that all frames need.
 
 const seen = frames.flatMap((frame) => frame.points_px).filter((point) => known(point));
 const extent = [0, 1].map((axis) => {
@@ -49,7 +49,7 @@ const drawPoints = drawnCanvas($("points"), () => (view.canvas.clientWidth < 500
   context.globalAlpha = 1;
 });
 
-// In 3D: the likeliest motion, and beside it, see-through, another reading.
+// In 3D: the most probable motion, and beside it an alternative, transparent.
 
 const other = $("other");
 const most = frames.reduce((count, frame) => Math.max(count, frame.groups_m.length), 0);
@@ -99,18 +99,18 @@ $("views").addEventListener("click", (event) => {
   if (chosen) view.from(...chosen);
 });
 
-// Words and numbers of the frame.
+// Texts and numbers of the frame.
 
 function showFrame() {
   const frame = now();
   $("frame-now").textContent = `frame ${frame.frame}`;
   const lines = [];
-  if (frame.problem) lines.push(`This frame says nothing: ${frame.problem}`);
+  if (frame.problem) lines.push(`This frame cannot be used: ${frame.problem}`);
   const count = frame.group_count === null ? "" : `, in ${frame.group_count} groups`;
   lines.push(`${frame.survivors} postures left${count}.`);
-  for (const broken of frame.cut_all ?? []) lines.push(`Nothing is left; the least violating posture: ${broken}`);
+  for (const broken of frame.cut_all ?? []) lines.push(`No posture is left; the least violating posture: ${broken}`);
   lines.push(frame.linked_breaks?.length ? `The posture in the motion breaks: ${frame.linked_breaks.map((name) => name.replaceAll("_", " ")).join(", ")}.` : "The posture in the motion breaks no constraint.");
-  lines.push(isNumber(frame.margin_nats) ? `Margin of this frame, to the best motion that differs in it: ${told(frame.margin_nats, 2)} nats.` : "No other motion is in reach here.");
+  lines.push(isNumber(frame.margin_nats) ? `Margin between this motion and the best one that differs in this frame: ${told(frame.margin_nats, 2)} nats.` : "No other motion is possible in this frame.");
   $("frame-told").replaceChildren(...lines.map((line) => element("li", {}, line)));
   const rows = joints.map((name, index) => {
     const p = frame.p_mirrored[index];
@@ -130,7 +130,7 @@ function showFrame() {
 const times = frames.map(({ time_s: time }) => time);
 const drawn = [
   ["Postures left", "", 0, frames.map(({ survivors }) => survivors), undefined],
-  ["Margin of each frame, to the best motion that differs in it", "nats", 2, frames.map(({ margin_nats: margin }) => margin), undefined],
+  ["Margin to the best motion that differs in the frame", "nats", 2, frames.map(({ margin_nats: margin }) => margin), undefined],
   ["Largest P(mirrored) of all joints", "", 2, frames.map(({ p_mirrored: p }) => (p.some(isNumber) ? Math.max(...p.filter(isNumber)) : null)), [0, 1]],
   ["Distance of the neck from the camera", "m", 2, frames.map(({ anchor_m: anchor }) => anchor), undefined, frames.map(({ anchor_sd_m: sd }) => sd)],
 ].map(([title, unit, digits, ys, yRange, sds]) => {

@@ -21,7 +21,7 @@ const TRAIL_S = 1;
 const stagePictures = new Pictures(pictures.uri);
 const movedPictures = new Pictures(pictures.moved);
 
-/** Segments out of base64: [[u, v], [u, v]] each, in pixels of the part shown. */
+/** Segments from base64: [[u, v], [u, v]] each, in pixels of the part shown. */
 const unpackedOf = new Map();
 function unpacked(text, stepPx) {
   if (!unpackedOf.has(text)) {
@@ -85,7 +85,7 @@ const drawStage = drawnCanvas($("stage"), () => stageSize()[0] / stageSize()[1],
     strokes(context, unpacked(model, step_px), "#f0e442", thick * 0.7, ([u, v]) => place([u + corner[0], v + corner[1]]));
   }
   for (const [side, chain] of CHAINS) {
-    const colour = DARK[side]; // a picture is as bright on any theme
+    const colour = DARK[side]; // a picture has the same brightness in every theme
     if ($("show-trail").checked && chain[2].endsWith("ankle")) {
       context.globalAlpha = 0.55;
       const trail = [];
@@ -160,13 +160,13 @@ $("views").addEventListener("click", (event) => {
   if (chosen) view.from(...chosen);
 });
 
-// Why.
+// Explanation.
 
 const PARTS = [["head", 0, 0], ["torso", 1, 1], ["right arm", 2, 4], ["left arm", 5, 7], ["right leg", 8, 10], ["left leg", 11, 13]];
 const whyPictures = Object.fromEntries(["luma", "change", "edges"].map((name) => [name, new Pictures(why.map((item) => item[name]))]));
 let whyNow = 0;
 
-/** Red where nothing answers, yellow to green where something does; from a half on all is as green. */
+/** Red without support, yellow to green with support; the same green from a half on. */
 const matchColour = (share) => (share > 0 ? `hsl(${Math.round(60 + 80 * Math.min(1, 2 * share))} 90% 50%)` : "#e5484d");
 const partColour = (part) => (part >= 8 ? (part <= 10 ? DARK.right : DARK.left) : part >= 5 ? DARK.left : part >= 2 ? DARK.right : "#f0e442");
 const WHY = {

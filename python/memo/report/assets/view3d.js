@@ -1,4 +1,4 @@
-// A small 3D view on a canvas: an eye that circles a point, things sorted by depth.
+// A small 3D view on a canvas: an eye that orbits a point, items sorted by depth.
 
 const sum = (a, b) => a.map((value, k) => value + b[k]);
 const difference = (a, b) => a.map((value, k) => value - b[k]);
@@ -9,7 +9,7 @@ const known = (...points) => points.every((point) => point && point.every(isNumb
 const NEAR_M = 0.05;
 
 class View3D {
-  /** `scene(view)` puts things into the view by `line`, `limb`, `ball`, `face` and `label`; `aspect()` is width over height. */
+  /** `scene(view)` adds items to the view by `line`, `limb`, `ball`, `face` and `label`; `aspect()` is width over height. */
   constructor(canvas, scene, aspect = () => 4 / 3) {
     this.canvas = canvas;
     this.scene = scene;
@@ -92,7 +92,7 @@ class View3D {
     return [this.middle[0] + factor * dot(from, this.right), this.middle[1] - factor * dot(from, this.up)];
   }
 
-  /** What is nearer is painted later. */
+  /** Nearer items are painted later. */
   flush() {
     this.things.sort((a, b) => b.depth - a.depth);
     for (const thing of this.things) thing.paint(this.context);
@@ -179,7 +179,7 @@ class View3D {
     }, 0.05);
   }
 
-  /** The ground around the target, half a metre a square, fading; and the axes at the origin. */
+  /** The ground around the target, in squares of half a metre, fading; and the axes at the origin. */
   ground() {
     const { grid, soft } = palette();
     const reach = Math.min(12, Math.max(3, Math.ceil(this.distance)));
@@ -205,13 +205,13 @@ class View3D {
   }
 }
 
-// The figure both pages have: limbs by name, metres.
+// The figure of both pages: limbs by name, metres.
 
 const LIMBS = [
   ["shoulder", "elbow", 0.045], ["elbow", "wrist", 0.036], ["hip", "knee", 0.066], ["knee", "ankle", 0.046],
 ];
 
-/** A figure of rods; `joint(name)` gives a point or null, `bones` is the look: thick or thin, or see-through. */
+/** A figure of rods; `joint(name)` gives a point or null, `bones` is the style: thick or thin, or transparent. */
 function figure(view, joint, { opacity = 1, thickness = 1, plain: plainColour = null } = {}) {
   const { right, left, body, rim, shadow } = palette();
   const trunk = ["right_shoulder", "left_shoulder", "left_hip", "right_hip"].map(joint);
@@ -241,7 +241,7 @@ function cameraPose({ rotation, translation }) {
   const angle = Math.hypot(...rotation);
   const axis = angle ? scaled(rotation, 1 / angle) : [0, 0, 1];
   const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
-  const worldFromCamera = (v) => // the inverse turns back by the same angle
+  const worldFromCamera = (v) => // the inverse is a rotation back by the same angle
     sum(sum(scaled(v, Math.cos(angle)), scaled(cross(axis, v), -Math.sin(angle))), scaled(axis, dot(axis, v) * (1 - Math.cos(angle))));
   return { centre: scaled(worldFromCamera(translation), -1), forward: worldFromCamera([0, 0, 1]) };
 }
