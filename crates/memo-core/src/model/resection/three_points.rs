@@ -28,9 +28,9 @@ use glam::{DMat3, DVec3};
 use nalgebra::Matrix4;
 use nalgebra::linalg::Schur;
 
-/// Of the two roots u for one v, the root that satisfies u D = N worse by this factor is dropped,
+/// Of the two roots u for one v, a root is dropped if its error in u D = N is larger by this factor.
 const TOLD_APART: f64 = 10.0;
-/// unless the difference is within the rounding error of a double root.
+/// Errors in u D = N up to this are the rounding of a double root: both roots are kept.
 const ROUNDING: f64 = 1e-6;
 
 /// At most eight rotations that map the points onto the rays; the rays have unit length.
