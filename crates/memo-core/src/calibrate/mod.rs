@@ -1,11 +1,14 @@
-//! A camera from what its picture shows: measured points, or a person who walks.
+//! Camera calibration from an image: from measured points, or from a person who walks.
 //!
-//! | function | needs | leaves open |
+//! | function | needs | undetermined |
 //! |---|---|---|
-//! | [`camera_from_points`] | six points whose places are measured, four in a plane | nothing but what they do not show |
-//! | [`camera_from_walker`] | a person of known height at several distances | where the world's X axis points |
+//! | [`camera_from_points`] | six points with measured positions, four in a plane | only what the points do
+//! not determine |
+//! | [`camera_from_walker`] | a person of known height at several distances | the direction of the world's X
+//! axis |
 //!
-//! Both fit by least squares and give the covariance of what they fitted. Pixels are taken as square.
+//! Both fit by least squares and return the covariance of the fitted parameters. Pixels are assumed to be
+//! square.
 
 pub mod points;
 pub mod walker;
@@ -15,13 +18,13 @@ pub use walker::{
     Sighting, WalkerCalibration, WalkerError, WalkerOptions, camera_from_walker, sightings_from_joints,
 };
 
-/// A fitted number.
+/// A fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// What it is, with its unit.
+    /// Name of the parameter, with its unit.
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, in the same unit.
     pub sd: f64,
 }

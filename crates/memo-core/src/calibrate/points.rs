@@ -1,18 +1,20 @@
-//! A camera from measured points: their places in the world and where the picture shows them.
+//! Camera calibration from measured points: their positions in the world and in the image.
 //!
-//! 1. Poses to start from come from [`resect`], which tries all directions and the linear solution of Lee and
-//!    Chen 1985 (their eqs. (1)-(5), the direct linear transformation): from all points, and from some six of them
-//!    so that a mistaken point does not spoil all.
-//! 2. Focal length and pose are fitted by least squares (Levenberg and Marquardt), with weights that forget points
-//!    far off; what then lies farther off than one calibration in a hundred would have by chance is left out.
-//! 3. The principal point, k1 and k2 are fitted too where Akaike's criterion for small samples (Hurvich and Tsai
-//!    1989) asks for them by a margin; else the principal point is the picture's centre and the lens has none.
+//! 1. Initial poses come from [`resect`], which tries all directions and the linear solution of Lee and Chen
+//!    1985 (their eqs. (1)-(5), the direct linear transformation): from all points, and from several sets of
+//!    six points so that a wrong point does not affect all of them.
+//! 2. Focal length and pose are fitted by least squares (Levenberg and Marquardt), with weights that suppress
+//!    outliers. Points farther off than chance would cause in one calibration in a hundred are left out.
+//! 3. The principal point, k1 and k2 are fitted too if Akaike's criterion for small samples (Hurvich and Tsai
+//!    1989) improves by a margin; otherwise the principal point is the image centre and the lens has no
+//!    distortion.
 //!
-//! The standard deviation of a pixel is estimated from the residuals, and the covariance is that of the fit alone:
-//! that pixels are square and the lens is no more than k1, k2 is assumed.
+//! The standard deviation of a pixel coordinate is estimated from the residuals. The covariance is that of
+//! the fit alone: it assumes that pixels are square and that the distortion is no more than k1, k2.
 //!
-//! Points in one plane do not tell the focal length if the plane is seen head on. Which of the parameters the
-//! points do not tell is an error that says so, not a number with a large deviation.
+//! Limits: points in one plane do not determine the focal length if the camera looks straight at the plane. A
+//! parameter that the points do not determine is an error that names it, not a number with a large standard
+//! deviation.
 
 use crate::wording::counted;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -27,30 +29,30 @@ use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
 use crate::model::resection::{Focal, ResectionOptions, resect};
 
-/// Points in space, and in a plane, that the fit needs.
+/// Number of points that the fit needs in space, and in a plane.
 const NEEDED: usize = 6;
 const NEEDED_IN_PLANE: usize = 4;
-/// Points lie in a plane, on a line, below this ratio of the singular values of their centred coordinates.
+/// Points are coplanar or collinear below this ratio of the singular values of their centred coordinates.
 const FLAT: f64 = 1e-4;
-/// The focal length is told apart from the distance if its standard deviation is below this share of it.
+/// The focal length is determined if its relative standard deviation is below this.
 const MAX_FOCAL_SD: f64 = 0.25;
-/// At least this noise is assumed when asking what the points tell, pixels.
+/// Lower bound of the noise in the test of what the points determine, pixels.
 const LEAST_NOISE_PX: f64 = 0.5;
 /// An additional parameter must lower Akaike's criterion by this much (odds of 20 to 1).
 const MARGIN: f64 = 6.0;
-/// A point is left out if chance would put the farthest of all so far off less often than this.
+/// A point is left out if, by chance, the largest of all errors would be as large less often than this.
 const CHANCE: f64 = 0.01;
-/// Coordinates beyond this are no metres or pixels.
+/// Largest accepted coordinate, metres or pixels.
 const MAX_COORDINATE: f64 = 1e6;
 
 /// Why no camera was found.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PointError {
-    /// Places and pixels are not paired.
+    /// The numbers of positions and pixels differ.
     #[error("{} but {}", counted(*world, "place"), counted(*image, "pixel"))]
     Unpaired {
-        /// Number of places.
+        /// Number of positions.
         world: usize,
         /// Number of pixels.
         image: usize,
@@ -58,54 +60,54 @@ pub enum PointError {
     /// A coordinate is NaN, infinite or too large.
     #[error("point {index}: {column} must be finite and at most {MAX_COORDINATE:e} in size, got {value}")]
     Coordinate {
-        /// Number of the point, from 0.
+        /// Index of the point, from 0.
         index: usize,
         /// `x_m`, `y_m`, `z_m`, `u_px` or `v_px`.
         column: &'static str,
         /// Its value.
         value: f64,
     },
-    /// Not enough points.
+    /// There are not enough points.
     #[error("{}: {NEEDED} are needed, or {NEEDED_IN_PLANE} if all lie in one plane", counted(*count, "point"))]
     TooFew {
-        /// Points given.
+        /// Number of points given.
         count: usize,
     },
-    /// Two points are one.
+    /// Two points coincide.
     #[error("points {first} and {second} have the same place: {NEEDED} different ones are needed")]
     SamePlace {
-        /// Number of one point, from 0.
+        /// Index of one point, from 0.
         first: usize,
-        /// Number of the other.
+        /// Index of the other point.
         second: usize,
     },
     /// All points lie on a line.
     #[error("all points lie on one line: the camera could be turned about it; measure points beside it")]
     Collinear,
-    /// All pixels are one or on a line.
+    /// All pixels coincide or lie on a line.
     #[error("all pixels lie on one line: the camera would stand in the plane of the points")]
     PixelsOnALine,
-    /// The focal length and the distance cannot be told apart.
+    /// The points do not determine focal length and distance separately.
     #[error(
         "the points do not tell focal length from distance (the focal length would be known to ±{:.0} %): they are seen at too similar depths; measure points nearer and farther, or give the field of view",
         relative_sd * 100.0
     )]
     FocalUnknown {
-        /// Standard deviation of the focal length over itself.
+        /// Standard deviation of the focal length, divided by the focal length.
         relative_sd: f64,
     },
-    /// The points leave the camera free in some way.
+    /// The points leave the camera undetermined in some way.
     #[error("the points do not determine the camera: more than one fits them alike")]
     Undetermined,
-    /// No camera has all points in front of it and near their pixels.
+    /// No camera has all points in front of it and close to their pixels.
     #[error(
         "no camera shows the points at these pixels: nearest is {rms_px:.0} px off; are places and pixels of the same points, in metres and pixels?"
     )]
     NoCamera {
-        /// Root mean square distance of the best camera, pixels; infinite if there is none.
+        /// Root mean square residual of the best camera, pixels; infinite if there is none.
         rms_px: f64,
     },
-    /// A mirrored picture fits.
+    /// The points fit a mirrored image.
     #[error(
         "the points fit a mirrored picture: the axes are left-handed, v counts upwards, or the picture is mirrored"
     )]
@@ -115,15 +117,16 @@ pub enum PointError {
     Camera(#[from] CameraError),
 }
 
-/// What is known of the lens beforehand.
+/// Known lens parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum KnownLens {
-    /// Nothing: square pixels, and a principal point in the centre unless the points say otherwise.
+    /// No parameter is known: square pixels, and a principal point at the image centre unless the points show
+    /// otherwise.
     #[default]
     Nothing,
-    /// The focal length, pixels.
+    /// The focal length is known, pixels.
     Focal(f64),
-    /// All of it.
+    /// All parameters are known.
     All {
         /// Focal lengths along u and v, pixels.
         focal_px: DVec2,
@@ -134,46 +137,47 @@ pub enum KnownLens {
     },
 }
 
-/// What is known and how the fit is done.
+/// Known quantities and options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointOptions {
-    /// Width and height of the picture, pixels.
+    /// Width and height of the image, pixels.
     pub size: [u32; 2],
-    /// What is known of the lens.
+    /// Known lens parameters.
     pub lens: KnownLens,
 }
 
-/// A camera and how well the points tell it.
+/// A camera and its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointCalibration {
     /// The camera.
     pub camera: Camera,
-    /// What was fitted: `focal_px`, `centre_u_px`, `centre_v_px`, `k1`, `k2` as far as they were, then the position
-    /// `x_m`, `y_m`, `z_m` of the camera. Deviations are NaN where there are as many equations as unknowns.
+    /// The fitted parameters: `focal_px`, `centre_u_px`, `centre_v_px`, `k1`, `k2` if they were fitted, then
+    /// the position `x_m`, `y_m`, `z_m` of the camera. Standard deviations are NaN where there are as many
+    /// equations as unknowns.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the fitted parameters: those of the lens as in `estimates` but the focal length's logarithm,
-    /// then the rotation (a vector in camera axes, radians) and the translation, metres.
+    /// Covariance of the fitted parameters: those of the lens as in `estimates`, but with the logarithm of
+    /// the focal length, then the rotation (a vector in camera axes, radians) and the translation, metres.
     pub covariance: DMatrix<f64>,
-    /// Projected minus given pixel of every point, those left out too.
+    /// Projected minus given pixel of every point, including the points left out.
     pub residuals_px: Vec<DVec2>,
-    /// Numbers of the points that were left out, from 0.
+    /// Indices of the points left out, from 0.
     pub outliers: Vec<usize>,
-    /// Root mean square distance of projected and given pixels, of points not left out.
+    /// Root mean square distance between projected and given pixels, over the points not left out.
     pub rms_px: f64,
-    /// Standard deviation of a pixel's coordinate, estimated from the residuals.
+    /// Standard deviation of a pixel coordinate, estimated from the residuals, pixels.
     pub noise_px: f64,
-    /// Equations less unknowns.
+    /// Number of equations minus number of unknowns.
     pub degrees_of_freedom: usize,
     /// Whether all points lie in one plane.
     pub is_planar: bool,
 }
 
-/// The camera that shows `places` (metres) at `pixels`.
+/// The camera that images `places` (world axes, metres) at `pixels` (u, v).
 ///
 /// # Errors
 ///
-/// Coordinates that are no numbers, too few points or such that leave the camera open, mirrored ones, and points
-/// that no camera shows so.
+/// Coordinates that are not finite or too large, too few points, points that leave the camera undetermined,
+/// mirrored points, and points that are not consistent with any camera.
 pub fn camera_from_points(
     places: &[DVec3],
     pixels: &[DVec2],
@@ -195,7 +199,7 @@ pub fn camera_from_points(
     let problem = Problem::new(places, pixels, options)?;
     let fitted = problem.fitted();
     let is_good = |found: &Fitted| found.rms_px < 0.02 * problem.diagonal_px;
-    // Mirrored points fit as well as others if they lie in a plane, but from below it.
+    // Mirrored points in a plane fit as well as others, with the camera below the plane.
     let mirrored = || problem.mirrored().fitted().is_some_and(|other| is_good(&other));
     let found = match fitted {
         Some(found) if is_good(&found) => found,
@@ -242,12 +246,12 @@ fn check(places: &[DVec3], pixels: &[DVec2]) -> Result<(), PointError> {
     Ok(())
 }
 
-/// How points spread.
+/// The spread of points.
 #[derive(Debug)]
 struct Shape {
     /// Second and third over first singular value of the centred points.
     ratios: [f64; 2],
-    /// Unit direction in which they spread least.
+    /// Unit direction in which the points spread least.
     normal: DVec3,
 }
 
@@ -283,17 +287,17 @@ const STEPS: [f64; PARAMETERS] = [1e-6, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6
 
 struct Problem<'a> {
     places: &'a [DVec3],
-    /// Pixels to be met: undistorted and with square pixels where the lens is known.
+    /// The pixels to fit: undistorted and with square pixels if the lens is known.
     pixels: Vec<DVec2>,
     size: [u32; 2],
     lens: KnownLens,
-    /// Where the principal point is taken to be.
+    /// The assumed principal point.
     centre_px: DVec2,
     known_focal_px: Option<f64>,
     diagonal_px: f64,
 }
 
-/// A camera of the problem's parameters.
+/// A camera given by the parameters of the problem.
 #[derive(Clone, Copy)]
 struct State {
     focal_px: f64,
@@ -346,13 +350,13 @@ impl<'a> Problem<'a> {
         Ok(Self { places, pixels, size, lens: options.lens, centre_px, known_focal_px, diagonal_px })
     }
 
-    /// The same with the picture mirrored.
+    /// The same problem with the image mirrored.
     fn mirrored(&self) -> Self {
         let pixels = self.pixels.iter().map(|p| DVec2::new(2.0 * self.centre_px.x - p.x, p.y)).collect();
         Self { pixels, ..*self }
     }
 
-    /// Steps 1 to 3 of the module's head.
+    /// Steps 1 to 3 of the module documentation.
     fn fitted(&self) -> Option<Fitted> {
         let mut free: Vec<usize> = (5..PARAMETERS).collect();
         if self.known_focal_px.is_none() {
@@ -365,7 +369,7 @@ impl<'a> Problem<'a> {
         if self.known_focal_px.is_some() {
             return Some(found);
         }
-        // 3. One more parameter at a time, or the two of the principal point.
+        // 3. Add one parameter at a time, or the two of the principal point.
         loop {
             let extensions: [&[usize]; 3] = [&CENTRE, &[K1], &[K2]];
             let allowed = |extra: &&[usize]| {
@@ -389,7 +393,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The best pose to start from, by the median distance of its pixels.
+    /// The best initial pose, by the median distance of its pixels.
     fn start(&self) -> Option<State> {
         let all: Vec<usize> = (0..self.places.len()).collect();
         let mut subsets = vec![all.clone()];
@@ -407,7 +411,7 @@ impl<'a> Problem<'a> {
         }
         let mut best: Option<(f64, State)> = None;
         for (number, subset) in subsets.iter().enumerate() {
-            // Where the pose from all points leaves none far off, none of them spoils it.
+            // If the pose from all points has no outliers, no wrong point affects it.
             if number == 1
                 && best.as_ref().is_some_and(|(middle, state)| self.leaves_none_far(state, *middle))
             {
@@ -418,7 +422,7 @@ impl<'a> Problem<'a> {
                     .map(|i| self.residual(&state, i).map_or(f64::INFINITY, DVec2::length))
                     .collect();
                 distances.sort_by(f64::total_cmp);
-                // The median, counted so that the points a fit goes through do not make it small.
+                // The median, shifted so that the points which a fit passes through do not make it small.
                 let middle = distances[(distances.len() + NEEDED.min(distances.len() / 2)) / 2];
                 if best.as_ref().is_none_or(|(least, _)| middle < *least) {
                     best = Some((middle, state));
@@ -428,8 +432,9 @@ impl<'a> Problem<'a> {
         best.map(|(_, state)| state).filter(|state| all.iter().any(|&i| self.residual(state, i).is_some()))
     }
 
-    /// Whether no point is much farther off than most, in a picture of any size: a pixel read from it may err by one,
-    /// and a pose that misses most points by a visible share of the picture is not that of the camera.
+    /// Whether no point is much farther off than most. The limit holds for images of any size: a pixel read
+    /// from an image may be off by one, and a pose that misses most points by a visible fraction of the image
+    /// is not that of the camera.
     fn leaves_none_far(&self, state: &State, middle_px: f64) -> bool {
         let limit_px = (2.5 * middle_px).min(0.003 * self.diagonal_px).max(1.0);
         (0..self.places.len()).all(|i| self.residual(state, i).is_some_and(|r| r.length() < limit_px))
@@ -475,7 +480,7 @@ impl<'a> Problem<'a> {
         Some(state.centre_px + state.focal_px * radial * x - self.pixels[point])
     }
 
-    /// `start` changed by the free parameters, of which rotation and translation count from `start`.
+    /// `start` changed by the free parameters; rotation and translation are relative to `start`.
     fn state(&self, start: &State, free: &[usize], parameters: &DVector<f64>) -> State {
         let mut change = [0.0; PARAMETERS];
         free.iter().zip(parameters.iter()).for_each(|(&i, &value)| change[i] = value);
@@ -489,7 +494,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The fit to some points with weights.
+    /// The weighted fit to some points.
     fn fit(&self, start: &State, free: &[usize], points: &[usize], weights: &[f64]) -> Option<(State, Fit)> {
         let residuals = |parameters: &DVector<f64>| {
             let state = self.state(start, free, parameters);
@@ -506,7 +511,7 @@ impl<'a> Problem<'a> {
         Some((state, fit))
     }
 
-    /// Weights 1 / (1 + (r / s)²), s from the median distance, ten times over.
+    /// A fit with weights 1 / (1 + (r / s)²), s from the median distance, repeated ten times.
     fn robust(&self, start: State, free: &[usize]) -> Option<State> {
         let seen: Vec<usize> =
             (0..self.places.len()).filter(|&i| self.residual(&start, i).is_some()).collect();
@@ -523,13 +528,14 @@ impl<'a> Problem<'a> {
         Some(state)
     }
 
-    /// The fit without the points that lie farther off than chance allows.
+    /// The fit without the points that are farther off than chance allows.
     fn without_outliers(&self, start: State, free: &[usize], all: &[usize]) -> Option<Fitted> {
         let mut state = start;
         let mut inliers: Vec<usize> = all.to_vec();
-        // At most a quarter may be mistaken, and one point more than unknowns must be left.
+        // At most a quarter of the points may be wrong, and one point more than the unknowns need must
+        // remain.
         let least = (all.len() - all.len() / 4).max(free.len() / 2 + 1).min(all.len());
-        // The robust pose says which points may be wrong: at first those six times as far as most.
+        // The robust pose shows which points may be wrong: initially those six times as far off as most.
         let mut distances: Vec<(f64, usize)> =
             all.iter().map(|&i| (self.residual(&state, i).map_or(f64::INFINITY, DVec2::length), i)).collect();
         distances.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -545,7 +551,7 @@ impl<'a> Problem<'a> {
             if freedom < 2 {
                 break;
             }
-            // Nobody measures pixels to better than a twentieth.
+            // No pixel coordinate is measured more accurately than a twentieth of a pixel.
             let variance = (fit.sum_sq() / freedom as f64).max(0.05 * 0.05);
             // F of 2 and `freedom` degrees: P(F > x) = (1 + 2 x / freedom)^(-freedom / 2).
             let chance = |distance: f64| {
@@ -570,12 +576,12 @@ impl<'a> Problem<'a> {
         Some(Fitted { state, fit, free: free.to_vec(), inliers, rms_px })
     }
 
-    /// m ln(S / m) + 2 p + 2 p (p + 1) / (m - p - 1) of S, the sum of the squared residuals of some points.
+    /// m ln(S / m) + 2 p + 2 p (p + 1) / (m - p - 1), with S the sum of the squared residuals of some points.
     fn criterion(&self, found: &Fitted, points: &[usize]) -> Option<f64> {
         let (m, p) = (2.0 * points.len() as f64, found.free.len() as f64 + 1.0);
         let sum_sq: Option<f64> =
             points.iter().map(|&i| self.residual(&found.state, i).map(|r| r.length_squared())).sum();
-        // Below a millionth of a pixel there is nothing left to explain.
+        // Residuals below a millionth of a pixel leave nothing to explain.
         let mean_sq = (sum_sq? / m).max(1e-12);
         (m - p - 1.0 > 0.0).then(|| m * mean_sq.ln() + 2.0 * p + 2.0 * p * (p + 1.0) / (m - p - 1.0))
     }
@@ -613,7 +619,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The pixel as it was given.
+    /// The pixel as given.
     fn given(&self, camera: &Camera, point: usize) -> DVec2 {
         let pixel = self.pixels[point];
         match self.lens {
@@ -667,7 +673,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Standard deviation of a pixel's coordinate.
+/// Standard deviation of a pixel coordinate.
 fn noise_px(found: &Fitted) -> f64 {
     let freedom = (2 * found.inliers.len()).saturating_sub(found.free.len());
     (found.fit.sum_sq() / freedom.max(1) as f64).sqrt()

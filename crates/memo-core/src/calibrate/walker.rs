@@ -1,27 +1,28 @@
-//! A camera from a person of known height who walks through its picture.
+//! Camera calibration from a person of known height who walks through the image.
 //!
-//! Where the feet are seen fixes where the person stands, for a camera of focal length f, pitch, roll and height
-//! above the ground; where the head then must be seen is compared with where it is (the geometry of Lv, Zhao and
-//! Nevatia 2006: the line through two positions' feet and that through their heads meet on the horizon, the bodies
-//! themselves point to the vertical vanishing point). All sightings are fitted at once by least squares, weighted
-//! against those far off.
+//! For a camera of focal length f, pitch, roll and height above the ground, the image of the feet determines
+//! where the person stands; the predicted image of the head is compared with the measured one (the geometry
+//! of Lv, Zhao and Nevatia 2006: the line through the feet of two positions and the line through their heads
+//! meet on the horizon; the bodies point to the vertical vanishing point). All sightings are fitted together
+//! by least squares; weights reduce the influence of outliers.
 //!
 //! ```text
 //! x_cam = R_z(roll) R_x(pitch) R_level (x_world - (0, 0, height)),   R_level: looking along world Y
 //! ```
 //!
-//! The world's origin is on the ground below the mean place of the person, its Y axis is where the camera looks. A
-//! camera stands level but for some degrees: roll has a prior of 2 degrees, the focal length one of a factor of e
-//! about the picture's width, both weak beside any walk that tells them. The principal point is the picture's
-//! centre unless the lens is known.
+//! The origin of the world is on the ground below the mean position of the person; its Y axis is the viewing
+//! direction of the camera. A camera is level up to some degrees: roll has a prior of 2 degrees, and the
+//! focal length has a prior of a factor of e about the image width. Both are weak compared with any walk that
+//! determines these parameters. The principal point is the image centre unless the lens is known.
 //!
-//! # What it cannot do
+//! # Limits
 //!
-//! Horizon and vertical vanishing point give f by their distance, f² = -(v_y - c_y) (h_y - c_y): a level camera has
-//! the latter at infinity, a person who always stays equally far away shows neither. Then the focal length is
-//! refused, and with a known field of view the rest may be told. All lengths scale with the person's height. A
-//! walker bends and sways by a hundredth of the height, more than a detector errs; that is averaged, not modelled.
-//! Leaning forwards averages out only if the person also comes back: the deviations of a walk one way allow for it.
+//! The distance between horizon and vertical vanishing point determines f, f² = -(v_y - c_y) (h_y - c_y): for
+//! a level camera the latter is at infinity, and a person who always stays equally far away shows neither. In
+//! these cases the focal length is refused; with a known field of view the other parameters may still be
+//! determined. All lengths are proportional to the person's height. A walker bends and sways by a hundredth
+//! of the height, more than the error of a detector; this is averaged, not modelled. A forward lean averages
+//! out only if the person also comes back; the standard deviations for a walk in one direction allow for it.
 
 use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
@@ -33,22 +34,24 @@ use crate::estimate::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
 
-/// Sightings that are needed.
+/// Number of sightings needed.
 const NEEDED: usize = 4;
-/// Of a camera's roll, radians (2 degrees).
+/// Standard deviation of the prior of the camera's roll, radians (2 degrees).
 const ROLL_SD_RAD: f64 = 0.035;
-/// Of a focal length that nothing is known of, as the picture's longer side: a factor of e.
+/// Standard deviation of the prior of an unknown focal length, as the logarithm of its ratio to the longer
+/// side of the image: a factor of e.
 const FOCAL_SD: f64 = 1.0;
-/// A walker's sway and a detector's error at least, as a share of the height.
+/// Lower bound of the sway of a walker and the error of a detector, as a fraction of the height.
 const LEAST_NOISE: f64 = 0.005;
-/// The focal length is told if its standard deviation is below this share of it, the pitch below this, radians.
+/// The focal length is determined if its relative standard deviation is below the first limit; the pitch is
+/// determined if its standard deviation is below the second, radians.
 const MAX_FOCAL_SD: f64 = 0.25;
 const MAX_PITCH_SD_RAD: f64 = 0.09;
-/// How far head or feet are off in all sightings alike where a person only goes one way, as a share of the
-/// height: in three recorded walks the head was 0.03 to 0.04 before the middle of the feet. Half of that is taken
-/// as its deviation, so it rests on these three.
+/// Common error of head or feet in all sightings if a person only walks in one direction, as a fraction of
+/// the height. In three recorded walks the head was 0.03 to 0.04 in front of the midpoint of the feet; half
+/// of that is the standard deviation, so it depends on these three walks.
 const LEAN: f64 = 0.02;
-/// A sighting is left out if chance would put the farthest of all so far off less often than this.
+/// A sighting is left out if, by chance, the largest of all errors would be as large less often than this.
 const CHANCE: f64 = 0.01;
 const FOCAL: usize = 0;
 const PITCH: usize = 1;
@@ -59,7 +62,7 @@ const HEIGHT: usize = 3;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum WalkerError {
-    /// The person's height makes no sense.
+    /// The person's height is implausible.
     #[error("the person's height must be 0.5 to 2.5 metres, got {height_m}")]
     PersonHeight {
         /// The height given, metres.
@@ -68,33 +71,33 @@ pub enum WalkerError {
     /// A pixel is NaN or infinite.
     #[error("sighting {index} has a pixel that is not finite")]
     NotFinite {
-        /// Number of the sighting, from 0.
+        /// Index of the sighting, from 0.
         index: usize,
     },
-    /// Not enough sightings.
+    /// There are not enough sightings.
     #[error("{} of the whole person from head to feet: {NEEDED} are needed", counted(*count, "sighting"))]
     TooFew {
-        /// Sightings given.
+        /// Number of sightings given.
         count: usize,
     },
     /// The person is upside down.
     #[error("in {count} of {} the head is not above the feet: v counts downwards", counted(*total, "sighting"))]
     UpsideDown {
-        /// Sightings in which the head is below the feet.
+        /// Number of sightings in which the head is below the feet.
         count: usize,
-        /// All sightings.
+        /// Number of all sightings.
         total: usize,
     },
-    /// The focal length cannot be told.
+    /// The walk does not determine the focal length.
     #[error(
         "the walk does not tell the focal length (it would be known to ±{:.0} %): the person should come nearer and go farther under a camera that looks down; or give the field of view",
         relative_sd * 100.0
     )]
     FocalUnknown {
-        /// Standard deviation of the focal length over itself.
+        /// Standard deviation of the focal length, divided by the focal length.
         relative_sd: f64,
     },
-    /// The pitch cannot be told, even with the focal length known.
+    /// The walk does not determine the pitch, even with the focal length known.
     #[error(
         "the walk does not tell how far the camera looks down (it would be known to ±{:.0} degrees): the person should come nearer and go farther",
         sd_rad.to_degrees()
@@ -103,16 +106,16 @@ pub enum WalkerError {
         /// Standard deviation of the pitch, radians.
         sd_rad: f64,
     },
-    /// No camera shows the person so.
+    /// No camera is consistent with the sightings.
     #[error(
         "no camera over flat ground shows a person of {height_m} m so: nearest is {rms_px:.0} px off at {person_px:.0} px of height"
     )]
     NoCamera {
         /// The person's height, metres.
         height_m: f64,
-        /// Root mean square distance of the best camera, pixels.
+        /// Root mean square residual of the best camera, pixels.
         rms_px: f64,
-        /// Median height of the person in the picture, pixels.
+        /// Median height of the person in the image, pixels.
         person_px: f64,
     },
     /// The camera is not valid.
@@ -120,73 +123,75 @@ pub enum WalkerError {
     Camera(#[from] CameraError),
 }
 
-/// A person seen once, from head to feet.
+/// A person in one frame, from head to feet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// The lower point, pixels.
     pub foot_px: DVec2,
     /// The upper point, pixels.
     pub head_px: DVec2,
-    /// The lower point's height above the ground, as a share of the person's.
+    /// Height of the lower point above the ground, as a fraction of the person's height.
     pub foot_share: f64,
-    /// The upper point's.
+    /// Height of the upper point above the ground, as a fraction of the person's height.
     pub head_share: f64,
 }
 
 impl Sighting {
-    /// From the middles of a rectangle's lower and upper side.
+    /// A sighting from the midpoints of the lower and the upper side of a rectangle.
     pub fn from_rectangle(foot_px: DVec2, head_px: DVec2) -> Self {
         Self { foot_px, head_px, foot_share: 0.0, head_share: 1.0 }
     }
 }
 
-/// What is known beforehand.
+/// Known quantities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WalkerOptions {
-    /// Width and height of the picture, pixels.
+    /// Width and height of the image, pixels.
     pub size: [u32; 2],
     /// Height of the person, crown to sole, metres.
     pub height_m: f64,
-    /// What is known of the lens.
+    /// Known lens parameters.
     pub lens: KnownLens,
 }
 
-/// A camera and how well the walk tells it.
+/// A camera and its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WalkerCalibration {
-    /// The camera; the origin is on the ground below the mean place of the person, Y where it looks.
+    /// The camera; the origin is on the ground below the mean position of the person, Y is the viewing
+    /// direction.
     pub camera: Camera,
-    /// `focal_px` unless it was given, `pitch_deg` (down), `roll_deg`, `height_m` of the camera. Their deviations
-    /// take sightings of one stride as the alike ones they are, and allow for a lean where the person goes one way.
+    /// `focal_px` unless it was given, `pitch_deg` (down), `roll_deg`, and `height_m` of the camera. Their
+    /// standard deviations take into account that the sightings of one stride have similar errors, and allow
+    /// for a lean if the person walks in one direction.
     pub estimates: Vec<Estimate>,
-    /// Fitted minus seen head, pixels, of every sighting; NaN where the feet are above the horizon.
+    /// Fitted minus measured head of every sighting, pixels; NaN where the feet are above the horizon.
     pub residuals_px: Vec<DVec2>,
-    /// Numbers of the sightings that were left out, from 0.
+    /// Indices of the sightings left out, from 0.
     pub outliers: Vec<usize>,
-    /// Root mean square of the residuals of the others, pixels.
+    /// Root mean square of the residuals of the other sightings, pixels.
     pub rms_px: f64,
-    /// Median distance of head and feet, pixels.
+    /// Median distance between head and feet, pixels.
     pub person_px: f64,
-    /// How many sightings in a row err alike.
+    /// Number of consecutive sightings with similar errors.
     pub alike: f64,
-    /// Where the person stood, metres; NaN where the feet are above the horizon.
+    /// Where the person stood, world axes, metres; NaN where the feet are above the horizon.
     pub places: Vec<DVec3>,
 }
 
-/// The camera that sees a walker so.
+/// The camera that fits the sightings of a walker.
 ///
 /// `sightings` in the order of time.
 ///
 /// # Errors
 ///
-/// Sightings that are too few, not finite or upside down, walks that do not tell the camera, and such that no
-/// camera shows.
+/// Sightings that are too few, not finite or upside down; walks that do not determine the camera; sightings
+/// that are not consistent with any camera.
 pub fn camera_from_walker(
     sightings: &[Sighting],
     options: &WalkerOptions,
 ) -> Result<WalkerCalibration, WalkerError> {
     let problem = Problem::new(sightings, options)?;
-    // 1. The best of a grid, then weights that forget what is far off.
+    // 1. The best of a grid, then fits with weights that suppress outliers.
     let mut parameters = problem.start();
     let mut weights = vec![1.0; problem.sightings.len()];
     for _ in 0..10 {
@@ -200,14 +205,14 @@ pub fn camera_from_walker(
         }
         parameters = problem.fit(&parameters, &weights).map_or(parameters, |fit| problem.all(&fit));
     }
-    // 2. Least squares of what is left.
+    // 2. Least squares on the inliers.
     let (fit, inliers) = problem.without_outliers(&parameters)?;
-    // 3. What it tells.
+    // 3. Parameters and their uncertainties.
     problem.calibration(&fit, &inliers)
 }
 
 struct Problem {
-    /// In ideal pixels, the principal point at zero, square pixels.
+    /// In ideal pixels, relative to the principal point, with square pixels.
     sightings: Vec<Sighting>,
     options: WalkerOptions,
     centre_px: DVec2,
@@ -260,7 +265,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// The camera at the origin with the lens that is known; sets the known focal length.
+    /// A camera at the origin with the known lens; sets the known focal length.
     fn lens(&mut self) -> Result<Camera, WalkerError> {
         let (focal_px, centre_px, distortion) = match self.options.lens {
             KnownLens::Nothing => (DVec2::splat(self.width_px), self.centre_px, Distortion::None),
@@ -287,7 +292,7 @@ impl Problem {
         (drop_m > 0.0 && share > 0.0 && share.is_finite()).then(|| (ray * share).with_z(0.0))
     }
 
-    /// Fitted minus seen head, pixels.
+    /// Fitted minus measured head, pixels.
     fn residual(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &Sighting) -> Option<DVec2> {
         let place = self.place(parameters, rotation, sighting)?;
         let rise_m = sighting.head_share * self.options.height_m - parameters[HEIGHT].exp();
@@ -304,13 +309,13 @@ impl Problem {
         10.0 * self.width_px
     }
 
-    /// Lengths of the residuals; far where there is none.
+    /// Lengths of the residuals; a large value where there is none.
     fn distances(&self, parameters: &[f64; 4]) -> Vec<f64> {
         let far = self.far_px();
         self.residuals(parameters).into_iter().map(|r| r.map_or(far, |r| r.length().min(far))).collect()
     }
 
-    /// The best of some hundred cameras, by the median distance.
+    /// The best of some hundred cameras, by the median residual.
     fn start(&self) -> [f64; 4] {
         let focals: Vec<f64> = match self.known_focal_px {
             Some(focal) => vec![focal],
@@ -361,7 +366,8 @@ impl Problem {
             let mut all = Vec::with_capacity(2 * weights.len() + 1);
             for (residual, weight) in self.residuals(&parameters).into_iter().zip(weights) {
                 if *weight > 0.0 {
-                    // Head and foot are both seen with noise, which moves the fitted head as much.
+                    // Head and foot are both measured with noise, and the noise of the foot moves the fitted
+                    // head equally.
                     let r = residual? * (weight / 2.0).sqrt();
                     all.extend([r.x, r.y]);
                 }
@@ -370,7 +376,7 @@ impl Problem {
             all.push((parameters[FOCAL] - fixed.max(self.width_px.ln())) / FOCAL_SD * noise_px);
             Some(DVector::from_vec(all))
         };
-        // What is above the horizon at the start cannot be fitted.
+        // Sightings above the horizon at the start cannot be fitted.
         minimise(DVector::from_vec(free.clone()), &vec![1e-6; free.len()], MOST_ITERATIONS, residuals)
     }
 
@@ -383,7 +389,7 @@ impl Problem {
             let distances = self.distances(&parameters);
             let mut sorted = distances.clone();
             sorted.sort_by(f64::total_cmp);
-            // Of normal noise in two directions the median is 1.18 standard deviations.
+            // For normal noise in two dimensions the median is 1.18 standard deviations.
             let variance = (sorted[count / 2] / 1.18).powi(2).max(1e-12);
             let limit = (2.0 * variance * (count as f64 / CHANCE).ln()).sqrt();
             let next: Vec<usize> = (0..count).filter(|&i| distances[i] <= limit).collect();
@@ -429,7 +435,8 @@ impl Problem {
             let (Some(covariance), Some(row)) = (&covariance, row) else { return f64::INFINITY };
             (covariance[(row, row)] * variance_px).sqrt()
         };
-        // What the walk tells is a matter of noise, how well it is told also of the lean that all sightings share.
+        // Whether a parameter is determined depends on the noise; its standard deviation also includes the
+        // lean shared by all sightings.
         let shared_px = inliers.len() as f64 * lean_px.powi(2);
         let sd = |parameter: usize| sd_of(parameter, alike * fitted_px.powi(2) + shared_px);
         let assumed_px = alike * fitted_px.max(LEAST_NOISE * self.person_px).powi(2);
@@ -456,8 +463,9 @@ impl Problem {
         self.described(&parameters, residuals, inliers, rms_px, alike, estimates)
     }
 
-    /// 1 if the person always goes the same way, 0 if they end where they began: the distance of the ends over
-    /// the length of the way in eight pieces, so that steps and noise are no ways of their own.
+    /// 1 if the person always walks in the same direction, 0 if the path ends where it began: the distance
+    /// between the ends divided by the path length in eight pieces, so that steps and noise do not add to the
+    /// length.
     fn one_way(&self, parameters: &[f64; 4], inliers: &[usize]) -> f64 {
         let rotation = Self::rotation(parameters);
         let places: Vec<DVec3> =
@@ -501,7 +509,8 @@ impl Problem {
     }
 }
 
-/// 1 + 2 Σ ρ_k of the autocorrelations ρ_k up to the first that is not positive: how many in a row are alike.
+/// 1 + 2 Σ ρ_k over the autocorrelations ρ_k up to the first that is not positive: the number of consecutive
+/// values that are similar.
 fn alike(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count.max(1.0);
@@ -516,9 +525,9 @@ fn alike(values: &[f64]) -> f64 {
     1.0 + 2.0 * lags.sum::<f64>()
 }
 
-/// Heights of detected points as shares of the body's: crown, eyes, tragions and nose, mid-shoulders (after Drillis
-/// and Contini 1966 and the survey of Gordon et al. 1989); the first that is seen is taken, ears before the nose
-/// because they are above the ankles.
+/// Heights of detected points as fractions of body height: crown, eyes, tragions, nose and mid-shoulders
+/// (after Drillis and Contini 1966 and the survey of Gordon et al. 1989). The first visible point is used;
+/// ears precede the nose because they are above the ankles.
 const HEADS: [(&[&str], f64); 5] = [
     (&["head_top"], 1.0),
     (&["right_ear", "left_ear"], 0.926),
@@ -526,15 +535,16 @@ const HEADS: [(&[&str], f64); 5] = [
     (&["nose"], 0.91),
     (&["neck"], 0.83),
 ];
-/// Of the ankle's joint centre.
+/// Height of the ankle joint centre, as a fraction of body height.
 const ANKLE_SHARE: f64 = 0.042;
-/// Ankles this far apart, as a share of the height, are not passing each other.
+/// Largest distance between ankles that pass each other, as a fraction of the height.
 const MAX_APART: f64 = 0.15;
 
-/// Sightings from joints over time: where the ankles pass each other, which is when the person stands highest and
-/// upright over one foot; all frames if that is hardly ever seen.
+/// Sightings from joints over time: the frames in which the ankles pass each other, where the person is
+/// highest and upright over one foot; all frames if there are too few of these.
 ///
-/// `names` of the joints in this project's spelling; `points_px` one row of them a frame, NaN where missing.
+/// `names` of the joints in this project's spelling; `points_px` has one row per frame with one pixel
+/// position (u, v) per name, NaN where missing.
 pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Sighting> {
     let column = |name: &str| names.iter().position(|n| *n == name);
     let point =
@@ -549,7 +559,7 @@ pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Si
             (!found.is_empty()).then(|| (found.iter().sum::<DVec2>() / found.len() as f64, *share))
         });
         let Some((head_px, head_share)) = head else { continue };
-        // The foot on the ground is the lower one; from side to side the body is between both.
+        // The foot on the ground is the lower one; horizontally the body is between both.
         let foot_px = DVec2::new((right.x + left.x) / 2.0, right.y.max(left.y));
         let apart = right.distance(left) / head_px.distance(foot_px).max(1e-9);
         seen.push((apart, Sighting { foot_px, head_px, foot_share: ANKLE_SHARE, head_share }));

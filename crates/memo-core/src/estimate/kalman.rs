@@ -1,8 +1,8 @@
 //! The discrete linear Kalman filter of the walker's state (Rohr 1994, section 5.2, eqs. 12-22).
 //!
-//! The state is (X, X', Y, Y', Z, Z', pose, pose') and all matrices of eqs. (19)-(22) are block diagonal, so
+//! The state is (X, X', Y, Y', Z, Z', pose, pose'), and all matrices of eqs. (19)-(22) are block diagonal, so
 //! the filter splits exactly into four independent filters of position and velocity; [`ConstantVelocity`] is
-//! one of them. Seconds take the place of the paper's images, so that any frame rate and uneven time stamps
+//! one of them. Time is in seconds instead of the paper's images, so any frame rate and uneven time stamps
 //! work.
 
 use crate::option_error::OptionError;
@@ -16,7 +16,8 @@ pub struct Noise {
     pub measurement_variance: f64,
 }
 
-/// Noise of the four coordinates; the defaults are the printed values at the paper's 25 images a second.
+/// Noise of the filtered coordinates; the defaults are the printed values at the paper's 25 images per
+/// second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterOptions {
     /// Along the walking direction, metres. Printed: sigma_Q = 0.3 * 6.4 cm/image, sigma_R = 20 cm.
@@ -27,12 +28,12 @@ pub struct FilterOptions {
     pub phase: Noise,
 }
 
-/// Images per second of the paper's sequences.
+/// Image rate of the paper's sequences, images per second.
 const PAPER_RATE_HZ: f64 = 25.0;
 
 impl Default for FilterOptions {
     fn default() -> Self {
-        // A velocity step of s unit/image in every image is s * 25 unit/s each 1/25 s.
+        // A velocity step of s unit/image in every image is a step of s * 25 unit/s every 1/25 s.
         let per_s = |step_per_image: f64| (step_per_image * PAPER_RATE_HZ).powi(2) * PAPER_RATE_HZ;
         Self {
             along: Noise { velocity_variance_per_s: per_s(0.3 * 0.064), measurement_variance: 0.04 },
@@ -53,7 +54,7 @@ impl FilterOptions {
     }
 }
 
-/// Position and velocity of one coordinate with their covariance.
+/// Position and velocity of one coordinate, with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstantVelocity {
     /// Estimated position, unit.
@@ -65,7 +66,7 @@ pub struct ConstantVelocity {
 }
 
 impl ConstantVelocity {
-    /// A state with independent uncertainties of position and velocity.
+    /// A state whose position and velocity have independent errors.
     pub fn new(position: f64, velocity: f64, position_variance: f64, velocity_variance: f64) -> Self {
         Self { position, velocity, covariance: [position_variance, 0.0, velocity_variance] }
     }
@@ -80,7 +81,8 @@ impl ConstantVelocity {
         self.covariance[2].max(0.0).sqrt()
     }
 
-    /// Eqs. (14), (15): p* = Phi p, P* = Phi P Phi^T + Q with Phi = (1 dt; 0 1) and Q on the velocity alone.
+    /// The state after `dt_s` seconds. Eqs. (14), (15): p* = Phi p, P* = Phi P Phi^T + Q with Phi = (1 dt; 0
+    /// 1) and Q on the velocity alone.
     #[must_use]
     pub fn predict(&self, dt_s: f64, noise: &Noise) -> Self {
         let [pp, pv, vv] = self.covariance;
@@ -95,7 +97,8 @@ impl ConstantVelocity {
         }
     }
 
-    /// Eqs. (16)-(18) with H = (1 0): K = P* H^T (H P* H^T + R)^-1, p = p* + K (z - H p*), P = (I - K H) P*.
+    /// The state after a measured position. Eqs. (16)-(18) with H = (1 0): K = P* H^T (H P* H^T + R)^-1, p =
+    /// p* + K (z - H p*), P = (I - K H) P*.
     #[must_use]
     pub fn update(&self, measured: f64, noise: &Noise) -> Self {
         let [pp, pv, vv] = self.covariance;
@@ -110,9 +113,10 @@ impl ConstantVelocity {
     }
 }
 
-/// Rauch-Tung-Striebel smoothing of a filtered coordinate: what all frames, later ones included, say of each.
+/// Rauch-Tung-Striebel smoothing of a filtered coordinate: the state at each frame given all frames, later
+/// ones included.
 ///
-/// `filtered[k]` is the state after frame k, `dt_s[k]` the time from frame k to k + 1.
+/// `filtered[k]` is the state after frame k; `dt_s[k]` is the time from frame k to k + 1, seconds.
 pub fn smooth(filtered: &[ConstantVelocity], dt_s: &[f64], noise: &Noise) -> Vec<ConstantVelocity> {
     let mut smoothed = filtered.to_vec();
     for k in (0..filtered.len().saturating_sub(1)).rev() {
@@ -132,7 +136,7 @@ fn smooth_step(
     let [a, b, d] = prior.covariance;
     let determinant = a * d - b * b;
     if determinant <= 1e-12 * a * d {
-        // Only without process noise: the state then follows from the later one alone.
+        // Only without process noise: the state then follows from the later state alone.
         return later.predict(-dt_s, &Noise { velocity_variance_per_s: 0.0, ..*noise });
     }
     let [pp, pv, vv] = now.covariance;

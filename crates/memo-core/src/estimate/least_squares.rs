@@ -1,13 +1,13 @@
-//! Levenberg and Marquardt's method with numerical derivatives, for a dozen parameters.
+//! The method of Levenberg and Marquardt with numerical derivatives, for about a dozen parameters.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Iterations after which a camera's search is given up.
+/// Maximum number of iterations in the search for a camera.
 pub(crate) const MOST_ITERATIONS: usize = 200;
-/// Relative decrease of the sum of squares that ends the search.
+/// Relative decrease of the sum of squares below which the search ends.
 const TOLERANCE: f64 = 1e-14;
 
-/// Where the search ended.
+/// The end of a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) parameters: DVector<f64>,
@@ -20,9 +20,10 @@ impl Fit {
         self.residuals.norm_squared()
     }
 
-    /// Covariance for residuals of unit variance: (JᵀJ)⁻¹; `None` if some parameter has no influence.
+    /// Covariance for residuals of unit variance: (JᵀJ)⁻¹; `None` if a parameter has no influence.
     pub(crate) fn unit_covariance(&self) -> Option<DMatrix<f64>> {
-        // Scaled to unit diagonal, so that the parameters' units do not decide what is singular.
+        // Scaled to unit diagonal, so that the units of the parameters do not affect the test for
+        // singularity.
         let normal = self.jacobian.tr_mul(&self.jacobian);
         let scale: Vec<f64> = normal.diagonal().iter().map(|d| d.sqrt()).collect();
         if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
@@ -39,10 +40,10 @@ impl Fit {
     }
 }
 
-/// The parameters of least squared residuals reached from `start` in at most so many iterations; `steps` are those of
-/// the derivatives.
+/// The parameters with the smallest sum of squared residuals, reached from `start` in at most the given
+/// number of iterations; `steps` are the step sizes of the derivatives.
 ///
-/// `residuals` gives `None` where the model has no answer, such as a point behind the camera.
+/// `residuals` returns `None` where the model is undefined, for example for a point behind the camera.
 pub(crate) fn minimise(
     start: DVector<f64>,
     steps: &[f64],
@@ -85,7 +86,7 @@ pub(crate) fn minimise(
     current.iter().all(|r| r.is_finite()).then_some(Fit { parameters, residuals: current, jacobian })
 }
 
-/// Central differences.
+/// Derivatives by central differences.
 fn derivatives(
     parameters: &DVector<f64>,
     steps: &[f64],
@@ -120,7 +121,8 @@ mod tests {
         DVector::from_column_slice(values)
     }
 
-    /// A straight line through points: parameters and their unit covariance from the normal equations by hand.
+    /// A straight line through points: parameters and their unit covariance from the normal equations,
+    /// written out.
     #[test]
     fn a_line_has_the_covariance_of_the_textbook() {
         let points = [(0.0, 1.1), (1.0, 2.9), (2.0, 5.2), (4.0, 8.8)];
@@ -138,7 +140,7 @@ mod tests {
         assert!((fit.sum_sq() - by_hand.iter().sum::<f64>()).abs() < 1e-12);
     }
 
-    /// Two parameters that do nearly the same are refused once rounding would decide between them.
+    /// Two parameters with nearly the same effect have no covariance once rounding would determine it.
     #[test]
     fn parameters_that_do_the_same_have_no_covariance() {
         let with = |difference: f64| {
@@ -158,7 +160,7 @@ mod tests {
         );
     }
 
-    /// Rosenbrock's valley, (1 - x, 10 (y - x²)) from (-1.2, 1): its floor at (1, 1) is far along a bend.
+    /// Rosenbrock's valley, (1 - x, 10 (y - x²)) from (-1.2, 1): its minimum at (1, 1) is far along a curve.
     #[test]
     fn a_bent_valley_is_followed_to_its_end() {
         let residuals = |p: &DVector<f64>| Some(vector(&[1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]));
@@ -166,14 +168,14 @@ mod tests {
         assert!((fit.parameters - vector(&[1.0, 1.0])).norm() < 1e-6);
     }
 
-    /// Undamped, the step from 3 on the arc tangent goes to -9.5 and from there farther and farther.
+    /// Undamped, the step from 3 on the arc tangent goes to -9.5 and diverges from there.
     #[test]
     fn steps_that_lead_away_are_shortened() {
         let fit = minimise(vector(&[3.0]), &[1e-6], MOST_ITERATIONS, |p| Some(p.map(f64::atan))).unwrap();
         assert!(fit.parameters[0].abs() < 1e-9, "{}", fit.parameters[0]);
     }
 
-    /// From 20 the step to the root of ln x - 1 goes to -20, where there is no logarithm.
+    /// From 20 the step to the root of ln x - 1 goes to -20, where the logarithm is undefined.
     #[test]
     fn steps_to_where_the_model_has_no_answer_are_shortened() {
         let residuals = |p: &DVector<f64>| (p[0] > 0.0).then(|| p.map(|x| x.ln() - 1.0));

@@ -1,6 +1,6 @@
 //! Straight lines through points.
 
-/// Least-squares line y = level + slope x as (slope, level); slope 0 where x does not vary.
+/// Least-squares line y = level + slope x, as (slope, level); the slope is 0 where x does not vary.
 pub(crate) fn line_through(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len().max(1) as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));

@@ -1,6 +1,7 @@
 //! The median.
 
-/// The middle value, or the mean of the two in the middle of an even number; none of none.
+/// The middle value, or the mean of the two middle values for an even number of values; `None` without
+/// values.
 ///
 /// The values are reordered. NaN counts as the largest.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! Estimation that knows nothing of walkers: filters, paths and least squares.
+//! Estimation methods that are independent of walkers: filters, paths and least squares.
 
 pub mod kalman;
 pub(crate) mod least_squares;

@@ -1,5 +1,5 @@
-//! Smoothing of one quantity over time by the frames before and after: a constant-velocity Kalman filter and
-//! the Rauch-Tung-Striebel pass backwards, uneven times and missing values allowed.
+//! Smoothing of one quantity over time from the frames before and after: a constant-velocity Kalman filter
+//! and the backward pass of Rauch, Tung and Striebel. Uneven times and missing values are allowed.
 
 use crate::estimate::kalman::{ConstantVelocity, Noise, smooth};
 
@@ -13,10 +13,10 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Nothing was measured.
+    /// A missing measurement.
     pub const NOTHING: Self = Self { value: f64::NAN, sd: f64::NAN };
 
-    /// Both measurements of one quantity together.
+    /// The fusion of two measurements of one quantity.
     #[must_use]
     pub fn fused(self, other: Self) -> Self {
         let weight = |m: Self| if m.value.is_finite() { 1.0 / (m.sd * m.sd).max(1e-12) } else { 0.0 };
@@ -28,22 +28,22 @@ impl Measured {
     }
 }
 
-/// How far a measurement is from its prediction.
+/// The difference between a measurement and its prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
-    /// Measurement less prediction, unit.
+    /// Measurement minus prediction, in the unit of the value.
     pub value: f64,
-    /// Its variance, unit².
+    /// Variance of the difference, unit².
     pub variance: f64,
 }
 
-/// Time over which an acceleration lasts, seconds: the velocity gains acceleration² times this a second.
+/// Duration of an acceleration, seconds: the velocity variance grows by acceleration² times this per second.
 const ACCELERATION_LASTS_S: f64 = 0.1;
 
-/// Standard deviation of the velocity before the first measurement, units a second.
+/// Standard deviation of the velocity before the first measurement, units per second.
 const FIRST_VELOCITY_SD: f64 = 2.0;
 
-/// Least standard deviation of a measurement: a model is not exact.
+/// Smallest standard deviation of a measurement: no model is exact.
 const LEAST_SD: f64 = 1e-4;
 
 fn noise(acceleration_sd: f64, measurement_sd: f64) -> Noise {
@@ -53,10 +53,10 @@ fn noise(acceleration_sd: f64, measurement_sd: f64) -> Noise {
     }
 }
 
-/// One step of the filter: predicts over `step_s` and takes a measurement in.
+/// One step of the filter: predicts over `step_s` seconds and applies a measurement.
 ///
-/// The filter is none before the first measurement. The second value is the innovation, where there is
-/// a prediction and a measurement.
+/// `filter` is `None` before the first measurement. The second value is the innovation, if there are a
+/// prediction and a measurement.
 pub fn filter_step(
     filter: Option<ConstantVelocity>,
     step_s: f64,
@@ -83,8 +83,8 @@ pub fn filter_step(
     }
 }
 
-/// Smooths a track. `acceleration_sd` in units/s². Between and after measurements the value is the motion's
-/// expected one, with its growing uncertainty; before the first it is not known (NaN).
+/// Smooths a track. `acceleration_sd` in units/s². Between and after measurements the value is the expected
+/// motion, with growing uncertainty; before the first measurement it is NaN.
 pub fn smooth_track(times_s: &[f64], measured: &[Measured], acceleration_sd: f64) -> Vec<Measured> {
     let first = measured.iter().position(|m| m.value.is_finite()).unwrap_or(measured.len());
     let steps: Vec<f64> = times_s[first..].windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -141,7 +141,7 @@ mod tests {
         assert!(smooth_track(&[], &[], 1.0).is_empty());
     }
 
-    /// Two measurements of 10 ± 1 and 14 ± 2 together: weights 1 and 1/4.
+    /// Fusion of two measurements 10 ± 1 and 14 ± 2: weights 1 and 1/4.
     #[test]
     fn measurements_fuse_by_their_variances() {
         let [a, b] = [(10.0, 1.0), (14.0, 2.0)].map(|(value, sd)| Measured { value, sd });
@@ -153,8 +153,8 @@ mod tests {
         assert_eq!(Measured::NOTHING.fused(a), a);
     }
 
-    /// From 2 ± 0.1 at rest ± 2 a second: the velocity's variance gains 3² times 0.1 s a second, and the place
-    /// feels it from the next step on.
+    /// From 2 ± 0.1, at rest ± 2 per second: the variance of the velocity grows by 3² times 0.1 s per second,
+    /// and affects the position from the next step on.
     #[test]
     fn an_innovation_is_as_unsure_as_prediction_and_measurement() {
         let first = Measured { value: 2.0, sd: 0.1 };
@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(nothing, None);
         let innovation = filter_step(waiting, 1.0, next, 3.0).1.unwrap();
         assert!((innovation.variance - (0.01 + 4.0 * 4.0 + 0.9 + 0.25)).abs() < 1e-9, "{innovation:?}");
-        // Nothing is measured better than a tenth of a millimetre.
+        // No measurement counts as more accurate than a tenth of a millimetre.
         let (sharp, _) = filter_step(None, 0.0, Measured { value: 2.0, sd: 0.0 }, 3.0);
         assert!(sharp.unwrap().position_sd() >= 1e-4);
     }

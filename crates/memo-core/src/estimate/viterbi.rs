@@ -1,13 +1,13 @@
-//! Least-cost path of second order through a few states a frame, by dynamic programming.
+//! Second-order path of least cost through a few states per frame, by dynamic programming.
 //!
-//! Cost = Σ u_t(s_t) + Σ a_t(s_{t-2}, s_{t-1}, s_t). First order cannot tell a value that crosses zero from one
-//! that bounces off it; the change of velocity can, and that takes three frames. The search runs over pairs of
-//! neighbouring states.
+//! Cost = Σ u_t(s_t) + Σ a_t(s_{t-2}, s_{t-1}, s_t). A first-order cost cannot distinguish a value that
+//! crosses zero from one that bounces off it; the change of velocity can, and it needs three frames. The
+//! search runs over pairs of consecutive states.
 
-/// Finds the least-cost path. `counts[t]` states in frame t, each at least one.
+/// The path of least cost. `counts[t]` is the number of states in frame t, each at least one.
 ///
-/// `unary(t, s)` and `ternary(t, s_{t-2}, s_{t-1}, s_t)`, t >= 2, must not be NaN. Of equal costs the lower
-/// state wins.
+/// `unary(t, s)` and `ternary(t, s_{t-2}, s_{t-1}, s_t)`, t >= 2, must not be NaN. Of states with equal cost
+/// the lower one wins.
 pub fn least_path(
     counts: &[usize],
     unary: impl Fn(usize, usize) -> f64,
@@ -17,7 +17,7 @@ pub fn least_path(
     if frames < 2 {
         return counts.iter().map(|&n| argmin((0..n).map(|s| unary(0, s)))).collect();
     }
-    // Cost of the best beginning that ends in states i, j of frames t-1, t; index i * n_t + j.
+    // Cost of the best path that ends in states i, j of frames t-1, t; index i * n_t + j.
     let mut costs: Vec<f64> = (0..counts[0])
         .flat_map(|i| (0..counts[1]).map(move |j| [i, j]))
         .map(|[i, j]| unary(0, i) + unary(1, j))
@@ -55,7 +55,7 @@ pub fn least_path(
     states
 }
 
-/// Index of the least value, the first of equal ones; 0 of none.
+/// Index of the smallest value, the first of equal ones; 0 without values.
 pub fn argmin(costs: impl Iterator<Item = f64>) -> usize {
     costs.enumerate().reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(0, |best| best.0)
 }
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
     use crate::synth::Random;
 
-    /// The least of all paths, tried one by one.
+    /// The path of least cost, found by trying all paths.
     fn brute(
         counts: &[usize],
         unary: &dyn Fn(usize, usize) -> f64,
@@ -101,7 +101,7 @@ mod tests {
         assert!(least_path(&[], |_, _| 0.0, |_, _, _, _| 0.0).is_empty());
     }
 
-    /// |x| is known, x swings through zero: second order crosses.
+    /// |x| is known and x swings through zero: the second-order path crosses zero.
     #[test]
     fn a_swing_known_up_to_sign_crosses_zero_and_does_not_bounce() {
         let swing: Vec<f64> = (0..60).map(|t| (t as f64 * 0.2 + 0.37).sin()).collect();
@@ -119,7 +119,8 @@ mod tests {
         for frames in 1..6 {
             let found = least_path(&vec![3; frames], |_, _| 1.0, |_, _, _, _| 2.0);
             assert_eq!(found, vec![0; frames]);
-            // The first state is too dear: the second, not the third, of the same cost.
+            // The first state is too expensive: the second state wins over the third, which has the same
+            // cost.
             let found = least_path(&vec![3; frames], |_, s| if s == 0 { 9.0 } else { 1.0 }, |_, _, _, _| 0.0);
             assert_eq!(found, vec![1; frames]);
         }

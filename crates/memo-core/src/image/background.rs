@@ -1,13 +1,14 @@
-//! A slowly varying image of the empty scene, for people who stop: against it they stay visible when eq. (1)
-//! between consecutive frames sees nothing.
+//! A slowly varying image of the empty scene, for people who stop: compared with it they stay visible when
+//! eq. (1) between consecutive frames detects nothing.
 //!
-//! Per pixel the temporal median, which a person in front of the pixel for less than half of the time does
-//! not disturb. From a file, [`Background::from_frames`] takes the exact median of a few frames. On a stream
-//! the median is approached by stochastic approximation (Robbins and Monro 1951): each frame moves the level
-//! towards its grey value by at most a step that falls as 1/k to a constant. Memory is one image, whatever
-//! the length of the stream. Foreground is what passes eq. (1) of [`super::change`] against this image.
+//! Each pixel of the background is a temporal median, which a person does not disturb who covers the pixel
+//! for less than half of the time. From a file, [`Background::from_frames`] takes the exact median of a few
+//! frames. On a stream the median is approximated by stochastic approximation (Robbins and Monro 1951): each
+//! frame moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory is
+//! one image, whatever the length of the stream. Foreground is what passes eq. (1) of [`super::change`]
+//! against this image.
 //!
-//! It takes for background whatever covers a pixel most of the time, and needs a static camera.
+//! Limits: whatever covers a pixel most of the time counts as background, and the camera must be static.
 
 use super::change::{ChangeOptions, pair_changes};
 use super::clean::fill_holes;
@@ -15,18 +16,18 @@ use super::frame::{Frame, FrameError, Image, Mask};
 use crate::option_error::OptionError;
 use thiserror::Error;
 
-/// How the background follows the scene.
+/// Options for the background.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackgroundOptions {
-    /// Largest lasting change of the level in grey levels a frame, 1/256 to 128. 0.05: follows daylight (a
-    /// few grey levels a minute) and takes a minute or so to absorb a person who stands still and is not
-    /// masked.
+    /// Largest lasting change of the level, grey levels per frame, 1/256 to 128. The default 0.05 follows
+    /// daylight (a few grey levels per minute) and takes a minute or so to absorb a person who stands still
+    /// and is not masked.
     pub rate: f64,
-    /// The step at the second frame in grey levels, falling as 1/k until it meets `rate`. 64 lets the first
-    /// dozens of frames correct a first frame with people in it.
+    /// The step at the second frame, grey levels; it falls as 1/k until it reaches `rate`. With the default
+    /// 64, the first dozens of frames correct a first frame with people in it.
     pub first_step: f64,
-    /// How a frame is compared with the background. T is at least 8, twice that of consecutive frames: here
-    /// soft shadows and slow changes of light appear at full strength.
+    /// How a frame is compared with the background. By default T is at least 8, twice that of consecutive
+    /// frames: soft shadows and slow changes of light appear at full strength here.
     pub change: ChangeOptions,
 }
 
@@ -46,7 +47,7 @@ impl BackgroundOptions {
     }
 }
 
-/// Why no background was made.
+/// Why no background was computed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum BackgroundError {
@@ -61,7 +62,7 @@ pub enum BackgroundError {
 /// Steps of the stored level in one grey level.
 const LEVELS: i32 = 256;
 
-/// The empty scene as known so far.
+/// The current estimate of the empty scene.
 #[derive(Debug, Clone)]
 pub struct Background {
     options: BackgroundOptions,
@@ -76,8 +77,8 @@ impl Background {
         Self::from_image(&first.to_image(), 1, options)
     }
 
-    /// The temporal median of frames, best spread evenly over the footage; of an even number the lower of the
-    /// two middle values. Holds no copy of the frames.
+    /// The temporal median of frames, best spread evenly over the footage; for an even number of frames, the
+    /// lower of the two middle values. Does not keep a copy of the frames.
     pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
         let first = frames.first().ok_or(BackgroundError::NoFrames)?;
         frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
@@ -125,13 +126,13 @@ impl Background {
     }
 
     /// The pixels of `within` whose grey value differs from the background by more than `threshold` grey
-    /// levels, holes filled: a mask that ends at the visible edge, where eq. (1) with its 5x5 windows reaches
-    /// beyond it.
+    /// levels, with holes filled: a mask that ends at the visible edge, where eq. (1) with its 5x5 windows
+    /// reaches beyond it.
     ///
-    /// The difference is smoothed by (1, 2, 1) / 4 along x and y, so noise of standard deviation s counts as
-    /// 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below half
-    /// of the person's contrast: 20 to 30 on well-lit footage. What has less contrast is lost: take the
-    /// region itself there.
+    /// The difference is smoothed by (1, 2, 1) / 4 along x and y, so noise of standard deviation s is reduced
+    /// to 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below
+    /// half of the person's contrast: 20 to 30 on well-lit footage. Parts with less contrast are lost; in
+    /// such footage use the region itself.
     pub fn silhouette(&self, frame: &Frame, within: &Mask, threshold: f64) -> Result<Mask, FrameError> {
         self.check_size(frame.width(), frame.height())?;
         self.check_size(within.width(), within.height())?;
@@ -171,8 +172,8 @@ fn add_rows(frame: [&[u8]; 3], background: [&[u8]; 3], columns: &mut [i32]) {
     }
 }
 
-/// Unmarks pixels where the column sums weighted by (1, 2, 1) do not exceed the limit; beyond its ends the
-/// row repeats.
+/// Clears pixels where the column sums weighted by (1, 2, 1) do not exceed the limit; the row is replicated
+/// beyond its ends.
 fn keep_differing(columns: &[i32], limit: i32, mask: &mut [bool]) {
     let last = columns.len() - 1;
     for (x, pixel) in mask.iter_mut().enumerate().filter(|(_, pixel)| **pixel) {
@@ -181,14 +182,15 @@ fn keep_differing(columns: &[i32], limit: i32, mask: &mut [bool]) {
     }
 }
 
-/// The level, moved by at most `step` >= 0. Not `clamp`: its check of the bounds would keep the loop scalar.
+/// The level, moved by at most `step` >= 0. `clamp` is not used: its check of the bounds would keep the loop
+/// scalar.
 #[inline(always)]
 fn moved(level: u16, grey: u8, step: i32) -> u16 {
     let level = i32::from(level);
     (level + (i32::from(grey) * LEVELS - level).max(-step).min(step)) as u16
 }
 
-/// Moves levels towards a frame, with the widest vectors found at run time.
+/// Moves levels towards a frame, with the widest vectors available at run time.
 struct MoveLevels<'a> {
     levels: &'a mut Image<u16>,
     frame: Frame<'a>,
@@ -225,8 +227,8 @@ fn move_unmasked_row(levels: &mut [u16], row: &[u8], mask: &[bool], step: i32) {
     }
 }
 
-/// Lower median of each column, bit by bit: the largest value that at most (n - 1) / 2 of the n values are
-/// below.
+/// Lower median of each column, bit by bit: the largest value such that at most (n - 1) / 2 of the n values
+/// are smaller.
 fn median_row(rows: &[&[u8]], median: &mut [u8]) {
     let most_below = (rows.len() - 1) / 2;
     let mut below = vec![0u32; median.len()];
@@ -340,7 +342,7 @@ mod tests {
         assert!(background.update(&Image::filled(8, 8, 0u8).as_frame(), Some(&mask)).is_err());
     }
 
-    /// A silhouette has no holes, though a person's shirt may be as grey as the wall.
+    /// A silhouette has no holes, even where the person's shirt is as grey as the wall.
     #[test]
     fn a_silhouette_is_filled() {
         let background =
@@ -354,7 +356,7 @@ mod tests {
         assert!(mask.at(20, 20) && (390..=410).contains(&marked), "{marked}");
     }
 
-    /// Long after its beginning a background follows by a twentieth of a grey level a frame, and shows the
+    /// Long after its start a background follows by a twentieth of a grey level per frame and reports the
     /// nearest grey level; changes begin at 8.
     #[test]
     fn an_old_background_follows_slowly() {

@@ -1,58 +1,60 @@
 //! Change detection: which pixels differ between consecutive frames of a static camera.
 //!
-//! Rohr 1994, section 4.1, eq. (1). The n = 25 grey values of a 5x5 window are fitted by a bivariate
-//! polynomial of second order, g = X beta, and the fits of two frames are compared. With X* the generalised
-//! inverse, a pixel of frame k has changed when
+//! Source: Rohr 1994, section 4.1, eq. (1). A bivariate polynomial of second order, g = X beta, is fitted to
+//! the n = 25 grey values of a 5x5 window, and the fits of two frames are compared. With X* the generalised
+//! inverse of X, a pixel of frame k has changed when
 //!
 //! ```text
 //! N_kj = 1/sqrt(n) |X X* (g_k - g_j)|  >  T            (1)
 //! ```
 //!
 //! holds for j = k - 1 or j = k + 1. The fit is linear, so one fit of the difference d = g_k - g_j serves
-//! both frames of a pair; `fit` computes N^2 of a window exactly, in integers.
+//! both frames of a pair. `fit` computes N^2 of a window exactly, in integers.
 //!
-//! A pixel less than two pixels from the frame's edge has no window of its own and takes the answer of the
-//! nearest whole window. So the statistics of the test, and with them its false rate, are the same
-//! everywhere, which replicated grey values would not give. A frame with a side under 5 pixels has no window
-//! and no changes.
+//! A pixel less than two pixels from the border of the frame has no window of its own and takes the result of
+//! the nearest whole window. The statistics of the test, and its false rate, are therefore the same
+//! everywhere; with replicated grey values they would not be. A frame with a side of less than 5 pixels has
+//! no window and no changes.
 //!
-//! It cannot tell an object from its shadow or reflection, sees nothing where a moving object has no contrast
-//! or stands still, and marks what the object covers in either neighbour frame along with what it covers now.
+//! Limits: the test cannot distinguish an object from its shadow or reflection. It detects nothing where a
+//! moving object has no contrast or stands still. It marks the pixels the object covers in either
+//! neighbouring frame as well as those it covers in the current frame.
 
 use super::fit::{BORDER, NORM_SCALE, WINDOW, for_each_window, window_norm};
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
 use crate::option_error::OptionError;
 
-/// How far beyond the visible edge of a moving thing eq. (1) marks pixels, because a window sees the edge
-/// from two pixels away.
+/// How far beyond the visible edge of a moving object eq. (1) marks pixels, in pixels: a window reaches the
+/// edge from two pixels away.
 ///
-/// Measured at T = 4 on upright rectangles and discs at random subpixel positions, from the true edge to the
-/// outer side of the outermost marked pixel, across the direction of motion: 1.9 px at a contrast of 20 grey
-/// levels, 2.3 at 50, 2.4 at 100; 1.8, 2.4 and 2.9 with edges blurred by 0.7 px; 0.3 px standard deviation
-/// from the subpixel position. Below a contrast of 10 it falls to 1 and less.
+/// Measured at T = 4 on upright rectangles and discs at random subpixel positions, across the direction of
+/// motion, from the true edge to the outer side of the outermost marked pixel: 1.9 px at a contrast of 20
+/// grey levels, 2.3 at 50, 2.4 at 100; 1.8, 2.4 and 2.9 with edges blurred by 0.7 px. The subpixel position
+/// adds a standard deviation of 0.3 px. Below a contrast of 10 the reach falls to 1 px and less.
 pub const CHANGE_REACH_PX: f64 = 2.3;
 
 /// Median of the chi-square distribution with six degrees of freedom.
 const CHI_SQ_6_MEDIAN: f64 = 5.348_120_627;
 
-/// How a frame pair is compared.
+/// Options for comparing two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeOptions {
-    /// The threshold T of eq. (1) in grey levels, 0 to 255 (values outside act as the nearest). `None`
-    /// (default): T follows the noise of the pair, because a fixed one fails as soon as the noise comes near
-    /// it: at a noise standard deviation of 6, noise alone reaches T = 4.
+    /// The threshold T of eq. (1) in grey levels, 0 to 255; values outside are clamped. `None` (default): T
+    /// follows the noise of the pair. A fixed threshold fails when the noise comes near it: at a noise
+    /// standard deviation of 6 grey levels, noise alone reaches T = 4.
     pub threshold: Option<f64>,
-    /// Fraction of unchanged pixels that may pass the test under Gaussian noise, for `threshold: None`. 1e-6
-    /// leaves about two false pixels in a 1080p frame, which the clean-up of regions removes.
+    /// Fraction of unchanged pixels that may pass the test under Gaussian noise, used with `threshold: None`.
+    /// The default 1e-6 leaves about two false pixels in a 1080p frame; cleaning the regions removes them.
     pub false_rate: f64,
-    /// T never follows the noise below this, in grey levels. 4 covers 99.9 % of a walker's joints in clean
-    /// footage (8: 95-98 %) and is above the residual that video codecs leave, which the noise estimate does
-    /// not see: skipped blocks are exactly equal. Reflections on a polished floor pass 4 and lengthen the
-    /// region downwards; 8 to 12 cut most of them off.
+    /// Lower bound of T in grey levels when T follows the noise. At the default 4, eq. (1) covers 99.9 % of a
+    /// walker's joints in clean footage (at 8: 95-98 %), and 4 is above the residual that video codecs leave.
+    /// The noise estimate does not include that residual, because skipped blocks are exactly equal.
+    /// Reflections on a polished floor pass 4 and lengthen the region downwards; 8 to 12 removes most of
+    /// them.
     pub min_threshold: f64,
-    /// Remove a common change of brightness and contrast first. Off: it costs a pass over the frame, and a
-    /// camera with fixed exposure, which eq. (1) assumes, does not need it.
+    /// Removes a common change of brightness and contrast before the comparison. Off by default: it costs one
+    /// pass over the frame, and a camera with fixed exposure, which eq. (1) assumes, does not need it.
     pub compensate_gain: bool,
 }
 
@@ -73,7 +75,8 @@ impl ChangeOptions {
     }
 }
 
-/// The pixels where eq. (1) holds between two frames; symmetric in them unless the gain is compensated.
+/// The pixels where eq. (1) holds between two frames. The result is symmetric in `a` and `b` unless the gain
+/// is compensated.
 pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
     a.check_same_size(b)?;
     if !options.compensate_gain {
@@ -95,7 +98,7 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     Ok(norms)
 }
 
-/// The threshold T that eq. (1) uses for this pair, in grey levels; without regard to the gain.
+/// The threshold T that eq. (1) uses for this pair, in grey levels, without gain compensation.
 pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
     a.check_same_size(b)?;
     match options.threshold {
@@ -104,14 +107,14 @@ pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f
     }
 }
 
-/// Standard deviation of one frame's grey-value noise, from a pair of frames with unchanged pixels in the
-/// majority.
+/// Standard deviation of the grey-value noise of one frame, from a pair of frames. More than half of the
+/// pixels must be unchanged.
 ///
 /// Under Gaussian noise of standard deviation s, n N^2 / (2 s^2) follows chi-square with six degrees of
-/// freedom; the median of N^2 over about 2000 windows on a grid is set equal to that distribution's. It uses
-/// the sums over 25 pixels, so that noise below one grey level is seen, where the median absolute difference
-/// of single pixels is 0. Moving pixels bias it up: 9 % when a fifth of the frame moves. Footage whose codec
-/// repeats more than half of the blocks gives 0.
+/// freedom. The median of N^2 over about 2000 windows on a grid is set equal to the median of that
+/// distribution. Sums over 25 pixels also measure noise below one grey level, where the median absolute
+/// difference of single pixels is 0. Moving pixels bias the estimate upwards: 9 % when a fifth of the frame
+/// moves. Footage whose codec repeats more than half of the blocks gives 0.
 pub fn noise_sd(a: &Frame, b: &Frame) -> Result<f64, FrameError> {
     a.check_same_size(b)?;
     let mut norms = sampled_norms(a, b);
@@ -124,7 +127,7 @@ pub fn noise_sd(a: &Frame, b: &Frame) -> Result<f64, FrameError> {
     Ok((n * median / (2.0 * CHI_SQ_6_MEDIAN)).sqrt())
 }
 
-/// The T that Gaussian noise of standard deviation `noise_sd` passes with probability `false_rate` (1e-12 to
+/// The T that Gaussian noise of standard deviation `noise_sd` exceeds with probability `false_rate` (1e-12 to
 /// 0.5) at a pixel.
 ///
 /// T = s sqrt(2 q / 25), q the upper quantile of chi-square with six degrees of freedom; 1.75 s at 1e-6.
@@ -133,8 +136,8 @@ pub fn threshold_for_noise(noise_sd: f64, false_rate: f64) -> f64 {
     noise_sd * (2.0 * chi_sq_6_upper_quantile(false_rate.clamp(1e-12, 0.5)) / n).sqrt()
 }
 
-/// The x with P(chi-square_6 > x) = exp(-x/2) (1 + x/2 + x^2/8) = p, by Newton steps on the logarithm, which
-/// is concave.
+/// The x with P(chi-square_6 > x) = exp(-x/2) (1 + x/2 + x^2/8) = p, by Newton's method on the logarithm,
+/// which is concave.
 fn chi_sq_6_upper_quantile(p: f64) -> f64 {
     let mut x = CHI_SQ_6_MEDIAN;
     for _ in 0..20 {
@@ -146,7 +149,7 @@ fn chi_sq_6_upper_quantile(p: f64) -> f64 {
     x
 }
 
-/// 17500 N^2 of windows on a square grid, about 2048 of them.
+/// 17500 N^2 of about 2048 windows on a square grid.
 fn sampled_norms(a: &Frame, b: &Frame) -> Vec<i32> {
     let step = ((a.width() * a.height()) as f64 / 2048.0).sqrt().max(1.0) as usize;
     let centres = |side: usize| (BORDER..side.saturating_sub(BORDER)).step_by(step);
@@ -157,10 +160,10 @@ fn sampled_norms(a: &Frame, b: &Frame) -> Vec<i32> {
     norms
 }
 
-/// Marks the pixels with N > `threshold`; the frames agree in size.
+/// Marks the pixels with N > `threshold`. The frames have the same size.
 fn changes_over(a: &Frame, b: &Frame, threshold: f64) -> Mask {
     let mut mask = Image::filled(a.width(), a.height(), false);
-    // An integer exceeds a real number when it exceeds its floor.
+    // An integer exceeds a real number exactly when it exceeds the floor of that number.
     let limit = (NORM_SCALE * threshold.clamp(0.0, 255.0).powi(2)).floor() as i32;
     for_each_window(a, b, &mut mask, move |norm_sq| norm_sq > limit);
     extend_to_border(&mut mask);
@@ -187,10 +190,11 @@ fn extend_to_border<T: Copy>(image: &mut Image<T>) {
     }
 }
 
-/// Eq. (1) over a stream of frames: a pixel of frame k has changed when it did against frame k - 1 or k + 1.
+/// Eq. (1) over a stream of frames: a pixel of frame k has changed if it changed against frame k - 1 or k +
+/// 1.
 ///
-/// Each pair is fitted once and serves both of its frames. The mask of a frame can only be known when the
-/// next one has come; the first and the last frame have one neighbour.
+/// Each pair is fitted once and serves both of its frames. The mask of a frame is available when the next
+/// frame has arrived. The first and the last frame have one neighbour only.
 #[derive(Debug, Clone)]
 pub struct ChangeDetector {
     options: ChangeOptions,
@@ -199,13 +203,13 @@ pub struct ChangeDetector {
 }
 
 impl ChangeDetector {
-    /// A detector that has seen no frame.
+    /// A detector before its first frame.
     pub fn new(options: ChangeOptions) -> Self {
         Self { options, previous: None, previous_pair: None }
     }
 
-    /// Takes the next frame and returns the mask of the one before it, `None` for the first. A frame of
-    /// another size is refused and leaves the detector as it was.
+    /// Takes the next frame and returns the mask of the previous one, `None` for the first frame. A frame of
+    /// another size is an error and does not change the detector.
     pub fn push(&mut self, frame: &Frame) -> Result<Option<Mask>, FrameError> {
         let Some(previous) = &self.previous else {
             self.previous = Some(frame.to_image());
@@ -221,7 +225,7 @@ impl ChangeDetector {
         Ok(Some(mask))
     }
 
-    /// The mask of the last frame, from its only pair; `None` when fewer than two frames came.
+    /// The mask of the last frame, from its only pair; `None` after fewer than two frames.
     pub fn finish(self) -> Option<Mask> {
         self.previous_pair
     }
@@ -314,8 +318,8 @@ mod tests {
         }
     }
 
-    /// Standard deviation of Gaussian numbers about a whole number, rounded to whole numbers: about
-    /// sqrt(sd² + 1/12) from sd = 0.5 on, less below (7 % at 0.4), where most become the whole number itself.
+    /// Standard deviation of Gaussian numbers about a whole number after rounding to whole numbers: about
+    /// sqrt(sd² + 1/12) for sd >= 0.5, less below (7 % less at 0.4), where most round to the mean itself.
     ///
     /// sum k² P(k - 1/2 < x < k + 1/2), each probability by Simpson's rule.
     fn rounded_sd(sd: f64) -> f64 {
@@ -416,8 +420,9 @@ mod tests {
         assert!(!masks[3].pixels().contains(&true));
     }
 
-    /// With noise the default threshold is that of one window in a million: sd times the root of twice the
-    /// quantile of chi squared of 6 degrees of freedom over 25 pixels (38.258336, scipy 1.17.1 chi2.isf(1e-6, 6)).
+    /// With noise, the default threshold is that of one window in a million: sd times the square root of
+    /// twice the quantile of chi-square with 6 degrees of freedom over 25 pixels (38.258336, scipy 1.17.1
+    /// chi2.isf(1e-6, 6)).
     #[test]
     fn the_default_threshold_is_that_of_one_window_in_a_million() {
         let mut random = crate::synth::Random::new(6);
@@ -434,7 +439,7 @@ mod tests {
         assert!((found / (sd * (2.0 * 38.258336f64 / 25.0).sqrt()) - 1.0).abs() < 1e-6, "{found} {sd}");
     }
 
-    /// Without noise changes begin at 4 grey levels; a threshold that is given holds, however low.
+    /// Without noise the default threshold is 4 grey levels; a given threshold holds, however low.
     #[test]
     fn still_footage_has_a_least_threshold() {
         let changed = |by: u8, options: &ChangeOptions| {

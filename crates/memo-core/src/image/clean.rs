@@ -1,16 +1,17 @@
 //! Binary image operations that turn a change mask into solid areas.
 //!
-//! Rohr 1994, section 4.1: detected pixels with a small number of detected neighbours in the 3x3 window are
-//! deleted, undetected ones with a large number are marked, recursively because each step changes its
-//! neighbours' numbers; remaining holes are filled by a separate algorithm. The thresholds are not printed.
+//! Source: Rohr 1994, section 4.1: detected pixels with a small number of detected neighbours in the 3x3
+//! window are deleted, and undetected pixels with a large number are marked, recursively, because each step
+//! changes the numbers of its neighbours. Remaining holes are filled by a separate algorithm. The paper does
+//! not print the thresholds.
 //!
-//! The recursion ends. Let m be the number of marked pixels, p the number of marked neighbour pairs, and c =
-//! (few + many) / 2. Deleting a pixel with n <= few neighbours changes E = c m - p by n - c, marking one with
-//! n >= many by c - n: with few < many both lower E by at least 1/2, and E cannot fall below -4 times the
-//! number of pixels. The result may depend on the order of steps, which is fixed: row by row, then first come
-//! first served.
+//! The recursion terminates. Let m be the number of marked pixels, p the number of marked neighbour pairs,
+//! and c = (few + many) / 2. Deleting a pixel with n <= few neighbours changes E = c m - p by n - c; marking
+//! one with n >= many changes it by c - n. With few < many both lower E by at least 1/2, and E cannot fall
+//! below -4 times the number of pixels. The result may depend on the order of steps, which is fixed: row by
+//! row, then first come, first served.
 //!
-//! None of this knows what a person is: two people who touch become one area, a faint person several.
+//! Limits: two people who touch become one area, and a person of low contrast becomes several.
 
 use super::frame::{Image, Mask};
 use super::region::{self, Rectangle};
@@ -18,14 +19,14 @@ use super::runs::{Connectivity, connected_runs, runs};
 use crate::option_error::OptionError;
 use std::collections::VecDeque;
 
-/// Neighbour numbers at which a pixel changes.
+/// Numbers of neighbours at which a pixel changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CleanOptions {
-    /// A marked pixel with at most this many of 8 marked neighbours is deleted. 2 removes specks, lines and
-    /// spurs one pixel wide and keeps every corner of an area at least two pixels wide.
+    /// A marked pixel with at most this many marked neighbours out of 8 is deleted. The default 2 removes
+    /// specks, lines and spurs one pixel wide and keeps every corner of an area at least two pixels wide.
     pub few: u8,
-    /// An unmarked pixel with at least this many of 8 marked neighbours is marked; 9 marks none. 5 closes
-    /// slots up to three pixels wide and leaves straight edges and outer corners alone.
+    /// An unmarked pixel with at least this many marked neighbours out of 8 is marked; 9 marks none. The
+    /// default 5 closes slots up to three pixels wide and leaves straight edges and outer corners unchanged.
     pub many: u8,
 }
 
@@ -48,7 +49,7 @@ pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, OptionError> {
     options.check()?;
     let many = options.many;
     let Some(marked) = region::enclosing(&runs(mask, true)) else { return Ok(mask.clone()) };
-    // A pixel outside the rectangle has 3 marked neighbours at most, so it stays unmarked.
+    // A pixel outside the rectangle has at most 3 marked neighbours, so it stays unmarked.
     let area = if many > 3 { marked } else { whole(mask) };
     let mut grid = NeighbourGrid::new(mask, &area);
     grid.settle(options);
@@ -61,12 +62,12 @@ fn whole(mask: &Mask) -> Rectangle {
     Rectangle { left: 0, top: 0, right: mask.width() - 1, bottom: mask.height() - 1 }
 }
 
-/// Added to a pixel's neighbour number when it is marked itself.
+/// Added to the number of neighbours of a pixel that is itself marked.
 const MARKED: u8 = 16;
-/// State of the rim, which is neither marked nor ever changed.
+/// Value of the rim, which is not marked and never changes.
 const RIM: u8 = 128;
 
-/// Per pixel the number of marked neighbours, plus [`MARKED`], inside a rim one pixel wide.
+/// For each pixel the number of marked neighbours, plus [`MARKED`], inside a rim one pixel wide.
 struct NeighbourGrid {
     width: usize,
     state: Vec<u8>,
@@ -96,7 +97,7 @@ impl NeighbourGrid {
         grid
     }
 
-    /// Flips pixels until none is to be deleted or marked.
+    /// Deletes and marks pixels until no pixel changes.
     fn settle(&mut self, options: &CleanOptions) {
         let mut unstable = self.unstable(options);
         while let Some(at) = unstable.pop_front() {
@@ -111,7 +112,7 @@ impl NeighbourGrid {
         is_unstable(self.state[at], options)
     }
 
-    /// The pixels to change, row by row. Rows are searched in blocks, most of which hold none.
+    /// The pixels to change, row by row. Rows are searched in blocks, most of which contain none.
     fn unstable(&self, options: &CleanOptions) -> VecDeque<usize> {
         const BLOCK: usize = 64;
         let mut found = VecDeque::new();
@@ -158,8 +159,8 @@ fn is_unstable(state: u8, options: &CleanOptions) -> bool {
     deleted | marked
 }
 
-/// Marks every unmarked area that is surrounded by marked pixels: one from which no path of horizontal and
-/// vertical steps over unmarked pixels leads to the mask's edge.
+/// Marks every unmarked area enclosed by marked pixels: an area from which no path of horizontal and vertical
+/// steps over unmarked pixels leads to the border of the mask.
 pub fn fill_holes(mask: &Mask) -> Mask {
     let (right, bottom) = (mask.width(), mask.height() - 1);
     let mut filled = mask.clone();
@@ -206,7 +207,7 @@ mod tests {
         near.filter(|&(u, v)| (u, v) != (x, y) && mask.at(u, v)).count() as u8
     }
 
-    /// Unmarked pixels that a walk from the edge reaches, one pixel at a time.
+    /// Unmarked pixels that a walk from the border reaches, one pixel at a time.
     fn outside(mask: &Mask) -> Mask {
         let (w, h) = (mask.width(), mask.height());
         let mut reached = Image::filled(w, h, false);
@@ -294,7 +295,7 @@ mod tests {
         assert_eq!(error, OptionError { name: "few", wanted: "less than many", got: 4.0 });
     }
 
-    /// Pixels with up to two of eight neighbours go: lines of one pixel from end to end, and what sticks out.
+    /// Pixels with up to two of eight neighbours are deleted: lines of one pixel from end to end, and spurs.
     #[test]
     fn thin_lines_go() {
         let mut mask = Image::filled(30, 20, false);
@@ -303,7 +304,7 @@ mod tests {
         assert!(cleaned.pixels().iter().all(|p| !p));
         (9..12).for_each(|y| mask.row_mut(y)[3..15].fill(true));
         let cleaned = clean(&mask, &CleanOptions::default()).unwrap();
-        // Corners have three neighbours and stay, and so does the pixel of the line that touches the block.
+        // Corners have three neighbours and remain; so does the pixel of the line that touches the block.
         assert_eq!(cleaned.pixels().iter().filter(|p| **p).count(), 3 * 12 + 1);
     }
 }

@@ -1,16 +1,16 @@
-//! Edge points: where the grey-value gradient is steepest, found to a fraction of a pixel and linked into
-//! chains.
+//! Edge points: where the magnitude of the grey-value gradient is largest across the edge, located to a
+//! fraction of a pixel and linked into chains.
 //!
-//! The image is differentiated with the gradient of a Gaussian of one chosen scale, thinned across the edge,
-//! cleared of faint points by hysteresis, and the points that remain are linked along the edge.
+//! The image is differentiated with the gradient of a Gaussian of one given scale, thinned across the edge
+//! and cleared of faint points by hysteresis. The remaining points are linked along the edge.
 //!
 //! Sources: Rohr 1994, section 4.3; Korn, "Toward a symbolic representation of intensity changes in images",
 //! PAMI 10, 1988 (gradient of Gaussian); Canny, PAMI 8, 1986 (hysteresis); Devernay, INRIA RR-2724, 1995
 //! (thinning and localising along the image axis nearest to the gradient).
 //!
-//! One scale only: Korn's selection of the best scale for each point is not done. Two edges closer than about
-//! 2 sigma pull at each other, corners are rounded over about sigma, and lines thinner than that show as two
-//! edges.
+//! Limits: there is one scale only; Korn's selection of the best scale for each point is not implemented. Two
+//! edges closer than about 2 sigma shift each other, corners are rounded over about sigma, and lines thinner
+//! than about 2 sigma give two edges.
 
 use super::frame::{Frame, FrameError, Mask};
 use crate::option_error::OptionError;
@@ -18,31 +18,32 @@ use glam::Vec2;
 use std::ops::Range;
 use thiserror::Error;
 
-/// Why edges were not looked for.
+/// Why edge detection failed.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EdgeError {
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The mask does not fit the frame.
+    /// The mask differs in size from the frame.
     #[error(transparent)]
     Mask(#[from] FrameError),
 }
 
-/// Scales that can be computed: below the first the Gaussian falls between the pixels.
+/// Smallest and largest allowed scale, pixels: below the smallest, the Gaussian falls between the pixels.
 const SIGMA_PX: (f32, f32) = (0.4, 50.0);
 
-/// How edges are found.
+/// Options for edge detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeOptions {
-    /// Scale of the Gaussian. 1 px: finer scales follow sensor noise, at 2 px the two edges of a limb 4 px
-    /// wide push each other apart.
+    /// Scale of the Gaussian, pixels. Default 1: finer scales follow sensor noise; at 2 px the two edges of a
+    /// limb 4 px wide shift each other apart.
     pub sigma_px: f32,
-    /// Gradient every edge point reaches, grey levels per pixel. 5: at sigma 1 noise of 5 grey levels leaves
-    /// a gradient of 1 along either axis; a step of 13 grey levels passes.
+    /// Smallest gradient of an edge point, grey levels per pixel. Default 5: at sigma = 1, noise of 5 grey
+    /// levels leaves a gradient of 1 along either axis, and a step of 13 grey levels passes.
     pub low: f32,
-    /// Gradient that at least one point of a connected edge reaches. 12: a step of 31 grey levels.
+    /// Gradient that at least one point of a connected edge must reach, grey levels per pixel. Default 12: a
+    /// step of 31 grey levels.
     pub high: f32,
 }
 
@@ -77,35 +78,36 @@ pub struct Window {
     pub height: usize,
 }
 
-/// Where edges are looked for: in the intersection of what is given, in the whole frame by default.
+/// The part of the frame to search for edges: the intersection of the fields that are set, the whole frame by
+/// default.
 ///
-/// Grey values outside are still read by the Gaussian, so an edge found here is the same as in the whole
+/// The Gaussian also reads grey values outside the domain, so an edge found here is the same as in the whole
 /// frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct EdgeDomain<'a> {
     /// Pixels that may be edge points.
     pub mask: Option<&'a Mask>,
-    /// Rectangle that may hold edge points; work is done only here.
+    /// Rectangle that may hold edge points; only this rectangle is computed.
     pub window: Option<Window>,
 }
 
 /// An edge point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edgel {
-    /// Image position, sub-pixel across the edge.
+    /// Image position, pixels, with subpixel precision across the edge.
     pub position_px: Vec2,
-    /// Gradient of the smoothed image, grey levels per pixel; points to the brighter side.
+    /// Gradient of the smoothed image, grey levels per pixel; it points to the brighter side.
     pub gradient: Vec2,
 }
 
 impl Edgel {
-    /// Direction of the edge (not normalised), with the brighter side on the right as seen in the image.
+    /// Direction of the edge (not normalised), with the brighter side on its right as seen in the image.
     pub fn tangent(&self) -> Vec2 {
         -self.gradient.perp()
     }
 }
 
-/// Edge points in order along their edges.
+/// Edge points in order along their edges, as chains.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EdgeChains {
     edgels: Vec<Edgel>,
@@ -122,7 +124,7 @@ impl EdgeChains {
         })
     }
 
-    /// One chain of the edge points given.
+    /// A single chain of the given edge points.
     #[cfg(test)]
     pub(super) fn single(edgels: &[Edgel]) -> Self {
         Self { edgels: edgels.to_vec(), ends: vec![edgels.len()] }
@@ -190,15 +192,15 @@ fn shrink_to_mask(frame: &Frame<'_>, window: Window, mask: &Mask) -> Result<Wind
     Ok(Window { x: x0.min(x1), y: y0.min(y1), width: x1.saturating_sub(x0), height: y1.saturating_sub(y0) })
 }
 
-/// One side (0..=radius) of the sampled Gaussian g(k) ~ exp(-k^2 / 2 sigma^2) and of its derivative ~ k g(k),
-/// scaled so that a constant stays itself and a ramp of 1 grey/px has slope 1.
+/// One half (0..=radius) of the sampled Gaussian g(k) ~ exp(-k^2 / 2 sigma^2) and of its derivative ~ k g(k),
+/// scaled so that a constant is preserved and a ramp of 1 grey/px has slope 1.
 struct Taps {
     smooth: Vec<f32>,
     slope: Vec<f32>,
 }
 
 impl Taps {
-    /// Cut at 3 sigma, where a step of 255 grey levels still shows 0.3 of one.
+    /// Truncates at 3 sigma, where a step of 255 grey levels still contributes 0.3 grey levels.
     fn new(sigma_px: f32) -> Self {
         let radius = (3.0 * sigma_px).ceil() as usize;
         let gauss = |k: usize| (-((k * k) as f32) / (2.0 * sigma_px * sigma_px)).exp();
@@ -215,7 +217,7 @@ impl Taps {
     }
 }
 
-/// Columns computed together: one register of the widest vectors, two or four of the narrower ones.
+/// Columns computed together: one register of the widest vectors, two or four registers of narrower ones.
 const BLOCK: usize = 16;
 
 /// A frame row after filtering along x.
@@ -233,7 +235,7 @@ struct GradientRow {
     magnitude_sq: Vec<f32>,
 }
 
-/// The search for gradient maxima, compiled for each width of vectors.
+/// The search for gradient maxima, compiled for each vector width.
 struct FindMaxima<'a> {
     frame: &'a Frame<'a>,
     window: Window,
@@ -252,8 +254,9 @@ impl pulp::WithSimd for FindMaxima<'_> {
 
 /// Gradient maxima inside `window`, above the low threshold.
 ///
-/// Rows stream through: each is filtered along x once, and only the rows the filter along y needs are kept.
-/// The rows are one pixel wider than the window on either side, because a maximum has neighbours.
+/// Rows are streamed: each row is filtered along x once, and only the rows that the filter along y needs are
+/// kept. The rows are one pixel wider than the window on either side, because the test for a maximum reads
+/// the neighbours.
 #[inline(always)]
 fn gradient_maxima(frame: &Frame<'_>, window: &Window, mask: Option<&Mask>, options: &EdgeOptions) -> Maxima {
     let taps = Taps::new(options.sigma_px);
@@ -282,7 +285,7 @@ fn gradient_maxima(frame: &Frame<'_>, window: &Window, mask: Option<&Mask>, opti
     maxima
 }
 
-/// The grey values from column `x0` on; beyond the frame's sides its last value is repeated.
+/// The grey values from column `x0` on; beyond the sides of the frame the border value is repeated.
 #[inline(always)]
 fn pad_row(row: &[u8], x0: isize, grey: &mut [f32]) {
     let left = ((-x0).max(0) as usize).min(grey.len());
@@ -319,8 +322,8 @@ fn filter_along_row(grey: &[f32], taps: &Taps, out: &mut FilteredRow) {
     }
 }
 
-/// `I_x = g * (g' * I)` and `I_y = g' * (g * I)`: the second factor was applied along x, the first is along
-/// y.
+/// `I_x = g * (g' * I)` and `I_y = g' * (g * I)`: the inner factor was applied along x, the outer one is
+/// applied along y.
 #[inline(always)]
 fn filter_across_rows(rows: &[FilteredRow], taps: &Taps, out: &mut GradientRow) {
     let radius = taps.radius();
@@ -348,10 +351,10 @@ fn filter_across_rows(rows: &[FilteredRow], taps: &Taps, out: &mut GradientRow) 
     }
 }
 
-/// Free cells round the grid, so that a search needs no bounds.
+/// Free cells around the grid, so that neighbour searches need no bounds checks.
 const MARGIN: usize = 2;
 
-/// No edge point.
+/// Marks a missing edge point.
 const NONE: u32 = u32::MAX;
 
 /// Edge points and the pixels they belong to.
@@ -360,7 +363,8 @@ struct Maxima {
     edgels: Vec<Edgel>,
     /// The grid cell of each edge point.
     cells: Vec<usize>,
-    /// For each pixel of the window, margin added, one more than the index of its edge point; 0 without one.
+    /// For each pixel of the window, with margin: the index of its edge point plus one; 0 without an edge
+    /// point.
     grid: Vec<u32>,
 }
 
@@ -374,7 +378,7 @@ impl Maxima {
         self.window.width + 2 * MARGIN
     }
 
-    /// Adds the maxima of frame row `y`, the middle one of the three rows; blocks below the threshold are
+    /// Adds the maxima of frame row `y`, the middle one of the three rows. Blocks below the threshold are
     /// skipped.
     #[inline(always)]
     fn collect_row(&mut self, y: usize, rows: &[GradientRow], mask: Option<&Mask>, low: f32) {
@@ -388,8 +392,8 @@ impl Maxima {
         }
     }
 
-    /// The magnitude is compared along the image axis nearest to the gradient. Along a straight edge that
-    /// finds the same points as the gradient's own direction, one for each row or column, without
+    /// The magnitude is compared along the image axis nearest to the gradient. Along a straight edge this
+    /// finds the same points as a comparison along the gradient, one per row or column, without
     /// interpolation.
     fn collect_block(
         &mut self,
@@ -426,8 +430,8 @@ impl Maxima {
         self.grid[cell] = self.edgels.len() as u32;
     }
 
-    /// Hysteresis: removes the edge points that no path over neighbouring edge points joins to one of
-    /// gradient `high`.
+    /// Hysteresis: removes the edge points that are not connected, over neighbouring edge points, to an edge
+    /// point of gradient `high`.
     fn drop_faint(&mut self, high: f32) {
         let mut is_kept: Vec<bool> =
             self.edgels.iter().map(|e| e.gradient.length_squared() >= high * high).collect();
@@ -445,7 +449,7 @@ impl Maxima {
         }
     }
 
-    /// Visits the edge points within `reach` pixels of number `i`, itself excluded.
+    /// Visits the edge points within `reach` pixels of edge point `i`, except `i` itself.
     #[inline(always)]
     fn for_each_neighbour(&self, i: usize, reach: usize, mut visit: impl FnMut(usize)) {
         let (cell, stride) = (self.cells[i], self.stride());
@@ -463,7 +467,7 @@ impl Maxima {
         self.grid[self.cells[i]] != 0
     }
 
-    /// Links neighbours first, then bridges gaps of one pixel between the ends that are left.
+    /// Links neighbours first, then bridges gaps of one pixel between the remaining ends.
     fn link(&self) -> Links {
         let mut links =
             Links { next: vec![NONE; self.edgels.len()], previous: vec![NONE; self.edgels.len()] };
@@ -473,7 +477,7 @@ impl Maxima {
     }
 
     /// Links each free end to the best free start within `reach` that in turn prefers this end to all others.
-    /// At a junction only one pair prefers each other, so chains end there.
+    /// At a junction only one pair prefers each other, so the other chains end there.
     fn link_within(&self, reach: usize, links: &mut Links) {
         let kept = || (0..self.edgels.len()).filter(|&i| self.is_kept(i));
         let mut best = Links { next: links.next.clone(), previous: links.previous.clone() };
@@ -489,7 +493,7 @@ impl Maxima {
         }
     }
 
-    /// The successor and the predecessor edge point `i` would choose among those that are free.
+    /// The successor and the predecessor that edge point `i` prefers among the free ones.
     fn best_neighbours(&self, i: usize, reach: usize, links: &Links) -> (u32, u32) {
         let (mut next, mut previous) = (links.next[i], links.previous[i]);
         let (mut next_cost, mut previous_cost) = (f32::INFINITY, f32::INFINITY);
@@ -510,7 +514,7 @@ impl Maxima {
         (next, previous)
     }
 
-    /// Follows the links: open chains from their starts, then the closed ones.
+    /// Follows the links: first the open chains from their starts, then the closed ones.
     fn chains(&self, links: &Links) -> EdgeChains {
         let mut chains = EdgeChains::default();
         let mut is_done: Vec<bool> = (0..self.edgels.len()).map(|i| !self.is_kept(i)).collect();
@@ -528,8 +532,8 @@ impl Maxima {
         chains
     }
 
-    /// Where a closed chain through `i` is best opened: the point farthest from `i` is a corner if there is
-    /// one. Open chains start where they start.
+    /// The point at which to open a closed chain through `i`: the point farthest from `i`, which is a corner
+    /// if there is one. An open chain keeps its start.
     fn start_of_loop(&self, i: usize, links: &Links) -> usize {
         if links.previous[i] == NONE {
             return i;
@@ -546,7 +550,7 @@ struct Links {
 }
 
 impl Links {
-    /// A chain from `start` to its end, or once round if it is closed.
+    /// A chain from `start` to its end, or once around if it is closed.
     fn from(&self, start: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(Some(start), move |&i| {
             let next = self.next[i];
@@ -555,10 +559,11 @@ impl Links {
     }
 }
 
-/// The top of the parabola through the logarithms of three equidistant (squared) magnitudes, in (-1/2, 1/2].
+/// The maximum of the parabola through the logarithms of three equidistant (squared) magnitudes, in (-1/2,
+/// 1/2].
 ///
-/// Across a step edge the magnitude is a Gaussian, whose logarithm is a parabola. What is left of the error,
-/// 0.03 px at a step without any blur, comes from the pixels' own width.
+/// Across a step edge the magnitude is a Gaussian, whose logarithm is a parabola. The remaining error, 0.03
+/// px at a step without any blur, comes from the width of the pixels.
 #[inline(always)]
 fn peak_offset(before: f32, here: f32, after: f32) -> f32 {
     let [before, here, after] = [before, here, after].map(|m| m.max(f32::MIN_POSITIVE).ln());
@@ -572,8 +577,8 @@ struct Step {
     cost: f32,
 }
 
-/// How well `to` continues the edge at `from`, `None` if it belongs to another edge: their gradients differ
-/// by more than 60 degrees, or `to` lies beside `from` rather than ahead or behind.
+/// How well `to` continues the edge at `from`. `None` if it belongs to another edge: the gradients differ by
+/// more than 60 degrees, or `to` lies beside `from` rather than ahead or behind.
 fn step_between(from: &Edgel, to: &Edgel) -> Option<Step> {
     let (a, b) = (from.gradient, to.gradient);
     let dot = a.dot(b);

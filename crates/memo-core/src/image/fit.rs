@@ -1,9 +1,9 @@
 //! The left side of Rohr 1994, eq. (1): the norm of the second-order fit to the difference of two frames in a
 //! 5x5 window.
 //!
-//! X X* of eq. (1) projects the 25 differences d on six polynomials that are separable and orthogonal over
+//! X X* of eq. (1) projects the 25 differences d onto six polynomials that are separable and orthogonal over
 //! the window. With the taps 1: (1,1,1,1,1), x: (-2,-1,0,1,2), x^2 - 2: (2,-1,-2,-1,2) of squared length 5,
-//! 10, 14 and c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
+//! 10, 14, and c_ij the sum of d weighted by the i-th tap along x and the j-th along y,
 //!
 //! ```text
 //! 25 N^2  = c00^2/25 + (c10^2 + c01^2)/50 + c11^2/100 + (c20^2 + c02^2)/70
@@ -13,22 +13,22 @@
 //! which is exact in integers: |c_ij| <= 10200 and 2 |c00| <= 12750 fit 16 bits, 17500 N^2 <= 17500 * 255^2
 //! fits 32.
 //!
-//! The sums along y are shared by the five windows that contain a column. Where the processor has AVX2 the
-//! rest is written in its instructions: one `vpmaddwd` squares and adds two sums, for which compilers emit
-//! four instructions.
+//! The sums along y are shared by the five windows that contain a column. On processors with AVX2 the rest is
+//! computed with AVX2 instructions: one `vpmaddwd` squares and adds two sums, for which compilers emit four
+//! instructions.
 
 use super::frame::{Frame, Image};
 
-/// Side of the fit's window in pixels.
+/// Side of the fit window, pixels.
 pub(super) const WINDOW: usize = 5;
-/// Pixels between the frame's edge and the first window centre.
+/// Distance of the first window centre from the border of the frame, pixels.
 pub(super) const BORDER: usize = WINDOW / 2;
 /// The integers are this multiple of N^2.
 pub(super) const NORM_SCALE: f64 = 17500.0;
 /// Windows computed together: the 16-bit lanes of an AVX2 register.
 const LANES: usize = 16;
 
-/// Writes `value(17500 N^2)` of every window to its centre in `out`; the three images agree in size.
+/// Writes `value(17500 N^2)` of every window to its centre in `out`. The three images have the same size.
 pub(super) fn for_each_window<T: Copy>(a: &Frame, b: &Frame, out: &mut Image<T>, value: impl Fn(i32) -> T) {
     let (a, b) = (*a, *b);
     #[cfg(target_arch = "x86_64")]
@@ -38,7 +38,7 @@ pub(super) fn for_each_window<T: Copy>(a: &Frame, b: &Frame, out: &mut Image<T>,
     pulp::Arch::new().dispatch(NormRows { a, b, out, value, fit: PortableFit });
 }
 
-/// 17500 N^2 of the window centred on one pixel at least [`BORDER`] from the frame's edge.
+/// 17500 N^2 of the window centred on one pixel, which is at least [`BORDER`] from the border of the frame.
 pub(super) fn window_norm(a: &Frame, b: &Frame, x: usize, y: usize) -> i32 {
     let row = |j: usize| {
         let [a, b] = [a, b].map(|frame| &frame.row(y + j - BORDER)[x - BORDER..][..WINDOW]);
@@ -52,14 +52,13 @@ pub(super) fn window_norm(a: &Frame, b: &Frame, x: usize, y: usize) -> i32 {
 /// The three tap sums along y of every column, padded to whole blocks of windows.
 type ColumnSums = [Vec<i16>; 3];
 
-/// How the norms of a block of windows follow from the tap sums along y.
+/// Computes the norms of a block of windows from the tap sums along y.
 trait BlockFit: Copy {
     /// 17500 N^2 of the windows whose first columns are `start..start + LANES`.
     fn norms(self, columns: &ColumnSums, start: usize) -> [i32; LANES];
 }
 
-/// All windows of two frames in one pass: five rows of differences are kept, and of them the tap sums along
-/// y.
+/// All windows of two frames in one pass; it keeps five rows of differences and their tap sums along y.
 struct NormRows<'a, T, F, K> {
     a: Frame<'a>,
     b: Frame<'a>,
@@ -150,8 +149,8 @@ fn scaled_norm_sq(columns: [[i16; WINDOW]; 3]) -> i32 {
     7 * (4 * square(c00) + 2 * (square(c10) + square(c01)) + square(c11)) + 10 * (square(c20) + square(c02))
 }
 
-/// The block fit in AVX2 instructions, through pulp's safe wrappers. No closures: they would not be compiled
-/// for AVX2.
+/// The block fit in AVX2 instructions, through pulp's safe wrappers. It uses no closures, because closures
+/// would not be compiled for AVX2.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::{BlockFit, ColumnSums, LANES, WINDOW};
@@ -172,14 +171,14 @@ mod avx2 {
             let [second, second_high] = self.square_sums(c20, c02);
             let low = self.weigh(even, odd, second);
             let high = self.weigh(even_high, odd_high, second_high);
-            // Both 128-bit lanes were halved.
+            // Both 128-bit lanes have been halved.
             let first = self.0.avx2._mm256_permute2x128_si256::<0x20>(low, high);
             let last = self.0.avx2._mm256_permute2x128_si256::<0x31>(low, high);
             pulp::cast([first, last])
         }
     }
 
-    /// A block of tap sums along y at each of the five places in the window.
+    /// A block of tap sums along y at each of the five columns of the window.
     #[inline(always)]
     fn five_columns(sums: &[i16], start: usize) -> [__m256i; WINDOW] {
         let sums = &sums[start..start + LANES + WINDOW - 1];
@@ -209,7 +208,7 @@ mod avx2 {
             self.add(a, a)
         }
 
-        /// As [`super::taps`]; sums that are not used cost nothing.
+        /// As [`super::taps`]; unused sums cost nothing.
         #[inline(always)]
         fn taps(self, [p, q, r, s, t]: [__m256i; WINDOW]) -> [__m256i; 3] {
             let (outer, inner) = (self.add(p, t), self.add(q, s));

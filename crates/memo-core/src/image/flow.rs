@@ -1,6 +1,6 @@
 //! The velocity field of a moving region between two frames.
 //!
-//! Minimises, over the region R alone and without a condition on its border,
+//! Minimises, over the region R alone and without a boundary condition,
 //!
 //! ```text
 //! J(u, v) = integral over R of (I_x u + I_y v + I_t)^2 + lambda^2 (|grad u|^2 + |grad v|^2)
@@ -10,20 +10,22 @@
 //! Schnörr, "Determining optical flow for irregular domains", IJCV 6(1), 1991 (irregular domains, existence
 //! and uniqueness).
 //!
-//! Discretised with one unknown vector a pixel and one difference for each pair of neighbours that both lie
-//! in the region. Leaving out all other differences is the natural boundary condition: nothing is drawn
+//! Discretisation: one unknown vector per pixel and one difference for each pair of neighbours that both lie
+//! in the region. Omitting all other differences is the natural boundary condition: the field is not pulled
 //! towards the background, and a constant motion is reproduced up to the border.
 //!
-//! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term leaves the
-//! constant vectors free, so there is exactly one minimum if and only if the gradients there have two
-//! directions, that is if the sum of grad I grad I^T over the component is regular. Components that fail this
-//! are refused by name ([`Evidence`]) and get no velocity.
+//! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term does not
+//! determine the constant vectors, so there is exactly one minimum if and only if the gradients in the
+//! component have two directions, that is, if the sum of grad I grad I^T over the component is regular.
+//! Components that fail this test get no velocity, and [`Evidence`] gives the reason.
 //!
-//! Minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine over a pyramid, the
-//! second frame being warped by the motion found so far. The oriented smoothness of Nagel is not offered.
+//! The functional is minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine
+//! over a pyramid; the second frame is warped by the motion found so far. Nagel's oriented smoothness is not
+//! implemented.
 //!
-//! The motion is smoothed across the borders of limbs that move differently; grey values must persist from
-//! frame to frame; what moves farther than its own size on the coarsest pyramid level is lost.
+//! Limits: the motion is smoothed across the borders of limbs that move differently. Grey values must persist
+//! from frame to frame. A motion of more than the moving object's own size on the coarsest pyramid level is
+//! not found.
 
 mod domain;
 mod multigrid;
@@ -51,25 +53,28 @@ pub enum FlowError {
     Option(#[from] OptionError),
 }
 
-/// How the velocity field is computed.
+/// Options for computing the velocity field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowOptions {
-    /// Weight lambda of the smoothness, grey levels. 25: at 10 the field runs away at limb crossings of real
-    /// footage, where grey values do not persist; at 60 the swinging and the standing leg no longer separate.
+    /// Weight lambda of the smoothness term, grey levels. Default 25: at 10 the field diverges at limb
+    /// crossings in real footage, where grey values do not persist; at 60 the swing leg and the stance leg
+    /// are no longer separated.
     pub smoothness: f64,
-    /// Number of pyramid levels, each half the size of the one below. 5: 16 px of motion are one on the
-    /// coarsest. Small frames get fewer.
+    /// Number of pyramid levels; each level has half the size of the one below. Default 5: 16 px of motion
+    /// are 1 px on the coarsest level. Small frames get fewer levels.
     pub levels: usize,
-    /// Linearisations on each level. 2: 95 % of a walker's velocities are within 0.01 px of those after
-    /// twelve in slow footage (6 px a frame), within 0.15 px in fast (20 px a frame).
+    /// Linearisations per level. Default 2: 95 % of a walker's velocities are within 0.01 px of those after
+    /// twelve in slow footage (6 px per frame), and within 0.15 px in fast footage (20 px per frame).
     pub warps: usize,
-    /// Residual of the linear equations, relative to their right side, at which the solver stops. 1e-4 leaves
-    /// 99 % of a walker's velocities within 0.01 px of the exact solution.
+    /// Residual of the linear equations, relative to their right-hand side, at which the solver stops. The
+    /// default 1e-4 leaves 99 % of a walker's velocities within 0.01 px of the exact solution.
     pub tolerance: f64,
-    /// Largest number of solver steps for one linearisation. 200: thirty times what regions of a person take.
+    /// Maximum number of solver iterations per linearisation. Default 200: thirty times what regions of a
+    /// person need.
     pub max_iterations: usize,
-    /// RMS gradient in the weaker of two directions below which a component is not textured, grey levels per
-    /// pixel. 0.5: about what noise of one grey level leaves after smoothing.
+    /// Smallest RMS gradient, along the weaker principal direction, of a component whose motion is
+    /// determined, grey levels per pixel. Default 0.5: about what noise of one grey level leaves after
+    /// smoothing.
     pub min_gradient: f64,
 }
 
@@ -104,12 +109,12 @@ impl FlowOptions {
     }
 }
 
-/// What the grey values of a connected component say about its motion.
+/// What the grey values of a connected component determine about its motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Evidence {
-    /// Gradients in two directions: there is exactly one velocity field.
+    /// Gradients in two directions: the velocity field is unique.
     Determined,
-    /// Gradients in one direction only: the motion along the edges is free (aperture problem).
+    /// Gradients in one direction only: the motion along the edges is undetermined (aperture problem).
     OneDirection,
     /// No gradients.
     Textureless,
@@ -133,22 +138,24 @@ pub struct FlowComponent {
 /// Velocities of the pixels of a region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowField {
-    /// The rectangle round the region.
+    /// The bounding rectangle of the region.
     pub window: Window,
-    /// Velocity to the right in the window, px per frame; NaN outside the determined components.
+    /// Velocity to the right, pixels per frame, for each pixel of the window; NaN outside the determined
+    /// components.
     pub u_px: Image<f32>,
-    /// Velocity downwards in the window, px per frame; NaN outside the determined components.
+    /// Velocity downwards, pixels per frame, for each pixel of the window; NaN outside the determined
+    /// components.
     pub v_px: Image<f32>,
     /// The connected components of the region, in reading order of their first pixels.
     pub components: Vec<FlowComponent>,
-    /// Solver steps on the finest level, over all linearisations.
+    /// Solver iterations on the finest level, summed over all linearisations.
     pub iterations: usize,
-    /// Relative residual of the last linear equations solved.
+    /// Relative residual of the last linear system solved.
     pub relative_residual: f64,
 }
 
 impl FlowField {
-    /// The velocity of the pixel at column `x`, row `y` of the frame, px per frame.
+    /// The velocity of the pixel at column `x`, row `y` of the frame, pixels per frame.
     pub fn at(&self, x: usize, y: usize) -> Option<DVec2> {
         let (i, j) = (x.checked_sub(self.window.x)?, y.checked_sub(self.window.y)?);
         let is_inside = i < self.window.width && j < self.window.height;
@@ -159,7 +166,7 @@ impl FlowField {
 
 /// Computes the velocity field of a region from one frame to the next.
 ///
-/// 1. Smooth both frames round the region and refuse components whose motion is not determined.
+/// 1. Smooth both frames around the region and remove components whose motion is not determined.
 /// 2. Build a pyramid of grey values, gradients and region.
 /// 3. From the coarsest level down: linearise about the motion found so far, solve, repeat.
 pub fn velocity_field(
@@ -191,13 +198,13 @@ pub fn velocity_field(
     Ok(field_of_motion(motion, &pyramid[0].domain, window, components))
 }
 
-/// As many levels as asked for, but no motion of more than half the frame is looked for.
+/// The requested number of levels, limited so that no motion of more than half the frame is searched for.
 fn levels_for(frame: &Frame<'_>, options: &FlowOptions) -> usize {
     let side = frame.width().max(frame.height());
     options.levels.min((side / 2).max(2).ilog2() as usize)
 }
 
-/// The rectangle round the region.
+/// The bounding rectangle of the region.
 fn window_of_region(frame: &Frame<'_>, region: &Mask) -> Result<Window, FlowError> {
     let (width, height) = (region.width(), region.height());
     if (width, height) != (frame.width(), frame.height()) {
@@ -213,7 +220,7 @@ fn window_of_region(frame: &Frame<'_>, region: &Mask) -> Result<Window, FlowErro
     Ok(Window { x: x0, y: y0, width: x1 - x0 + 1, height: y1 - y0 + 1 })
 }
 
-/// Removes the components without gradients in two directions from the domain and reports on all of them.
+/// Removes the components without gradients in two directions from the domain and describes all components.
 fn refuse_undetermined(
     domain: &mut Domain,
     grey: &Raster,
@@ -249,7 +256,7 @@ fn refuse_undetermined(
     components
 }
 
-/// Roots of the eigenvalues, smaller first, of the mean of g g^T.
+/// Square roots of the eigenvalues of the mean of g g^T, smaller first.
 fn principal_rms(gradients: impl Iterator<Item = DVec2>) -> [f64; 2] {
     let (mut n, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0);
     for g in gradients {
@@ -266,7 +273,7 @@ struct Sample {
     gradient: Vec2,
 }
 
-/// Pixels that smoothing (2) and central differences (1) read beyond a pixel.
+/// Number of pixels that smoothing (2) and central differences (1) read beyond a pixel.
 const REACH: usize = 3;
 
 /// Smoothed grey values with gradients.
@@ -274,14 +281,14 @@ struct Raster {
     width: usize,
     height: usize,
     samples: Vec<Sample>,
-    /// The part that shows the frame rather than its repeated border.
+    /// The part that shows the frame rather than its replicated border.
     low: Vec2,
     high: Vec2,
 }
 
 impl Raster {
-    /// The window and `margin` pixels round it, smoothed with the binomial of 5 taps (sigma 1); the frame's
-    /// border is repeated outwards.
+    /// The window and `margin` pixels around it, smoothed with the binomial of 5 taps (sigma 1); the border
+    /// of the frame is replicated outwards.
     fn smoothed(frame: &Frame<'_>, window: &Window, margin: usize) -> Self {
         let margin = margin + REACH;
         let (width, height) = (window.width + 2 * margin, window.height + 2 * margin);
@@ -333,9 +340,9 @@ impl Raster {
         self.samples[y * self.width + x]
     }
 
-    /// Between pixels the gradient is bilinear, and the grey value is the weighted mean of the four straight
-    /// continuations I + g.d / 2: the half cancels the error bilinear interpolation makes where the image is
-    /// curved. `None` outside the frame.
+    /// Between pixels, the gradient is bilinear, and the grey value is the weighted mean of the four linear
+    /// extrapolations I + g.d / 2: the factor 1/2 cancels the error of bilinear interpolation where the image
+    /// is curved. `None` outside the frame.
     fn sample(&self, at: Vec2) -> Option<Sample> {
         if !(at.cmpge(self.low).all() && at.cmple(self.high).all()) {
             return None;
@@ -353,7 +360,8 @@ impl Raster {
         Some(mean)
     }
 
-    /// Half the size: pixel i lies between pixels 2 i and 2 i + 1 and weighs four of them (1, 3, 3, 1) / 8.
+    /// Half the size: pixel i lies between pixels 2 i and 2 i + 1 and is a mean of four pixels with weights
+    /// (1, 3, 3, 1) / 8.
     fn halved(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let taps = [0.125, 0.375, 0.375, 0.125];
@@ -399,7 +407,7 @@ struct Level {
     margin: usize,
 }
 
-/// Finest level first; ends early once the region is a single pixel.
+/// Finest level first; stops early when the region is a single pixel.
 fn pyramid(first: Raster, second: Raster, domain: Domain, margin: usize, levels: usize) -> Vec<Level> {
     let mut pyramid = vec![Level { first, second, domain, margin }];
     for _ in 1..levels {
@@ -430,8 +438,8 @@ impl Motion {
         Self { velocity, iterations: 0, relative_residual: 0.0 }
     }
 
-    /// The same motion on the next finer level: each pixel takes twice the velocity of the one that covers
-    /// it.
+    /// The same motion on the next finer level: each pixel takes twice the velocity of the coarse pixel that
+    /// covers it.
     fn refined(&self, coarse: &Domain, fine: &Domain) -> Self {
         let mut refined = Self::still(fine);
         for (x, y, cell) in fine.pixels() {
@@ -443,7 +451,7 @@ impl Motion {
     }
 }
 
-/// Linearises the grey value constraint about the motion so far, and minimises.
+/// Linearises the grey value constraint about the current motion and minimises.
 fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: &FlowOptions) {
     for (x, y, cell) in level.domain.pixels() {
         let velocity = DVec2::new(motion.velocity.u[cell], motion.velocity.v[cell]);
@@ -456,9 +464,9 @@ fn improve(motion: &mut Motion, level: &Level, solver: &mut Multigrid, options: 
     motion.relative_residual = solved.relative_residual;
 }
 
-/// The gradient g and the offset c of the constraint g . (u, v) + c = 0 at a pixel that so far moves with w:
-/// g is the mean of both frames' gradients at the pixel's two places, c = `I_2`(x + w) - `I_1`(x) - g . w.
-/// `None` if the pixel has left the frame.
+/// The gradient g and the offset c of the constraint g . (u, v) + c = 0 at a pixel whose current velocity is
+/// w: g is the mean of the gradients of both frames at the two places of the pixel, c = `I_2`(x + w) -
+/// `I_1`(x) - g . w. `None` if the pixel has left the frame.
 fn constraint(level: &Level, x: usize, y: usize, velocity: DVec2) -> Option<(DVec2, f64)> {
     let (x, y) = (x + level.margin, y + level.margin);
     let before = level.first.at(x, y);
@@ -467,7 +475,7 @@ fn constraint(level: &Level, x: usize, y: usize, velocity: DVec2) -> Option<(DVe
     Some((gradient, f64::from(after.grey - before.grey) - gradient.dot(velocity)))
 }
 
-/// Cuts the padding off and marks what has no velocity.
+/// Removes the padding and marks the pixels without a velocity.
 fn field_of_motion(
     motion: Motion,
     domain: &Domain,

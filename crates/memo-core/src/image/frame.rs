@@ -1,8 +1,8 @@
 //! Grey images: one owned image type, one borrowed view.
 //!
-//! Frames arrive as 8-bit grey values because every camera and codec delivers them so and
-//! because change detection is exact in integers. Derived quantities are `Image<f32>`: seven digits are more
-//! than a grey value has, and half the memory traffic of `f64`.
+//! Frames are 8-bit grey images, because cameras and codecs deliver 8 bits and because change detection is
+//! exact in integers. Derived quantities are `Image<f32>`: a grey value has fewer than the seven digits of
+//! `f32`, and `f64` would double the memory traffic.
 
 use crate::wording::counted;
 use thiserror::Error;
@@ -11,21 +11,21 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The buffer is shorter than the image it should hold; for an owned image, of another length.
+    /// The buffer is shorter than the image needs; for an owned image, its length differs from the image's.
     #[error("a {width}x{height} frame with rows {stride} apart needs {}, got {got}", counted(*needed, "byte"))]
     TooShort {
         /// Width in pixels.
         width: usize,
         /// Height in pixels.
         height: usize,
-        /// Distance of two rows in elements.
+        /// Distance between the starts of two rows, in elements.
         stride: usize,
         /// Number of elements needed.
         needed: usize,
         /// Number of elements given.
         got: usize,
     },
-    /// An image side is zero, or rows overlap.
+    /// An image side is zero, or the rows overlap.
     #[error(
         "frame of {width}x{height} pixels with rows {stride} apart: sides must be positive and rows must not overlap"
     )]
@@ -34,10 +34,10 @@ pub enum FrameError {
         width: usize,
         /// Height in pixels.
         height: usize,
-        /// Distance of two rows in elements.
+        /// Distance between the starts of two rows, in elements.
         stride: usize,
     },
-    /// Two frames that must agree in size do not.
+    /// Two frames that must have the same size differ in size.
     #[error("frame size changed: expected {expected_width}x{expected_height}, got {width}x{height}")]
     SizeChanged {
         /// Width of the first frame.
@@ -68,7 +68,7 @@ impl<T: Copy> Image<T> {
         Self { width, height, data: vec![value; width * height] }
     }
 
-    /// Takes row-major data of `width * height` elements.
+    /// Takes row-major data of `width * height` elements; any other length is an error.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 {
             return Err(FrameError::BadShape { width, height, stride: width });
@@ -95,7 +95,7 @@ impl<T: Copy> Image<T> {
         &self.data
     }
 
-    /// All pixels, row by row.
+    /// All pixels, row by row, mutable.
     pub fn pixels_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
@@ -104,16 +104,16 @@ impl<T: Copy> Image<T> {
     ///
     /// # Panics
     ///
-    /// Below the last row.
+    /// If `y` is not less than the height.
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// One row.
+    /// One row, mutable.
     ///
     /// # Panics
     ///
-    /// Below the last row.
+    /// If `y` is not less than the height.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         &mut self.data[y * self.width..(y + 1) * self.width]
     }
@@ -122,7 +122,8 @@ impl<T: Copy> Image<T> {
     ///
     /// # Panics
     ///
-    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
+    /// If the index `y * width + x` is past the last pixel. `x` is not compared with the width: a larger `x`
+    /// reads a pixel of a later row.
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
     }
@@ -131,7 +132,8 @@ impl<T: Copy> Image<T> {
     ///
     /// # Panics
     ///
-    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
+    /// If the index `y * width + x` is past the last pixel. `x` is not compared with the width: a larger `x`
+    /// sets a pixel of a later row.
     pub fn set(&mut self, x: usize, y: usize, value: T) {
         self.data[y * self.width + x] = value;
     }
@@ -143,13 +145,14 @@ impl<T: Copy> Image<T> {
 }
 
 impl Image<u8> {
-    /// Borrows the image as a frame.
+    /// Borrows the image as a [`Frame`].
     pub fn as_frame(&self) -> Frame<'_> {
         Frame { data: &self.data, width: self.width, height: self.height, stride: self.width }
     }
 }
 
-/// A borrowed 8-bit grey frame; rows may be padded (a video decoder's luma plane can be used in place).
+/// A borrowed 8-bit grey frame. Rows may be padded, so the luma plane of a video decoder can be used in
+/// place.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
     data: &'a [u8],
@@ -159,7 +162,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Borrows `height` rows of `width` bytes, each starting `stride` bytes after the one before.
+    /// Borrows `height` rows of `width` bytes; each row starts `stride` bytes after the previous one.
     pub fn new(data: &'a [u8], width: usize, height: usize, stride: usize) -> Result<Self, FrameError> {
         if width == 0 || height == 0 || stride < width {
             return Err(FrameError::BadShape { width, height, stride });
@@ -185,7 +188,7 @@ impl<'a> Frame<'a> {
     ///
     /// # Panics
     ///
-    /// Below the last row.
+    /// If `y` is not less than the height.
     pub fn row(&self, y: usize) -> &'a [u8] {
         let start = y * self.stride;
         &self.data[start..start + self.width]
@@ -195,7 +198,8 @@ impl<'a> Frame<'a> {
     ///
     /// # Panics
     ///
-    /// Beyond the last pixel. That `x` is less than the width is not checked: beyond it is the next row.
+    /// If the index `y * stride + x` is past the end of the data. `x` is not compared with the width: a
+    /// larger `x` reads padding or a later row.
     pub fn at(&self, x: usize, y: usize) -> u8 {
         self.data[y * self.stride + x]
     }
@@ -209,7 +213,7 @@ impl<'a> Frame<'a> {
         Image { width: self.width, height: self.height, data }
     }
 
-    /// Refuses another frame of a different size.
+    /// Returns an error if `other` differs in size.
     pub fn check_same_size(&self, other: &Frame<'_>) -> Result<(), FrameError> {
         if (self.width, self.height) == (other.width, other.height) {
             return Ok(());

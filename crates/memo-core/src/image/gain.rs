@@ -1,21 +1,21 @@
-//! A common change of brightness and contrast between two frames, as automatic exposure makes it.
+//! A common change of brightness and contrast between two frames, such as automatic exposure causes.
 //!
-//! Model: a = scale * b + offset at unchanged, unsaturated pixels. Both frames carry the same noise, so the
-//! line is fitted by total least squares over about 4000 pixels on a grid; pixels whose residual exceeds 2.5
-//! robust standard deviations (moving objects) are left out and the fit repeated. The start matches the
-//! quartiles of the two frames, which moving objects hardly change.
+//! Model: a = scale * b + offset at unchanged, unsaturated pixels. Both frames have the same noise, so the
+//! line is fitted by total least squares to about 4000 pixels on a grid. Pixels whose residual exceeds 2.5
+//! robust standard deviations (moving objects) are excluded and the fit is repeated. The initial line matches
+//! the quartiles of the two frames, which moving objects hardly change.
 //!
-//! It cannot follow a change that differs over the frame (a lamp, a cloud's edge), nor a tone curve that is
-//! not straight.
+//! Limits: a change that varies over the frame (a lamp, the edge of a cloud's shadow) and a nonlinear tone
+//! curve are not modelled.
 
 use super::frame::{Frame, FrameError, Image};
 
-/// Grey values nearer than this to 0 or 255 may be clipped and are not used.
+/// Grey values closer than this to 0 or 255 may be clipped and are not used.
 const CLIPPED: u8 = 4;
-/// Trimming repeats at most this often; five rounds are usual.
+/// Maximum number of trimming rounds; five are usual.
 const MAX_ROUNDS: usize = 12;
 
-/// The straight line from one frame's grey values to another's.
+/// The linear map from the grey values of one frame to those of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain {
     /// Contrast factor.
@@ -25,10 +25,10 @@ pub struct Gain {
 }
 
 impl Gain {
-    /// The line that changes nothing.
+    /// The map that changes nothing.
     pub const IDENTITY: Gain = Gain { scale: 1.0, offset: 0.0 };
 
-    /// The frame with every grey value mapped along the line, rounded and clipped to 0..=255.
+    /// The frame with every grey value mapped, rounded and clipped to 0..=255.
     pub fn apply(&self, frame: &Frame) -> Image<u8> {
         let table: [u8; 256] = std::array::from_fn(|grey| self.map(grey as f64).round() as u8);
         let mut image = frame.to_image();
@@ -45,10 +45,10 @@ impl Gain {
     }
 }
 
-/// The line a = scale * b + offset of the unchanged pixels, which must be in the majority.
+/// The map a = scale * b + offset of the unchanged pixels; more than half of the pixels must be unchanged.
 ///
-/// Too little contrast to fix a scale gives scale 1 and the median difference; no usable pixel gives the
-/// identity.
+/// With too little contrast to determine a scale, the result is scale 1 and the median difference; without
+/// usable pixels it is the identity.
 pub fn estimate_gain(a: &Frame, b: &Frame) -> Result<Gain, FrameError> {
     a.check_same_size(b)?;
     let pairs = sampled_pairs(a, b);
@@ -82,7 +82,7 @@ fn sampled_pairs(a: &Frame, b: &Frame) -> Vec<(f64, f64)> {
     pairs
 }
 
-/// The line through the quartiles of both grey value distributions.
+/// The line through the quartiles of both grey-value distributions.
 fn quartile_gain(pairs: &[(f64, f64)]) -> Gain {
     let mut of_a: Vec<f64> = pairs.iter().map(|pair| pair.0).collect();
     let mut of_b: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
@@ -97,7 +97,7 @@ fn quartiles(values: &mut [f64]) -> [f64; 3] {
     [1, 2, 3].map(|i| values[i * (values.len() - 1) / 4])
 }
 
-/// The pairs within 2.5 robust standard deviations of the line, at least one grey level.
+/// The pairs within 2.5 robust standard deviations of the line, but not less than one grey level.
 fn inliers(pairs: &[(f64, f64)], gain: Gain) -> Vec<(f64, f64)> {
     let residual = |&(a, b): &(f64, f64)| (a - gain.map(b)).abs();
     let mut sizes: Vec<f64> = pairs.iter().map(residual).collect();
@@ -106,8 +106,8 @@ fn inliers(pairs: &[(f64, f64)], gain: Gain) -> Vec<(f64, f64)> {
     pairs.iter().copied().filter(|pair| residual(pair) <= limit).collect()
 }
 
-/// The line with the least sum of squared perpendicular distances; `None` when the grey values hardly vary or
-/// do not vary together.
+/// The line with the smallest sum of squared perpendicular distances; `None` when the grey values hardly vary
+/// or are not correlated.
 fn total_least_squares(pairs: &[(f64, f64)]) -> Option<Gain> {
     let n = pairs.len() as f64;
     let mean = |value: fn(&(f64, f64)) -> f64| pairs.iter().map(value).sum::<f64>() / n;
@@ -117,7 +117,8 @@ fn total_least_squares(pairs: &[(f64, f64)]) -> Option<Gain> {
         let (a, b) = (a - mean_a, b - mean_b);
         (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
     }
-    // Correlation below 0.9 or a standard deviation under two grey levels: noise would decide the slope.
+    // With a correlation below 0.9 or a standard deviation under two grey levels, noise would determine the
+    // slope.
     if bb < 4.0 * n || ab <= 0.0 || ab * ab < 0.81 * aa * bb {
         return None;
     }
@@ -137,7 +138,8 @@ mod tests {
     use crate::image::{ChangeOptions, pair_changes};
     use proptest::prelude::*;
 
-    /// A smooth scene with a dark rectangle whose left edge is given; `tone` maps scene to grey values.
+    /// A smooth scene with a dark rectangle whose left edge is given; `tone` maps scene values to grey
+    /// values.
     fn scene(left: usize, tone: impl Fn(f64) -> f64) -> Image<u8> {
         let grey = |x: usize, y: usize| {
             if (left..left + 40).contains(&x) && y > 30 {
@@ -187,7 +189,8 @@ mod tests {
         assert_eq!(gain.apply(&image.as_frame()).pixels(), [0, 107, 255]);
     }
 
-    /// Inliers are within two and a half standard deviations, 1.4826 medians each: 98.8 % of normal residuals.
+    /// Inliers are within two and a half standard deviations of 1.4826 medians each: 98.8 % of normal
+    /// residuals.
     #[test]
     fn inliers_are_most_of_what_is_normal() {
         let mut random = crate::synth::Random::new(2);
@@ -198,7 +201,7 @@ mod tests {
             })
             .collect();
         let share = inliers(&pairs, Gain { scale: 0.9, offset: 5.0 }).len() as f64 / 20_000.0;
-        // Two-sided 2.5 standard deviations of a normal: 0.98758.
+        // Two-sided 2.5 standard deviations of a normal distribution: 0.98758.
         assert!((share - 0.98758).abs() < 0.004, "{share}");
     }
 
@@ -209,7 +212,7 @@ mod tests {
         assert!((found.scale - 0.8).abs() < 1e-12 && (found.offset - 10.0).abs() < 1e-12, "{found:?}");
     }
 
-    /// A scale is read off frames whose correlation is at least 0.9; off others an offset alone.
+    /// A scale is estimated from frames whose correlation is at least 0.9; other frames give an offset alone.
     #[test]
     fn frames_that_hardly_go_together_have_no_scale() {
         let mut random = crate::synth::Random::new(4);

@@ -1,10 +1,11 @@
-//! Straight edges: chains of edge points cut where they bend and replaced by eigenvector lines.
+//! Straight edges: chains of edge points are split where they bend, and each piece is fitted by an
+//! eigenvector line.
 //!
 //! Sources: Rohr 1994, section 4.3; Duda & Hart, "Pattern Classification and Scene Analysis", 1973, p. 332
 //! (eigenvector line fitting) and p. 338 (splitting at the point farthest from the chord).
 //!
-//! A segment never reaches over the end of a chain: collinear pieces of an interrupted edge stay separate.
-//! Curves become polygons within the tolerance; where exactly they are cut means nothing.
+//! Limits: a segment never extends over the end of a chain, so collinear pieces of an interrupted edge stay
+//! separate. Curves become polygons within the tolerance; the exact split points on a curve are arbitrary.
 
 use super::edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, edge_chains};
 use super::frame::Frame;
@@ -20,19 +21,19 @@ pub enum LineError {
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The edge points were refused.
+    /// Edge detection failed.
     #[error(transparent)]
     Edge(#[from] EdgeError),
 }
 
-/// How chains become straight edges.
+/// Options for fitting straight edges to chains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineOptions {
-    /// Largest distance of an edge point from its line. 1 px: five times the scatter of edge points in
-    /// compressed video, while the outline of a limb 100 px long that bows by 2 px is cut once.
+    /// Largest distance of an edge point from its line, pixels. Default 1: five times the scatter of edge
+    /// points in compressed video; the outline of a limb 100 px long that bows by 2 px is split once.
     pub max_deviation_px: f64,
-    /// Shorter segments are dropped. 8 px: below that noise makes segments too, and their direction scatters
-    /// by degrees.
+    /// Minimum length of a segment, pixels. Default 8: shorter segments also arise from noise, and their
+    /// direction scatters by degrees.
     pub min_length_px: f64,
 }
 
@@ -51,23 +52,24 @@ impl LineOptions {
     }
 }
 
-/// A straight edge. Seen in the image, the brighter side is on the right of the way from start to end.
+/// A straight edge. The brighter side is on the right of the direction from start to end, as seen in the
+/// image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeSegment {
-    /// First end, pixels.
+    /// Start point, pixels.
     pub start_px: DVec2,
-    /// Second end, pixels.
+    /// End point, pixels.
     pub end_px: DVec2,
-    /// Mean magnitude of the gradient of its edge points, grey levels per pixel.
+    /// Mean gradient magnitude of the edge points, grey levels per pixel.
     pub mean_gradient: f64,
-    /// Root mean square distance of the edge points from the line, rounded ends excepted.
+    /// Root mean square distance of the edge points from the line, pixels, without the rounded ends.
     pub residual_rms_px: f64,
     /// Number of edge points along the segment.
     pub edgel_count: usize,
 }
 
 impl EdgeSegment {
-    /// Distance of the two ends.
+    /// Distance between the two ends, pixels.
     pub fn length_px(&self) -> f64 {
         self.start_px.distance(self.end_px)
     }
@@ -77,12 +79,12 @@ impl EdgeSegment {
         (self.end_px - self.start_px).normalize_or_zero()
     }
 
-    /// Unit vector across the edge to the brighter side; zero if the ends coincide.
+    /// Unit vector across the edge towards the brighter side; zero if the ends coincide.
     pub fn normal(&self) -> DVec2 {
         self.direction().perp()
     }
 
-    /// The point halfway.
+    /// The midpoint of the segment, pixels.
     pub fn midpoint_px(&self) -> DVec2 {
         self.start_px.midpoint(self.end_px)
     }
@@ -104,8 +106,9 @@ pub fn edge_segments(
 
 /// Approximates each chain by straight segments, in the order of the chains.
 ///
-/// 1. Cut a piece at its farthest point from the chord until every piece is near its own line.
-/// 2. Join neighbouring pieces that one line fits as well.
+/// 1. Split a piece at its farthest point from the chord until every piece is within the tolerance of its own
+///    line.
+/// 2. Join neighbouring pieces that one line fits within the tolerance.
 /// 3. Keep the pieces that are long enough.
 pub fn segments_from_chains(
     chains: &EdgeChains,
@@ -140,7 +143,7 @@ impl Line {
     }
 }
 
-/// Sums over the points from the start of a chain, relative to its first point.
+/// Sums over the points of a chain from its start, relative to its first point.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     count: f64,
@@ -192,13 +195,13 @@ impl Moments {
     }
 }
 
-/// A chain of edge points with what makes the line through any stretch of it cheap.
+/// A chain of edge points with prefix sums, which make the line through any piece of it cheap.
 struct Chain<'a> {
     edgels: &'a [Edgel],
     origin: DVec2,
     /// Positions relative to the origin.
     points: Vec<DVec2>,
-    /// Entry i sums the first i points.
+    /// Entry i sums over the first i points.
     moments: Vec<Moments>,
 }
 
@@ -243,8 +246,8 @@ impl<'a> Chain<'a> {
         pieces
     }
 
-    /// The inner point farthest from the chord. The fitted line would not do: a corner's line runs through
-    /// both its sides, and the ends may be as far from it as the corner.
+    /// The inner point farthest from the chord. The fitted line cannot be used instead: the line fitted to a
+    /// corner runs through both sides, and the ends may be as far from it as the corner.
     fn farthest_from_chord(&self, piece: &Range<usize>) -> usize {
         let (a, b) = (self.points[piece.start], self.points[piece.end - 1]);
         let chord = b - a;
@@ -256,7 +259,7 @@ impl<'a> Chain<'a> {
         inner.max_by(|i, j| distance(i).total_cmp(&distance(j))).unwrap_or(piece.start + 1)
     }
 
-    /// Joins neighbours from the left as long as the common line keeps the tolerance.
+    /// Joins neighbours from left to right as long as the common line is within the tolerance.
     fn join(&self, pieces: Vec<Range<usize>>, max_deviation_px: f64) -> Vec<Range<usize>> {
         let mut joined: Vec<Range<usize>> = Vec::with_capacity(pieces.len());
         for mut piece in pieces {
@@ -273,8 +276,9 @@ impl<'a> Chain<'a> {
         joined
     }
 
-    /// The line fitted again without the points more than twice the RMS distance away: the Gaussian rounds
-    /// corners, and the rounded ends would turn and shift the line. They still have to keep the tolerance.
+    /// The line refitted without the points more than twice the RMS distance away: the Gaussian rounds
+    /// corners, and the rounded ends would turn and shift the line. These points must still be within the
+    /// tolerance.
     fn line_without_rounded_ends(&self, piece: &Range<usize>, max_deviation_px: f64) -> Line {
         let points = &self.points[piece.clone()];
         let line = self.line(piece);

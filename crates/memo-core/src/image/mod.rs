@@ -1,4 +1,4 @@
-//! What the pixels say: from grey frames to moving regions, velocities and straight edges.
+//! Image processing: from grey frames to moving regions, velocity fields and straight edges.
 
 pub mod background;
 #[cfg(feature = "image")]

@@ -1,20 +1,20 @@
 //! Outlines: the ordered pixels along the borders of marked areas.
 //!
-//! Border following of Suzuki and Abe 1985 (step 3), which walks the border pixels of an area with 8
-//! neighbours so that the unmarked side stays on one hand. Where a border starts is known from the connected
-//! areas of marked and of unmarked pixels, so their labels of borders already followed are not needed. The
-//! nesting of borders is not computed.
+//! Border following of Suzuki and Abe 1985 (step 3): it walks along the border pixels of an area (8
+//! neighbours) with the unmarked side always on the same hand. The start of each border is known from the
+//! connected areas of marked and of unmarked pixels, so the paper's labels of borders already followed are
+//! not needed. The nesting of borders is not computed.
 
 use super::frame::Mask;
 use super::runs::{Connectivity, Run, connected_runs, runs};
 
-/// One border. Consecutive pixels are neighbours, as are the last and the first; where the area is one pixel
-/// wide a pixel occurs twice.
+/// One border. Consecutive pixels are neighbours, as are the last and the first. Where the area is one pixel
+/// wide, a pixel occurs twice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outline {
-    /// Columns and rows of the border's pixels, which are all marked. Anticlockwise in the image as seen for
-    /// outer borders, clockwise for holes, starting in the top row of the area or on the left of the hole's
-    /// top row.
+    /// Column and row of each border pixel; all are marked. Outer borders run anticlockwise in the image as
+    /// seen and start in the top row of the area; borders of holes run clockwise and start on the left of the
+    /// top row of the hole.
     pub pixels: Vec<[usize; 2]>,
     /// Whether this is the border of a hole.
     pub is_hole: bool,
@@ -43,7 +43,7 @@ const STEPS: [[isize; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -
 const EAST: usize = 0;
 const WEST: usize = 4;
 
-/// The border through `start` whose unmarked side lies in the direction `unmarked` of it.
+/// The border through `start`; its unmarked side lies in the direction `unmarked` from `start`.
 fn follow(mask: &Mask, start: [usize; 2], unmarked: usize) -> Vec<[usize; 2]> {
     let clockwise = (1..8).map(|turn| (unmarked + turn) % 8);
     let Some(to_last) = clockwise.into_iter().find(|&direction| neighbour(mask, start, direction).is_some())
@@ -54,7 +54,7 @@ fn follow(mask: &Mask, start: [usize; 2], unmarked: usize) -> Vec<[usize; 2]> {
     let (mut at, mut back) = (start, to_last);
     loop {
         let (next, direction) = next_anticlockwise(mask, at, back);
-        // Closed: about to leave the last pixel for the start, as the walk would arrive from there.
+        // Closed: the next step leads from the last pixel of the border to its start.
         if next == start && Some(at) == neighbour(mask, start, to_last) {
             return pixels;
         }
@@ -63,15 +63,15 @@ fn follow(mask: &Mask, start: [usize; 2], unmarked: usize) -> Vec<[usize; 2]> {
     }
 }
 
-/// The first marked neighbour of `at` anticlockwise after the direction `back`, which leads to a marked one
-/// itself.
+/// The first marked neighbour of `at`, anticlockwise from the direction `back`, which itself leads to a
+/// marked pixel.
 fn next_anticlockwise(mask: &Mask, at: [usize; 2], back: usize) -> ([usize; 2], usize) {
     let directions = (1..8).map(|turn| (back + 8 - turn) % 8);
     let found = directions.into_iter().find_map(|d| neighbour(mask, at, d).map(|next| (next, d)));
     found.or_else(|| neighbour(mask, at, back).map(|next| (next, back))).unwrap_or((at, back))
 }
 
-/// The neighbour in a direction, if it lies in the mask and is marked.
+/// The neighbour in a direction, if it lies inside the mask and is marked.
 fn neighbour(mask: &Mask, [x, y]: [usize; 2], direction: usize) -> Option<[usize; 2]> {
     let [dx, dy] = STEPS[direction];
     let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
@@ -123,7 +123,7 @@ mod tests {
         }
     }
 
-    /// Marked pixels with an unmarked neighbour or the mask's edge on one of four sides.
+    /// Marked pixels with an unmarked neighbour, or the border of the mask, on one of four sides.
     fn border_pixels(mask: &Mask) -> Vec<[usize; 2]> {
         let marked = |x: Option<usize>, y: Option<usize>| match (x, y) {
             (Some(x), Some(y)) => x < mask.width() && y < mask.height() && mask.at(x, y),

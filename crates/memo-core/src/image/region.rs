@@ -1,12 +1,12 @@
-//! Moving regions: connected areas of a change mask, their enclosing rectangles, and their grouping into
+//! Moving regions: connected areas of a change mask, their bounding rectangles, and their grouping into
 //! candidates.
 //!
-//! Rohr 1994, section 4.1: the cleaned mask's area stands for the person, and its surrounding rectangle and
-//! outline are computed. On real footage a person falls apart where clothes resemble the background or where
-//! nothing moves (a foot in stance is not detected at all), so [`group_regions`] puts neighbouring areas
-//! together again.
+//! Source: Rohr 1994, section 4.1: the area of the cleaned mask represents the person; its bounding rectangle
+//! and its outline are computed. In real footage a person splits into several areas where clothes resemble
+//! the background or where nothing moves (a foot in stance is not detected at all), so [`group_regions`]
+//! joins neighbouring areas.
 //!
-//! It cannot separate people who overlap in the image, nor a person from shadow and reflection.
+//! Limits: people who overlap in the image are not separated, nor is a person from shadow and reflection.
 
 #[cfg(doc)]
 use super::change::CHANGE_REACH_PX;
@@ -16,11 +16,11 @@ use super::runs::{Connectivity, Run, connected_runs, runs};
 use crate::option_error::OptionError;
 use std::cmp::Reverse;
 
-/// An upright rectangle of whole pixels; all four sides belong to it.
+/// An axis-aligned rectangle of whole pixels. The first and the last column and row belong to it.
 ///
-/// Around a region of changes it is larger than the moving thing: by about [`CHANGE_REACH_PX`] on every side,
-/// and by what the thing covers in the neighbour frames along its motion. [`Rectangle::sides`] takes the
-/// first back.
+/// The rectangle around a region of changes is larger than the moving object: by about [`CHANGE_REACH_PX`] on
+/// every side, and along the motion by what the object covers in the neighbouring frames.
+/// [`Rectangle::sides`] corrects the first effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rectangle {
     /// First column.
@@ -45,8 +45,8 @@ impl Rectangle {
     }
 
     /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette,
-    /// [`CHANGE_REACH_PX`] for a region of changes, where 0.7 px either way remains for contrasts of 20 to
-    /// 100 grey levels. A rectangle narrower than twice the reach shrinks to its middle.
+    /// [`CHANGE_REACH_PX`] for a region of changes, where an error of 0.7 px either way remains for contrasts
+    /// of 20 to 100 grey levels. A rectangle narrower than twice the reach shrinks to its middle.
     pub fn sides(&self, reach_px: f64) -> Sides {
         let shrunk = |first: usize, last: usize| {
             let (low, high) = (first as f64 - 0.5, last as f64 + 0.5);
@@ -78,8 +78,7 @@ impl Rectangle {
     }
 }
 
-/// The sides of an upright rectangle in pixel coordinates, where the centre of a pixel is its integer
-/// coordinate.
+/// The sides of an axis-aligned rectangle in pixel coordinates; pixel centres are at integer coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
     /// Column of the left side.
@@ -92,7 +91,7 @@ pub struct Sides {
     pub bottom: f64,
 }
 
-/// A set of pixels that stands for one moving thing: a connected area, or several areas grouped.
+/// A set of pixels that represents one moving object: a connected area, or several areas grouped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Region {
     /// Its pixels, row by row and left to right.
@@ -104,7 +103,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// From at least one run, in any order, no two overlapping.
+    /// From at least one run, in any order; no two may overlap.
     fn from_runs(mut runs: Vec<Run>) -> Self {
         runs.sort_unstable();
         let rectangle = enclosing(&runs).unwrap_or(Rectangle { left: 0, top: 0, right: 0, bottom: 0 });
@@ -118,7 +117,7 @@ impl Region {
         after.checked_sub(1).is_some_and(|i| self.runs[i].y == y && x < self.runs[i].end)
     }
 
-    /// The region as a mask of a frame's size; pixels outside it are dropped.
+    /// The region as a mask of the given size; pixels outside it are dropped.
     pub fn mask(&self, width: usize, height: usize) -> Mask {
         let mut mask = Image::filled(width, height, false);
         for run in self.runs.iter().filter(|run| run.y < height && run.start < width) {
@@ -127,7 +126,7 @@ impl Region {
         mask
     }
 
-    /// The borders of the region in frame coordinates, see [`outlines`].
+    /// The borders of the region in frame coordinates; see [`outlines`].
     pub fn outlines(&self) -> Vec<Outline> {
         let Rectangle { left, top, .. } = self.rectangle;
         let shifted =
@@ -142,8 +141,8 @@ impl Region {
     }
 }
 
-/// The connected areas (8 neighbours) with at least `min_area` pixels, largest first, equal ones from top to
-/// bottom.
+/// The connected areas (8 neighbours) with at least `min_area` pixels, largest first; areas of equal size
+/// from top to bottom.
 pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
     let areas = connected_runs(&runs(mask, true), Connectivity::Eight);
     let mut regions: Vec<Region> = areas.into_iter().map(Region::from_runs).collect();
@@ -152,24 +151,25 @@ pub fn regions(mask: &Mask, min_area: usize) -> Vec<Region> {
     regions
 }
 
-/// When two areas belong to one candidate.
+/// Options for grouping areas into candidates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupOptions {
-    /// Smaller areas join nothing, in pixels: noise far from a person would stretch its rectangle. 16: less
-    /// than a shoe leaves once the 5x5 windows have widened it, more than most specks that survive the
-    /// clean-up.
+    /// Areas smaller than this are joined to no group, pixels: noise far from a person would enlarge the
+    /// rectangle. Default 16: less than a shoe leaves after the 5x5 windows have widened it, more than most
+    /// specks that remain after cleaning.
     pub min_part_area: usize,
-    /// Smaller groups are no candidates, in pixels. 150 is a person 30 pixels high, below which no limb can
-    /// be seen.
+    /// Groups smaller than this are no candidates, pixels. The default 150 is a person 30 pixels high; below
+    /// that height no limb is visible.
     pub min_area: usize,
-    /// Largest free height between a group and a further area, over the group's height. 0.3: the shank of a
-    /// trouser leg that resembles the floor may be missing.
+    /// Largest vertical gap between a group and a further area, as a fraction of the group's height. Default
+    /// 0.3: the shank of a trouser leg that resembles the floor may be missing.
     pub gap_y: f64,
-    /// Largest free width between a group and a further area, over the group's height. 0.05: wide enough for
-    /// a forearm, narrower than the space between two people side by side.
+    /// Largest horizontal gap between a group and a further area, as a fraction of the group's height.
+    /// Default 0.05: wide enough for a forearm, narrower than the space between two people side by side.
     pub gap_x: f64,
-    /// No area is added that makes the group wider than this times its height. 0.75: a long step with what
-    /// the neighbour frames add; two people side by side, or a row of small things, are wider.
+    /// Largest ratio of width to height of a group after an area is added. Default 0.75: a long step
+    /// including what the neighbouring frames add; two people side by side, or a row of small objects, are
+    /// wider.
     pub max_aspect: f64,
 }
 
@@ -190,8 +190,8 @@ impl GroupOptions {
 
 /// Joins regions whose rectangles overlap or nearly touch into upright candidates, largest first.
 ///
-/// The largest region takes in what is near enough, largest first, until nothing more is; then the largest
-/// one left, and so on.
+/// The largest region takes in the areas that are near enough, largest first, until none is left; then the
+/// largest remaining region does the same, and so on.
 pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
     let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
     parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
@@ -210,7 +210,7 @@ pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> 
     groups
 }
 
-/// Whether an area is near enough to a group and leaves it upright.
+/// Whether an area is near enough to a group and leaves the group upright.
 fn belongs(group: &Rectangle, part: &Rectangle, options: &GroupOptions) -> bool {
     let height = group.height() as f64;
     let [gap_x, gap_y] = group.gap(part);
@@ -220,7 +220,7 @@ fn belongs(group: &Rectangle, part: &Rectangle, options: &GroupOptions) -> bool 
     gap_x as f64 <= options.gap_x * height && gap_y as f64 <= options.gap_y * height && is_upright
 }
 
-/// The smallest rectangle that holds all runs, which are in order of their rows.
+/// The bounding rectangle of all runs, which are ordered by row.
 pub(super) fn enclosing(runs: &[Run]) -> Option<Rectangle> {
     Some(Rectangle {
         left: runs.iter().map(|run| run.start).min()?,
@@ -318,8 +318,8 @@ pub(super) mod tests {
         assert_eq!(group_regions(&row, &GroupOptions::default()), row);
     }
 
-    /// A frame of 110 grey levels with a disc of radius 20 around (x, y), its rim pixels weighted by 8x8
-    /// samples.
+    /// A frame of 110 grey levels with a disc of radius 20 around (x, y); the pixels on its border are
+    /// weighted by 8x8 samples.
     fn disc(x: f64, y: f64, contrast: f64) -> Image<u8> {
         let covered = |column: usize, row: usize| {
             let inside = |i: usize| {
@@ -392,8 +392,8 @@ pub(super) mod tests {
         areas.iter().map(|group| group.area).collect()
     }
 
-    /// By default a group takes in what is 5 % of its height beside it, 30 % above or below it, and leaves it
-    /// no wider than 75 % of its height.
+    /// By default a group takes in areas up to 5 % of its height beside it and up to 30 % above or below it,
+    /// and stays no wider than 75 % of its height.
     #[test]
     fn areas_are_joined_up_to_the_default_gaps() {
         let body = || block(100, 50, 40, 100);
@@ -413,12 +413,12 @@ pub(super) mod tests {
             let found = group_sizes(&[body(), block(140, 50, width, 100)]);
             assert_eq!(found.len() == 1, is_one, "{width} wide: {found:?}");
         }
-        // What is wide already may still grow downwards.
+        // A group that is already wide may still grow downwards.
         assert_eq!(group_sizes(&[block(0, 0, 90, 100), block(20, 105, 50, 20)]), [10_000]);
         assert_eq!(group_sizes(&[block(0, 0, 90, 100), block(20, 105, 70, 20)]), [10_400]);
     }
 
-    /// A gap is measured with what a group has grown to: a chain of small steps leads far.
+    /// A gap is measured relative to the grown group: a chain of small gaps reaches far.
     #[test]
     fn a_grown_group_reaches_farther() {
         let parts = [block(100, 50, 40, 100), block(105, 178, 30, 30), block(105, 255, 30, 20)];

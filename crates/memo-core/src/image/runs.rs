@@ -1,24 +1,24 @@
-//! Marked pixels row by row, and which of them hang together.
+//! Runs of marked pixels, row by row, and their connected areas.
 
 use super::frame::Mask;
 
-/// Marked pixels side by side in one row.
+/// Adjacent marked pixels in one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Run {
     /// Row.
     pub y: usize,
     /// First column.
     pub start: usize,
-    /// Column after the last.
+    /// Column after the last one.
     pub end: usize,
 }
 
 /// Which pixels count as neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Connectivity {
-    /// Those that share an edge.
+    /// Pixels that share an edge.
     Four,
-    /// Those that share an edge or a corner.
+    /// Pixels that share an edge or a corner.
     Eight,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn runs(mask: &Mask, value: bool) -> Vec<Run> {
     runs
 }
 
-/// Number of pixels before the first one equal to `value`. Whole blocks without it are skipped.
+/// Number of pixels before the first one equal to `value`. Whole blocks without that value are skipped.
 fn distance_to(row: &[bool], value: bool) -> usize {
     const BLOCK: usize = 64;
     let skipped =
@@ -48,7 +48,7 @@ fn distance_to(row: &[bool], value: bool) -> usize {
     row[skipped..].iter().position(|&pixel| pixel == value).map_or(row.len(), |i| skipped + i)
 }
 
-/// Groups runs (as [`runs`] orders them) into connected areas, in the order of their first runs.
+/// Groups runs (ordered as by [`runs`]) into connected areas, in the order of their first runs.
 pub(super) fn connected_runs(runs: &[Run], connectivity: Connectivity) -> Vec<Vec<Run>> {
     let reach = usize::from(connectivity == Connectivity::Eight);
     let mut parents: Vec<usize> = (0..runs.len()).collect();

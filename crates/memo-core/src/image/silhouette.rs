@@ -1,8 +1,8 @@
 //! Silhouettes of the person in a clip with a static background.
 //!
-//! Where all frames are at hand, the temporal median shows the place without the person, and eq. (1) of Rohr
-//! 1994 against it finds people who stand as well as people who move. Clothes of the background's grey are
-//! lost; soft shadows are not.
+//! All frames are available, so the temporal median gives the scene without the person, and eq. (1) of Rohr
+//! 1994 against it detects people who stand as well as people who move. Limits: clothes of the same grey as
+//! the background are lost; soft shadows do not matter.
 
 use super::background::{Background, BackgroundError, BackgroundOptions};
 use super::clean::{CleanOptions, clean, fill_holes};
@@ -11,7 +11,7 @@ use super::region::{GroupOptions, group_regions, regions};
 use crate::option_error::OptionError;
 use thiserror::Error;
 
-/// Why no silhouettes were made.
+/// Why no silhouettes were computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SilhouetteError {
@@ -21,20 +21,20 @@ pub enum SilhouetteError {
         /// The threshold given.
         threshold: f64,
     },
-    /// No background could be made.
+    /// No background could be computed.
     #[error(transparent)]
     Background(#[from] BackgroundError),
-    /// Frames of different sizes.
+    /// Frames differ in size.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// The binary operations were refused.
+    /// Cleaning the mask failed.
     #[error(transparent)]
     Option(#[from] OptionError),
 }
 
-/// The silhouette of the largest candidate in each frame; empty masks where there is none.
+/// The silhouette of the largest candidate in each frame; an empty mask where there is no candidate.
 ///
-/// `threshold` in grey levels as in [`Background::silhouette`].
+/// `threshold` in grey levels, as in [`Background::silhouette`].
 pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, SilhouetteError> {
     if !(threshold >= 0.0 && threshold.is_finite()) {
         return Err(SilhouetteError::Threshold { threshold });
@@ -43,7 +43,8 @@ pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, Si
     frames.iter().map(|frame| silhouette(frame, &background, threshold)).collect()
 }
 
-/// 1. What differs from the background. 2. The largest candidate of it. 3. Cut to the visible edge.
+/// 1. Find what differs from the background. 2. Take its largest candidate. 3. Cut the candidate to the
+///    visible edge.
 fn silhouette(frame: &Frame<'_>, background: &Background, threshold: f64) -> Result<Mask, SilhouetteError> {
     let changed = fill_holes(&clean(&background.foreground(frame)?, &CleanOptions::default())?);
     let group = GroupOptions::default();
@@ -80,8 +81,8 @@ mod tests {
         assert!(silhouettes(&views, f64::NAN).is_err() && silhouettes(&[], 25.0).is_err());
     }
 
-    /// Nine frames of a plain background, the fifth with blocks (left, width, height) and a line 1 pixel high from 58 to
-    /// 94.
+    /// Nine frames of a plain background, the fifth with blocks (left, width, height) and a line 1 pixel high
+    /// from column 58 to 94.
     fn scene(blocks: &[(usize, usize, usize)], line_level: u8) -> Vec<Image<u8>> {
         let mut frames = vec![Image::filled(220, 90, 100u8); 9];
         for &(left, width, height) in blocks {
@@ -98,14 +99,14 @@ mod tests {
         (0..220).filter(|&x| (0..90).any(|y| mask.at(x, y))).collect()
     }
 
-    /// Of two people the larger one is cut out.
+    /// Of two people, the larger one gives the silhouette.
     #[test]
     fn the_largest_mover_is_the_silhouette() {
         let columns = cut_out(&scene(&[(122, 14, 40), (42, 24, 60)], 0));
         assert!(columns.iter().all(|x| (38..72).contains(x)) && columns.len() >= 22, "{columns:?}");
     }
 
-    /// A line of single changed pixels joins nothing: cleaned away, it leaves both blocks apart.
+    /// A line of single changed pixels joins nothing: cleaning removes it, and both blocks stay separate.
     #[test]
     fn a_thin_line_joins_no_people() {
         let changed = |level: u8| -> Vec<usize> {
@@ -115,15 +116,16 @@ mod tests {
             let foreground = background.foreground(&views[4]).unwrap();
             (30..70).filter(|&y| foreground.at(76, y)).collect()
         };
-        // So faint that only windows with the line at their border differ, where the fit weighs it most.
+        // So faint that only windows with the line at their border differ, where its weight in the fit is
+        // largest.
         let level = (1..100).find(|&level| !changed(level).is_empty()).unwrap();
         assert_eq!(changed(level), [48, 52]);
         let columns = cut_out(&scene(&[(94, 14, 40), (34, 24, 60)], level));
         assert!(columns.iter().all(|x| (30..64).contains(x)) && columns.len() >= 22, "{columns:?}");
     }
 
-    /// What is as grey as the wall inside a person is part of the region, and of the silhouette where it differs a
-    /// little.
+    /// A patch of the wall's grey inside a person is part of the region, and of the silhouette if it differs
+    /// slightly.
     #[test]
     fn a_faint_patch_within_a_person_is_filled() {
         let patched = |level: u8| {

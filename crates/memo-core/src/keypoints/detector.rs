@@ -1,29 +1,30 @@
-//! What keypoint detectors deliver: which point stands where, what it is called, and how the fourteen joints of
-//! the stick figure and the six head points of Lee and Chen (1985) come from it.
+//! The output of keypoint detectors: the names and the order of the points, and how the fourteen joints of
+//! the stick figure and the six head points of Lee and Chen (1985) are computed from them.
 //!
-//! Every point has one name here (`right_knee`); the spellings of the detectors, of motion capture and of tables
-//! lead to it ([`joint_name`]). A [`Layout`] is the order of a detector's points; its source is part of it. Two
-//! layouts have 25 points, so [`Layout::from_points`] looks at the points themselves.
+//! Every point has one name here (`right_knee`); [`joint_name`] maps the spellings of detectors, motion
+//! capture and tables to it. A [`Layout`] is the order of a detector's points, with its source. Two layouts
+//! have 25 points, so [`Layout::from_points`] examines the points themselves.
 //!
-//! How the joints of the stick figure (section 2, figure 1, in the order of the paper's tree) are obtained:
+//! The joints of the stick figure (section 2, figure 1, in the order of the paper's tree) are obtained as
+//! follows:
 //!
-//! * shoulders, elbows, wrists, hips, knees and ankles are the detector's own;
-//! * the neck is the detector's point `neck` where its layout has one, else the middle of the shoulders. In
-//!   BODY_25 and COCO_18 it was trained as that middle. `upper_neck` of BODY_25B is another point, about 4 cm
-//!   above the line of the shoulders (median of 100 frames measured in space), and is used for the head only;
-//! * the pelvis is a point of the trunk's axis above the line of the hips. The lengths of table A.1 fit one rigid
-//!   trunk only, with the pelvis joint 10.09 cm above the line of the hips and 45.98 cm below that of the
-//!   shoulders, hence
-//!   `pelvis = m_hip + 10.09 / (10.09 + 45.98) (m_shoulder - m_hip)`
-//!   with the middles m in the image.
+//! * shoulders, elbows, wrists, hips, knees and ankles are the detector's own points;
+//! * the neck is the detector's point `neck` if its layout has one, otherwise the midpoint of the shoulders.
+//!   In BODY_25 and COCO_18 the neck was trained as that midpoint. `upper_neck` of BODY_25B is a different
+//!   point, about 4 cm above the line of the shoulders (median of 100 frames measured in space), and is used
+//!   for the head only;
+//! * the pelvis is a point on the axis of the trunk above the line of the hips. The lengths of table A.1 fit
+//!   only one rigid trunk, with the pelvis joint 10.09 cm above the line of the hips and 45.98 cm below that
+//!   of the shoulders, hence `pelvis = m_hip + 10.09 / (10.09 + 45.98) (m_shoulder - m_hip)` with the
+//!   midpoints m in the image.
 //!
-//! The source of a joint depends on the layout and not on the frame, so that its meaning does not change within
-//! a track. A joint with a missing source is missing (NaN, weight 0): nothing is invented.
+//! The source of a joint depends on the layout and not on the frame, so its meaning does not change within a
+//! track. A joint with a missing source is missing (NaN, weight 0); no joint is interpolated.
 //!
-//! What this cannot do: the middle of two image points is the image of the middle only where both are equally
-//! far away; at 4 m with one shoulder 0.4 m nearer it is off by 1 cm. The paper's neck lies 3.77 cm in front of
-//! the line of the shoulders, which a middle of two points cannot know. Detectors place hips and shoulders by
-//! habit, not by anatomy.
+//! Limits: the midpoint of two image points is the image of the midpoint only if both are equally far away;
+//! at 4 m with one shoulder 0.4 m nearer it is off by 1 cm. The paper's neck lies 3.77 cm in front of the
+//! line of the shoulders, which a midpoint of two points does not reproduce. Detectors place hips and
+//! shoulders by learned convention, not by anatomy.
 
 use glam::DVec2;
 
@@ -33,43 +34,44 @@ use super::names::{DetectorError, SIDE_PARTS, STICK_JOINTS, SwapGroup, joint_nam
 /// Names of the head points in the order of table A.2.
 pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "right_ear", "left_ear"];
 
-/// Where the pelvis joint lies on the way from the middle of the hips to the middle of the shoulders: from the
-/// lengths of table A.1 as a rigid trunk.
+/// Position of the pelvis joint between the midpoint of the hips (0) and the midpoint of the shoulders (1),
+/// from the lengths of table A.1 as a rigid trunk.
 pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
 
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SidePair {
-    /// What it changes sides with.
+    /// The group with which it is exchanged.
     pub group: SwapGroup,
     /// The part without its side, such as `knee`.
     pub part: &'static str,
-    /// Place of the right point.
+    /// Index of the right point.
     pub right: usize,
-    /// Place of the left point.
+    /// Index of the left point.
     pub left: usize,
 }
 
 /// N image points with weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPoints<const N: usize> {
-    /// Pixels; NaN where missing.
+    /// Image coordinates (u, v), pixels; NaN where missing.
     pub points_px: [DVec2; N],
-    /// The least score among a point's sources; 0 where missing, or where a score is negative or not finite.
+    /// The smallest score among a point's sources; 0 where missing, or where a score is negative or not
+    /// finite.
     pub weights: [f64; N],
 }
 
-/// What a point is computed from: places in a frame.
+/// The source of a point, as indices in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Source {
     Own(usize),
     Middle([usize; 2]),
-    /// Hips, then shoulders.
+    /// Indices of the hips, then of the shoulders.
     OnTrunk([[usize; 2]; 2]),
     Absent,
 }
 
-/// The named points of a detector, ready to be turned into joints of the stick figure.
+/// The named points of a detector, from which joints of the stick figure are computed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Detector {
     names: Vec<&'static str>,
@@ -78,7 +80,7 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// From the names of a frame's points in order, each in any known spelling.
+    /// A detector from the names of a frame's points in order, each in any known spelling.
     pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, DetectorError> {
         let mut known: Vec<&'static str> = Vec::with_capacity(names.len().min(LAYOUTS.len() * 33));
         for name in names {
@@ -91,7 +93,7 @@ impl Detector {
         Ok(Self::from_known(known))
     }
 
-    /// Of a layout.
+    /// A detector with the given layout.
     pub fn from_layout(layout: &'static Layout) -> Self {
         Self::from_known(layout.joints.to_vec())
     }
@@ -110,19 +112,19 @@ impl Detector {
             }
             _ => own(name),
         });
-        // Table A.2 has the neck 9.5 cm below the tip of the nose: the upper neck, where there is one.
+        // In table A.2 the neck is 9.5 cm below the tip of the nose: the upper neck, if there is one.
         let head =
             HEAD_POINTS.map(|name| if name == "neck" { own("upper_neck").or(neck) } else { own(name) });
         let or_absent = |source: Option<Source>| source.unwrap_or(Source::Absent);
         Self { stick: stick.map(or_absent), head: head.map(or_absent), names }
     }
 
-    /// The names of its points in order.
+    /// The names of the detector's points in order.
     pub fn names(&self) -> &[&'static str] {
         &self.names
     }
 
-    /// The joints of the stick figure, as [`STICK_JOINTS`], in one frame.
+    /// The joints of the stick figure in one frame, in the order of [`STICK_JOINTS`].
     pub fn stick_joints(
         &self,
         points_px: &[DVec2],
@@ -131,8 +133,8 @@ impl Detector {
         self.collect(&self.stick, points_px, scores)
     }
 
-    /// The head points, as [`HEAD_POINTS`], in one frame. The neck is the upper neck of BODY_25B, else the neck
-    /// of the stick figure.
+    /// The head points in one frame, in the order of [`HEAD_POINTS`]. The neck is the upper neck of BODY_25B
+    /// if there is one, otherwise the neck of the stick figure.
     pub fn head_points(
         &self,
         points_px: &[DVec2],
@@ -141,12 +143,12 @@ impl Detector {
         self.collect(&self.head, points_px, scores)
     }
 
-    /// Which of [`HEAD_POINTS`] the detector can give at all.
+    /// Which of [`HEAD_POINTS`] the detector can provide.
     pub fn available_head_points(&self) -> [bool; 6] {
         self.head.map(|source| source != Source::Absent)
     }
 
-    /// The pairs of right and left points among its points: legs from hip to toes, then arms, then head.
+    /// The pairs of right and left points: legs from hip to toes, then arms, then head.
     pub fn side_pairs(&self) -> Vec<SidePair> {
         let place = |name: &str| self.names.iter().position(|other| *other == name);
         let pair = |&(group, right, left, _): &(SwapGroup, &'static str, &str, _)| {
@@ -204,7 +206,8 @@ mod tests {
     use crate::synth::random::Random;
     use proptest::prelude::*;
 
-    /// Places copied by hand from the makers' own documents, as far as mistakes would hurt most.
+    /// Indices copied by hand from the makers' own documents, for the points where a mistake would do most
+    /// harm.
     #[test]
     fn places_are_those_the_makers_document() {
         let at = |layout: &str, place: usize| Layout::by_name(layout).unwrap().joints[place];
@@ -290,8 +293,8 @@ mod tests {
 
     #[test]
     fn the_trunk_lengths_of_table_a1_place_the_pelvis() {
-        // Shoulders 56.07 above the hips, drawn at 1 px/cm, leaning: the pelvis is 10.09 up that axis and the
-        // distance from it to the neck 45.98.
+        // Shoulders 56.07 above the hips, drawn at 1 px/cm, leaning: the pelvis is 10.09 up that axis and its
+        // distance from the neck is 45.98.
         let names = ["right_shoulder", "left_shoulder", "right_hip", "left_hip"];
         let axis = DVec2::from_angle(-1.4);
         let (hips, across) = (DVec2::new(300.0, 500.0), 16.1 * axis.perp());
@@ -365,7 +368,7 @@ mod tests {
     }
 
     /// Points 1, 2, 5, 8, 9, 12 of two real BODY_25 frames, with the nose and a heel: figures that published
-    /// software carries as examples.
+    /// software contains as examples.
     #[test]
     fn real_body_25_frames_are_recognised() {
         let frames = [
@@ -400,7 +403,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is missing or broken in a frame: a joint is missing exactly when one of its sources is.
+        /// Whatever is missing or invalid in a frame, a joint is missing exactly when one of its sources is.
         #[test]
         fn a_joint_is_missing_exactly_when_a_source_is(
             which in 0..LAYOUTS.len(),

@@ -1,4 +1,4 @@
-//! The orders in which detectors list their points, each with its source, and how an order is recognised.
+//! The orders in which detectors list their points, each with its source, and how to recognise an order.
 
 use glam::DVec2;
 
@@ -9,15 +9,15 @@ use super::names::{DetectorError, STICK_JOINTS, nearest, plain};
 /// The order of a detector's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Its name, as its makers write it.
+    /// The name used by its makers.
     pub name: &'static str,
     /// Names of its points in order, in this project's spelling.
     pub joints: &'static [&'static str],
-    /// Where the order was read.
+    /// The source of the order.
     pub source: &'static str,
 }
 
-/// All layouts known.
+/// All known layouts.
 pub static LAYOUTS: [Layout; 8] = [
     Layout {
         name: "BODY_25",
@@ -237,7 +237,7 @@ fn layout_counts() -> Vec<String> {
 }
 
 impl Layout {
-    /// The layout called `name`, however its letters and separators are written.
+    /// The layout called `name`, whatever its case and separators.
     pub fn by_name(name: &str) -> Result<&'static Self, DetectorError> {
         let wanted = plain(name);
         let same = |layout: &&'static Self| plain(layout.name) == wanted;
@@ -248,14 +248,16 @@ impl Layout {
         })
     }
 
-    /// The layout with `joint_count` points that `points_px` are in, frame after frame, NaN where missing.
+    /// The layout with `joint_count` points that fits `points_px`, given frame after frame, NaN where
+    /// missing.
     ///
-    /// BODY_25 and BODY_25B both have 25. The **middle test** tells them apart: BODY_25 alone has a neck and a
-    /// middle of the hips, which were trained as middles of the shoulders and of the hips. In published BODY_25
-    /// files those points lie within 0.01 of the figure's size (the diagonal of the box around it) of the
-    /// middles; where a BODY_25B file has other points in those places, the distance is 0.24 to 0.45 for the
-    /// hips and 0.02 to 0.16 for the neck. The greater of the two medians over the frames decides: up to
-    /// [`MIDDLE_NEAR`] it is BODY_25, from [`MIDDLE_FAR`] on it is not, and between it is an error.
+    /// BODY_25 and BODY_25B both have 25 points. The **midpoint test** distinguishes them: only BODY_25 has a
+    /// neck and a mid-hip, which were trained as midpoints of the shoulders and of the hips. In published
+    /// BODY_25 files those points lie within 0.01 of the figure's size (the diagonal of its bounding box) of
+    /// the midpoints. A BODY_25B file has other points at those indices, at a distance of 0.24 to 0.45 for
+    /// the hips and 0.02 to 0.16 for the neck. The larger of the two medians over the frames decides: up to
+    /// [`MIDDLE_NEAR`] the layout is BODY_25, from [`MIDDLE_FAR`] on it is not, and between them the result
+    /// is an error.
     pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
         let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
         let (with_middles, without) = match fitting[..] {
@@ -275,8 +277,8 @@ impl Layout {
         }
     }
 
-    /// How far the neck and the middle of the hips lie from the middles of shoulders and hips, in sizes of the
-    /// figure: the greater of the medians over the frames. None where no frame tells.
+    /// Distance of the neck and the mid-hip from the midpoints of shoulders and hips, as a fraction of the
+    /// figure's size: the larger of the medians over the frames. `None` if no frame has the points.
     fn distance_from_middles(&self, points_px: &[DVec2]) -> Option<f64> {
         let place = |name: &str| self.joints.iter().position(|joint| *joint == name);
         let middles = [["neck", "right_shoulder", "left_shoulder"], ["mid_hip", "right_hip", "left_hip"]];
@@ -293,7 +295,7 @@ impl Layout {
     }
 }
 
-/// Diagonal of the box around the points that are not missing.
+/// Diagonal of the bounding box of the points that are not missing.
 pub(super) fn size_px(points_px: &[DVec2]) -> f64 {
     let seen = || points_px.iter().filter(|point| point.is_finite());
     let low = seen().fold(DVec2::INFINITY, |low, point| low.min(*point));
@@ -301,8 +303,8 @@ pub(super) fn size_px(points_px: &[DVec2]) -> f64 {
     if seen().next().is_none() { 0.0 } else { (high - low).length() }
 }
 
-/// Up to here points lie in the middle; see [`Layout::from_points`].
+/// Up to this distance points count as midpoints; see [`Layout::from_points`].
 pub const MIDDLE_NEAR: f64 = 0.04;
 
-/// From here on they do not.
+/// From this distance on points do not count as midpoints.
 pub const MIDDLE_FAR: f64 = 0.06;

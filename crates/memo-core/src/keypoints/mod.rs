@@ -1,5 +1,5 @@
-//! Keypoints of people in two dimensions, as detectors write them: whose they are, which joints they show, and
-//! where right and left were exchanged.
+//! Two-dimensional keypoints of people, as detectors write them: which person they belong to, which joints
+//! they show, and where the right and left labels are exchanged.
 
 pub mod detector;
 pub mod layouts;

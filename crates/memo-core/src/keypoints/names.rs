@@ -1,11 +1,10 @@
-//! What a point is called: one name here, and the spellings of detectors, motion capture and tables that lead to
-//! it.
+//! Names of points: one name here, and the spellings of detectors, motion capture and tables that map to it.
 
 use thiserror::Error;
 
 use crate::wording::counted;
 
-/// Names of the stick figure's joints in the order of the paper's tree, the root first.
+/// Names of the joints of the stick figure in the order of the paper's tree, the root first.
 pub const STICK_JOINTS: [&str; 14] = [
     "neck",
     "right_shoulder",
@@ -27,53 +26,53 @@ pub const STICK_JOINTS: [&str; 14] = [
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DetectorError {
-    /// No layout of this name.
+    /// There is no layout with this name.
     #[error("unknown keypoint layout `{name}`{}; known are {}", hint(nearest), known.join(", "))]
     UnknownLayout {
         /// The name given.
         name: String,
-        /// The known name most like it, if one is.
+        /// The most similar known name, if one is similar.
         nearest: Option<&'static str>,
         /// The known names.
         known: Vec<&'static str>,
     },
-    /// No point of this name.
+    /// There is no point with this name.
     #[error("unknown joint `{name}`{}; known are {}", hint(nearest), joint_names().join(", "))]
     UnknownJoint {
         /// The name given.
         name: String,
-        /// The known name most like it, if one is.
+        /// The most similar known name, if one is similar.
         nearest: Option<&'static str>,
     },
-    /// Two points of one name.
+    /// Two points have the same name.
     #[error("joint `{name}` is named twice, at places {first} and {second}")]
     RepeatedJoint {
         /// The joint.
         name: &'static str,
-        /// Its first place.
+        /// Index of the first one.
         first: usize,
-        /// Its second place.
+        /// Index of the second one.
         second: usize,
     },
-    /// Not as many points or scores as names.
+    /// The number of points or scores differs from the number of names.
     #[error("expected {expected} {what}, got {got}")]
     Count {
-        /// Points or scores.
+        /// "points" or "scores".
         what: &'static str,
         /// The number of names.
         expected: usize,
-        /// The number that came.
+        /// The number given.
         got: usize,
     },
-    /// No layout has so many points.
+    /// No layout has this number of points.
     #[error("no keypoint layout has {}; known are {}", counted(*count, "point"), known.join(", "))]
     UnknownCount {
         /// The number of points.
         count: usize,
-        /// The known numbers, each with its layout.
+        /// The known numbers of points, each with its layout.
         known: Vec<String>,
     },
-    /// Two layouts have so many points and the points do not tell which.
+    /// Two layouts have this number of points and the points do not determine which.
     #[error(
         "{count} points may be {} or {}, and they do not tell which{}: name the layout",
         names[0], names[1], distance.map_or(String::new(), |far| format!(" (middle test {far:.3})"))
@@ -81,9 +80,10 @@ pub enum DetectorError {
     UnclearLayout {
         /// The number of points.
         count: usize,
-        /// The layouts that have it.
+        /// The layouts with that number of points.
         names: [&'static str; 2],
-        /// Result of the middle test, if a frame allowed it; see [`Layout::from_points`](super::layouts::Layout::from_points).
+        /// Result of the midpoint test, if a frame has the points; see
+        /// [`Layout::from_points`](super::layouts::Layout::from_points).
         distance: Option<f64>,
     },
 }
@@ -92,7 +92,7 @@ fn hint(nearest: &Option<&'static str>) -> String {
     nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
 }
 
-/// Points that change sides together when a detector confuses right and left.
+/// Points that are exchanged together when a detector confuses right and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SwapGroup {
     /// Hip, knee, ankle, heel and toes.
@@ -104,7 +104,7 @@ pub enum SwapGroup {
 }
 
 impl SwapGroup {
-    /// Its name in files: "legs", "arms" or "head".
+    /// The name of the group in files: "legs", "arms" or "head".
     pub fn name(self) -> &'static str {
         match self {
             Self::Legs => "legs",
@@ -114,7 +114,7 @@ impl SwapGroup {
     }
 }
 
-/// Points without a side, with their other spellings (lower case, nothing but letters and digits).
+/// Points without a side, with their other spellings (lower case, letters and digits only).
 const MIDDLE_PARTS: [(&str, &[&str]); 6] = [
     ("nose", &[]),
     ("neck", &[]),
@@ -145,13 +145,13 @@ pub(super) const SIDE_PARTS: [(SwapGroup, &str, &str, &[&str]); 17] = [
     (SwapGroup::Head, "right_mouth", "left_mouth", &[]),
 ];
 
-/// All names of points.
+/// The names of all points.
 pub fn joint_names() -> Vec<&'static str> {
     let middle = MIDDLE_PARTS.iter().map(|(name, _)| *name);
     middle.chain(SIDE_PARTS.iter().flat_map(|(_, right, left, _)| [*right, *left])).collect()
 }
 
-/// The name here of a point that `name` spells in any known way: `RKnee`, `right_knee`, `RIGHT_KNEE`, `RKN`.
+/// The name used here for a point spelled in any known way: `RKnee`, `right_knee`, `RIGHT_KNEE`, `RKN`.
 pub fn joint_name(name: &str) -> Result<&'static str, DetectorError> {
     let plain = plain(name);
     let spelt = |own: &str, others: &[&str]| plain_is(own, &plain) || others.contains(&plain.as_str());
@@ -182,12 +182,12 @@ pub(super) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_ascii_alphanumeric()).map(|c| c.to_ascii_lowercase()).collect()
 }
 
-/// Whether a name of this project reads `plain` without its underscores.
+/// Whether a name of this project equals `plain` without its underscores.
 fn plain_is(own: &str, plain: &str) -> bool {
     own.bytes().filter(|&b| b != b'_').eq(plain.bytes())
 }
 
-/// The name most like `plain`, if few letters differ: one, or two from eight letters on.
+/// The known name most similar to `plain`, if at most one letter differs, or two from eight letters on.
 pub(super) fn nearest(plain_name: &str, known: Vec<&'static str>) -> Option<&'static str> {
     const LONGEST: usize = 40;
     if plain_name.is_empty() || plain_name.len() > LONGEST {
@@ -198,8 +198,8 @@ pub(super) fn nearest(plain_name: &str, known: Vec<&'static str>) -> Option<&'st
     distances.filter(|(distance, _)| *distance <= allowed).min().map(|(_, name)| name)
 }
 
-/// Letters to insert, drop, change or exchange with their neighbour to make one text of the other
-/// (Damerau and Levenshtein's, each stretch edited once).
+/// Number of letters to insert, delete, replace or exchange with their neighbour to turn one text into the
+/// other (distance of Damerau and Levenshtein, each stretch edited once).
 fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     let mut before = vec![0; b.len() + 1];

@@ -1,11 +1,12 @@
-//! Which of the people a detector found in each frame is the one to follow.
+//! Selects the person to follow among all people detected in each frame.
 //!
-//! The most prominent person of the whole sequence (the greatest product of size and mean score) is where it
-//! starts; from there the nearest person is followed from frame to frame, forwards and backwards. Size is the
-//! diagonal of the box around the points; nearness the median distance over the points seen in both frames. A
-//! frame in which nobody is near enough has no person.
+//! Following starts at the most prominent person of the whole sequence, the one with the largest product of
+//! size and mean score; from there the nearest person is followed from frame to frame, forwards and
+//! backwards. Size is the diagonal of the bounding box of the points; distance is the median distance over
+//! the points visible in both frames. A frame in which nobody is near enough has no person.
 //!
-//! What it cannot do: two people who come closer to each other than the person moves between two frames may be
+//! Limits: no motion is predicted, so two people who come closer to each other than the person moves between
+//! two frames may be confused.
 //! confused, as no motion is predicted.
 
 use super::layouts::size_px;
@@ -13,15 +14,15 @@ use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;
 
-/// How far the nearest person may be, as a fraction of their size, from where the person was last seen.
+/// Largest distance of the nearest person from where the person was last seen, as a fraction of their size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowOptions {
-    /// Between neighbouring frames. A walker at 7 frames a second covers 0.12 body heights between two; the rest
-    /// is for detectors that jump.
+    /// Largest distance between consecutive frames. Default 0.3: a walker at 7 frames per second covers 0.12
+    /// body heights between two frames; the rest is a margin for detectors that jump.
     pub reach: f64,
-    /// More for every frame in which nobody was near.
+    /// Increase for every frame in which nobody was near enough. Default 0.1.
     pub reach_per_frame: f64,
-    /// At most, however long the person was lost.
+    /// Upper bound, however long the person was lost. Default 1.
     pub farthest: f64,
 }
 
@@ -35,7 +36,7 @@ impl Default for FollowOptions {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FollowError {
-    /// The lists do not belong together.
+    /// The lengths of the lists are inconsistent.
     #[error(
         "points and scores of {} with {} each: {} wanted, got {points} and {scores}",
         if *people == 1 { "1 person".to_owned() } else { format!("{people} people") },
@@ -43,21 +44,21 @@ pub enum FollowError {
         people.saturating_mul(*joints)
     )]
     Count {
-        /// Number of people, one frame number each.
+        /// Number of people, with one frame number each.
         people: usize,
-        /// Points of a person.
+        /// Number of points per person.
         joints: usize,
-        /// Points that came.
+        /// Number of points given.
         points: usize,
-        /// Scores that came.
+        /// Number of scores given.
         scores: usize,
     },
-    /// Frames are not in order.
+    /// The frame numbers are not in order.
     #[error("frame {after} follows frame {before}: people must be in the order of their frames")]
     Order {
         /// The earlier entry.
         before: i64,
-        /// The one that follows.
+        /// The following entry.
         after: i64,
     },
 }
@@ -70,9 +71,9 @@ struct Person<'a> {
     prominence: f64,
 }
 
-/// Marks the followed person among all people, `frames[i]` being the frame of person i, in order, and
-/// `joint_count` points (NaN where missing) and scores belonging to each. At most one a frame is marked; where no
-/// frame has two people, all are.
+/// Marks the followed person among all people. `frames[i]` is the frame of person i, in ascending order; each
+/// person has `joint_count` points (NaN where missing) and scores. At most one person per frame is marked; if
+/// no frame contains two people, all are marked.
 pub fn follow_person(
     frames: &[i64],
     joint_count: usize,
@@ -137,11 +138,11 @@ impl<'a> Person<'a> {
         let size_px = size_px(points_px);
         let total: f64 = seen().map(|(_, score)| if score.is_finite() { score.max(0.0) } else { 0.0 }).sum();
         let prominence = size_px * total / count.max(1) as f64;
-        // Coordinates beyond all pictures overflow; they must not win.
+        // Implausibly large coordinates overflow; such a person must not be the most prominent.
         Self { frame, points_px, size_px, prominence: if prominence.is_finite() { prominence } else { 0.0 } }
     }
 
-    /// Median distance of the points seen in both; none where no point is.
+    /// Median distance over the points visible in both; `None` if there is no such point.
     fn distance_px(&self, other: &Self) -> Option<f64> {
         let pairs = self.points_px.iter().zip(other.points_px);
         let mut distances: Vec<f64> =
@@ -162,7 +163,8 @@ mod tests {
         (0..5).map(|k| point(k, DVec2::from(random.normal_pair().map(f64::from)))).collect()
     }
 
-    /// Two people who cross (in random order within a frame) and a ghost in the first frame; who is marked.
+    /// Two people who cross (in random order within a frame) and a false detection in the first frame;
+    /// returns who is marked.
     fn followed(first_gap: std::ops::Range<usize>) -> Vec<Option<char>> {
         let mut random = Random::new(11);
         let (mut frames, mut points, mut scores, mut who) = (vec![], vec![], vec![], vec![]);
@@ -206,7 +208,7 @@ mod tests {
         }
     }
 
-    /// People of three points, two of them at the top: frame, place, size, score. Who is followed.
+    /// People of three points, two of them at the top: frame, position, size, score. Returns who is followed.
     fn of_three_points(people: &[(i64, f64, f64, f64)]) -> Vec<bool> {
         let frames: Vec<i64> = people.iter().map(|p| p.0).collect();
         let points: Vec<DVec2> =
@@ -215,15 +217,15 @@ mod tests {
         follow_person(&frames, 3, &points, &scores, &FollowOptions::default()).unwrap()
     }
 
-    /// Three tenths of the larger of both sizes to the next frame, a tenth more for every frame between, at
-    /// most one size.
+    /// The reach is three tenths of the larger of both sizes to the next frame, a tenth more for every frame
+    /// between, and at most one size.
     #[test]
     fn the_nearest_person_is_followed_within_reach() {
         for (frame, size, reach_px) in
             [(1, 100.0, 30.0), (1, 50.0, 30.0), (2, 100.0, 40.0), (4, 100.0, 60.0), (100, 100.0, 100.0)]
         {
             for beyond in [-1.0, 1.0] {
-                // Somebody else far away makes a choice necessary.
+                // A second person far away makes a choice necessary.
                 let people =
                     [(0, 0.0, 100.0, 0.9), (0, 5000.0, 10.0, 0.1), (frame, reach_px + beyond, size, 0.9)];
                 assert_eq!(of_three_points(&people), [true, false, beyond < 0.0], "{frame} {size} {beyond}");

@@ -1,22 +1,25 @@
-//! Repair of exchanged left and right labels in anybody's 2D joints over time.
+//! Repair of exchanged left and right labels in 2D joints over time, from any detector.
 //!
-//! A detector that takes the left leg for the right one exchanges two labels; it moves no joint. For a pair
-//! with difference d = right - left that is a change of the sign of d. The labels are taken as right where d
-//! moves smoothly: a second-order chain (change of velocity, irregular times allowed) over the bits of a limb
-//! group's levels (hip, knee, ankle), solved for its best path (Viterbi 1967) and for each bit's posterior
-//! (forward-backward). Noise and acceleration come from the data, so image scale and frame rate do not matter.
+//! A detector that confuses the left leg with the right one exchanges two labels and moves no joint. For a
+//! pair with difference d = right - left this changes the sign of d. The labels are taken as correct where d
+//! moves smoothly: a second-order chain (change of velocity, irregular times allowed) over the bits of the
+//! levels of a limb group (hip, knee, ankle), solved for its best path (Viterbi 1967) and for the posterior
+//! of each bit (forward-backward). Noise and acceleration are estimated from the data, so image scale and
+//! frame rate do not matter.
 //!
-//! Handled: groups apart from one another; within a group every pattern of exchanged levels, a change of
-//! pattern being dear; missing joints, gaps, uneven times; single bad detections, which are left out.
+//! Supported: groups exchanged independently of one another; within a group every pattern of exchanged
+//! levels, where a change of pattern has a high cost; missing joints, gaps and uneven times; single bad
+//! detections, which are left out.
 //!
-//! It cannot know
-//! * which leg is the left one: that is what most frames of the input say, and has a probability;
-//! * whether the legs passed one another in a gap: such runs of frames get each their own label decision;
-//! * which label is right where both joints of a pair coincide, where it matters as little;
-//! * the side of a joint whose partner is missing: it goes with its group and is no evidence;
+//! Limits. The method cannot determine
+//! * which leg is the left one: this is decided by the majority of the input's frames, and has a probability;
+//! * whether the legs passed one another in a gap: the runs of frames on either side get separate label
+//!   decisions;
+//! * which label is correct where both joints of a pair coincide; there it matters little;
+//! * the side of a joint whose partner is missing: it follows its group and is no evidence;
 //! * that a detector put both labels on one leg: such a sample is at best left out.
 //!
-//! Only ever are a left and a right entry exchanged; nothing is moved, made up or removed.
+//! Only a left and a right entry are ever exchanged; no point is moved, added or removed.
 
 mod chain;
 mod relative;
@@ -29,63 +32,63 @@ use relative::{Sample, Scale, Track};
 
 use glam::DVec2;
 
-/// At most this many levels a group: states grow with 4^levels.
+/// Maximum number of levels per group: the number of states grows as 4^levels.
 pub const MAX_LEVELS: usize = 4;
-/// Largest coordinate taken, px.
+/// Largest accepted coordinate, px.
 const MAX_PX: f64 = 1e7;
-/// Least time between frames, s.
+/// Smallest accepted time between frames, s.
 const MIN_STEP_S: f64 = 1e-6;
-/// A level parts from the most telling one where that is twice as likely as not.
+/// Probability above which a level may differ from the most informative one: twice as likely as not.
 const LEVEL_PARTS: f64 = 2.0 / 3.0;
-/// A run is as sure as this of its bits relative to its first frame.
+/// Probability, relative to the first frame of a run, that the bits of the run must reach.
 const RUN_SURE: f64 = 0.95;
-/// Doubt for so many frames ends a run; fewer are a moment in which the joints coincide.
+/// A run ends after this many uncertain frames; with fewer, the joints coincide only for a moment.
 const RUN_PATIENCE: usize = 12;
 
-/// Joints over time as a detector gave them.
+/// Joints over time, as given by a detector.
 #[derive(Debug, Clone, Copy)]
 pub struct Keypoints<'a> {
     /// Time of every frame, s, increasing.
     pub times_s: &'a [f64],
-    /// Joints in a frame.
+    /// Number of joints per frame.
     pub joints: usize,
-    /// (u, v) px, frame after frame, `joints` to a frame; NaN where missing.
+    /// (u, v) px, frame after frame, `joints` entries per frame; NaN where missing.
     pub points_px: &'a [[f64; 2]],
-    /// Of every point, in [0, 1]; weights the noise, 0 or NaN is missing.
+    /// Score of every point, in [0, 1]; weights the noise. 0 or NaN means missing.
     pub scores: Option<&'a [f64]>,
 }
 
-/// Pairs at one place of a limb, such as knee, or ankle with heel and toes.
+/// Pairs at one level of a limb, such as the knee, or the ankle with heel and toes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Level {
-    /// What reports call it.
+    /// Name in reports.
     pub name: String,
     /// Indices (left, right) of joints that are exchanged together.
     pub pairs: Vec<[usize; 2]>,
 }
 
-/// A limb on both sides, from the trunk outwards.
+/// A limb on both sides of the body, from the trunk outwards.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LimbGroup {
-    /// What reports call it.
+    /// Name in reports.
     pub name: String,
-    /// One to [`MAX_LEVELS`].
+    /// One to [`MAX_LEVELS`] levels.
     pub levels: Vec<Level>,
 }
 
-/// Priors, in nats (natural log of odds), and when to be sure.
+/// Priors, in nats (natural log of odds), and the probability required for a decision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnswapOptions {
-    /// Per frame, against its labels being exchanged. 0.2: a run of 15 exchanged frames costs 3, far less than
-    /// two broken motions (10 to 30), and 11 more frames one way than the other decide a label with 0.9. Larger
-    /// values harm long runs. Frames count as independent: a detector that errs in runs longer than half a
-    /// step makes the probability of a run's label too sure.
+    /// Prior per frame against exchanged labels. Default 0.2: a run of 15 exchanged frames costs 3, far less
+    /// than two breaks in the motion (10 to 30), and a surplus of 11 frames decides a label with probability
+    /// 0.9. Larger values are worse for long runs. Frames count as independent: if a detector errs in runs
+    /// longer than half a step, the probability of a run's label is overconfident.
     pub as_is_nats: f64,
-    /// Against neighbouring levels beginning to differ (once in ninety frames).
+    /// Prior against a difference between neighbouring levels starting (once in ninety frames).
     pub partial_begin_nats: f64,
-    /// Against their differing for a further frame.
+    /// Prior against such a difference continuing for another frame.
     pub partial_stay_nats: f64,
-    /// From this probability on a frame's label counts as decided.
+    /// Probability from which on a frame's label counts as decided.
     pub decided_at: f64,
 }
 
@@ -95,23 +98,23 @@ impl Default for UnswapOptions {
     }
 }
 
-/// Input that cannot be repaired because it is not joints over time.
+/// Why input was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnswapError {
-    /// Counts of points and frames disagree.
+    /// The number of points disagrees with the number of frames.
     #[error("wanted {} x {} = {}, got {got}", counted(*frames, "frame"), counted(*joints, "joint"), counted(*wanted, "point"))]
     Points {
         /// Number of times.
         frames: usize,
-        /// Joints in a frame.
+        /// Joints per frame.
         joints: usize,
-        /// Their product.
+        /// Number of points expected, the product of both.
         wanted: usize,
         /// Points given.
         got: usize,
     },
-    /// Counts of scores and points disagree.
+    /// The number of scores disagrees with the number of points.
     #[error("wanted a score for each of {}, got {got}", counted(*wanted, "point"))]
     Scores {
         /// Points given.
@@ -119,19 +122,19 @@ pub enum UnswapError {
         /// Scores given.
         got: usize,
     },
-    /// A time that is not finite, or not later than the one before.
+    /// A time is not finite, or not later than the previous one.
     #[error(
         "wanted times within +-1e12 s at least 1e-6 s apart, got {time_s} s at frame {frame} after {before_s} s"
     )]
     Time {
-        /// Frame of the bad time.
+        /// Frame with the invalid time.
         frame: usize,
-        /// The time there, s.
+        /// The time of that frame, s.
         time_s: f64,
-        /// The time before (itself at frame 0), s.
+        /// The previous time (at frame 0 the same time), s.
         before_s: f64,
     },
-    /// A coordinate that is infinite or absurd.
+    /// A coordinate is infinite or larger than 1e7 px.
     #[error(
         "wanted coordinates within +-1e7 px (NaN where missing), got ({u}, {v}) at frame {frame}, joint {joint}"
     )]
@@ -140,12 +143,12 @@ pub enum UnswapError {
         frame: usize,
         /// Index of the joint.
         joint: usize,
-        /// px.
+        /// Coordinate u, px.
         u: f64,
-        /// px.
+        /// Coordinate v, px.
         v: f64,
     },
-    /// A score outside [0, 1].
+    /// A score is outside [0, 1].
     #[error("wanted scores in [0, 1], got {score} at frame {frame}, joint {joint}")]
     Score {
         /// Frame of the score.
@@ -155,15 +158,15 @@ pub enum UnswapError {
         /// The score.
         score: f64,
     },
-    /// A group with too few or too many levels.
+    /// A group has too few or too many levels.
     #[error("wanted 1 to 4 levels of a limb, got {levels} in group \"{group}\"")]
     Levels {
         /// Name of the group.
         group: String,
-        /// Levels given.
+        /// Number of levels given.
         levels: usize,
     },
-    /// A level without pairs.
+    /// A level has no pairs.
     #[error("wanted (left, right) pairs of joints, got none in level \"{level}\" of group \"{group}\"")]
     NoPairs {
         /// Name of the group.
@@ -171,17 +174,17 @@ pub enum UnswapError {
         /// Name of the level.
         level: String,
     },
-    /// A joint that does not exist.
+    /// A joint index does not exist.
     #[error("wanted joints 0 to {joints} - 1, got {joint} in group \"{group}\"")]
     Joint {
         /// Name of the group.
         group: String,
         /// Index given.
         joint: usize,
-        /// Joints in a frame.
+        /// Joints per frame.
         joints: usize,
     },
-    /// A joint in two places.
+    /// A joint is used twice.
     #[error("wanted every joint in one pair only, got {joint} a second time in group \"{group}\"")]
     JointTwice {
         /// Name of the group.
@@ -194,90 +197,93 @@ pub enum UnswapError {
     Option(#[from] OptionError),
 }
 
-/// Why a frame's labels are what they are.
+/// Why a frame has its labels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reason {
-    /// The motion of these levels is smooth this way; exchanging this frame alone would cost `gain_nats`.
+    /// The motion of these levels is smooth with these labels; exchanging this frame alone would cost
+    /// `gain_nats`.
     Continuity {
-        /// Levels that say so, most telling first; none where only the levels together do.
+        /// Levels that show this on their own, most informative first; empty if only the levels together do.
         levels: Vec<usize>,
         /// Natural log of the odds.
         gain_nats: f64,
     },
     /// The run of frames begins or ends at a gap in which the limbs may have passed one another.
     UnseenCrossing {
-        /// Between the frames on either side, s.
+        /// Time between the frames on either side, s.
         gap_s: f64,
     },
-    /// Left and right are less apart than noise tells.
+    /// The distance between left and right is within the noise.
     Coincide {
         /// The largest distance within a pair, px.
         distance_px: f64,
     },
-    /// The run begins or ends where the motion fits both labels, with no gap.
+    /// The run begins or ends where the motion fits both label assignments, without a gap.
     Unclear,
-    /// The labels follow from one another, but about as many frames say one thing as the other.
+    /// The labels are consistent over time, but about as many frames favour one assignment as the other.
     GlobalLabel,
-    /// No pair is seen on both sides: labels stay as they came.
+    /// No pair is visible on both sides: the labels stay unchanged.
     NothingSeen,
 }
 
-/// What was found for one group in one frame.
+/// The result for one group in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     /// Whether each level's entries were exchanged.
     pub level_flipped: Vec<bool>,
-    /// Posterior probability that each level came exchanged; unseen levels go with the nearest seen one.
+    /// Posterior probability that each level was exchanged in the input; a level that is not visible takes
+    /// the value of the nearest visible one.
     pub level_probability: Vec<f64>,
-    /// Whether the group's most telling level was exchanged.
+    /// Whether the most informative level of the group was exchanged.
     pub flipped: bool,
     /// Whether some of the levels were exchanged and others not.
     pub partial: bool,
-    /// Posterior probability that the most telling level came exchanged; 0.5 where nothing is seen.
+    /// Posterior probability that the most informative level was exchanged in the input; 0.5 where nothing is
+    /// visible.
     pub probability: f64,
-    /// Whether that is sure enough; if not, `flipped` is only the best guess.
+    /// Whether that probability suffices for a decision; if not, `flipped` is only the best guess.
     pub decided: bool,
-    /// Why.
+    /// The reason for the result.
     pub reason: Reason,
 }
 
-/// Frames whose labels follow from one another.
+/// Frames whose labels are determined relative to one another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// First frame.
     pub start: usize,
     /// Frame after the last one.
     pub end: usize,
-    /// Mean posterior probability of the labels given out in this run.
+    /// Mean posterior probability of the output labels in this run.
     pub probability: f64,
-    /// Time without samples before it (0 for the first), s.
+    /// Time without samples before the run (0 for the first run), s.
     pub gap_before_s: f64,
 }
 
-/// What was found for one group.
+/// The result for one group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupResult {
-    /// One a frame.
+    /// One verdict per frame.
     pub verdicts: Vec<Verdict>,
-    /// Runs of frames between crossings that were not seen.
+    /// Runs of frames, separated by places where the limbs may have crossed unobserved.
     pub runs: Vec<Run>,
-    /// Probability that the global label is right, rather than everything given out being exchanged, as far as
-    /// the majority of the input's labels tells.
+    /// Probability that the global label is correct, as opposed to all output labels being exchanged, judging
+    /// by the majority of the input's labels.
     pub global_probability: f64,
-    /// Standard deviation of a joint's coordinate found, px.
+    /// Estimated standard deviation of a joint coordinate, px.
     pub noise_px: f64,
-    /// (frame, left joint) of pairs that were left out as bad detections; they went with their group.
+    /// (frame, left joint) of the pairs left out as bad detections; their labels follow their group.
     pub left_out: Vec<[usize; 2]>,
 }
 
-/// Joints with left and right exchanged where that was found, and what was found.
+/// The joints with exchanged labels repaired, and the results for each group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unswapped {
     /// As [`Keypoints::points_px`].
     pub points_px: Vec<[f64; 2]>,
-    /// As [`Keypoints::scores`], exchanged with their points.
+    /// As [`Keypoints::scores`], exchanged together with their points.
     pub scores: Option<Vec<f64>>,
-    /// In the order of the groups given.
+    /// One result per group, in the order given.
     pub groups: Vec<GroupResult>,
 }
 
@@ -311,10 +317,10 @@ impl Verdict {
     }
 }
 
-/// Finds and undoes exchanges of left and right, group by group.
+/// Finds and undoes exchanged left and right labels, group by group.
 ///
 /// # Errors
-/// [`UnswapError`] where shapes disagree or values are out of range.
+/// [`UnswapError`] if shapes disagree or values are out of range.
 pub fn unswap(
     keypoints: &Keypoints,
     groups: &[LimbGroup],
@@ -347,15 +353,15 @@ pub fn unswap(
 struct Limb<'a> {
     times_s: &'a [f64],
     levels: usize,
-    /// Level of every track.
+    /// Level of each track.
     level_of: Vec<usize>,
     tracks: Vec<Track>,
     left_out: Vec<[usize; 2]>,
-    /// Frames that show at least one level on both sides, and which levels.
+    /// Frames that show at least one level on both sides, with those levels.
     shown: Vec<(usize, usize)>,
 }
 
-/// Everything found about the bits of a group.
+/// The solution for the bits of a group.
 struct Solution {
     scales: Vec<Scale>,
     /// Per step and level, the costs of the four sign patterns.
@@ -405,7 +411,8 @@ impl<'a> Limb<'a> {
         }
     }
 
-    /// Scales from the smoothest signs, a path; scales from that path's signs, twice; then the posterior.
+    /// Estimates the scales from the smoothest signs, then a path; the scales from the signs of that path,
+    /// twice; then the posterior.
     fn solution(&self, options: &UnswapOptions) -> Solution {
         let prior = Prior {
             as_is: options.as_is_nats,
@@ -428,7 +435,7 @@ impl<'a> Limb<'a> {
         Solution { scales, costs, path, posterior, starts }
     }
 
-    /// Costs per step and level, from the level's last two frames; zero where there are none yet.
+    /// Costs per step and level, from the last two frames of the level; zero where they do not exist yet.
     fn costs(&self, scales: &[Scale]) -> Vec<Vec<[f64; 4]>> {
         let mut past: Vec<[Option<usize>; 2]> = vec![[None; 2]; self.levels];
         let mut all = Vec::with_capacity(self.shown.len());
@@ -497,7 +504,7 @@ impl<'a> Limb<'a> {
         starts.iter().enumerate().map(run).collect()
     }
 
-    /// Time since the step before, s.
+    /// Time since the previous step, s.
     fn gap_before(&self, step: usize) -> f64 {
         if step == 0 || step >= self.shown.len() {
             return 0.0;
@@ -510,7 +517,7 @@ impl<'a> Limb<'a> {
         if solution.path[step] >> level & 1 == 1 { p } else { 1.0 - p }
     }
 
-    /// Level and distance, px, of the pair furthest apart.
+    /// Level and distance (px) of the pair with the largest distance.
     fn furthest(&self, step: usize) -> (usize, f64) {
         let t = self.shown[step].0;
         let apart = self
@@ -550,7 +557,7 @@ impl<'a> Limb<'a> {
             let flipped = bits >> telling & 1 == 1;
             let right = self.probability_of_path(solution, step, telling);
             let decided = right >= options.decided_at;
-            // Where both joints of a level coincide it goes along with the most telling level.
+            // A level whose joints coincide takes the label of the most informative level.
             let sure = |level: usize| self.probability_of_path(solution, step, level) >= LEVEL_PARTS;
             let level_flipped: Vec<bool> =
                 sources.iter().map(|&l| if sure(l) { bits >> l & 1 == 1 } else { flipped }).collect();
@@ -574,7 +581,7 @@ impl<'a> Limb<'a> {
         verdicts
     }
 
-    /// Why a run's label is not known.
+    /// Why the label of a run is uncertain.
     fn doubt(&self, solution: &Solution, run: usize, usual_s: f64) -> Reason {
         if solution.starts.len() == 1 {
             return Reason::GlobalLabel;
@@ -584,7 +591,7 @@ impl<'a> Limb<'a> {
         if gap_s > 1.5 * usual_s { Reason::UnseenCrossing { gap_s } } else { Reason::Unclear }
     }
 
-    /// Per step and level: by how much exchanging that sample alone makes the motion dearer, nats.
+    /// Per step and level: the cost that exchanging that sample alone adds to the motion, nats.
     fn gains(&self, solution: &Solution) -> Vec<Vec<f64>> {
         let mut gains = vec![vec![0.0; self.levels]; self.shown.len()];
         let levels = 0..self.levels;
@@ -604,7 +611,8 @@ impl<'a> Limb<'a> {
         gains
     }
 
-    /// Of all labels given out against all of them exchanged: motion says the same for both, the prior not.
+    /// Probability of all output labels against all of them exchanged: the motion cost is the same for both,
+    /// the prior differs.
     fn global_probability(&self, solution: &Solution, options: &UnswapOptions) -> f64 {
         let surplus = self.shown.iter().zip(&solution.path).map(|(&(_, seen), bits)| {
             1.0 - 2.0 * (bits & seen).count_ones() as f64 / seen.count_ones() as f64
@@ -613,14 +621,14 @@ impl<'a> Limb<'a> {
     }
 }
 
-/// The levels that alone say so with at least 1 nat.
+/// The levels that support the labels on their own with at least 1 nat.
 fn continuity(gains: &[f64]) -> Reason {
     let mut levels: Vec<usize> = (0..gains.len()).filter(|&level| gains[level] >= 1.0).collect();
     levels.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
     Reason::Continuity { levels, gain_nats: gains.iter().sum() }
 }
 
-/// Left and right of a frame where both are there.
+/// The sample of left and right in a frame where both are present.
 fn sample(keypoints: &Keypoints, frame: usize, left: usize, right: usize) -> Option<Sample> {
     let at = |joint: usize| {
         let i = frame * keypoints.joints + joint;

@@ -1,12 +1,12 @@
 //! The angles of a stick figure in the paper's axes (Lee and Chen 1985, sections 3.1 and 3.2 A).
 //!
-//! The trunk's axes, from the neck: y to the pelvis (down the trunk), z from the right shoulder to the left,
-//! x = y × z forward. y and z are not quite perpendicular; z is taken anew as x × y. Angles are signed, in
-//! radians, positive the way the paper names first: flexion, abduction.
+//! The axes of the trunk, with the origin at the neck: y to the pelvis (down the trunk), z from the right
+//! shoulder to the left, x = y × z forward. y and z are not exactly perpendicular; z is replaced by x × y.
+//! Angles are signed, in radians; the direction the paper names first is positive: flexion, abduction.
 //!
-//! The paper's angle from y to the projection of a limb has the sign of its clockwise sense; so has
-//! atan2 of the two components. The sign of the knee is opposite to the elbow's, for a knee bends backwards:
-//! the paper's "by the same token" cannot be meant literally.
+//! The paper's angle from y to the projection of a limb has a clockwise sign, as atan2 of the two components
+//! has. The sign of the knee is opposite to that of the elbow, because a knee bends backwards: the paper's
+//! "by the same token" cannot be meant literally.
 
 use glam::{DMat3, DVec3};
 
@@ -14,13 +14,13 @@ use super::skeleton::{Joint, Side, StickFigure};
 
 /// The axes of the trunk: columns x forward, y from neck to pelvis, z from right to left.
 ///
-/// None where neck, pelvis or a shoulder is unknown or the four lie on a line.
+/// `None` where neck, pelvis or a shoulder is unknown or the four points lie on a line.
 pub fn trunk_axes(figure: &StickFigure) -> Option<DMat3> {
     axes(figure.segment(Joint::Pelvis), figure[Joint::LeftShoulder] - figure[Joint::RightShoulder])
 }
 
-/// The axes of the hip part, of the same sense: y from the pelvis to the middle of the hips, z from the right
-/// hip to the left. Its x is the normal of the paper's hip plane.
+/// The axes of the hip part, in the same sense: y from the pelvis to the midpoint of the hips, z from the
+/// right hip to the left. Its x is the normal of the paper's hip plane.
 pub fn hip_axes(figure: &StickFigure) -> Option<DMat3> {
     let [right, left] = [figure[Joint::RightHip], figure[Joint::LeftHip]];
     axes(0.5 * (right + left) - figure[Joint::Pelvis], left - right)
@@ -32,12 +32,14 @@ fn axes(down: DVec3, across: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// Flexion (+) or extension of a limb of direction `u`: θ, the angle from y to u in the xy plane.
+/// Flexion (+) or extension (-) of a limb of direction `u`, radians: θ, the angle from y to u in the xy
+/// plane.
 pub fn swing_rad(axes: &DMat3, u: DVec3) -> f64 {
     axes.x_axis.dot(u).atan2(axes.y_axis.dot(u))
 }
 
-/// Abduction (+) or adduction of a side's limb of direction `u`: φ, the angle from y to u in the yz plane.
+/// Abduction (+) or adduction (-) of a limb of direction `u` on one side, radians: φ, the angle from y to u
+/// in the yz plane.
 pub fn abduction_rad(axes: &DMat3, u: DVec3, side: Side) -> f64 {
     let outward = match side {
         Side::Right => -axes.z_axis.dot(u),
@@ -46,27 +48,27 @@ pub fn abduction_rad(axes: &DMat3, u: DVec3, side: Side) -> f64 {
     outward.atan2(axes.y_axis.dot(u))
 }
 
-/// Flexion (+) or extension at an elbow between upper arm `u` and forearm `v`: ψ with the sign of w_z,
-/// w = v × u.
+/// Flexion (+) or extension (-) at an elbow between upper arm `u` and forearm `v`, radians: ψ with the sign
+/// of w_z, w = v × u.
 pub fn elbow_rad(axes: &DMat3, u: DVec3, v: DVec3) -> f64 {
     let w = v.cross(u);
     w.length().atan2(u.dot(v)).copysign(axes.z_axis.dot(w) + 0.0)
 }
 
-/// Flexion (+) or extension at a knee between thigh `u` and shank `v`: ψ with the sign of -w_z.
+/// Flexion (+) or extension (-) at a knee between thigh `u` and shank `v`, radians: ψ with the sign of -w_z.
 pub fn knee_rad(axes: &DMat3, u: DVec3, v: DVec3) -> f64 {
     let w = v.cross(u);
     w.length().atan2(u.dot(v)).copysign(0.0 - axes.z_axis.dot(w))
 }
 
-/// Angles of one rigid part against another: of the hip part or the head against the torso.
+/// Angles of one rigid part relative to another: of the hip part or the head relative to the torso.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartAngles {
-    /// δ, of the part's normal against x in the xy plane: flexion (bent forward) positive.
+    /// δ, the angle of the part's normal from x in the xy plane, radians: flexion (bent forward) positive.
     pub flexion_rad: f64,
-    /// Of the part's normal against x in the zx plane: turned to the left positive.
+    /// Angle of the part's normal from x in the zx plane, radians: turned to the left positive.
     pub rotation_rad: f64,
-    /// Of the part's long axis against y in the yz plane: bent to the left positive.
+    /// Angle of the part's long axis from y in the yz plane, radians: bent to the left positive.
     pub bending_rad: f64,
 }
 
@@ -76,15 +78,16 @@ impl PartAngles {
 
     /// Angles at the pelvis joint.
     ///
-    /// Flexion is bending of the torso towards the front of the hips; the hip part's normal then points up
+    /// Flexion bends the torso towards the front of the hips; the normal of the hip part then points upwards
     /// in the torso's axes, towards -y.
     pub fn of_hips(torso: &DMat3, hips: &DMat3) -> Self {
         Self::between(torso, hips.x_axis, hips.y_axis)
     }
 
-    /// Angles at the neck joint. `head` has the sense of the torso's axes: x the way the face looks, y down.
+    /// Angles at the neck joint. `head` has the same sense as the torso's axes: x in the facing direction, y
+    /// down.
     ///
-    /// Flexion is the chin going down: the head's normal points towards +y.
+    /// Flexion lowers the chin: the normal of the head points towards +y.
     pub fn of_head(torso: &DMat3, head: &DMat3) -> Self {
         let angles = Self::between(torso, head.x_axis, -head.y_axis);
         Self { flexion_rad: -angles.flexion_rad, ..angles }
@@ -106,7 +109,7 @@ mod tests {
     use super::*;
     use std::f64::consts::FRAC_PI_2;
 
-    /// Someone upright, looking along X, Z up, Y to the left.
+    /// An upright person, looking along X, Z up, Y to the left.
     fn upright() -> StickFigure {
         let mut figure = StickFigure::UNKNOWN;
         figure[Joint::Neck] = DVec3::new(0.0, 0.0, 1.4);
@@ -154,7 +157,7 @@ mod tests {
     #[test]
     fn hips_flex_turn_and_bend_as_named() {
         let torso = trunk_axes(&upright()).unwrap();
-        // The trunk bends forward over the hips by 0.3: the hips turn the other way about z in its axes.
+        // The trunk bends forward over the hips by 0.3: in its axes the hips turn the opposite way about z.
         let mut figure = upright();
         let bend = |p: DVec3, a: f64| {
             let about = DVec3::new(0.0, 0.0, 1.0);

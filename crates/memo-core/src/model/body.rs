@@ -2,11 +2,11 @@
 //!
 //! Lengths are fractions of body height after Drillis and Contini 1966 (as printed in Winter, *Biomechanics
 //! and Motor Control of Human Movement*). Rohr measured the thickness of the parts on a clothed person and
-//! does not print it; [`Proportions::default`] holds thicknesses of a person of average build in light
-//! clothing, chosen here.
+//! does not print it. [`Proportions::default`] holds thicknesses chosen here for a person of average build in
+//! light clothing.
 //!
-//! Limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of forearm
-//! and shank.
+//! Limits: limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of
+//! forearm and shank.
 
 use super::cylinder::EllipticCylinder;
 use super::gait::{Gait, GaitStyle, Posture, SideAngles};
@@ -16,14 +16,14 @@ use thiserror::Error;
 /// Number of parts.
 pub const PART_COUNT: usize = 14;
 
-/// Why a body could not be made.
+/// Why no body was made.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// Body height is not plausible for a human in metres.
+    /// The body height in metres is not plausible for a human.
     #[error("body height must lie between 0.4 and 2.6 metres, got {height_m}{}", centimetre_hint(*.height_m))]
     Height {
-        /// Height given.
+        /// The height given, metres.
         height_m: f64,
     },
 }
@@ -86,7 +86,7 @@ impl Part {
 /// Sizes as fractions of body height. Lengths and widths: Drillis and Contini 1966.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proportions {
-    /// Height of the chin, where the head begins.
+    /// Height of the chin, the lower end of the head.
     pub chin_height: f64,
     /// Height of the shoulder joints.
     pub shoulder_height: f64,
@@ -100,17 +100,18 @@ pub struct Proportions {
     pub upper_arm: f64,
     /// Elbow to wrist.
     pub forearm: f64,
-    /// Wrist to finger tips; the hand swings loosely curled, so it shows less.
+    /// Wrist to finger tips; the hand swings loosely curled, so this is less than the length of a straight
+    /// hand.
     pub hand: f64,
     /// Heel to toe.
     pub foot: f64,
-    /// Heel behind the ankle.
+    /// Distance of the heel behind the ankle.
     pub heel: f64,
-    /// Distance of a shoulder joint from the middle plane.
+    /// Distance of a shoulder joint from the sagittal plane.
     pub shoulder_half_width: f64,
-    /// Distance of a hip joint from the middle plane.
+    /// Distance of a hip joint from the sagittal plane.
     pub hip_half_width: f64,
-    /// Semi-axes (front to back, side to side) of head, torso, upper arm, forearm, hand, thigh, shank;
+    /// Semi-axes (front to back, side to side) of head, torso, upper arm, forearm, hand, thigh and shank, and
     /// of the foot (up and down, side to side).
     pub semi_axes: [(f64, f64); 8],
 }
@@ -175,21 +176,21 @@ pub struct PosedBody {
     pub right: SideJoints,
     /// Joints of the left side.
     pub left: SideJoints,
-    /// Centre of the torso.
+    /// Centre of the torso in the world, metres.
     pub torso_centre: DVec3,
 }
 
-/// A body of given height.
+/// A body of a given height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
-    /// Body height crown to sole, metres.
+    /// Body height from crown to sole, metres.
     pub height_m: f64,
-    /// Sizes as fractions of the height.
+    /// Sizes as fractions of the body height.
     pub proportions: Proportions,
 }
 
 impl Body {
-    /// A body of the default proportions.
+    /// A body with the default proportions.
     pub fn from_height(height_m: f64) -> Result<Self, BodyError> {
         if !(0.4..=2.6).contains(&height_m) {
             return Err(BodyError::Height { height_m });
@@ -197,17 +198,17 @@ impl Body {
         Ok(Self { height_m, proportions: Proportions::default() })
     }
 
-    /// Hip to shoulder, metres.
+    /// Distance from hip to shoulder, metres.
     pub fn torso_length_m(&self) -> f64 {
         (self.proportions.shoulder_height - self.proportions.hip_height) * self.height_m
     }
 
-    /// Hip joint to ground with straight legs, metres.
+    /// Distance from hip joint to ground with straight legs, metres.
     pub fn leg_length_m(&self) -> f64 {
         self.proportions.hip_height * self.height_m
     }
 
-    /// Places the body: torso centre and heading in the world, all joint angles given.
+    /// Poses the body from the torso centre (world, metres), the heading (radians) and all joint angles.
     ///
     /// Every transform is `parent_from_child`; the chain is world, torso, upper limb, lower limb, hand or
     /// foot.
@@ -234,8 +235,8 @@ impl Body {
         self.cylinder(0, world_from_torso * up(centre), half_length)
     }
 
-    /// The six limb parts and joints of one side; `side` is +1 left, -1 right. Thighs are given against the
-    /// vertical, so the trunk's lean is taken out at the hip.
+    /// The six limb parts and the joints of one side; `side` is +1 left, -1 right. Thigh angles are relative
+    /// to the vertical, so the lean of the trunk is subtracted at the hip.
     fn side(
         &self,
         world_from_torso: DAffine3,
@@ -274,8 +275,8 @@ impl Body {
         self.cylinder(row, world_from_joint * up(-0.5 * length), 0.5 * length)
     }
 
-    /// The foot points forward at a right angle to the shank, its sole as far below the ankle as the table
-    /// says.
+    /// The foot points forward at a right angle to the shank; its sole is as far below the ankle as the
+    /// proportions specify.
     fn foot(&self, world_from_ankle: DAffine3) -> EllipticCylinder {
         let (p, h) = (&self.proportions, self.height_m);
         let axis_below_ankle = p.ankle_height - p.semi_axes[7].0;
@@ -295,36 +296,37 @@ fn up(z: f64) -> DAffine3 {
     DAffine3::from_translation(DVec3::new(0.0, 0.0, z))
 }
 
-/// A body with its way of walking: what a position and a phase turn into a posed body.
+/// A body with a gait: together with a position and a phase it gives a posed body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walker {
-    /// Sizes.
+    /// The body.
     pub body: Body,
-    /// Average joint curves.
+    /// The average joint curves.
     pub gait: Gait,
-    /// The person's deviation from them.
+    /// The person's deviation from the average curves.
     pub style: GaitStyle,
 }
 
 impl Walker {
-    /// The body in its posture at `phase`. `torso_centre` is the mean (level) position; the gait's vertical
-    /// displacement is added here.
+    /// The body in its posture at `phase` (cycles). `torso_centre` is the mean (level) position, metres; the
+    /// vertical displacement of the gait is added to it.
     pub fn pose(&self, torso_centre: DVec3, heading_rad: f64, phase: f64) -> PosedBody {
         let centre = torso_centre + DVec3::Z * self.gait.vertical_m(phase);
         self.body.pose(centre, heading_rad, &self.gait.posture(phase, &self.style))
     }
 
-    /// Mean height of the torso's centre over a cycle with the lower ankle always at its standing height,
-    /// metres.
+    /// Mean height of the torso centre over a cycle in which the lower ankle is always at its standing
+    /// height, metres.
     ///
-    /// The ankle carries this and not the sole, because the model's foot does not bend: its toe would dig in
-    /// at push-off.
+    /// The ankle is used and not the sole, because the foot of the model does not bend: its toe would go
+    /// below the ground at push-off.
     pub fn level_torso_height_m(&self) -> f64 {
         let n = 40;
         (0..n).map(|i| self.torso_height_m(f64::from(i) / f64::from(n))).sum::<f64>() / f64::from(n)
     }
 
-    /// Mean height of the crown while walking, metres: bent legs take some centimetres off the body height.
+    /// Mean height of the crown while walking, metres: bent legs lower it by some centimetres below the body
+    /// height.
     pub fn level_crown_height_m(&self) -> f64 {
         let p = &self.body.proportions;
         let standing_torso = 0.5 * (p.shoulder_height + p.hip_height) * self.body.height_m;
@@ -390,7 +392,8 @@ mod tests {
 
     #[test]
     fn the_stance_foot_slides_little_when_the_walker_advances_at_its_own_speed() {
-        // Over mid-stance (phase 0.1 to 0.4) the ankle moves back in the body by what the body moves forward.
+        // During mid-stance (phase 0.1 to 0.4) the ankle moves back relative to the body by as much as the
+        // body moves forward.
         let walker = walker();
         let ankle_x = |phase: f64| walker.pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
         let stride = (ankle_x(0.1) - ankle_x(0.4)) / 0.3;
@@ -418,7 +421,7 @@ mod tests {
         body.pose(DVec3::Z * 0.5 * (0.818 + 0.530), 0.0, &Posture::default())
     }
 
-    /// How far a cylinder reaches along a direction of the world, from where to where.
+    /// The extent of a cylinder along a direction of the world, from minimum to maximum.
     fn reach(cylinder: &EllipticCylinder, direction: DVec3) -> (f64, f64) {
         let places = (0..720).flat_map(|i| {
             let rim = DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 720.0) * cylinder.semi_axes;
@@ -456,13 +459,13 @@ mod tests {
             assert!((from - low).abs() < 1e-12 && (to - high).abs() < 1e-12, "{part:?}: {from} to {to}");
         }
         assert!((extent(&[Part::RightFoot], DVec3::X) - 0.152).abs() < 1e-12);
-        // With straight fingers 0.108; the palm alone has 0.6 of that.
+        // With straight fingers 0.108; the palm alone is 0.6 of that.
         let hand = extent(&[Part::LeftHand], DVec3::Z);
         assert!((0.6 * 0.108..0.8 * 0.108).contains(&hand), "{hand}");
     }
 
-    /// A quarter of the foot lies behind the ankle (Perry and Burnfield, Gait Analysis, 2nd edition 2010, on the
-    /// heel rocker), its sole on the ground.
+    /// A quarter of the foot lies behind the ankle (Perry and Burnfield, Gait Analysis, 2nd edition 2010, on
+    /// the heel rocker), and its sole is on the ground.
     #[test]
     fn the_foot_stands_about_the_ankle() {
         let (body, foot) = (upright(), Part::RightFoot as usize);
@@ -481,17 +484,17 @@ mod tests {
         let near = |found: f64, mm: f64, share: f64| {
             assert!((found / (mm / 1756.0) - 1.0).abs() < share, "{found} for {mm} mm");
         };
-        // Chest, waist and hip, which one cylinder stands for.
+        // Chest, waist and hip, which one cylinder represents.
         near(extent(&[Part::Torso], left), (289.0 + 326.0 + 346.0) / 3.0, 0.1);
         near(extent(&[Part::Torso], ahead), (254.0 + 238.0 + 246.0) / 3.0, 0.1);
         near(extent(&[Part::Head], left), 154.0, 0.1);
         near(extent(&[Part::Head], ahead), 199.0, 0.1);
         near(extent(&[Part::RightThigh, Part::LeftThigh], left), 346.0, 0.06);
         near(extent(&[Part::LeftFoot], left), 102.0, 0.15);
-        // A hand hangs with its palm to the thigh.
+        // A hanging hand has its palm at the thigh.
         near(extent(&[Part::LeftHand], ahead), 88.0, 0.15);
         assert!(extent(&[Part::LeftHand], left) < 0.6 * 88.0 / 1756.0);
-        // Over both arms: the table's shoulders, 0.259, and the survey's, 510 mm.
+        // Across both arms: the shoulder width of the proportions, 0.259, and that of the survey, 510 mm.
         let shoulders = extent(&[Part::RightUpperArm, Part::LeftUpperArm], left);
         assert!((0.259..510.0 / 1756.0).contains(&shoulders), "{shoulders}");
         // Girths between the thinnest and the thickest place of a limb.
@@ -508,7 +511,7 @@ mod tests {
         }
     }
 
-    /// However a limb is bent, the ends of its parts are its joints.
+    /// Whatever the flexion of a limb, the ends of its parts are its joints.
     #[test]
     fn bent_limbs_hang_from_their_joints() {
         let bent = SideAngles { hip: 0.4, knee: 0.9, shoulder: -0.3, elbow: 1.1 };
@@ -528,14 +531,14 @@ mod tests {
             assert!(end(1.0).distance(upper) < 1e-12, "{part:?}");
             assert!(lower.is_none_or(|joint| end(-1.0).distance(joint) < 1e-12), "{part:?}");
         }
-        // The hand goes on along the forearm.
+        // The hand continues the forearm.
         let [forearm, hand] = [Part::RightForearm, Part::RightHand]
             .map(|part| body.cylinders[part as usize].world_from_cylinder.matrix3.z_axis);
         assert!(forearm.distance(hand) < 1e-12);
     }
 
-    /// Legs that are stiff at given angles carry the trunk as high as their cosines say, and the crown is as much
-    /// lower as the trunk.
+    /// Legs with fixed joint angles lower the trunk as the cosines of the angles give, and the crown by the
+    /// same amount.
     #[test]
     fn bent_legs_lower_trunk_and_crown() {
         let stiff = GaitStyle { leg_amplitude: 0.0, ..GaitStyle::default() };
@@ -561,8 +564,8 @@ mod tests {
         assert!((walker.level_torso_height_m() - expected).abs() < 1e-12);
     }
 
-    /// A walker bobs by 4 to 5 cm twice a cycle: highest over a standing leg, lowest while both carry (Saunders,
-    /// Inman and Eberhart 1953: 1.8 inches).
+    /// The trunk of a walker moves up and down by 4 to 5 cm twice per cycle: highest in single support,
+    /// lowest in double support (Saunders, Inman and Eberhart 1953: 1.8 inches).
     #[test]
     fn a_walker_bobs_as_measured() {
         let walker = walker();

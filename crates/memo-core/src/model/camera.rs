@@ -1,10 +1,10 @@
 //! The camera: full perspective projection with lens distortion (Rohr 1994, eq. 2).
 //!
-//! *Ideal* pixels obey eq. (2) exactly; pixels without that word are those of the image file, bent by the
-//! lens. All geometry is done on ideal pixels, so a pipeline undistorts its measurements once and then
-//! forgets the lens.
+//! *Ideal* pixels obey eq. (2) exactly. Pixels without that word are pixels of the image file, which the lens
+//! distorts. All geometry uses ideal pixels: a pipeline undistorts its measurements once and does not need
+//! the lens afterwards.
 //!
-//! The camera stands still and has no skew; fisheye lenses are not covered.
+//! Limits: the camera is static and has no skew; fisheye lenses are not supported.
 
 use std::f64::consts::PI;
 
@@ -14,17 +14,17 @@ use thiserror::Error;
 
 use super::distortion::Distortion;
 
-/// Horizontal field of view assumed when nothing is known, radians (62 degrees).
+/// Horizontal field of view assumed without calibration, radians (62 degrees).
 ///
-/// A phone's main camera has the view of a 24-28 mm lens on 36 mm film; recording video crops that to that of
-/// about 28-31 mm to leave room for stabilisation: 60-65 degrees across the long side of a landscape video.
-/// In portrait the same camera sees about 37 degrees.
+/// The main camera of a phone has the field of view of a 24-28 mm lens on 36 mm film. Video recording crops
+/// this to that of a lens of about 28-31 mm for stabilisation: 60-65 degrees across the long side of a
+/// landscape video. In portrait orientation the same camera covers about 37 degrees.
 pub const DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD: f64 = 62.0 * PI / 180.0;
 
-/// A camera farther from the world's origin than this is taken for one calibrated in millimetres, metres.
+/// A camera farther from the origin of the world than this, metres, was probably calibrated in millimetres.
 pub const MAX_DISTANCE_M: f64 = 200.0;
 
-/// Why a camera was refused or could not answer.
+/// Why a camera was refused or could not compute a result.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CameraError {
@@ -40,7 +40,7 @@ pub enum CameraError {
         /// Its name.
         parameter: &'static str,
     },
-    /// A focal length is zero or negative.
+    /// A focal length is not positive.
     #[error("focal lengths must be positive pixels, got fx = {}, fy = {}", focal_px.x, focal_px.y)]
     FocalLength {
         /// (fx, fy), pixels.
@@ -54,36 +54,36 @@ pub enum CameraError {
         /// Width and height, pixels.
         size: [u32; 2],
     },
-    /// The rotation is not orthonormal or mirrors.
+    /// The matrix is not orthonormal, or it mirrors.
     #[error(
         "not a rotation: determinant {determinant:.6} (a rotation has +1), columns off orthonormal by {deviation:.2e}"
     )]
     NotARotation {
         /// Determinant of the matrix.
         determinant: f64,
-        /// Largest element of RᵀR - I, absolute.
+        /// Largest absolute element of RᵀR - I.
         deviation: f64,
     },
-    /// The camera is improbably far from the world's origin.
+    /// The camera is implausibly far from the origin of the world.
     #[error(
         "camera is {distance_m:.0} m from the world's origin, a 1.7 m person there {person_px:.2} px high: the translation looks like millimetres, in which it would be {:.0} px; say so by the unit mm (--camera-unit mm)",
         person_px * 1000.0
     )]
     LooksLikeMillimetres {
-        /// Distance of camera and origin, if the translation is in metres.
+        /// Distance between camera and origin if the translation is in metres.
         distance_m: f64,
-        /// How high a person of 1.7 m is at the origin, pixels.
+        /// Image height of a person of 1.7 m at the origin, pixels.
         person_px: f64,
     },
-    /// The camera is improbably near to the world's origin.
+    /// The camera is implausibly close to the origin of the world.
     #[error(
         "camera is {:.1} mm from the world's origin, a 1.7 m person there {person_px:.0} px high: the unit is rather metres, in which it would be {:.0} px",
         distance_m * 1000.0, person_px / 1000.0
     )]
     LooksLikeMetres {
-        /// Distance of camera and origin.
+        /// Distance between camera and origin, metres.
         distance_m: f64,
-        /// How high a person of 1.7 m is at the origin, pixels.
+        /// Image height of a person of 1.7 m at the origin, pixels.
         person_px: f64,
     },
     /// A quantity that must be positive is not.
@@ -100,7 +100,7 @@ pub enum CameraError {
         /// The value, radians.
         field_of_view_rad: f64,
     },
-    /// A person's head is not above the feet in the image.
+    /// The head of a person is not above the feet in the image.
     #[error("the head's row must be less than the feet's, got head {head_row_px}, feet {foot_row_px}")]
     PersonRows {
         /// Row of the crown, pixels.
@@ -108,7 +108,7 @@ pub enum CameraError {
         /// Row of the soles, pixels.
         foot_row_px: f64,
     },
-    /// Feet at or above the horizon of a level camera.
+    /// The feet are at or above the horizon of a level camera.
     #[error(
         "the feet at row {foot_row_px} are not below the horizon of a level camera (row {horizon_row_px}): the camera must look down, give its calibration"
     )]
@@ -118,7 +118,7 @@ pub enum CameraError {
         /// Row of the horizon, pixels.
         horizon_row_px: f64,
     },
-    /// No ideal pixel is imaged at this pixel by the lens model.
+    /// The lens model maps no ideal pixel to this pixel.
     #[error("no undistorted point for pixel ({}, {}): it lies beyond the fold of the lens model", pixel.x, pixel.y)]
     NoIdealPixel {
         /// The distorted pixel.
@@ -135,11 +135,11 @@ pub struct Camera {
     pub focal_px: DVec2,
     /// Principal point (cx, cy), pixels.
     pub centre_px: DVec2,
-    /// The lens.
+    /// The lens distortion.
     pub distortion: Distortion,
-    /// Rotation of `x_cam = R x_world + t`.
+    /// Rotation R of `x_cam = R x_world + t`.
     pub rotation: DMat3,
-    /// Translation of `x_cam = R x_world + t`, metres.
+    /// Translation t of `x_cam = R x_world + t`, metres.
     pub translation: DVec3,
 }
 
@@ -156,7 +156,7 @@ pub struct TsaiParameters {
     pub kappa1_per_mm2: f64,
     /// Centre of distortion and principal point (`cx`, `cy`), pixels.
     pub centre_px: DVec2,
-    /// Uncertainty of the horizontal scale (`sx`), near 1.
+    /// Tsai's uncertainty factor of the horizontal scale (`sx`), near 1.
     pub sx: f64,
     /// Translation of `x_cam = R x_world + t` (`tx`, `ty`, `tz`), mm.
     pub translation_mm: DVec3,
@@ -165,10 +165,11 @@ pub struct TsaiParameters {
 }
 
 impl Camera {
-    /// From Tsai's parameters.
+    /// A camera from Tsai's parameters.
     ///
-    /// On the sensor x_d = dpx (u - cx) / sx, y_d = dpy (v - cy), and the ideal point is x_d (1 + kappa1
-    /// r_d²), all in mm. Divided by the focal length f: fx = sx f / dpx, fy = f / dpy, kappa = kappa1 f².
+    /// On the sensor x_d = dpx (u - cx) / sx and y_d = dpy (v - cy); the ideal point is x_d (1 + kappa1
+    /// r_d²), all in mm. Division by the focal length f gives fx = sx f / dpx, fy = f / dpy, kappa = kappa1
+    /// f².
     pub fn from_tsai(tsai: &TsaiParameters) -> Result<Self, CameraError> {
         positive("dpx", tsai.pixel_mm.x)?;
         positive("dpy", tsai.pixel_mm.y)?;
@@ -186,10 +187,10 @@ impl Camera {
         camera.validated()
     }
 
-    /// A level camera without distortion, looking along world Y.
+    /// A level camera without distortion that looks along world Y.
     ///
-    /// World X points right in the image, Y into the depth and Z up; the origin lies on the ground below the
-    /// image's centre column, `distance_m` in front of the camera.
+    /// World X points right in the image, Y away from the camera and Z up. The origin lies on the ground in
+    /// the centre column of the image, `distance_m` in front of the camera.
     pub fn level(
         size: [u32; 2],
         horizontal_field_of_view_rad: f64,
@@ -209,15 +210,15 @@ impl Camera {
         camera.validated()
     }
 
-    /// A level camera guessed from one upright person of known height, for video without calibration.
+    /// A level camera estimated from one upright person of known height, for video without calibration.
     ///
-    /// The person's soles are seen at `foot_row_px`, the crown at `head_row_px`. With the focal length f of
-    /// the field of view the person is at depth f H / (foot - head) and the camera depth (foot - cy) / f
-    /// above the ground. World as in [`Camera::level`] with the origin at the person's depth: a walk across
-    /// the image is along y = 0.
+    /// The soles of the person are at row `foot_row_px`, the crown at row `head_row_px`. With f the focal
+    /// length for the field of view, the person is at depth f H / (foot - head), and the camera is depth
+    /// (foot - cy) / f above the ground. World axes as in [`Camera::level`], with the origin at the person's
+    /// depth: a walk parallel to the image plane is along y = 0.
     ///
-    /// Depths scale with the assumed focal length, heights and sideways positions at the person's depth do
-    /// not.
+    /// Depths are proportional to the assumed focal length; heights and sideways positions at the person's
+    /// depth do not depend on it.
     pub fn from_person(
         size: [u32; 2],
         horizontal_field_of_view_rad: f64,
@@ -240,7 +241,7 @@ impl Camera {
         Self::level(size, horizontal_field_of_view_rad, camera_height_m, depth_m)
     }
 
-    /// The camera itself if its parameters make sense.
+    /// The camera itself if its parameters are valid.
     pub fn validated(self) -> Result<Self, CameraError> {
         check_size(self.size)?;
         self.check_finite()?;
@@ -260,7 +261,7 @@ impl Camera {
         Ok(self)
     }
 
-    /// A world point in the camera's axes (x right, y down, z forward), metres.
+    /// A world point in camera axes (x right, y down, z forward), metres.
     pub fn camera_from_world(&self, point_in_world: DVec3) -> DVec3 {
         self.rotation * point_in_world + self.translation
     }
@@ -276,35 +277,36 @@ impl Camera {
         (p.z > 1e-9).then(|| p.truncate() / p.z * self.focal_px + self.centre_px)
     }
 
-    /// The pixel of a world point; `None` behind the camera and where the lens model folds.
+    /// The pixel of a world point; `None` behind the camera and beyond the fold of the lens model.
     pub fn project(&self, point_in_world: DVec3) -> Option<DVec2> {
         self.distort(self.project_ideal(point_in_world)?)
     }
 
-    /// Where the lens images an ideal pixel; `None` beyond the fold of the lens model.
+    /// The pixel to which the lens maps an ideal pixel; `None` beyond the fold of the lens model.
     pub fn distort(&self, ideal_px: DVec2) -> Option<DVec2> {
         let distorted = self.distortion.distort(self.plane_from_pixel(ideal_px))?;
         Some(self.pixel_from_plane(distorted))
     }
 
-    /// The ideal pixel that the lens images at `pixel`, to 1e-10 px.
+    /// The ideal pixel that the lens maps to `pixel`, accurate to 1e-10 px.
     pub fn undistort(&self, pixel: DVec2) -> Result<DVec2, CameraError> {
         let ideal = self.distortion.undistort(self.plane_from_pixel(pixel));
         ideal.map(|x| self.pixel_from_plane(x)).ok_or(CameraError::NoIdealPixel { pixel })
     }
 
-    /// Unit direction in the world of the ray from [`Camera::position`] through an ideal pixel.
+    /// Unit direction, in the world, of the ray from [`Camera::position`] through an ideal pixel.
     pub fn ray_in_world(&self, ideal_px: DVec2) -> DVec3 {
         (self.rotation.transpose() * self.plane_from_pixel(ideal_px).extend(1.0)).normalize()
     }
 
-    /// Where the ray through an ideal pixel meets the ground z = 0; `None` at and above the horizon.
+    /// The intersection of the ray through an ideal pixel with the ground z = 0, metres; `None` at and above
+    /// the horizon.
     pub fn ground_point(&self, ideal_px: DVec2) -> Option<DVec3> {
         self.point_at_height(ideal_px, 0.0)
     }
 
-    /// Where the ray through an ideal pixel meets the horizontal plane z = `z_m`, in front of the camera
-    /// only.
+    /// The intersection of the ray through an ideal pixel with the horizontal plane z = `z_m`, metres; `None`
+    /// unless it lies in front of the camera.
     pub fn point_at_height(&self, ideal_px: DVec2, z_m: f64) -> Option<DVec3> {
         let (origin, ray) = (self.position(), self.ray_in_world(ideal_px));
         let length_m = (z_m - origin.z) / ray.z;
@@ -314,29 +316,29 @@ impl Camera {
     /// The matrix T of eq. (2) without its arbitrary third row: h (u, v, 1)ᵀ = T (X, Y, Z, 1)ᵀ in ideal
     /// pixels.
     ///
-    /// Its scale is such that h is the depth in metres.
+    /// The scale is chosen so that h is the depth in metres.
     pub fn matrix(&self) -> Matrix3x4<f64> {
         let intrinsics = self.intrinsics();
         let columns = [self.rotation.x_axis, self.rotation.y_axis, self.rotation.z_axis, self.translation];
         Matrix3x4::from_columns(&columns.map(|c| (intrinsics * c).to_array().into()))
     }
 
-    /// Where vertical lines meet, T (0, 0, 1, 0)ᵀ: homogeneous ideal pixels, third element zero for a level
-    /// camera.
+    /// The vanishing point of vertical lines, T (0, 0, 1, 0)ᵀ, in homogeneous ideal pixels; the third element
+    /// is zero for a level camera.
     pub fn vanishing_point_of_vertical(&self) -> DVec3 {
         self.intrinsics() * self.rotation.z_axis
     }
 
-    /// Distance in ideal pixels from a point to the point `height_m` above it; `None` if one is behind the
-    /// camera.
+    /// Distance in ideal pixels between a point and the point `height_m` above it; `None` if one of them is
+    /// behind the camera.
     pub fn pixel_height_at(&self, point_on_ground: DVec3, height_m: f64) -> Option<f64> {
         let foot = self.project_ideal(point_on_ground)?;
         let head = self.project_ideal(point_on_ground + DVec3::Z * height_m)?;
         Some(foot.distance(head))
     }
 
-    /// The camera of the same images resized by `factor` (pixel centres at integers, so the corner (-0.5,
-    /// -0.5) stays).
+    /// The camera for the same images resized by `factor`. Pixel centres are at integers, so the corner
+    /// (-0.5, -0.5) stays fixed.
     pub fn scaled(&self, factor: f64) -> Result<Self, CameraError> {
         positive("scale factor", factor)?;
         let scaled = Self {
@@ -348,14 +350,14 @@ impl Camera {
         scaled.validated()
     }
 
-    /// The camera of the same images with `n` by `n` pixels averaged to one; columns at the right and rows at the
-    /// bottom that do not fill one are left out.
+    /// The camera for the same images with each block of `n` by `n` pixels averaged to one pixel. Columns at
+    /// the right and rows at the bottom that do not fill a block are dropped.
     pub fn shrunk(&self, n: u32) -> Result<Self, CameraError> {
         let scaled = self.scaled(1.0 / f64::from(n))?;
         Self { size: self.size.map(|side| side / n), ..scaled }.validated()
     }
 
-    /// K of `h (u, v, 1)ᵀ = K x_cam`.
+    /// The matrix K of `h (u, v, 1)ᵀ = K x_cam`.
     pub(crate) fn intrinsics(&self) -> DMat3 {
         let (f, c) = (self.focal_px, self.centre_px);
         DMat3::from_cols(DVec3::X * f.x, DVec3::Y * f.y, c.extend(1.0))
@@ -384,7 +386,8 @@ impl Camera {
     }
 }
 
-/// Refuses a matrix whose columns are off orthonormal by more than `tolerance` or that mirrors.
+/// Returns an error for a matrix whose columns deviate from orthonormal by more than `tolerance`, or that
+/// mirrors.
 pub(crate) fn check_rotation(rotation: &DMat3, tolerance: f64) -> Result<(), CameraError> {
     let excess = rotation.transpose() * *rotation - DMat3::IDENTITY;
     let deviation = excess.to_cols_array().into_iter().fold(0.0, |most: f64, e| most.max(e.abs()));
@@ -468,7 +471,7 @@ mod tests {
         let camera = Camera { distortion: Distortion::from_opencv([-0.5, 0.0, 0.0, 0.0, 0.0]), ..level() };
         let pixel = DVec2::new(5000.0, 240.0);
         assert_eq!(camera.undistort(pixel), Err(CameraError::NoIdealPixel { pixel }));
-        // Far to the side the polynomial alone would come back into the image.
+        // Far to the side, the polynomial without the fold check would map back into the image.
         let far_to_the_side = DVec3::new(7.0, 0.0, 1.4);
         assert!(camera.project_ideal(far_to_the_side).is_some());
         assert_eq!(camera.project(far_to_the_side), None);
@@ -511,7 +514,7 @@ mod tests {
         let shrunk = camera.shrunk(3).unwrap();
         assert_eq!(shrunk.size, [214, 160]);
         let point = DVec3::new(0.4, 0.2, 1.1);
-        // The nine pixels 0, 1, 2 have their mean at 1, which is 0 in the shrunk image.
+        // The nine pixels 0, 1, 2 have their mean at 1, which is pixel 0 of the shrunk image.
         let expected = (camera.project(point).unwrap() - 1.0) / 3.0;
         assert!((shrunk.project(point).unwrap() - expected).length() < 1e-9);
         assert!(camera.shrunk(0).is_err() && camera.shrunk(1000).is_err());
@@ -539,7 +542,7 @@ mod tests {
         assert!((camera.position() - DVec3::new(0.0, -5.0, 1.4)).length() < 1e-12);
     }
 
-    /// Between the views of 28 and of 31 mm lenses on film 36 mm wide.
+    /// Between the fields of view of 28 mm and 31 mm lenses on film 36 mm wide.
     #[test]
     fn the_default_view_is_that_of_a_phone() {
         let across = |focal_mm: f64| 2.0 * (18.0 / focal_mm).atan();

@@ -1,52 +1,52 @@
 //! Lens distortion on the normalised image plane (focal length 1, origin at the principal point).
 //!
-//! Two models: Brown's as OpenCV writes it (ideal to distorted) and Tsai's single radial term (distorted to
-//! ideal; R. Tsai 1987, eq. 5). Each is a polynomial in one direction and solved by Newton's method in the
-//! other.
+//! Two models: Brown's as in OpenCV (ideal to distorted) and Tsai's single radial term (distorted to ideal;
+//! R. Tsai 1987, eq. 5). Each is a polynomial in one direction and is solved by Newton's method in the other.
 //!
-//! A polynomial folds back beyond some radius. Points out there have no image: they are refused rather than
-//! drawn inside the picture. Fisheye and rational models are not covered.
+//! Limits: a polynomial folds back beyond some radius. Points beyond it have no image; they are refused
+//! instead of being drawn inside the image. Fisheye and rational models are not supported.
 
 use glam::{DMat2, DVec2};
 
-/// How a lens bends the ideal perspective image.
+/// The distortion model of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Distortion {
-    /// A perfect perspective image.
+    /// No distortion: an exact perspective image.
     #[default]
     None,
     /// OpenCV's five coefficients: `x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + tangential(p1, p2)`, r = |x|.
     Brown {
-        /// Radial, r².
+        /// Coefficient of r², radial.
         k1: f64,
-        /// Radial, r⁴.
+        /// Coefficient of r⁴, radial.
         k2: f64,
-        /// Tangential, along v.
+        /// Tangential coefficient, along v.
         p1: f64,
-        /// Tangential, along u.
+        /// Tangential coefficient, along u.
         p2: f64,
-        /// Radial, r⁶.
+        /// Coefficient of r⁶, radial.
         k3: f64,
     },
     /// Tsai's radial term: `x = x_d (1 + kappa r_d²)`, r_d = |x_d|.
     Tsai {
-        /// Tsai's kappa1 (per mm²) times the focal length (mm) squared: no unit.
+        /// Tsai's kappa1 (per mm²) times the square of the focal length (mm): dimensionless.
         kappa: f64,
     },
 }
 
-/// Newton stops here: far below 1e-10 px for any focal length up to 10 000 px.
+/// Newton's method stops at this step: far below 1e-10 px for any focal length up to 10 000 px.
 const TOLERANCE: f64 = 4e-15;
 const MAX_ITERATIONS: usize = 100;
 
 impl Distortion {
-    /// From OpenCV's order (k1, k2, p1, p2, k3); all zero is [`Distortion::None`].
+    /// The model for OpenCV's coefficients (k1, k2, p1, p2, k3); all zero gives [`Distortion::None`].
     pub fn from_opencv(coefficients: [f64; 5]) -> Self {
         let [k1, k2, p1, p2, k3] = coefficients;
         if coefficients == [0.0; 5] { Self::None } else { Self::Brown { k1, k2, p1, p2, k3 } }
     }
 
-    /// Where the lens images the ideal point `x`; `None` beyond the radius at which the model folds.
+    /// The distorted point of the ideal point `x`, both on the normalised plane; `None` beyond the radius at
+    /// which the model folds.
     pub fn distort(&self, x: DVec2) -> Option<DVec2> {
         match *self {
             Self::None => Some(x),
@@ -55,7 +55,8 @@ impl Distortion {
         }
     }
 
-    /// The ideal point the lens images at `x_d`; `None` if there is none short of the fold.
+    /// The ideal point of the distorted point `x_d`, both on the normalised plane; `None` if there is none
+    /// inside the fold.
     pub fn undistort(&self, x_d: DVec2) -> Option<DVec2> {
         match *self {
             Self::None => Some(x_d),
@@ -95,7 +96,7 @@ impl Distortion {
         x * radial + tangential
     }
 
-    /// Jacobian of [`Self::brown`]; it is symmetric.
+    /// Jacobian of [`Self::brown`], which is symmetric.
     fn brown_jacobian(&self, x: DVec2) -> DMat2 {
         let [k1, k2, p1, p2, k3] = self.coefficients();
         let s = x.length_squared();
@@ -107,10 +108,10 @@ impl Distortion {
         DMat2::from_cols(DVec2::new(xx, xy), DVec2::new(xy, yy))
     }
 
-    /// Whether the radial part r (1 + k1 r² + k2 r⁴ + k3 r⁶) grows all the way from the centre to `x`.
+    /// Whether the radial part r (1 + k1 r² + k2 r⁴ + k3 r⁶) increases all the way from the centre to `x`.
     ///
-    /// With s = r² its slope is the cubic g(s) = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, whose least value on [0, s]
-    /// is taken at an end or where g' = 3 k1 + 10 k2 s + 21 k3 s² = 0.
+    /// With s = r² its slope is the cubic g(s) = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, whose minimum on [0, s] is
+    /// at an end or where g' = 3 k1 + 10 k2 s + 21 k3 s² = 0.
     fn is_unfolded(&self, x: DVec2) -> bool {
         let [k1, k2, _, _, k3] = self.coefficients();
         let g = |s: f64| 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * 7.0 * k3));
@@ -120,7 +121,7 @@ impl Distortion {
             && quadratic_roots(21.0 * k3, 10.0 * k2, 3.0 * k1).into_iter().all(|t| !is_met(t) || g(t) > 0.0)
     }
 
-    /// Newton from the distorted point, halving steps that do not bring it closer.
+    /// Newton's method from the distorted point; steps that do not reduce the error are halved.
     ///
     /// With one radial term the iterates approach from one side and no step is halved.
     fn brown_inverse(&self, x_d: DVec2) -> Option<DVec2> {
@@ -140,12 +141,12 @@ impl Distortion {
         None
     }
 
-    /// [`Self::is_unfolded`], and on the near side of the fold where the tangential terms shift it.
+    /// [`Self::is_unfolded`], and inside the fold where the tangential terms shift it.
     fn is_before_the_fold(&self, x: DVec2) -> bool {
         self.is_unfolded(x) && self.brown_jacobian(x).determinant() > 0.0
     }
 
-    /// The first of x - step, x - step/2, ... that is before the fold and brings the distorted point closer to
+    /// The first of x - step, x - step/2, ... that is inside the fold and whose distorted point is closer to
     /// `x_d`.
     fn closer(&self, x: DVec2, step: DVec2, x_d: DVec2, error_length: f64) -> Option<(DVec2, DVec2)> {
         (0..40).find_map(|halvings| {
@@ -162,9 +163,9 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     [q / a, c / q]
 }
 
-/// r_d / r where r_d (1 + kappa r_d²) = r. Newton on r_d from r approaches from one side.
+/// r_d / r where r_d (1 + kappa r_d²) = r. Newton's method on r_d, starting at r, approaches from one side.
 ///
-/// For kappa < 0 the left side has its greatest value 2/3 r_f at the fold r_f = 1 / sqrt(-3 kappa).
+/// For kappa < 0 the left side has its maximum 2/3 r_f at the fold r_f = 1 / sqrt(-3 kappa).
 fn tsai_distorted_radius(r: f64, kappa: f64) -> Option<f64> {
     if kappa < 0.0 && r >= 2.0 / 3.0 / (-3.0 * kappa).sqrt() {
         return None;
@@ -250,7 +251,7 @@ mod tests {
         ) {
             let lens = Distortion::from_opencv([k1, k2, p1, p2, k3]);
             let ideal = DVec2::new(x, y);
-            // Near the fold the inverse is a square root and loses digits.
+            // Near the fold the inverse behaves like a square root and loses digits.
             let is_clear = lens.brown_jacobian(ideal).determinant() > 0.05 && lens.is_unfolded(ideal * 1.1);
             prop_assume!(is_clear);
             let back = lens.undistort(lens.distort(ideal).unwrap());

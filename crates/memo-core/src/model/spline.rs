@@ -1,10 +1,10 @@
 //! Periodic cubic interpolation on the unit cycle.
 //!
-//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986); the monotone variant after
-//! Fritsch and Butland 1984 serves curves given by their extremes (Boulic et al. 1990). Knots must be
+//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986). The monotone variant after
+//! Fritsch and Butland 1984 is for curves given by their extremes (Boulic et al. 1990). Knots must be
 //! distinct modulo 1.
 
-/// A cubic polynomial per interval of the cycle, given by values and slopes at the knots (Hermite form).
+/// A cubic polynomial on each interval of the cycle, given by values and slopes at the knots (Hermite form).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeriodicCubic {
     knots: Vec<f64>,
@@ -13,11 +13,11 @@ pub struct PeriodicCubic {
 }
 
 impl PeriodicCubic {
-    /// The twice continuously differentiable periodic spline through equally spaced samples, the first at
-    /// phase 0.
+    /// The twice continuously differentiable periodic spline through equally spaced samples; the first sample
+    /// is at phase 0.
     ///
-    /// With h the spacing, continuity of the second derivative at knot i reads
-    /// s_(i-1) + 4 s_i + s_(i+1) = 3 (y_(i+1) - y_(i-1)) / h.
+    /// With h the spacing, continuity of the second derivative at knot i is s_(i-1) + 4 s_i + s_(i+1) = 3
+    /// (y_(i+1) - y_(i-1)) / h.
     ///
     /// # Panics
     /// With fewer than three samples.
@@ -85,7 +85,7 @@ impl PeriodicCubic {
             + (t3 - t2) * h * self.slopes[j]
     }
 
-    /// The same curve with every value multiplied by `factor` and `offset` added.
+    /// The same curve with every value multiplied by `factor` and then increased by `offset`.
     #[must_use]
     pub fn affine(&self, factor: f64, offset: f64) -> Self {
         Self {
@@ -98,8 +98,8 @@ impl PeriodicCubic {
 
 /// Solves x_(i-1) + 4 x_i + x_(i+1) = r_i with indices modulo n.
 ///
-/// Gauss-Seidel contracts by at least 1/2 a sweep (the matrix is diagonally dominant), so 60 sweeps reach the
-/// last bit for any n.
+/// Gauss-Seidel contracts by at least 1/2 per sweep (the matrix is diagonally dominant), so 60 sweeps
+/// converge to the last bit for any n.
 fn solve_cyclic_1_4_1(right: &[f64]) -> Vec<f64> {
     let n = right.len();
     let mut x: Vec<f64> = right.iter().map(|r| r / 6.0).collect();
@@ -156,8 +156,8 @@ mod tests {
         assert!((curve.at(0.9) - 25.0).abs() < 1e-12 && (curve.at(1.5) + 15.0).abs() < 1e-12);
     }
 
-    /// The slope at a knot between secants d0, d1 over h0, h1 is 3 (h0 + h1) over (2 h1 + h0) / d0 + (h1 + 2 h0) /
-    /// d1. SciPy 1.17.1 has the same formula:
+    /// The slope at a knot between secants d0, d1 over h0, h1 is 3 (h0 + h1) divided by (2 h1 + h0) / d0 +
+    /// (h1 + 2 h0) / d1. SciPy 1.17.1 uses the same formula:
     /// `x = np.array([0.1, 0.25, 0.6, 0.7]); y = np.array([2.0, 5.0, 6.0, 1.0])`
     /// `PchipInterpolator(np.concatenate([x - 1, x, x + 1]), np.tile(y, 3))(t)`.
     #[test]

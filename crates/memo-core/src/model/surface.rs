@@ -1,11 +1,11 @@
-//! The visible surface of a body, pixel by pixel (the 2½-D description of Rohr 1994, section 2, after Marr):
+//! The visible surface of a body for each pixel (the 2½-D description of Rohr 1994, section 2, after Marr):
 //! depth, part, normal.
 //!
-//! Each pixel's sight line C + s d, d having depth 1 in the camera, is cut with each part in the part's unit
-//! frame ([`silhouette`](super::silhouette)): the slab |z| <= 1 gives one interval of s, the infinite
-//! cylinder |c + s d|² <= 1 another, the solid is their intersection, and the smallest entry over all parts
-//! is seen. Nothing is tessellated; values are exact at pixel centres. What lies between pixel centres is not
-//! represented: for exact outlines see [`visibility`](super::visibility).
+//! The line of sight of each pixel, C + s d, with d of depth 1 in the camera, is intersected with each part
+//! in the part's unit frame ([`silhouette`](super::silhouette)): the slab |z| <= 1 gives one interval of s,
+//! the infinite cylinder |c + s d|² <= 1 another; the solid is their intersection, and the smallest entry
+//! over all parts is visible. There is no tessellation; values are exact at pixel centres. Detail between
+//! pixel centres is not represented; for exact contours see [`visibility`](super::visibility).
 //!
 //! Pixels are those of an ideal camera; lens distortion is not applied.
 
@@ -16,14 +16,14 @@ use glam::{DMat3, DVec2, DVec3};
 use std::ops::Range;
 use thiserror::Error;
 
-/// The part index of a pixel that shows no part.
+/// The part index of a pixel without a part.
 pub const NO_PART: u8 = u8::MAX;
 
-/// Why no surface map was made.
+/// Why no surface map was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
-    /// Part indices are bytes, and one value means "none".
+    /// There are too many parts: part indices are bytes, and one value means "none".
     #[error("{count} parts, at most 255 can be told apart")]
     TooManyParts {
         /// Number of parts given.
@@ -31,23 +31,24 @@ pub enum SurfaceError {
     },
 }
 
-/// What each pixel of a window sees; the images are as large as the window.
+/// The surface seen by each pixel of a window; all images have the size of the window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceMap {
-    /// The pixels covered: the window asked for, as far as it lies in the camera's image.
+    /// The pixels covered: the given window, clipped to the camera's image.
     pub window: Window,
-    /// Depth along the optical axis, metres; infinite where no part is seen.
+    /// Depth along the optical axis, metres; infinite where no part is visible.
     pub depth_m: Image<f32>,
-    /// Index of the part seen, [`NO_PART`] where there is none.
+    /// Index of the visible part; [`NO_PART`] where there is none.
     pub part: Image<u8>,
-    /// Outward unit normal of the surface in the camera's axes, zero where no part is seen.
+    /// Outward unit normal of the surface in camera axes (x right, y down, z forward); zero where no part is
+    /// visible.
     pub normal: Image<[f32; 3]>,
 }
 
-/// Depth, part and normal at each pixel of `window`, of the whole image by default.
+/// Depth, part and normal at each pixel of `window`; `None` means the whole image.
 ///
-/// From a camera inside a part nothing is seen, as in [`visible_contours`](super::visible_contours); a part
-/// with a semi-axis or half length that is not positive is not seen either.
+/// From a camera inside a part nothing is visible, as in [`visible_contours`](super::visible_contours); a
+/// part with a semi-axis or half length that is not positive is not visible either.
 pub fn surface_map(
     cylinders: &[EllipticCylinder],
     camera: &Camera,
@@ -79,7 +80,7 @@ impl SurfaceMap {
         }
     }
 
-    /// Draws one part where it is nearer than what is there already.
+    /// Draws one part where it is closer than the parts drawn before.
     fn draw(&mut self, part: u8, view: &PartView, area: Window) {
         for v in area.rows() {
             let row = v - self.window.y;
@@ -112,18 +113,18 @@ impl Window {
 /// One part in its unit frame, as the camera sees it.
 struct PartView {
     camera: DVec3,
-    /// Direction of pixel (0, 0)'s sight line, and its change per pixel to the right and down.
+    /// Direction of the line of sight of pixel (0, 0), and its change per pixel to the right and down.
     origin: DVec3,
     right: DVec3,
     down: DVec3,
-    /// Unit-frame gradient of the lateral surface to camera axes: R diag(1/a, 1/b, 1).
+    /// Transforms the unit-frame gradient of the lateral surface to camera axes: R diag(1/a, 1/b, 1).
     camera_from_gradient: DMat3,
 }
 
-/// Where a sight line enters a part.
+/// The entry point of a line of sight into a part.
 struct Entry {
     depth_m: f64,
-    /// The unit-frame point.
+    /// The point in the unit frame.
     point: DVec3,
     on_end_face: bool,
 }
@@ -146,7 +147,8 @@ impl PartView {
         })
     }
 
-    /// Cuts the sight line of a pixel with slab and infinite cylinder; `None` where the line misses the part.
+    /// Intersects the line of sight of a pixel with slab and infinite cylinder; `None` where it misses the
+    /// part.
     fn entry(&self, pixel: DVec2) -> Option<Entry> {
         let d = self.origin + self.right * pixel.x + self.down * pixel.y;
         let (c_xy, d_xy) = (self.camera.truncate(), d.truncate());
@@ -178,7 +180,7 @@ impl PartView {
     }
 }
 
-/// The window as far as it lies in the image.
+/// The window clipped to the image.
 fn within_image(window: Option<Window>, camera: &Camera) -> Window {
     let [width, height] = camera.size.map(|n| n as usize);
     let Some(asked) = window else { return Window { x: 0, y: 0, width, height } };
@@ -186,8 +188,8 @@ fn within_image(window: Option<Window>, camera: &Camera) -> Window {
     Window { x, y, width: asked.width.min(width - x), height: asked.height.min(height - y) }
 }
 
-/// The pixels of `window` that can show a part: the bounding rectangle of its bounding box, the whole window
-/// where the box reaches behind the camera.
+/// The pixels of `window` that can show a part: the bounding rectangle of its bounding box, or the whole
+/// window if the box reaches behind the camera.
 fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: Window) -> Window {
     let extents = cylinder.semi_axes.extend(cylinder.half_length);
     let corners = (0..8).map(|i| {
@@ -200,7 +202,7 @@ fn projected_box(cylinder: &EllipticCylinder, camera: &Camera, window: Window) -
         p.zip(q).map(|((p0, p1), (q0, q1))| (p0.min(q0), p1.max(q1)))
     };
     let Some(Some((low, high))) = bounds.reduce(hull) else { return window };
-    // Casts saturate: what lies beyond the image ends at its border.
+    // Casts saturate: coordinates outside the image end at its border.
     let clip = |range: Range<usize>, low: f64, high: f64| {
         let start = (low.ceil() as usize).clamp(range.start, range.end);
         let end = ((high.floor() + 1.0) as usize).clamp(start, range.end.max(start));
@@ -218,8 +220,8 @@ mod tests {
     use super::*;
     use glam::DAffine3;
 
-    /// A camera that looks at a point with the world's up upwards in the image (along the view, world x
-    /// upwards).
+    /// A camera that looks at a point, with the world's up upwards in the image (if it looks along that axis,
+    /// world x upwards).
     fn looking_at(position: DVec3, target: DVec3, focal_px: f64) -> Camera {
         let forward = (target - position).normalize();
         let up = if forward.z.abs() > 0.99 { DVec3::X } else { DVec3::Z };
@@ -292,7 +294,7 @@ mod tests {
         assert_eq!(surface_map(&many, &camera, None), Err(SurfaceError::TooManyParts { count: 256 }));
     }
 
-    /// A part that reaches behind the camera is drawn too: a floor under the camera up to its horizon.
+    /// A part that reaches behind the camera is drawn too: a floor under the camera, up to its horizon.
     #[test]
     fn a_part_reaching_behind_the_camera_is_seen_before_it() {
         let floor = post(DVec2::splat(1000.0), 1.0);
@@ -304,8 +306,8 @@ mod tests {
         assert!((map.depth_m.at(10, 479) - 500.0 / 239.5).abs() < 1e-5);
     }
 
-    /// The point seen lies on its part's surface, no part hides it, and its normal faces the camera along the
-    /// surface's gradient.
+    /// The visible point lies on the surface of its part, no part hides it, and its normal faces the camera
+    /// along the gradient of the surface.
     #[test]
     fn what_is_seen_is_the_nearest_surface() {
         for (bodies, camera) in views() {
@@ -334,7 +336,7 @@ mod tests {
         }
     }
 
-    /// The part seen at a point of the image between pixel centres: at a pixel of a camera shifted by the
+    /// The visible part at an image point between pixel centres, from a pixel of a camera shifted by the
     /// difference.
     fn part_at(bodies: &[EllipticCylinder], camera: &Camera, point_px: DVec2) -> Option<usize> {
         let pixel = point_px.round();
@@ -346,8 +348,9 @@ mod tests {
         surface_map(bodies, &shifted, Some(window)).ok().map(|map| usize::from(map.part.at(0, 0)))
     }
 
-    /// Just inside a visible contour its part is seen, just outside never: ray casting and the closed form of
-    /// hidden lines agree. Off by one in a thousand only where a piece begins or ends within the step.
+    /// Just inside a visible contour its part is visible, just outside it never is: ray casting agrees with
+    /// the closed form of hidden-line removal. One in a thousand differs, only where a piece begins or ends
+    /// within the step.
     #[test]
     fn visible_contours_bound_their_parts() {
         let (mut inside, mut agreeing, mut out) = (0, 0, Vec::new());

@@ -2,9 +2,9 @@
 //! "hidden contours have been removed").
 //!
 //! A convex solid K hides from the camera C the set S = {C + m (k - C) : k in K, m >= 1}: its own points and
-//! those behind it. S is convex, so each part hides **one interval** of a segment; the visible rest is the
-//! complement of the union over all parts. The paper does not say how it removes hidden lines, the derivation
-//! is ours.
+//! those behind it. S is convex, so each part hides **one interval** of a segment, and the visible remainder
+//! is the complement of the union over all parts. The paper does not describe its method; this derivation is
+//! ours.
 //!
 //! # One occluder
 //!
@@ -12,48 +12,49 @@
 //! the points where the tangents from c touch the unit circle, and P a point with (x, y) = c + α (T₁ - c) + β
 //! (T₂ - c) and Δz = P_z - C_z. α, β and Δz are linear in P. Write σ = α + β and μ = 4/|c|². Then
 //!
-//! * the tangent planes are α = 0 and β = 0, the plane through both tangent points is σ = 1;
+//! * the tangent planes are α = 0 and β = 0; the plane through both tangent points is σ = 1;
 //! * the infinite cylinder is (1 - σ)² <= μ α β, and the ray from C to P is inside it for s from 1/(σ +
 //!   sqrt(μ α β)) to 1/(σ - sqrt(μ α β)) (s = 0 at C, 1 at P);
-//! * the cone from C over the end ellipse in the plane z = ±1, at distance k = ±1 - C_z, is (Δz - k σ)² <=
-//!   μ k² α β.
+//! * the cone from C over the end ellipse in the plane z = ±1, at distance k = ±1 - C_z, is (Δz - k σ)² <= μ
+//!   k² α β.
 //!
-//! The infinite cylinder hides from P(t) = A + t (B - A) what lies between the tangent planes and not in
-//! front of the body. Whether the ends cut that interval is seen at its two limits: if the ray to a limit is
-//! inside the infinite cylinder only above (below) the solid, the true limit is where the segment meets the
-//! cone over the top (bottom) end ellipse or pierces that end. A camera inside the infinite cylinder, beyond
-//! an end, sees that end only: the hidden set is the cone over it, from its plane on.
+//! Of P(t) = A + t (B - A) the infinite cylinder hides the points that lie between the tangent planes and not
+//! in front of the body. The two limits of that interval determine whether the ends of the solid shorten it:
+//! if the ray to a limit is inside the infinite cylinder only above (below) the solid, the true limit is
+//! where the segment meets the cone over the top (bottom) end ellipse or passes through that end. A camera
+//! inside the infinite cylinder, beyond an end, sees only that end: the hidden set is the cone over it, from
+//! the plane of the end on.
 //!
-//! # What is decided where geometry leaves it open
+//! # Conventions for degenerate cases
 //!
-//! * Contact does not hide: an occluder is shrunk by 1e-11 of its size. Side lines of equal cylinders in
-//!   one row coincide with each other's surface; they would otherwise hide each other by a rounding error.
-//!   With a camera some hundred radii away rounding stays below 1e-13 radii.
+//! * Contact does not hide: an occluder is shrunk by 1e-11 of its size. Side lines of equal cylinders in one
+//!   row coincide with each other's surface and would otherwise hide each other by a rounding error. With a
+//!   camera some hundred radii away, rounding stays below 1e-13 radii.
 //! * A part does not hide its own contours; points of other parts inside it are hidden.
-//! * From a camera inside a part, or within 1e-7 of its size of it, everything is hidden, the definition of
-//!   S taken literally.
-//! * A part with a semi-axis or a half length that is not positive shows nothing and hides nothing.
-//! * No image plane enters: contours behind the camera are treated like those before it. Clipping is the
-//!   projection's affair.
-//! * Visible pieces shorter than 1e-11 of their contour, rounding between two occluders that meet, are
-//!   dropped.
+//! * If the camera is inside a part, or closer to it than 1e-7 of its size, everything is hidden, as the
+//!   definition of S gives.
+//! * A part with a semi-axis or a half length that is not positive has no contours and hides nothing.
+//! * There is no image plane: contours behind the camera are treated like those in front of it. Clipping is
+//!   left to the projection.
+//! * Visible pieces shorter than 1e-11 of their contour are dropped: they are rounding between two occluders
+//!   that meet.
 
 use super::silhouette::{ContourKind, RimAspect, RimChord, camera_in_unit_frame, rims, side_lines};
 use super::{Camera, Contour, EllipticCylinder};
 use glam::{DVec2, DVec3};
 
-/// The relative size of what is taken for rounding: occluders shrink by it, shorter visible pieces are
-/// dropped.
+/// Relative size below which lengths are rounding errors: occluders shrink by it, and shorter visible pieces
+/// are dropped.
 const ROUNDING: f64 = 1e-11;
 
-/// A camera nearer to a part than this fraction of its size counts as inside. On the surface the tangent
-/// planes coincide; at this distance their coordinates still keep eight digits.
+/// A camera closer to a part than this fraction of its size counts as inside. On the surface the tangent
+/// planes coincide; at this distance their coordinates still have eight digits.
 const CONTACT: f64 = 1e-7;
 
 /// A visible piece of a contour generator in the world, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VisibleSegment {
-    /// The part it belongs to, an index into the cylinders given.
+    /// The part it belongs to, an index into the given cylinders.
     pub part: usize,
     /// Which contour of the part.
     pub kind: ContourKind,
@@ -64,23 +65,24 @@ pub struct VisibleSegment {
 }
 
 impl VisibleSegment {
-    /// Its ends in image pixels; `None` unless the camera sees both.
+    /// Its end points in image pixels; `None` unless both are in front of the camera and imaged by the lens.
     pub fn ends_px(&self, camera: &Camera) -> Option<[DVec2; 2]> {
         Some([camera.project(self.start)?, camera.project(self.end)?])
     }
 }
 
-/// What [`visible_contours`] returns.
+/// Options for [`visible_contours`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VisibilityOptions {
-    /// Whether the end ellipses are returned too. Off: Rohr compares straight lines only.
+    /// Whether the end ellipses are returned too. Off by default: Rohr compares straight lines only.
     pub rims: bool,
-    /// Chords of an end ellipse. 24: they leave the ellipse by less than 1 % of its semi-axis.
+    /// Number of chords per end ellipse. With the default 24 they deviate from the ellipse by less than 1 %
+    /// of its semi-axis.
     pub rim_chords: usize,
 }
 
 impl VisibilityOptions {
-    /// Contours as they are drawn: side lines and end ellipses.
+    /// All contours of a drawing: side lines and end ellipses.
     pub const DRAWN: Self = Self { rims: true, rim_chords: 24 };
 }
 
@@ -90,8 +92,8 @@ impl Default for VisibilityOptions {
     }
 }
 
-/// The visible pieces of all contours, into `out`, which is cleared: part by part, left before right side
-/// line.
+/// Writes the visible pieces of all contours into `out`, which is cleared first: part by part, the left side
+/// line before the right.
 ///
 /// To reuse memory over many views, keep a [`PreparedView`].
 pub fn visible_contours(
@@ -115,11 +117,11 @@ pub fn hidden_interval(
     Some((hidden.t0, hidden.t1))
 }
 
-/// Working memory of [`visible_contours`], for views in succession.
+/// Working memory of [`visible_contours`], for successive views.
 #[derive(Debug, Clone, Default)]
 pub struct PreparedView {
     camera_position: DVec3,
-    /// A direction from the camera to the body, along which depths are compared.
+    /// A direction from the camera to the body, along which depths are measured.
     towards: DVec3,
     occluders: Vec<Occluder>,
     hidden: Vec<Interval>,
@@ -127,7 +129,7 @@ pub struct PreparedView {
 }
 
 impl PreparedView {
-    /// As the function [`visible_contours`]; allocates nothing once the memory has grown to its size.
+    /// As the function [`visible_contours`]; allocates nothing after the buffers have grown.
     pub fn visible_contours(
         &mut self,
         cylinders: &[EllipticCylinder],
@@ -178,7 +180,7 @@ impl PreparedView {
         self.chords = rim_chords;
     }
 
-    /// Appends what the other parts leave of one contour.
+    /// Appends the pieces of one contour that the other parts do not hide.
     fn push_visible(&mut self, part: usize, contour: &Contour, out: &mut Vec<VisibleSegment>) {
         let chord = Chord { a: contour.start - self.camera_position, b: contour.end - self.camera_position };
         let farthest = self.towards.dot(chord.a).max(self.towards.dot(chord.b));
@@ -203,7 +205,7 @@ impl PreparedView {
 }
 
 impl Contour {
-    /// The point at parameter t, exactly the end points at 0 and 1.
+    /// The point at parameter t; exactly the end points at t = 0 and t = 1.
     fn at(&self, t: f64) -> DVec3 {
         self.start * (1.0 - t) + self.end * t
     }
@@ -226,20 +228,20 @@ struct Interval {
 #[derive(Debug, Clone)]
 struct Occluder {
     part: usize,
-    /// The least depth of its points, along [`PreparedView::towards`].
+    /// The smallest depth of its points, along [`PreparedView::towards`].
     nearest: f64,
     shadow: Shadow,
 }
 
 impl Occluder {
-    /// Whether it lies before the camera and behind all points of a depth: what is hidden is deeper than what
-    /// hides it.
+    /// Whether the occluder lies in front of the camera and behind all points of a given depth: hidden points
+    /// are deeper than the part that hides them.
     fn is_behind(&self, depth: f64) -> bool {
         self.nearest > depth.max(0.0)
     }
 }
 
-/// The least product of a direction with the points of a cylinder, relative to the camera.
+/// The smallest dot product of a direction with the points of a cylinder relative to the camera.
 fn least_along(cylinder: &EllipticCylinder, camera_position: DVec3, direction: DVec3) -> f64 {
     let along = cylinder.world_from_cylinder.matrix3.transpose() * direction;
     let reach = (along.truncate() * cylinder.semi_axes).length() + along.z.abs() * cylinder.half_length;
@@ -255,7 +257,7 @@ enum Shadow {
 }
 
 impl Shadow {
-    /// `None` for a part that is no solid.
+    /// `None` for a part that is not a solid.
     fn new(cylinder: &EllipticCylinder, camera_position: DVec3) -> Option<Self> {
         let shrunk = EllipticCylinder {
             semi_axes: cylinder.semi_axes * (1.0 - ROUNDING),
@@ -284,8 +286,8 @@ impl Shadow {
     }
 }
 
-/// S for a camera outside the infinite cylinder. Vectors are gradients in the world, to be multiplied with a
-/// point relative to the camera.
+/// S for a camera outside the infinite cylinder. The vectors are gradients in the world, to be multiplied by
+/// a point relative to the camera.
 #[derive(Debug, Clone)]
 struct SideShadow {
     alpha: DVec3,
@@ -300,11 +302,12 @@ struct SideShadow {
 }
 
 impl SideShadow {
-    /// From the camera in the unit frame and the gradients of the unit frame's coordinates.
+    /// Computed from the camera in the unit frame and the gradients of the coordinates of the unit frame.
     ///
-    /// With ρ along c and λ across it, T₁ - c = (1/|c| - |c|, -w) and T₂ - c = (1/|c| - |c|, w), w = sqrt(1 -
-    /// 1/|c|²), so that α + β = -ρ |c| / (|c|² - 1) and β - α = λ / w. In the (ρ, z) plane K is the square
-    /// |ρ|, |z| <= 1; the planes `above` and `below` go through the camera at (|c|, C_z) and a corner of it.
+    /// With ρ along c and λ perpendicular to it, T₁ - c = (1/|c| - |c|, -w) and T₂ - c = (1/|c| - |c|, w), w
+    /// = sqrt(1 - 1/|c|²), so α + β = -ρ |c| / (|c|² - 1) and β - α = λ / w. In the (ρ, z) plane K is the
+    /// square |ρ|, |z| <= 1; the planes `above` and `below` pass through the camera at (|c|, C_z) and a
+    /// corner of the square.
     fn new(camera: DVec3, x: DVec3, y: DVec3, z: DVec3) -> Self {
         let distance_sq = camera.truncate().length_squared();
         let distance = distance_sq.sqrt();
@@ -359,9 +362,9 @@ struct SideRays<'a> {
 }
 
 impl SideRays<'_> {
-    /// What the infinite cylinder hides of a piece that lies between its tangent planes. Its near surface
-    /// bounds the piece where a limit lies before the plane of the tangent points, σ < 1, and not in the
-    /// body.
+    /// The interval that the infinite cylinder hides of a piece between its tangent planes. The near surface
+    /// of the cylinder bounds the interval where a limit lies in front of the plane of the tangent points, σ
+    /// < 1, and not in the body.
     fn not_in_front(&self, between: Interval) -> Option<Interval> {
         let front = Linear { at0: 1.0, at1: 1.0 }.plus(-1.0, self.sigma);
         let (front0, front1) = (front.at(between.t0), front.at(between.t1));
@@ -374,8 +377,8 @@ impl SideRays<'_> {
         if !cut0 && !cut1 {
             return Some(between);
         }
-        // A segment that changes side between the tangent points runs through the body; rounding may lose the
-        // roots.
+        // A segment that changes side between the tangent points passes through the body; rounding may lose
+        // the roots.
         let touching = (cut0 != cut1).then(|| [front.root(); 2]);
         let [enter, leave] = body.roots().or(touching)?;
         let t0 = if cut0 { enter.max(between.t0) } else { between.t0 };
@@ -383,7 +386,7 @@ impl SideRays<'_> {
         (t0 <= t1).then_some(Interval { t0, t1 })
     }
 
-    /// What the finite cylinder hides of a piece hidden by the infinite one.
+    /// The interval that the finite cylinder hides of an interval hidden by the infinite one.
     fn cut_by_ends(&self, behind: Interval) -> Option<Interval> {
         let t0 = match self.passes(behind.t0) {
             Passage::Through => behind.t0,
@@ -396,7 +399,7 @@ impl SideRays<'_> {
         (t0 <= t1).then_some(Interval { t0, t1 })
     }
 
-    /// Where the ray to P(t) runs while inside the infinite cylinder.
+    /// Where the ray to P(t) passes while it is inside the infinite cylinder.
     fn passes(&self, t: f64) -> Passage {
         let (alpha, beta, dz) = (self.alpha.at(t), self.beta.at(t), self.dz.at(t));
         let camera_z = self.shadow.camera_z;
@@ -416,7 +419,7 @@ impl SideRays<'_> {
         }
     }
 
-    /// The piece whose rays meet the end face in the plane z = `end`.
+    /// The interval whose rays meet the end face in the plane z = `end`.
     fn cone_interval(&self, end: f64) -> Option<Interval> {
         let k = end - self.shadow.camera_z;
         let e = self.dz.plus(-k, self.sigma);
@@ -426,14 +429,14 @@ impl SideRays<'_> {
 }
 
 enum Passage {
-    /// At least in one point between the planes of the ends.
+    /// In at least one point between the planes of the ends.
     Through,
     /// Only beyond the end at this z.
     Beyond(f64),
 }
 
-/// S for a camera that looks from beyond an end along the axis: x, y, z are the gradients of the unit frame's
-/// coordinates.
+/// S for a camera beyond an end that looks along the axis: x, y, z are the gradients of the coordinates of
+/// the unit frame.
 #[derive(Debug, Clone)]
 struct EndShadow {
     camera: DVec3,
@@ -454,9 +457,9 @@ impl EndShadow {
     }
 }
 
-/// The piece of a segment whose rays, z running from 0 to Δz(t), meet an end face in the plane z = k, `cone`
-/// being negative inside the double cone over it. Its limits are the segment's ends, the cone, or where the
-/// segment pierces the face.
+/// The interval of a segment whose rays, with z from 0 to Δz(t), meet an end face in the plane z = k. `cone`
+/// is negative inside the double cone over the face. The limits of the interval are the ends of the segment,
+/// the cone, or the point where the segment passes through the face.
 fn meets_end_face(cone: &Conic, dz: &Linear, k: f64) -> Option<Interval> {
     let is_inside = |t: f64| cone.at(t) <= 0.0;
     let slack = 1e-15 * (dz.at0.abs() + dz.at1.abs());
@@ -530,7 +533,8 @@ impl Linear {
         self.at0 >= 0.0 && self.at1 >= 0.0
     }
 
-    /// The piece of an interval where the function, positive somewhere on the segment, is not negative.
+    /// The part of an interval where the function, which is positive somewhere on the segment, is not
+    /// negative.
     fn where_positive(&self, within: Interval) -> Option<Interval> {
         let t0 = if self.at0 < 0.0 { within.t0.max(self.root()) } else { within.t0 };
         let t1 = if self.at1 < 0.0 { within.t1.min(self.root()) } else { within.t1 };
@@ -554,11 +558,11 @@ impl Conic {
         e * e - self.m * self.alpha.at(t) * self.beta.at(t)
     }
 
-    /// The real roots in ascending order, one of them infinite where the function is linear.
+    /// The real roots in ascending order; one is infinite where the function is linear.
     ///
-    /// The discriminant is taken from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]) with [pq] = p₀ q₁ -
-    /// p₁ q₀: products of what differs between the ends. b² - 4ac loses all digits for a camera near the
-    /// plane of an end, where m goes to 0.
+    /// The discriminant is computed from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]) with [pq] = p₀ q₁
+    /// - p₁ q₀: products of the differences between the ends. b² - 4ac would lose all digits for a camera
+    /// near the plane of an end, where m approaches 0.
     fn roots(&self) -> Option<[f64; 2]> {
         let (e, alpha, beta, m) = (self.e, self.alpha, self.beta, self.m);
         let across = alpha.cross(beta);

@@ -5,12 +5,12 @@ fn planted(focal_px: f64, turn: DVec3, depth_m: f64) -> Camera {
     let level = Camera::level([1280, 720], 1.0, 1.5, depth_m).unwrap();
     let rotation = DMat3::from_quat(DQuat::from_scaled_axis(turn)) * level.rotation;
     let centre = DVec3::new(0.0, 0.0, 1.0);
-    // The middle of the points stays before the camera, at the depth that was asked for.
+    // The midpoint of the points stays in front of the camera, at the requested depth.
     let translation = DVec3::Z * depth_m - rotation * centre;
     Camera { focal_px: DVec2::splat(focal_px), rotation, translation, ..level }
 }
 
-/// Ten points on two walls that a camera of 45 degrees sees all over its picture.
+/// Ten points on two walls that fill the image of a camera with a field of view of 45 degrees.
 fn walls(size: [u32; 2]) -> (Camera, Vec<DVec3>, Vec<DVec2>) {
     let camera = Camera::level(size, 45_f64.to_radians(), 1.5, 5.0).unwrap();
     let places: Vec<DVec3> = (0..10)
@@ -25,7 +25,7 @@ fn walls(size: [u32; 2]) -> (Camera, Vec<DVec3>, Vec<DVec2>) {
 
 #[test]
 fn a_planted_camera_is_recovered_in_pictures_of_any_size() {
-    // In the smallest the pixels do not tell the focal length, so it is given.
+    // In the smallest image the pixels do not determine the focal length, so it is given.
     for (size, is_known) in [
         ([16, 12], true),
         ([97, 31], true),
@@ -69,7 +69,7 @@ proptest! {
         let pixels: Vec<DVec2> = places.iter().map(|p| camera.project(*p).unwrap()).collect();
         let options = PointOptions { size: camera.size, lens: KnownLens::Nothing };
         let found = match camera_from_points(&places, &pixels, &options) {
-            // Some draws tell too little of the focal length, which is an answer as well.
+            // Some draws do not determine the focal length, which is a correct answer as well.
             Err(PointError::FocalUnknown { .. }) => return Ok(()),
             found => found.unwrap(),
         };
@@ -106,7 +106,7 @@ fn the_shape_of_points_does_not_depend_on_their_unit() {
     }
 }
 
-/// Points that fill the picture and a camera that is turned a little.
+/// Points that fill the image, and a camera that is turned slightly.
 fn scattered(count: usize, seed: u64) -> (Camera, Vec<DVec3>) {
     let camera = planted(900.0, DVec3::new(0.1, -0.15, 0.05), 6.0);
     let mut random = crate::synth::Random::new(seed);
@@ -137,8 +137,8 @@ fn names(found: &PointCalibration) -> Vec<&'static str> {
     found.estimates.iter().map(|estimate| estimate.name).collect()
 }
 
-/// Standard deviations of the focal length and of the camera's place, by derivatives of the projection to
-/// these very parameters and three small turns.
+/// Standard deviations of the focal length and of the camera position, from derivatives of the projection
+/// with respect to these parameters and three small rotations.
 fn deviations(camera: &Camera, places: &[DVec3], noise_px: f64) -> Vec<f64> {
     let pixels = |change: [f64; 7]| -> Vec<f64> {
         let turn = DQuat::from_scaled_axis(DVec3::new(change[4], change[5], change[6]));
@@ -181,7 +181,7 @@ fn deviations_are_those_of_the_projection() {
     assert!((found.camera.focal_px.x - 900.0).abs() < 4.0 * found.estimates[0].sd);
 }
 
-/// A principal point beside the centre and a bent picture are found where the points show them.
+/// A principal point away from the centre and a distortion are found if the points determine them.
 #[test]
 fn a_planted_lens_is_recovered() {
     let (camera, places) = scattered(60, 3);
@@ -196,7 +196,7 @@ fn a_planted_lens_is_recovered() {
     assert!(found.rms_px < 1e-4, "{}", found.rms_px);
 }
 
-/// Noise alone brings neither a principal point nor a bend.
+/// Noise alone leads to neither a principal point nor a distortion.
 #[test]
 fn a_plain_lens_stays_plain() {
     for seed in 0..4 {
@@ -227,7 +227,7 @@ fn the_criterion_is_the_published_one() {
     assert!((criterion - expected).abs() < 1e-9, "{criterion} {expected}");
 }
 
-/// Every point is measured to half a pixel but one or two.
+/// Every point is measured to half a pixel, except one or two.
 #[test]
 fn mistaken_points_are_left_out() {
     let (camera, places) = scattered(14, 7);
@@ -249,7 +249,7 @@ fn mistaken_points_are_left_out() {
     }
 }
 
-/// A plane head on does not tell the focal length; a slanting one does.
+/// A plane seen straight on does not determine the focal length; an oblique one does.
 #[test]
 fn a_plane_head_on_does_not_tell_the_focal_length() {
     let board: Vec<DVec3> =
@@ -266,7 +266,7 @@ fn a_plane_head_on_does_not_tell_the_focal_length() {
     assert!(found.is_planar && (found.camera.focal_px.x / 1171.5 - 1.0).abs() < 0.05, "{found:?}");
 }
 
-/// Points on the ground fit a mirrored picture as well, with the camera below it.
+/// Points on the ground also fit a mirrored image, with the camera below the ground.
 #[test]
 fn a_mirrored_ground_is_refused() {
     let camera = planted(900.0, DVec3::new(0.6, 0.1, 0.0), 6.0);
@@ -279,7 +279,7 @@ fn a_mirrored_ground_is_refused() {
     assert_eq!(calibrated(&camera, &places, &mirrored, lens), Err(PointError::Mirrored));
 }
 
-/// A lens with oblong pixels and a bend, all of it known: residuals are in the pixels that were given.
+/// A known lens with oblong pixels and distortion: residuals are in the given pixels.
 #[test]
 fn a_known_lens_is_taken_as_it_is() {
     let (camera, places) = scattered(14, 9);

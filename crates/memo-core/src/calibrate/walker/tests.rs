@@ -9,7 +9,7 @@ const LEVEL: Camera = Camera {
     translation: DVec3::ZERO,
 };
 
-/// A person of 1.8 m on a circle before a camera 3 m high that looks down.
+/// A person of 1.8 m on a circle in front of a camera 3 m high that looks down.
 fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<Sighting> {
     let rotation = DMat3::from_rotation_z(roll_rad) * DMat3::from_rotation_x(pitch_rad) * LEVEL.rotation;
     let translation = rotation * DVec3::new(0.0, 0.0, -3.0);
@@ -30,7 +30,7 @@ fn a_planted_camera_is_recovered() {
     let options = WalkerOptions { size: LEVEL.size, height_m: 1.8, lens: KnownLens::Nothing };
     let found = camera_from_walker(&sightings(0.25, 0.0), &options).unwrap();
     let value = |name: &str| found.estimates.iter().find(|e| e.name == name).unwrap().value;
-    // The prior draws it towards the picture's width of 1280 px, but little.
+    // The prior shifts it towards the image width of 1280 px, but only slightly.
     assert!((value("focal_px") - 1000.0).abs() < 0.5, "{}", value("focal_px"));
     assert!((value("pitch_deg").to_radians() - 0.25).abs() < 2e-4);
     assert!((value("height_m") - 3.0).abs() < 2e-3);
@@ -45,7 +45,7 @@ fn a_known_lens_leaves_pitch_roll_and_height() {
     let found = camera_from_walker(&sightings(0.15, 0.02), &options).unwrap();
     assert!(found.estimates.iter().all(|e| e.name != "focal_px"));
     let roll = found.estimates.iter().find(|e| e.name == "roll_deg").unwrap().value;
-    // The prior draws it towards zero, but little.
+    // The prior shifts it towards zero, but only slightly.
     assert!((roll.to_radians() - 0.02).abs() < 2e-3, "{roll}");
 }
 
@@ -72,7 +72,7 @@ fn looking_down(pitch_rad: f64, focal_px: DVec2) -> Camera {
     Camera { rotation, translation: rotation * DVec3::new(0.0, 0.0, -3.0), focal_px, ..LEVEL }
 }
 
-/// A person of 1.8 m, from one share of the height to another.
+/// A person of 1.8 m, from one fraction of the height to another.
 fn seen_at(camera: &Camera, places: &[DVec3], foot_share: f64, head_share: f64) -> Vec<Sighting> {
     let pixel = |p: &DVec3, share: f64| camera.project(*p + DVec3::Z * 1.8 * share).unwrap();
     let sighting =
@@ -86,7 +86,7 @@ fn circle() -> Vec<DVec3> {
     (0..=32).map(|i| DVec3::new(2.0 * turn(i).cos(), 9.0 + 3.0 * turn(i).sin(), 0.0)).collect()
 }
 
-/// A slanting way, always on.
+/// An oblique path in one direction.
 fn one_way() -> Vec<DVec3> {
     (0..=32).map(|i| DVec3::new(-2.0 + 0.12 * f64::from(i), 6.0 + 0.2 * f64::from(i), 0.0)).collect()
 }
@@ -102,7 +102,7 @@ fn ankles_and_eyes_stand_where_they_are() {
         .unwrap();
         assert!((value(&found, "focal_px").value - 1000.0).abs() < 0.5);
         assert!((value(&found, "height_m").value - 3.0).abs() < 3e-3);
-        // The feet are seen above their places on the ground.
+        // The feet are seen above their positions on the ground.
         for (place, planted) in found.places.iter().zip(circle()) {
             let ground = camera.project(planted).unwrap();
             assert!(found.camera.project(*place).unwrap().distance(ground) < 0.2, "{place}");
@@ -125,9 +125,10 @@ fn a_known_lens_may_have_oblong_pixels() {
     assert!((value(&found, "height_m").value - 3.0).abs() < 1e-3 && found.rms_px < 0.05);
 }
 
-/// Standard deviations of the parameters where each coordinate of head and foot has unit variance, by
-/// derivatives of the camera's own ground point and projection. A camera is level but for 2 degrees, and its
-/// focal length the picture's width but for a factor of e, as sure as a sighting of half a hundredth.
+/// Standard deviations of the parameters if each coordinate of head and foot has unit variance, from
+/// derivatives of the camera's own ground point and projection. The priors on roll (2 degrees) and focal
+/// length (a factor of e about the image width) have the weight of a sighting with an error of half a
+/// hundredth.
 fn unit_deviations(camera: &Camera, sightings: &[Sighting]) -> [f64; 4] {
     let heights: Vec<f64> = sightings.iter().map(|s| s.head_px.distance(s.foot_px)).collect();
     let noise_px = 0.005 * median(heights);
@@ -165,8 +166,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Without noise what is left is the lean: two hundredths of the height in all sightings alike, where the
-/// person goes one way; nothing where they come back.
+/// Without noise only the lean remains: two hundredths of the height, common to all sightings, if the person
+/// walks in one direction; none if the person comes back.
 #[test]
 fn a_walk_one_way_may_lean() {
     let camera = looking_down(0.25, LEVEL.focal_px);
@@ -187,7 +188,7 @@ fn a_walk_one_way_may_lean() {
     assert!(back.estimates.iter().all(|e| e.sd < 1e-2 * value(&found, e.name).sd), "{:?}", back.estimates);
 }
 
-/// Noise of each sighting by itself, on a way back: deviations follow it.
+/// Independent noise of each sighting on a closed path: the standard deviations follow it.
 #[test]
 fn noise_makes_the_deviations_of_a_walk_back() {
     let camera = looking_down(0.25, LEVEL.focal_px);
@@ -226,11 +227,12 @@ fn mistaken_sightings_are_left_out() {
 #[test]
 fn walks_that_do_not_tell_the_camera_are_refused() {
     let refused = |sightings: &[Sighting], lens| camera_from_walker(sightings, &options(lens)).unwrap_err();
-    // Across before a level camera: nearer with a shorter lens looks the same.
+    // Walking parallel to the image plane of a level camera: closer with a shorter focal length looks the
+    // same.
     let across: Vec<DVec3> = (0..20).map(|i| DVec3::new(-1.5 + 0.15 * f64::from(i), 8.0, 0.0)).collect();
     let sightings = seen_at(&looking_down(0.0, LEVEL.focal_px), &across, 0.0, 1.0);
     assert!(matches!(refused(&sightings, KnownLens::Nothing), WalkerError::FocalUnknown { .. }));
-    // Standing still: a lower camera that looks less far down sees the same.
+    // Standing still: a lower camera with less pitch sees the same.
     let still = seen_at(&looking_down(0.1, LEVEL.focal_px), &[DVec3::new(0.0, 30.0, 0.0); 12], 0.0, 1.0);
     let error = refused(&still, KnownLens::Focal(1000.0));
     assert!(matches!(error, WalkerError::PitchUnknown { .. }), "{error}");
@@ -251,7 +253,7 @@ fn what_is_no_walk_is_refused() {
         camera_from_walker(&turned(16), &options(KnownLens::Nothing)),
         Err(WalkerError::UpsideDown { .. })
     ));
-    // Heights between half and one and a half are no person's.
+    // Heights that vary between half and one and a half of a person's height are not a person.
     let wild: Vec<Sighting> = good
         .iter()
         .enumerate()
@@ -296,12 +298,13 @@ fn sightings_are_where_the_ankles_pass() {
     assert_eq!(found.len(), 10);
     assert!(found.iter().all(|s| s.foot_px == DVec2::new(300.0, 500.0)));
     assert_eq!(found[0].head_px, DVec2::new(305.0, 212.0));
-    // Too few of them: all frames.
+    // Too few such frames: all frames are returned.
     assert_eq!(sightings_from_joints(&names, &strides(105, &names)).len(), 105);
 }
 
-/// Heights of what is detected over the body's: eyes 0.936 and ankles 0.039 after Drillis and Contini 1966 (in
-/// Winter 2009, fig. 4.1), tragions 0.925 and malleoli 0.0415 by means of 4082 men in Gordon and others 2014.
+/// Heights of detected points as fractions of body height: eyes 0.936 and ankles 0.039 after Drillis and
+/// Contini 1966 (in Winter 2009, fig. 4.1), tragions 0.925 and malleoli 0.0415 from the means of 4082 men in
+/// Gordon and others 2014.
 #[test]
 fn points_are_as_high_as_on_a_body() {
     let shares = |names: &[&str]| {

@@ -1,4 +1,4 @@
-//! The filter and the smoother against matrices written out, and their covariances against simulated motion.
+//! The filter and the smoother against explicit matrices, and their covariances against simulated motion.
 
 use super::*;
 use crate::synth::Random;
@@ -37,8 +37,8 @@ fn printed_variances_are_reproduced_at_25_images_a_second() {
     }
 }
 
-/// Eqs. (14)-(22) with the matrices as printed. The state is (X, X', Y, Y', pose, pose'): Z is kept (section
-/// 5.2).
+/// Eqs. (14)-(22) with the matrices as printed. The state is (X, X', Y, Y', pose, pose'); Z is constant
+/// (section 5.2).
 struct Printed {
     state: SVector<f64, 6>,
     covariance: SMatrix<f64, 6, 6>,
@@ -52,7 +52,7 @@ impl Printed {
             [PRINTED_ALONG, PRINTED_VERTICAL, PRINTED_PHASE].into_iter().enumerate()
         {
             phi[(2 * i, 2 * i + 1)] = dt_s;
-            // 25 independent steps of sigma_Q unit/image a second, each 25 sigma_Q unit/s.
+            // 25 independent steps of sigma_Q unit/image per second, each 25 sigma_Q unit/s.
             q[(2 * i + 1, 2 * i + 1)] = (25.0 * sigma_q).powi(2) * 25.0 * dt_s;
             h[(i, 2 * i)] = 1.0;
             r[(i, i)] = sigma_r * sigma_r;
@@ -102,7 +102,7 @@ fn the_split_filter_equals_the_printed_matrices_at_uneven_times_and_several_rate
             let dt_s = time_s - before_s;
             let mut near = |mean: f64, sd: f64| mean + sd * normal(&mut random);
             let measured = [near(0.3 + 1.5 * time_s, 0.2), near(1.2, 0.1), near(0.7 + 0.95 * time_s, 0.2)];
-            // Every ninth frame shows nothing.
+            // Every ninth frame has no measurement.
             let measured = (k % 9 != 8).then_some(measured);
             printed.step(dt_s, measured);
             for i in 0..3 {
@@ -133,7 +133,7 @@ fn coasting_a_second_is_as_uncertain_at_every_rate() {
     }
 }
 
-/// What a filter of one simulated walk made of its last frame, and its innovations over their predicted
+/// The result of filtering one simulated walk: its last frame, and its innovations divided by their predicted
 /// standard deviations.
 struct Simulated {
     /// (estimate - truth)ᵀ P^-1 (estimate - truth) of position and velocity.
@@ -141,7 +141,7 @@ struct Simulated {
     innovations: Vec<f64>,
 }
 
-/// A coordinate whose velocity is changed at random in every frame (eq. 12), measured at uneven times.
+/// A coordinate whose velocity changes at random in every frame (eq. 12), measured at uneven times.
 fn simulated(rate_hz: f64, noise: &Noise, random: &mut Random) -> Simulated {
     let measured_sd = noise.measurement_variance.sqrt();
     let (start_sd, start_velocity_sd) = (0.2, 0.4);
@@ -166,7 +166,7 @@ fn simulated(rate_hz: f64, noise: &Noise, random: &mut Random) -> Simulated {
     Simulated { nees, innovations }
 }
 
-/// Of a consistent filter the mean of `nees` is 2, with a standard deviation of 2 / sqrt(walks), and the
+/// For a consistent filter the mean of `nees` is 2, with a standard deviation of 2 / sqrt(walks), and the
 /// innovations are white with variance 1.
 #[test]
 fn errors_and_innovations_of_simulated_motion_are_as_large_as_the_covariance_says() {
@@ -185,8 +185,8 @@ fn errors_and_innovations_of_simulated_motion_are_as_large_as_the_covariance_say
     }
 }
 
-/// Means and covariances of all states of a series given all its measurements, by conditioning one large Gaussian.
-/// The unknowns u are the first state and the velocity's changes; every state is linear in them.
+/// Means and covariances of all states of a series given all its measurements, by conditioning one large
+/// Gaussian. The unknowns u are the first state and the changes of velocity; every state is linear in them.
 fn conditioned(
     start: &ConstantVelocity,
     dt_s: &[f64],
@@ -228,7 +228,7 @@ fn conditioned(
     (0..frames).map(state).collect()
 }
 
-/// The series filtered frame by frame; the start is the state before the first measurement.
+/// The series filtered frame by frame; `start` is the state before the first measurement.
 fn filtered(
     start: &ConstantVelocity,
     dt_s: &[f64],

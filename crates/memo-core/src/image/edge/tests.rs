@@ -3,7 +3,7 @@ use crate::image::Image;
 use glam::DVec2;
 use proptest::prelude::*;
 
-/// Grey levels of a half plane, each pixel weighed by the part of its square that lies inside: a box of
+/// Grey levels of a half plane, each pixel weighted by the part of its square that lies inside: a box of
 /// width a = |n_x| smoothed by one of width b = |n_y|, integrated up to the distance of the border.
 fn half_plane(size: usize, normal: Vec2, offset_px: f32, dark: f32, bright: f32) -> Image<u8> {
     let normal = normal.as_dvec2();
@@ -226,14 +226,14 @@ fn edgel(x: f32, y: f32, gradient: Vec2) -> Edgel {
     Edgel { position_px: Vec2::new(x, y), gradient }
 }
 
-/// Edge points follow each other where their gradients differ by up to 60 degrees, however strong they are.
+/// Edge points are linked where their gradients differ by up to 60 degrees, whatever their magnitude.
 #[test]
 fn gradients_up_to_sixty_degrees_apart_belong_to_one_edge() {
     for (degrees, is_one) in
         [(0.0f32, true), (50.0, true), (59.0, true), (61.0, false), (90.0, false), (180.0, false)]
     {
         let angle = 0.5 * degrees.to_radians();
-        // The mean of both gradients points along x, so the way goes along y.
+        // The mean of both gradients points along x, so the step goes along y.
         let [a, b] = [Vec2::from_angle(angle), Vec2::from_angle(-angle)].map(|direction| 10.0 * direction);
         let step = step_between(&edgel(0.0, 0.0, a), &edgel(0.0, 1.0, b));
         assert_eq!(step.is_some(), is_one, "{degrees}");
@@ -243,7 +243,8 @@ fn gradients_up_to_sixty_degrees_apart_belong_to_one_edge() {
     }
 }
 
-/// A step must go along the edge more than across it, and costs four times as much across as along.
+/// A step must go along the edge more than across it; a distance across costs four times as much as one along
+/// it.
 #[test]
 fn steps_go_along_the_edge() {
     let gradient = Vec2::new(10.0, 0.0);
@@ -259,13 +260,14 @@ fn steps_go_along_the_edge() {
         assert_eq!(step.is_some(), cost.is_some(), "{x} {y}");
         if let (Some(step), Some(cost)) = (step, cost) {
             assert!((step.cost - cost).abs() < 1e-5, "{}", step.cost);
-            // The gradient points to the bright side, which is on the right of the way: y is down, so ahead is up.
+            // The gradient points to the bright side, which is on the right of the direction of travel: y is
+            // down, so ahead is up.
             assert_eq!(step.is_forward, y < 0.0, "{x} {y}");
         }
     }
 }
 
-/// Of a Gaussian profile the summit is found where it is.
+/// The maximum of a Gaussian profile is found exactly.
 #[test]
 fn the_summit_of_a_gaussian_is_found_exactly() {
     for offset in [-0.45f32, -0.2, 0.0, 0.1, 0.4] {
@@ -277,7 +279,8 @@ fn the_summit_of_a_gaussian_is_found_exactly() {
     }
 }
 
-/// A vertical step in the middle, whose height fades from one to the other between rows 15 and 45.
+/// A vertical step in the middle, whose height changes linearly from `upper` to `lower` between rows 15 and
+/// 45.
 fn step(upper: u8, lower: u8) -> Image<u8> {
     let mut image = Image::filled(40, 60, 60u8);
     for y in 0..60 {
@@ -293,8 +296,8 @@ fn chains_of(image: &Image<u8>, mask: Option<&Mask>) -> EdgeChains {
     edge_chains(&image.as_frame(), &domain, &EdgeOptions::default()).unwrap()
 }
 
-/// Beside a step of h the smoothed gradient is h Σ k e^(-k²/2) / 2 Σ k² e^(-k²/2) over k = 1, 2, 3: 0.365 h. An
-/// edge begins at 12 grey levels a pixel and goes on down to 5.
+/// Beside a step of h the smoothed gradient is h Σ k e^(-k²/2) / 2 Σ k² e^(-k²/2) over k = 1, 2, 3: 0.365 h.
+/// An edge starts at 12 grey levels per pixel and continues down to 5.
 #[test]
 fn edges_begin_and_end_at_their_gradients() {
     let sums = (1..=3).map(f64::from).fold((0.0, 0.0), |(first, second), k: f64| {
@@ -315,7 +318,8 @@ fn edges_begin_and_end_at_their_gradients() {
     }
 }
 
-/// One edge point missing does not part an edge, two do; and a faint part does not go on over a missing one.
+/// One missing edge point does not split an edge, two do; and a faint part does not continue over a missing
+/// one.
 #[test]
 fn edges_bridge_a_single_missing_point() {
     let hole = |rows: std::ops::Range<usize>| {

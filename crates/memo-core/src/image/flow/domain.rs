@@ -1,9 +1,9 @@
-//! The pixels on which the velocity field is sought.
+//! The pixels for which the velocity field is computed.
 
 use crate::image::edge::Window;
 use crate::image::frame::Mask;
 
-/// Pixels of the region in a window, with a free cell all round so that every pixel has four neighbours.
+/// Pixels of the region in a window, with a free cell on every side so that every pixel has four neighbours.
 #[derive(Clone)]
 pub(super) struct Domain {
     pub(super) width: usize,
@@ -40,7 +40,7 @@ impl Domain {
         all.map(|(x, y)| (x, y, self.cell(x, y))).filter(|&(_, _, cell)| self.is_inside[cell])
     }
 
-    /// Half the size; a pixel is inside if one of the four it covers is.
+    /// Half the size; a pixel is inside if one of the four pixels it covers is inside.
     pub(super) fn halved(&self) -> Self {
         let mut half = Self::empty(self.width.div_ceil(2), self.height.div_ceil(2));
         for (x, y, _) in self.pixels() {
@@ -50,7 +50,7 @@ impl Domain {
         half
     }
 
-    /// The cells connected to `start`, itself first.
+    /// The cells connected to `start`, beginning with `start`.
     pub(super) fn connected_to(&self, start: usize, is_seen: &mut [bool]) -> Vec<usize> {
         let mut found = vec![start];
         is_seen[start] = true;

@@ -1,8 +1,10 @@
-//! The linear equations of a velocity field on one grid, and their solution: conjugate gradients preconditioned
-//! by one multigrid cycle, block Jacobi steps between grids of half the size.
+//! The linear equations of a velocity field on one grid and their solution: conjugate gradients
+//! preconditioned by one multigrid cycle, with block Jacobi smoothing; each grid has half the size of the
+//! finer one.
 //!
-//! It solves what [`super`] has linearised and knows neither frames nor pyramids. On components where the
-//! equations are singular it finds one of the solutions; such components are refused before.
+//! It solves the equations that [`super`] has linearised and does not depend on frames or pyramids. On
+//! components where the equations are singular it finds one of the solutions; [`super`] removes such
+//! components beforehand.
 
 use super::domain::Domain;
 use glam::DVec2;
@@ -45,7 +47,7 @@ fn combine(a: &mut [f64], scale: f64, factor: f64, b: &[f64]) {
     }
 }
 
-/// Eight partial sums, so that the order of summation is the same with vectors of any length.
+/// Eight partial sums, so that the order of summation does not depend on the vector width.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
@@ -85,20 +87,21 @@ impl Blocks {
     }
 }
 
-/// Outcome of a solution.
+/// Result of a solution.
 pub(super) struct Solved {
     pub(super) iterations: usize,
     pub(super) relative_residual: f64,
 }
 
-/// Damping of the block Jacobi steps: 0.8 at least halves every wave shorter than four pixels.
+/// Damping of the block Jacobi steps: with 0.8, every step at least halves all waves shorter than four
+/// pixels.
 const DAMPING: f64 = 0.8;
 
 /// Block Jacobi steps on the coarsest grid, which has at most 2x2 cells.
 const COARSEST_STEPS: usize = 12;
 
-/// The linear equations A x = b of the minimum on one grid, with what solving them needs. At each pixel p,
-/// with the sum over its neighbours q inside,
+/// The linear equations A x = b of the minimum on one grid, with the buffers for solving them. At each pixel
+/// p, with the sum over its neighbours q inside the domain,
 ///
 /// ```text
 /// g g^T (u, v)_p + sum of w_pq ((u, v)_p - (u, v)_q) = -g c
@@ -115,7 +118,7 @@ struct GridLevel {
     data: Blocks,
     /// The blocks on the diagonal of A: g g^T plus the weights of all neighbours.
     diagonal: Blocks,
-    /// Their inverses; zero for blocks that have none, which leaves the cell to the other smoothing steps.
+    /// Their inverses; zero for singular blocks, whose cells are left to the other smoothing steps.
     inverse: Blocks,
     right_side: Vectors,
     solution: Vectors,
@@ -146,8 +149,9 @@ impl GridLevel {
         Self::new(domain.clone(), right, below)
     }
 
-    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the blocks' borders add
-    /// up, and are halved, for they stand for a slope over two pixels rather than a jump over one.
+    /// The equations for vectors constant on blocks of 2x2 pixels: the weights across the borders of the
+    /// blocks are added and halved, because they now weigh a slope over two pixels instead of a jump over
+    /// one.
     fn halved(&self) -> Self {
         let half = self.domain.halved();
         let (mut right, mut below) = (vec![0.0; half.is_inside.len()], vec![0.0; half.is_inside.len()]);
@@ -163,7 +167,7 @@ impl GridLevel {
         Self::new(half, right, below)
     }
 
-    /// The diagonal and its inverse for the present data.
+    /// The diagonal and its inverse for the current data.
     #[inline(always)]
     fn update_diagonal(&mut self) {
         for i in 0..self.weights.len() {
@@ -202,7 +206,7 @@ impl GridLevel {
         self.residual = residual;
     }
 
-    /// The cells without the free first and last row.
+    /// The cells without the free first and last rows.
     fn inner_cells(&self) -> Range<usize> {
         self.domain.stride()..self.right.len() - self.domain.stride()
     }
@@ -236,7 +240,7 @@ impl GridLevel {
         self.inverse.multiply_add(DAMPING, &self.residual, &mut self.solution);
     }
 
-    /// The same step from zero.
+    /// One damped block Jacobi step from the start value zero.
     #[inline(always)]
     fn smooth_from_zero(&mut self) {
         self.solution.u.fill(0.0);
@@ -244,7 +248,7 @@ impl GridLevel {
         self.inverse.multiply_add(DAMPING, &self.right_side, &mut self.solution);
     }
 
-    /// Hands the residual down as the right side of the coarser grid.
+    /// Restricts the residual to the coarser grid as its right-hand side.
     #[inline(always)]
     fn restrict_residual(&mut self, coarse: &mut GridLevel) {
         self.update_residual();
@@ -252,7 +256,7 @@ impl GridLevel {
         sum_blocks(&self.domain, &self.residual.v, &coarse.domain, &mut coarse.right_side.v);
     }
 
-    /// Adds the correction found on the coarser grid.
+    /// Adds the correction computed on the coarser grid.
     #[inline(always)]
     fn correct(&mut self, coarse: &GridLevel) {
         add_parents(&coarse.domain, &coarse.solution.u, &self.domain, &mut self.solution.u);
@@ -260,7 +264,7 @@ impl GridLevel {
     }
 }
 
-/// Sums over blocks of 2x2 pixels. The free cells on the right and below hold zero and complete odd sizes.
+/// Sums over blocks of 2x2 pixels. The free cells on the right and below are zero and complete odd sizes.
 #[inline(always)]
 fn sum_blocks(fine: &Domain, values: &[f64], coarse: &Domain, sums: &mut [f64]) {
     for y in 0..coarse.height {
@@ -272,7 +276,7 @@ fn sum_blocks(fine: &Domain, values: &[f64], coarse: &Domain, sums: &mut [f64]) 
     }
 }
 
-/// Adds to each pixel inside the value of the block it lies in.
+/// Adds to each pixel of the domain the value of its block.
 #[inline(always)]
 fn add_parents(coarse: &Domain, parents: &[f64], fine: &Domain, values: &mut [f64]) {
     for y in 0..fine.height {
@@ -319,7 +323,7 @@ impl<'a> Plus<'a> {
 pub(super) struct Multigrid {
     /// Finest grid first.
     levels: Vec<GridLevel>,
-    /// The right side b of the equations.
+    /// The right-hand side b of the equations.
     right_side: Vectors,
     residual: Vectors,
     direction: Vectors,
@@ -327,7 +331,7 @@ pub(super) struct Multigrid {
 }
 
 impl Multigrid {
-    /// Grids for a domain, down to at most 2x2 cells.
+    /// The grids of a domain, down to at most 2x2 cells.
     pub(super) fn new(domain: &Domain, lambda_sq: f64) -> Self {
         let mut levels = vec![GridLevel::finest(domain, lambda_sq)];
         while levels.last().is_some_and(|l| l.domain.width > 2 || l.domain.height > 2) {
@@ -346,12 +350,12 @@ impl Multigrid {
         (self.right_side.u[cell], self.right_side.v[cell]) = (-g.x * c, -g.y * c);
     }
 
-    /// Solves A x = b from the given x on, until |b - A x| <= tolerance |b|.
+    /// Solves A x = b, starting from the given x, until |b - A x| <= tolerance |b|.
     pub(super) fn solve(&mut self, x: &mut Vectors, goal: Goal) -> Solved {
         pulp::Arch::new().dispatch(Solve { grids: self, x, goal })
     }
 
-    /// Completes A on all grids after the constraints were set.
+    /// Completes A on all grids after the constraints have been set.
     #[inline(always)]
     fn update_diagonals(&mut self) {
         for k in 0..self.levels.len() {
@@ -386,9 +390,9 @@ impl Multigrid {
         Solved { iterations, relative_residual: if scale > 0.0 { residual_norm / scale } else { 0.0 } }
     }
 
-    /// One cycle down to the coarsest grid and up again, a smoothing step before and after each: multiplies
-    /// the residual by a symmetric approximation of the inverse of A. The product is the finest grid's
-    /// solution.
+    /// One cycle down to the coarsest grid and up again, with a smoothing step before and after each grid:
+    /// multiplies the residual by a symmetric approximation of the inverse of A. The result is the solution
+    /// on the finest grid.
     #[inline(always)]
     fn precondition(&mut self) {
         self.levels[0].right_side.clone_from(&self.residual);
@@ -410,16 +414,16 @@ impl Multigrid {
     }
 }
 
-/// When a solution is good enough.
+/// When a solution is accurate enough.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Goal {
-    /// Residual relative to the right side.
+    /// Residual relative to the right-hand side.
     pub(super) tolerance: f64,
-    /// Iterations after which it is given up.
+    /// Iterations after which the solver stops.
     pub(super) max_iterations: usize,
 }
 
-/// A solution, compiled for each width of vectors.
+/// The solver, compiled for each vector width.
 struct Solve<'a> {
     grids: &'a mut Multigrid,
     x: &'a mut Vectors,

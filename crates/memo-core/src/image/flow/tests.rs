@@ -23,7 +23,7 @@ fn domain_of(rows: &[&str]) -> Domain {
     domain
 }
 
-/// The normal equations written down from the functional, term by term, and solved directly.
+/// The normal equations derived from the functional term by term and solved directly.
 fn dense_solution(domain: &Domain, g: &[DVec2], c: &[f64], lambda: f64) -> Option<DVector<f64>> {
     let pixels: Vec<_> = domain.pixels().collect();
     let mut terms: Vec<(Vec<(usize, f64)>, f64)> = Vec::new();
@@ -96,7 +96,7 @@ fn the_number_of_solver_steps_does_not_grow_with_the_region() {
     }
 }
 
-/// On a chain of pixels that is free of data between its ends, u is a straight line between them.
+/// On a chain of pixels without data between its ends, u is a straight line between them.
 #[test]
 fn a_flat_stretch_interpolates_linearly_between_textured_ends() {
     let domain = domain_of(&["#####################"]);
@@ -112,7 +112,7 @@ fn a_flat_stretch_interpolates_linearly_between_textured_ends() {
     }
 }
 
-/// Grey values of a texture without a period, seen after it moved by `shift`.
+/// Grey values of a non-periodic texture after a motion by `shift`.
 fn textured(width: usize, height: usize, shift: DVec2, texture: impl Fn(DVec2) -> f64) -> Image<u8> {
     let at = |p: usize| DVec2::new((p % width) as f64, (p / width) as f64) - shift;
     let data = (0..width * height).map(|p| (128.0 + texture(at(p))).round() as u8).collect();
@@ -243,7 +243,7 @@ proptest! {
     }
 }
 
-/// Leaves components of three pixels and more, whose random gradients have two directions.
+/// Keeps components of three pixels and more, whose random gradients have two directions.
 fn drop_small_components(domain: &mut Domain) {
     let mut is_seen = vec![false; domain.is_inside.len()];
     for start in 0..is_seen.len() {
@@ -256,7 +256,7 @@ fn drop_small_components(domain: &mut Domain) {
     }
 }
 
-/// Two frames of a texture that moves by little, and a region.
+/// Two frames of a texture with a small motion, and a region.
 fn moving(motion: Vec2, width: usize, height: usize) -> [Image<u8>; 2] {
     let grey = |p: Vec2| {
         let wave = |a: f32, b: f32, c: f32| (a * p.x + b * p.y + c).sin();
@@ -271,7 +271,7 @@ fn moving(motion: Vec2, width: usize, height: usize) -> [Image<u8>; 2] {
     })
 }
 
-/// One linearisation on one level is the minimum of the functional, written down pixel by pixel: grey levels
+/// One linearisation on one level is the minimum of the functional, written out pixel by pixel: grey levels
 /// smoothed by binomial weights, mean gradient of both frames by central differences, smoothness squared.
 #[test]
 fn one_step_is_the_minimum_of_the_functional() {
@@ -311,7 +311,7 @@ fn one_step_is_the_minimum_of_the_functional() {
     }
 }
 
-/// Between pixels a quadratic is interpolated exactly, which a bilinear interpolation does not do.
+/// Between pixels a quadratic is interpolated exactly; bilinear interpolation would not do so.
 #[test]
 fn quadratics_are_interpolated_exactly() {
     let f = |x: f32, y: f32| 3.0 + 0.5 * x - 0.25 * y + 0.125 * x * x - 0.25 * x * y + 0.0625 * y * y;
@@ -326,7 +326,8 @@ fn quadratics_are_interpolated_exactly() {
     assert!(raster.sample(Vec2::new(-0.1, 3.0)).is_none() && raster.sample(Vec2::new(11.1, 3.0)).is_none());
 }
 
-/// A pixel of the half-size picture lies between two of the whole: grey levels and borders go along.
+/// A pixel of the half-size image lies between two pixels of the full-size image: grey levels and borders
+/// correspond.
 #[test]
 fn half_a_picture_shows_the_same_places() {
     let f = |x: f32, y: f32| 5.0 + 2.0 * x - 3.0 * y;
@@ -363,7 +364,7 @@ fn every_warp_comes_nearer_to_the_motion() {
     assert!(five < 0.5 * one && five < 0.03, "{one} {five}");
 }
 
-/// A component counts as determined from the gradient asked for, in its weaker direction.
+/// A component counts as determined from the given gradient on, along its weaker direction.
 #[test]
 fn evidence_begins_at_the_least_gradient() {
     let [first, second] = moving(Vec2::new(0.2, 0.1), 40, 40);
@@ -381,7 +382,8 @@ fn evidence_begins_at_the_least_gradient() {
     assert_eq!(evidence(1.001 * stronger).0, Evidence::Textureless);
 }
 
-/// Steps and residual are those of the full-size level, and a solution cut short says so.
+/// Iterations and residual are those of the full-size level, and a solution stopped early reports its
+/// residual.
 #[test]
 fn steps_are_counted_on_the_last_level() {
     let [first, second] = moving(Vec2::new(0.6, 0.3), 64, 64);

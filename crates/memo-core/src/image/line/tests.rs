@@ -32,7 +32,7 @@ fn segments(image: &Image<u8>) -> Vec<EdgeSegment> {
     edge_segments(&image.as_frame(), &EdgeDomain::default(), &edge_options, &line_options).unwrap()
 }
 
-/// Edge points with gradients across the way they run.
+/// Edge points with gradients perpendicular to the direction of the chain.
 fn segments_through(points: &[DVec2], options: &LineOptions) -> Vec<EdgeSegment> {
     let edgel = |i: usize| {
         let way = points[(i + 1).min(points.len() - 1)] - points[i.saturating_sub(1)];
@@ -177,7 +177,7 @@ proptest! {
     }
 }
 
-/// Least squares through points by their scatter's largest eigenvector.
+/// Least squares through points by the largest eigenvector of their scatter matrix.
 fn fitted(points: &[DVec2]) -> (DVec2, DVec2) {
     let mean = points.iter().sum::<DVec2>() / points.len() as f64;
     let mut scatter = nalgebra::Matrix2::zeros();
@@ -190,8 +190,8 @@ fn fitted(points: &[DVec2]) -> (DVec2, DVec2) {
     (mean, DVec2::new(along[0], along[1]))
 }
 
-/// A straight stretch whose ends are rounded: points farther than two standard deviations are left out, and the
-/// line lies on the rest.
+/// A straight piece with rounded ends: points farther than two standard deviations are excluded, and the line
+/// lies on the rest.
 #[test]
 fn rounded_ends_do_not_turn_a_line() {
     let mut points: Vec<DVec2> = (0..40).map(|i| DVec2::new(f64::from(i), 0.02 * f64::from(i % 3))).collect();
@@ -206,9 +206,9 @@ fn rounded_ends_do_not_turn_a_line() {
     assert!(near.len() < 40 && near.len() > 35);
     let (_, expected) = fitted(&near);
     assert!(segment.direction().perp_dot(expected).abs() < 1e-9, "{segment:?} {expected}");
-    // All of them would turn it by more than twice as much.
+    // Including all points would turn it by more than twice as much.
     assert!(expected.y.abs() < 0.5 * along.y.abs(), "{expected} {along}");
-    // Refitted, but with a point farther than allowed, the line through all points is kept.
+    // If a point is farther from the refitted line than allowed, the line through all points is kept.
     let strict = LineOptions { max_deviation_px: 0.75, ..LineOptions::default() };
     let is_near =
         |direction: DVec2, mean: DVec2| points.iter().all(|p| direction.perp_dot(*p - mean).abs() <= 0.75);
@@ -217,7 +217,7 @@ fn rounded_ends_do_not_turn_a_line() {
     assert!(segment.direction().perp_dot(along).abs() < 1e-9, "{segment:?} {along}");
 }
 
-/// What was split needlessly is joined again: no two neighbouring pieces make one straight piece.
+/// Pieces split unnecessarily are joined again: no two neighbouring pieces form one straight piece.
 #[test]
 fn neighbouring_pieces_are_not_one_line() {
     let mut joined = 0;
@@ -252,7 +252,7 @@ fn neighbouring_pieces_are_not_one_line() {
     assert!(joined > 10, "{joined}");
 }
 
-/// A closed chain has no chord: it is cut at the point farthest from where it begins.
+/// A closed chain has no chord: it is split at the point farthest from its start.
 #[test]
 fn a_loop_is_cut_at_its_far_side() {
     let points: Vec<Edgel> = (0..=40)
@@ -263,7 +263,8 @@ fn a_loop_is_cut_at_its_far_side() {
     assert_eq!(chain.farthest_from_chord(&chain.whole()), 20);
 }
 
-/// Residual and gradient of a segment are means over its points: of the distances' squares, of the lengths.
+/// Residual and gradient of a segment are means over its points: of the squared distances and of the
+/// magnitudes.
 #[test]
 fn a_segment_has_the_means_of_its_points() {
     let edgels: Vec<Edgel> = (0..40)

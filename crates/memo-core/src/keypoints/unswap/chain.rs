@@ -1,27 +1,27 @@
 //! The second-order chain of exchange bits of one limb group: best path, posterior, posterior from an anchor.
 //!
-//! A level (hip, knee, ankle) has at every frame that shows it a bit: exchanged or not. The state holds every
-//! level's bit at the last frame that showed it (`last`) and at the one before (`before`), so a level that is
-//! missing for some frames simply waits. With L levels there are 4^L states and 2^L ways on from each; the
-//! work is linear in the number of frames.
+//! A level (hip, knee, ankle) has one bit in every frame that shows it: exchanged or not. The state holds the
+//! bit of each level at the last frame that showed it (`last`) and at the frame before that (`before`), so a
+//! level that is missing for some frames keeps its bits. With L levels there are 4^L states and 2^L
+//! transitions from each; the time is linear in the number of frames.
 
-/// What one frame says about the bits of the levels it shows.
+/// The costs of one frame for the bits of the levels it shows.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
     /// Bit mask of the levels this frame shows on both sides.
     pub seen: usize,
-    /// Cost in nats of (before ^ last, last ^ now), both restricted to `seen`: index `(b << levels) | n`.
+    /// Cost in nats of (before ^ last, last ^ now), both restricted to `seen`; index `(b << levels) | n`.
     pub motion: Vec<f64>,
 }
 
 /// Prior costs in nats.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prior {
-    /// Of exchanging all levels seen in a frame.
+    /// Cost of exchanging all levels seen in a frame.
     pub as_is: f64,
-    /// Of two neighbouring levels beginning to differ.
+    /// Cost of a difference between two neighbouring levels starting.
     pub partial_begin: f64,
-    /// Of two neighbouring levels differing for a further frame.
+    /// Cost of such a difference continuing for another frame.
     pub partial_stay: f64,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Chain<'a> {
     steps: &'a [Step],
     /// Prior cost per (seen, last, now), shared by all frames.
     prior: Vec<f64>,
-    /// e^-cost of each.
+    /// e^-cost of each prior cost.
     prior_weight: Vec<f64>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Chain<'a> {
         1 << (2 * self.levels)
     }
 
-    /// Calls `f(state, next_state, index of the motion's cost, index of the prior's)` for every way on.
+    /// Calls `f(state, next_state, index of the motion cost, index of the prior cost)` for every transition.
     fn each_way(&self, seen: usize, mut f: impl FnMut(usize, usize, usize, usize)) {
         let (l, n) = (self.levels, 1 << self.levels);
         for before in 0..n {
@@ -78,7 +78,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// The bits of least total cost per step: of every level at the last frame that showed it.
+    /// The bits of least total cost per step: for each level, at the last frame that showed it.
     pub fn best_path(&self) -> Vec<usize> {
         let states = self.states();
         let mut cost = vec![f64::INFINITY; states];
@@ -139,10 +139,12 @@ impl<'a> Chain<'a> {
         scale(next);
     }
 
-    /// Where the path's bits stop following from one another: first steps of the runs, 0 always among them.
+    /// Splits the path where its bits no longer determine one another. Returns the first steps of the runs; 0
+    /// is always among them.
     ///
-    /// From the first step of a run, taken as right, the probability that a later step's best-known level has
-    /// the path's bit is followed; a run ends where it stays under `sure` for `patience` steps or to the end.
+    /// The first step of a run is taken as correct. For each later step, the probability that its best-known
+    /// level has the path's bit is computed; the run ends where this stays below `sure` for `patience` steps
+    /// or to the end.
     pub fn runs(&self, path: &[usize], posterior: &Posterior, sure: f64, patience: usize) -> Vec<usize> {
         let (states, mask) = (self.states(), (1 << self.levels) - 1);
         let mut starts = Vec::new();
@@ -173,7 +175,7 @@ impl<'a> Chain<'a> {
         starts
     }
 
-    /// The greatest probability, over the levels seen, that a level has the path's bit.
+    /// The largest probability, over the visible levels, that a level has the path's bit.
     fn agreement(&self, alpha: &[f64], beta: &[f64], seen: usize, bits: usize) -> f64 {
         (0..self.levels)
             .filter(|level| seen >> level & 1 == 1)
@@ -216,7 +218,7 @@ fn scale(row: &mut [f64]) {
     }
 }
 
-/// Only levels seen in this frame count; neighbours are neighbours among them.
+/// Only levels visible in this frame count, and neighbours are neighbours among them.
 fn prior_cost(levels: usize, seen: usize, last: usize, now: usize, prior: Prior) -> f64 {
     let shown: Vec<usize> = (0..levels).filter(|level| seen >> level & 1 == 1).collect();
     if shown.is_empty() {
@@ -239,14 +241,14 @@ mod tests {
     use super::*;
     use crate::synth::Random;
 
-    /// Frames that show random levels, with any costs of their motion; costs of frame 0 and 1 too.
+    /// Frames that show random levels, with arbitrary motion costs; costs in frames 0 and 1 too.
     fn drawn(levels: usize, frames: usize, random: &mut Random) -> Vec<Step> {
         let n = 1 << levels;
         let mut step = || {
             let seen = 1 + (random.uniform(0.0, (n - 1) as f64) as usize).min(n - 2);
             let mut motion = vec![0.0; n * n];
             for (i, cost) in motion.iter_mut().enumerate() {
-                // Of levels that are not seen the motion cannot speak.
+                // The motion has no cost for levels that are not visible.
                 if (i / n) & !seen == 0 && (i % n) & !seen == 0 {
                     *cost = random.uniform(0.0, 3.0);
                 }
@@ -256,8 +258,8 @@ mod tests {
         (0..frames).map(|_| step()).collect()
     }
 
-    /// Every history of bits with its cost, level by level as the module head tells it: each level has a list
-    /// of its own bits, in the frames that show it, before which it was not exchanged.
+    /// Every history of bits with its cost, level by level as in the module documentation: each level has a
+    /// list of its own bits in the frames that show it; before the first it was not exchanged.
     fn histories(levels: usize, steps: &[Step], prior: Prior) -> Vec<(Vec<Vec<usize>>, f64)> {
         let mut all: Vec<(Vec<Vec<usize>>, f64)> = vec![(vec![vec![]; levels], 0.0)];
         for step in steps {
@@ -292,7 +294,7 @@ mod tests {
         all
     }
 
-    /// Best path and probabilities against all histories, one by one.
+    /// Best path and probabilities against an enumeration of all histories.
     #[test]
     fn path_and_posterior_are_those_of_all_histories() {
         let prior = Prior { as_is: 0.7, partial_begin: 1.1, partial_stay: 0.4 };
@@ -320,7 +322,7 @@ mod tests {
         }
     }
 
-    /// Motion of one level whose every turn costs 9 nats; in some frames it says nothing.
+    /// Motion of one level in which every exchange costs 9 nats; the `silent` frames carry no information.
     fn one_level(frames: usize, silent: &[usize]) -> Vec<Step> {
         let motion = |k: usize| if silent.contains(&k) { vec![0.0; 4] } else { vec![0.0, 9.0, 9.0, 18.0] };
         (0..frames).map(|k| Step { seen: 1, motion: motion(k) }).collect()
@@ -334,22 +336,23 @@ mod tests {
             chain.runs(&vec![0; steps.len()], &chain.posterior(), sure, patience)
         };
         assert_eq!(runs(&one_level(20, &[]), 0.95, 3), [0]);
-        // Two silent frames, and nobody knows whether the label is the same after them as before.
+        // After two silent frames it is unknown whether the label is the same as before.
         assert_eq!(runs(&one_level(20, &[8, 9]), 0.95, 3), [0, 8]);
         assert_eq!(runs(&one_level(20, &[8, 9, 14, 15]), 0.95, 3), [0, 8, 14]);
-        // Half sure is enough if asked so.
+        // A probability of one half suffices if the caller asks for it.
         assert_eq!(runs(&one_level(20, &[8, 9]), 0.4, 3), [0]);
-        // A frame that is silent on both sides of itself is a moment's doubt: the next ones go on from before.
+        // A single silent frame causes only a moment of doubt: the following frames continue from before it.
         let mut steps = one_level(20, &[8]);
-        // Frame 9 speaks of the change from frame 7 to itself, whatever frame 8 is.
+        // Frame 9 compares itself with frame 7, whatever frame 8 is.
         steps[9].motion = vec![0.0, 9.0, 9.0, 0.0];
         assert_eq!(runs(&steps, 0.95, 3), [0]);
-        // A doubt shorter than the patience begins a run if it lasts to the end: here frame 18, and 19 anew.
+        // A doubt shorter than the patience begins a run if it lasts to the end: here at frame 18, and again
+        // at 19.
         assert_eq!(runs(&one_level(20, &[18, 19]), 0.95, 12), [0, 18, 19]);
         assert_eq!(runs(&[], 0.95, 3), [] as [usize; 0]);
     }
 
-    /// One of two levels sure is sure enough.
+    /// One certain level out of two is enough.
     #[test]
     fn a_run_goes_on_while_any_level_is_sure() {
         let motion = |is_silent: bool| {

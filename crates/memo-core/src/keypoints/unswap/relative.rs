@@ -1,24 +1,24 @@
-//! What is seen of left and right relative to one another, its noise and how hard it accelerates.
+//! The position of right and left relative to one another, its noise and its acceleration.
 //!
 //! With the difference d = right - left and the mean m of a pair, an exchange changes the sign of d and
-//! leaves m alone. So m gives the noise whatever the labels, and the labels are right where the signs make d
-//! smooth.
+//! leaves m unchanged. So m gives the noise whatever the labels, and the labels are correct where the signs
+//! make d smooth.
 
 use crate::estimate::median::median;
 use glam::DVec2;
 
-/// A pair seen on both sides.
+/// A pair visible on both sides.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     /// Right minus left as labelled, px.
     pub difference: DVec2,
-    /// px.
+    /// Mean of right and left, px.
     pub mean: DVec2,
-    /// Of the two scores, (0, 1]; noise variance is divided by it.
+    /// Weight from the two scores, (0, 1]; the noise variance is divided by it.
     pub weight: f64,
 }
 
-/// One pair over time; `None` where a side is missing or the sample was found to be an outlier.
+/// One pair over time; `None` where a side is missing or the sample is an outlier.
 pub(super) type Track = Vec<Option<Sample>>;
 
 /// Noise and acceleration of one pair.
@@ -28,24 +28,26 @@ pub(super) struct Scale {
     pub noise_sq: f64,
     /// Mean square of one coordinate of the acceleration of d, (px/s^2)^2.
     pub acceleration_sq: f64,
-    /// Variance no residual goes below, px^2.
+    /// Lower bound of the variance of a residual, px^2.
     pub floor_sq: f64,
 }
 
-/// Degrees of freedom of the residuals' Student distribution: heavy tails for heel strikes and bad detections.
+/// Degrees of freedom of the Student distribution of the residuals: heavy tails for heel strikes and bad
+/// detections.
 const NU: f64 = 4.0;
-/// One triple of samples says no more than this, nats: anything can happen once in e^8. Less and
-/// an exchange of knee and ankle alone is lost, more and single bad detections turn a whole run.
+/// Upper bound of the information from one triple of samples, nats: any event has at least the odds e^-8.
+/// With a smaller bound an exchange of knee and ankle alone is lost; with a larger one single bad detections
+/// exchange a whole run.
 const MOST_NATS: f64 = 8.0;
 /// Residuals of neighbouring triples share two of three samples: for white noise the log odds of a single
-/// exchange vary by 7.8 (d / sd)^2 where independent residuals of that mean would vary by 4. Doubling the
-/// noise's variance keeps the odds from being too sure.
+/// exchange have a variance of 7.8 (d / sd)^2, while independent residuals of the same mean would have 4.
+/// Doubling the noise variance keeps the odds from being overconfident.
 const SHARED: f64 = 2.0;
-/// Over this lag walking accelerates evenly enough and noise no longer hides it.
+/// Over this lag, s, the acceleration of walking is nearly constant and noise no longer masks it.
 const LAG_S: f64 = 0.1;
-/// An outlier's distance from its neighbours' line, in medians of that distance.
+/// Distance of an outlier from the line between its neighbours, in medians of that distance.
 const OUTLIER_MEDIANS: f64 = 4.5;
-/// Median of |r|^2 over the variance of a coordinate, for two Gaussian coordinates: 2 ln 2.
+/// Median of |r|^2 divided by the variance of a coordinate, for two Gaussian coordinates: 2 ln 2.
 const MEDIAN_CHI2: f64 = 2.0 * std::f64::consts::LN_2;
 
 /// The costs in nats of the four sign patterns (before * last, last * now), index `2 * (turned) + turned`.
@@ -72,7 +74,8 @@ pub(super) fn triple_costs(times_s: [f64; 3], samples: [Sample; 3], scale: &Scal
     costs.map(|c| (c - least).min(MOST_NATS))
 }
 
-/// Drops samples that lie off their neighbours' line whatever the signs; the frames dropped.
+/// Drops samples that lie off the line between their neighbours whatever the signs; returns the frames
+/// dropped.
 pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
     let mut dropped = Vec::new();
     for _ in 0..3 {
@@ -101,9 +104,11 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
     dropped
 }
 
-/// Of every inner sample, from the line between its neighbours: of m and, for the best signs, of d / 2.
+/// The distance of every inner sample from the line between its neighbours: of m and, for the best signs, of
+/// d / 2.
 ///
-/// Divided by how much further apart than usual the neighbours are, since a bend grows with h1 h2.
+/// Divided by the ratio of the neighbours' spacing to the usual spacing, because the bend is proportional to
+/// h1 h2.
 fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f64> {
     let Some(step) = median(&mut seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect::<Vec<_>>())
     else {
@@ -123,9 +128,9 @@ fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f6
     seen.windows(3).map(distance).collect()
 }
 
-/// Noise from the means of a group's pairs, then each pair's acceleration from its differences.
+/// Noise from the means of a group's pairs, then the acceleration of each pair from its differences.
 ///
-/// `signs` are those of a path found before; without them the smoothest of the four patterns is taken.
+/// `signs` are those of an earlier path; without them the smoothest of the four patterns is used.
 pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>]>) -> Vec<Scale> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     let step_s = median(&mut steps).unwrap_or(1.0);
@@ -157,7 +162,7 @@ pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>
 /// Noise variance of a joint and mean square bend a^2 h^4 of the mean m, from second differences over one
 /// step and over `lag` steps: R_1 = 3 noise + bend, R_k = 3 noise + k^4 bend.
 ///
-/// With a lag of one step the two cannot be told apart: then all of it counts as bend but a tenth.
+/// With a lag of one step the two cannot be separated: then all but a tenth counts as bend.
 fn noise_and_bend(times_s: &[f64], track: &Track, step_s: f64, lag: usize) -> [f64; 2] {
     let variance = |lag| {
         second_difference_variance(times_s, track, step_s, lag, |w| {
@@ -176,7 +181,7 @@ fn noise_and_bend(times_s: &[f64], track: &Track, step_s: f64, lag: usize) -> [f
     }
 }
 
-/// Variance of a coordinate of the second differences over `lag` samples, robustly, from even triples.
+/// Robust variance of a coordinate of the second differences over `lag` samples, from evenly spaced triples.
 fn second_difference_variance(
     times_s: &[f64],
     track: &Track,
@@ -201,22 +206,22 @@ mod tests {
         Sample { difference, mean, weight }
     }
 
-    /// The formula of the head, by hand: steps of 0.1 and 0.2 s, so q = 2, and weights that differ.
+    /// The formula above, written out: steps of 0.1 and 0.2 s, so q = 2, and different weights.
     #[test]
     fn costs_of_sign_patterns_are_those_of_the_formula() {
         let [d0, d1, d2] = [DVec2::new(3.0, 1.0), DVec2::new(4.0, 0.0), DVec2::new(7.0, -2.5)];
         let scale = Scale { noise_sq: 0.5, acceleration_sq: 200.0, floor_sq: 0.25 };
         let samples = [(d0, 0.5), (d1, 1.0), (d2, 2.0)].map(|(d, w)| sample(d, DVec2::ZERO, w));
         let found = triple_costs([1.0, 1.1, 1.3], samples, &scale);
-        // The noise of q d0, (1 + q) d1 and d2 by their weights, of differences of two joints and doubled; the
-        // change of velocity that an acceleration makes over both steps; the floor.
+        // The noise of q d0, (1 + q) d1 and d2 by their weights, for differences of two joints, and doubled;
+        // the change of velocity that an acceleration causes over both steps; the lower bound.
         let noise = 2.0 * 2.0 * 0.5 * (4.0 / 0.5 + 9.0 + 1.0 / 2.0);
         let bend = 0.5 * 0.2 * 0.3;
         let variance = noise + 200.0 * bend * bend + 0.25;
         let costs: Vec<f64> = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
             .into_iter()
             .map(|(before, now)| {
-                // From d1 on with the velocity of the step before: d1 + q (d1 - d0).
+                // From d1 with the velocity of the previous step: d1 + q (d1 - d0).
                 let expected = d1 + 2.0 * (d1 - before * d0);
                 3.0 * (1.0 + (now * d2 - expected).length_squared() / (4.0 * variance)).ln()
             })
@@ -228,7 +233,8 @@ mod tests {
         assert!(found.iter().any(|cost| *cost > 0.5), "{found:?}");
     }
 
-    /// Uniform motion costs nothing without an exchange, at uneven times; a single frame never says more than 8.
+    /// Uniform motion without an exchange costs nothing, at uneven times; a single frame never costs more
+    /// than 8.
     #[test]
     fn uniform_motion_is_free_and_no_frame_decides_alone() {
         let at = |time_s: f64| DVec2::new(50.0 + 30.0 * time_s, -20.0 * time_s);
@@ -238,7 +244,7 @@ mod tests {
         assert_eq!(triple_costs(times_s, samples, &scale), [0.0, 8.0, 8.0, 8.0]);
     }
 
-    /// A sum of slow sines of random phases, its acceleration's mean square, and noise added.
+    /// A sum of slow sines of random phases, the mean square of its acceleration, and added noise.
     struct Drawn {
         means: Vec<DVec2>,
         differences: Vec<DVec2>,
@@ -269,7 +275,7 @@ mod tests {
         Drawn { means, differences, acceleration_sq }
     }
 
-    /// Noise and acceleration planted are found, whatever the rate.
+    /// The estimates recover the true noise and acceleration, whatever the frame rate.
     #[test]
     fn planted_noise_and_acceleration_are_found() {
         let mut random = Random::new(17);
@@ -284,14 +290,14 @@ mod tests {
             assert!((noise_sd / 1.5 - 1.0).abs() < 0.1, "{rate_hz} Hz: {noise_sd}");
             let ratio = (found.acceleration_sq / drawn.acceleration_sq).sqrt();
             assert!((ratio - 1.0).abs() < 0.25, "{rate_hz} Hz: {ratio}");
-            // Half a percent of the usual distance: nothing is known better.
+            // Half a percent of the usual distance is the lower bound of the uncertainty.
             let mut lengths: Vec<f64> = drawn.differences.iter().map(|d| d.length()).collect();
             lengths.sort_by(f64::total_cmp);
             assert!((found.floor_sq.sqrt() / (0.005 * lengths[2000]) - 1.0).abs() < 0.01);
         }
     }
 
-    /// Without signs the smoothest pattern of each triple is taken: exchanges change nothing of what is found.
+    /// Without signs the smoothest pattern of each triple is used: exchanges do not change the estimates.
     #[test]
     fn exchanges_do_not_disturb_the_scales() {
         let mut random = Random::new(4);
@@ -307,8 +313,8 @@ mod tests {
         assert!((straight.acceleration_sq / exchanged.acceleration_sq - 1.0).abs() < 1e-9);
     }
 
-    /// Detections off their neighbours' line go, a small one beside a large one too, in mean or difference;
-    /// exchanges stay.
+    /// Detections off the line between their neighbours are dropped, also a small one beside a large one, in
+    /// mean or difference; exchanges are kept.
     #[test]
     fn outliers_go_and_exchanges_stay() {
         let mut random = Random::new(8);
@@ -320,7 +326,7 @@ mod tests {
         for (t, size) in [(20, 10.0), (22, 1.0), (80, 1.0)] {
             track[t] = Some(sample(drawn.differences[t], drawn.means[t] + size * far, 1.0));
         }
-        // Both joints off in opposite directions: the mean is where it was.
+        // Both joints are off in opposite directions, so the mean is unchanged.
         track[50] = Some(sample(drawn.differences[50] + 2.0 * far, drawn.means[50], 1.0));
         for t in [35, 36, 65] {
             track[t] = Some(sample(-drawn.differences[t], drawn.means[t], 1.0));

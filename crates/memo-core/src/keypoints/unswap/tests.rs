@@ -1,7 +1,7 @@
 use super::*;
 use crate::synth::Random;
 
-/// One pair swinging against each other, joint 0 left, joint 1 right.
+/// One pair swinging in opposite phase; joint 0 is left, joint 1 is right.
 fn swing(times_s: &[f64], scale_px: f64) -> Vec<[f64; 2]> {
     let pair = |t: &f64| {
         let reach = scale_px * (6.0 * t).sin();
@@ -45,7 +45,7 @@ proptest::proptest! {
                 scores.swap(2 * t, 2 * t + 1);
             }
         }
-        // The side that most frames name is taken for the right one.
+        // The assignment of most frames counts as correct.
         proptest::prop_assume!(exchanged < 40);
         let found = solve(&times_s, &seen, Some(&scores));
         proptest::prop_assert_eq!(&found.points_px, &truth);
@@ -156,8 +156,8 @@ fn no_frames_give_no_verdicts() {
     assert!(solve(&[], &[], None).groups[0].verdicts.is_empty());
 }
 
-/// Knee and ankle of a walker of 100 px, each pair swinging against its other; some frames' labels exchanged:
-/// a mask of levels for each frame.
+/// Knee and ankle of a walker of 100 px; the two joints of each pair swing in opposite phase. The labels of
+/// some frames are exchanged: a mask of levels for each frame.
 fn two_levels(times_s: &[f64], exchanged: impl Fn(usize) -> usize) -> Vec<[f64; 2]> {
     let mut points = Vec::new();
     for (t, time_s) in times_s.iter().enumerate() {
@@ -184,8 +184,8 @@ fn solve_legs(times_s: &[f64], points_px: &[[f64; 2]], options: &UnswapOptions) 
     unswap(&keypoints, &legs(), options).unwrap().groups.remove(0)
 }
 
-/// Of n frames k came exchanged: the odds that most are right are exp(p (n - 2 k)) for p nats a frame; half
-/// of a frame's levels count half.
+/// If k of n frames were exchanged, the odds that the majority is correct are exp(p (n - 2 k)) for p nats per
+/// frame; half of a frame's levels count half.
 #[test]
 fn the_global_probability_counts_the_frames_by_the_prior() {
     let times_s = times(60);
@@ -202,7 +202,7 @@ fn the_global_probability_counts_the_frames_by_the_prior() {
     }
 }
 
-/// The prior of the labels decides which of two halves was exchanged, as far as it is not zero.
+/// The prior of the labels decides which of two halves was exchanged, unless it is zero.
 #[test]
 fn labels_as_they_came_are_believed_by_their_prior() {
     let times_s = times(60);
@@ -224,7 +224,7 @@ fn labels_as_they_came_are_believed_by_their_prior() {
     }
 }
 
-/// From which probability on a frame is decided is the caller's to say.
+/// The caller sets the probability from which on a frame is decided.
 #[test]
 fn a_frame_is_decided_from_the_probability_asked_for() {
     let times_s = times(60);
@@ -237,7 +237,7 @@ fn a_frame_is_decided_from_the_probability_asked_for() {
     }
 }
 
-/// Knees and ankles exchanged apart from each other: found level by level, unless that is too dear to begin.
+/// Knees and ankles exchanged independently: found level by level, unless the prior cost is too high.
 #[test]
 fn levels_exchanged_alone_are_found_at_a_price() {
     let times_s = times(60);
@@ -256,13 +256,14 @@ fn levels_exchanged_alone_are_found_at_a_price() {
         UnswapOptions { partial_stay_nats: 90.0, ..UnswapOptions::default() },
     ] {
         let found = solve_legs(&times_s, &points, &dear);
-        // Beginning is paid once, staying in every further frame: both are more than the motion pays.
+        // The start is paid once, the continuation in every further frame: both exceed the gain of the
+        // motion.
         let partial = found.verdicts.iter().filter(|v| v.partial).count();
         assert!(partial <= 4, "{partial} {dear:?}");
     }
 }
 
-/// Where the legs may have passed one another unseen the two sides of the gap have labels of their own.
+/// Where the legs may have crossed unobserved, the two sides of the gap have separate labels.
 #[test]
 fn a_gap_in_which_legs_may_have_crossed_parts_the_runs() {
     let mut times_s = times(80);
@@ -284,7 +285,7 @@ fn a_gap_in_which_legs_may_have_crossed_parts_the_runs() {
     }
 }
 
-/// Both joints of the pair coincide for long: no gap, but no motion to tell either.
+/// Both joints of the pair coincide for a long time: no gap, but the motion does not determine the labels.
 #[test]
 fn a_stretch_that_fits_both_labels_is_unclear() {
     let times_s = times(90);
@@ -305,7 +306,7 @@ fn a_stretch_that_fits_both_labels_is_unclear() {
     assert!(!reasons.iter().any(|reason| matches!(reason, Reason::UnseenCrossing { .. })));
 }
 
-/// The gain of a level is what exchanging it in that frame alone would add to the cost of all its motion.
+/// The gain of a level is the cost that exchanging it in that frame alone would add to all its motion.
 #[test]
 fn gains_are_what_a_single_exchange_costs() {
     let times_s = times(40);
@@ -336,7 +337,7 @@ fn gains_are_what_a_single_exchange_costs() {
     assert_eq!(solution.path.iter().enumerate().filter(|(_, bits)| **bits != 0).count(), 1);
 }
 
-/// A pair is as sure as the harmonic mean of its scores, and the side that is not seen makes it unseen.
+/// A pair has the harmonic mean of its scores as weight, and a side that is not visible removes the pair.
 #[test]
 fn a_pair_weighs_as_its_two_scores_together() {
     let points = [[0.0, 1.0], [4.0, 5.0], [f64::NAN, 0.0]];

@@ -1,16 +1,17 @@
-//! The eleven coefficients of the direct linear transformation (Abdel-Aziz and Karara 1971), a camera a column,
-//! as DLTdv, Argus and Kinovea write them.
+//! The eleven coefficients of the direct linear transformation (Abdel-Aziz and Karara 1971), one column per
+//! camera, as DLTdv, Argus and Kinovea write them.
 //!
 //! ```text
 //! u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)
 //! v = (L5 X + L6 Y + L7 Z + L8) / (L9 X + L10 Y + L11 Z + 1)
 //! ```
 //!
-//! The matrix of these is K (R | t) up to its scale, so that K, R and t follow by orthogonalising its rows from
-//! the last to the first (Hartley and Zisserman 2004, section 6.2.4).
+//! Their matrix is K (R | t) up to scale, so K, R and t follow from orthogonalising its rows from the last to
+//! the first (Hartley and Zisserman 2004, section 6.2.4).
 //!
-//! The coefficients know neither the size of the picture nor distortion, and their skew is left out: they are
-//! refused if it is more than a hundredth of the focal length. If the matrix mirrors, either v is counted
+//! The coefficients contain neither the image size nor distortion. Their skew is ignored; they are refused if
+//! it exceeds a hundredth of the focal length. If the matrix mirrors, either v increases upwards, as in
+//! DLTdv, or the origin lies behind the camera; only the caller can tell which.
 //! upwards, as DLTdv does, or the origin lies behind the camera; only the caller knows which.
 
 use crate::wording::counted;
@@ -21,10 +22,10 @@ use crate::model::camera::Camera;
 use crate::model::distortion::Distortion;
 
 const COEFFICIENTS: usize = 11;
-/// Largest skew left out, in focal lengths.
+/// Largest skew that is ignored, as a fraction of the focal length.
 const MAX_SKEW: f64 = 0.01;
 
-/// Reads the camera whose column is called `name`, or numbered so from 1.
+/// Reads the camera whose column is called `name`, or whose column has that number, counted from 1.
 pub(super) fn camera(text: &str, options: &CameraFileOptions<'_>) -> Result<Camera, CameraFileError> {
     let (names, rows) = table(text)?;
     let columns: Vec<Vec<f64>> = if rows.len() == COEFFICIENTS {
@@ -50,7 +51,8 @@ pub(super) fn camera(text: &str, options: &CameraFileOptions<'_>) -> Result<Came
     from_coefficients(&coefficients, size, options.v_up, options.unit.map_or(1.0, |unit| unit.metres()))
 }
 
-/// The names of the first row if it has no numbers, and the rows of numbers, 11 of one length or of 11 each.
+/// The names in the first row, if it has no numbers, and the rows of numbers: 11 rows of equal length, or
+/// rows of 11 numbers.
 #[expect(clippy::type_complexity, reason = "a table is its header and its rows")]
 fn table(text: &str) -> Result<(Option<Vec<String>>, Vec<Vec<f64>>), CameraFileError> {
     let syntax = |line: usize, what: String| CameraFileError::Syntax {

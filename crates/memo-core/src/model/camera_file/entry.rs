@@ -1,4 +1,4 @@
-//! Which camera of a file is meant, and the camera its keys describe.
+//! Selects a camera of a file and builds it from its keys.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
@@ -7,8 +7,8 @@ use super::{CameraFileError, CameraFileOptions, FileFormat, Place};
 use crate::model::camera::{Camera, CameraError, check_rotation};
 use crate::model::distortion::Distortion;
 
-// What keys are called, without capitals and underscores; the first is that of Pose2Sim and anipose, those with
-// `camera` OpenCV's and ROS's.
+// The names of the keys, without capitals and underscores. The first is that of Pose2Sim and anipose; those
+// with `camera` are those of OpenCV and ROS.
 const NAME: &[&str] = &["name", "cameraname"];
 const SIZE: &[&str] = &["size", "imagesize", "resolution"];
 const WIDTH: &[&str] = &["imagewidth", "width"];
@@ -20,19 +20,19 @@ const ROTATION: &[&str] = &["rotation", "rvec", "rotationvector", "rotationmatri
 const TRANSLATION: &[&str] = &["translation", "tvec", "translationvector", "t"];
 const FISHEYE: &[&str] = &["fisheye", "fisheyemodel"];
 const MODEL: &[&str] = &["distortionmodel"];
-/// What Caliscope and anipose add without changing the camera.
+/// Keys that Caliscope and anipose add and that do not affect the camera.
 const IGNORED: &[&str] =
     &["error", "gridcount", "exposure", "ignore", "port", "camid", "verticesflipped", "reprojectionerror"];
-/// Quarter turns of the picture, of Caliscope.
+/// Quarter turns of the image, written by Caliscope.
 const TURNS: &[&str] = &["rotationcount"];
 
-/// With another unit than metres, a camera this near to the origin has been scaled by mistake, metres.
+/// In a unit other than metres, a camera closer to the origin than this, metres, has the wrong unit.
 const MIN_DISTANCE_M: f64 = 0.05;
 const SKIPPED_SECTION: &str = "metadata";
-/// A written rotation matrix may be off orthonormal by this: files round to four decimals or more.
+/// Largest deviation of a rotation matrix in a file from orthonormal: files round to four decimals or more.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// The camera of a file that is meant.
+/// The selected camera of a file.
 pub(super) fn camera(
     root: &Node,
     format: FileFormat,
@@ -47,7 +47,7 @@ struct Section<'a> {
     node: &'a Node,
 }
 
-/// The whole file if it has a matrix, its list or table `cameras`, or its tables.
+/// The whole file if it has a matrix; otherwise its list or table `cameras`, or its tables.
 fn sections(root: &Node) -> Result<Vec<Section<'_>>, CameraFileError> {
     let Some(entries) = root.table() else { return Err(CameraFileError::NoCamera) };
     if root.entry(MATRIX).is_some() {
@@ -73,7 +73,7 @@ fn numbered((index, node): (usize, &Node)) -> Section<'_> {
     Section { title: name.unwrap_or_else(|| (index + 1).to_string()), node }
 }
 
-/// The tables that describe cameras; all of them if none does, so that what is missing can be told.
+/// The tables that describe cameras; all tables if none does, so that the missing keys can be reported.
 fn tables(entries: &[(String, Node)]) -> Vec<Section<'_>> {
     let tables =
         entries.iter().filter(|(title, node)| title.as_str() != SKIPPED_SECTION && node.table().is_some());
@@ -82,7 +82,7 @@ fn tables(entries: &[(String, Node)]) -> Vec<Section<'_>> {
     if all.iter().any(is_camera) { all.into_iter().filter(is_camera).collect() } else { all }
 }
 
-/// The section of that title, else the one of that `name`, else the only one.
+/// The section with that title, otherwise the one with that `name`, otherwise the only one.
 fn choose<'a, 'b>(
     sections: &'b [Section<'a>],
     name: Option<&str>,
@@ -125,7 +125,7 @@ impl Section<'_> {
         let camera =
             Camera { size, focal_px, centre_px, distortion, rotation, translation: translation * unit_m };
         let camera = camera.validated().map_err(|source| self.invalid(keys_of(&source), source))?;
-        // Millimetres asked for where the file has metres. A camera at the very origin is possible.
+        // The caller gave millimetres but the file is in metres. A camera exactly at the origin is allowed.
         let distance_m = camera.translation.length();
         if unit_m < 1.0 && distance_m > 0.0 && distance_m < MIN_DISTANCE_M {
             let person_px = camera.focal_px.y * 1.7 / distance_m;
@@ -213,7 +213,7 @@ impl Section<'_> {
         }
     }
 
-    /// Four or five coefficients; OpenCV's longer models where the rest of them is zero.
+    /// Four or five coefficients; OpenCV's longer models are accepted if all further coefficients are zero.
     fn distortion(&self) -> Result<Distortion, CameraFileError> {
         let (key, node) = self.value(DISTORTIONS)?;
         let wrong = || self.unexpected(key, "4 or 5 finite numbers k1, k2, p1, p2(, k3)", node);
@@ -267,7 +267,7 @@ impl Section<'_> {
     }
 }
 
-/// The key a refused camera owes its fault to.
+/// The key that causes this error.
 fn keys_of(error: &CameraError) -> &'static [&'static str] {
     match error {
         CameraError::Size { .. } => SIZE,

@@ -1,4 +1,4 @@
-//! JSON, with lines.
+//! JSON with line numbers.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ pub(super) fn parse(text: &str) -> Result<Node, CameraFileError> {
 
 fn node(text: &str, raw: &RawValue, depth: usize) -> Result<Node, CameraFileError> {
     let written = raw.get();
-    // A raw value is a piece of the text, so its place there is the difference of the two addresses.
+    // A raw value is a slice of the text, so the difference of the two addresses is its offset.
     let line = line_of(text, (written.as_ptr() as usize).saturating_sub(text.as_ptr() as usize));
     check_depth(depth, line)?;
     let value = match written.as_bytes().first() {

@@ -1,12 +1,12 @@
-//! Calibration files.
+//! Reads and writes camera calibration files.
 //!
-//! | format | known by | written by |
+//! | format | file name ends in | written by |
 //! |---|---|---|
 //! | TOML | `.toml` | Pose2Sim, anipose, Caliscope; one section per camera |
 //! | YAML | `.yml`, `.yaml` | OpenCV's `FileStorage`, its calibration sample, ROS `camera_info` |
-//! | JSON | `.json` | `FileStorage`, and the same keys by hand |
+//! | JSON | `.json` | `FileStorage`, and files with the same keys |
 //! | XML | `.xml` | `FileStorage`; Tsai's parameters as PETS and ETISEO publish them |
-//! | DLT | `.csv`, `.txt`, `.dlt` | eleven coefficients a column: DLTdv, Argus, Kinovea |
+//! | DLT | `.csv`, `.txt`, `.dlt` | eleven coefficients per column: DLTdv, Argus, Kinovea |
 //!
 //! ```toml
 //! [cam_01]
@@ -19,13 +19,13 @@
 //! fisheye = false
 //! ```
 //!
-//! `name` and `fisheye` may be left out, a `[metadata]` section is skipped. In TOML, keys that mean nothing are
-//! refused; in the others they are passed over. Keys may be called as OpenCV does: `camera_matrix`,
-//! `distortion_coefficients`, `image_width` and `image_height`, `rvec` or `R`, `tvec` or `T`. Lengths are metres
-//! (in Tsai's XML mm) unless [`CameraFileOptions::unit`] says otherwise.
+//! `name` and `fisheye` are optional; a `[metadata]` section is skipped. In TOML, unknown keys are an error;
+//! in the other formats they are ignored. Keys may have OpenCV's names: `camera_matrix`,
+//! `distortion_coefficients`, `image_width` and `image_height`, `rvec` or `R`, `tvec` or `T`. Lengths are in
+//! metres (in Tsai's XML in mm) unless [`CameraFileOptions::unit`] gives another unit.
 //!
-//! Fisheye lenses, skew and OpenCV's longer distortion models are refused. Whether a rotation is that of
-//! `x_cam = R x_world + t` or its inverse, a file does not say: the former is taken.
+//! Limits: fisheye lenses, skew and OpenCV's longer distortion models are refused. A file does not specify
+//! whether its rotation is that of `x_cam = R x_world + t` or its inverse; the former is assumed.
 
 mod dlt;
 mod entry;
@@ -45,26 +45,26 @@ use thiserror::Error;
 
 use super::camera::{Camera, CameraError};
 
-/// Larger files hold something else, bytes.
+/// Largest file size, bytes; larger files are not calibrations.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// How a calibration is written.
+/// The file format of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FileFormat {
-    /// Pose2Sim, anipose.
+    /// TOML: Pose2Sim, anipose, Caliscope.
     Toml,
-    /// OpenCV, ROS.
+    /// YAML: OpenCV, ROS.
     Yaml,
-    /// The same keys.
+    /// JSON with OpenCV's keys.
     Json,
-    /// OpenCV, or Tsai's parameters.
+    /// XML: OpenCV, or Tsai's parameters.
     Xml,
-    /// A table of eleven coefficients a camera.
+    /// A table of eleven DLT coefficients per camera.
     Dlt,
 }
 
 impl FileFormat {
-    /// By the end of the file's name; `None` if it is no known one.
+    /// The format for the end of a file name; `None` for an unknown one.
     pub fn of_path(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "toml" => Some(Self::Toml),
@@ -89,7 +89,7 @@ impl fmt::Display for FileFormat {
     }
 }
 
-/// The unit of lengths in a file.
+/// The unit of the lengths in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum LengthUnit {
     /// Metres.
@@ -102,7 +102,7 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Its size in metres.
+    /// The size of the unit in metres.
     pub fn metres(self) -> f64 {
         match self {
             Self::Metre => 1.0,
@@ -111,7 +111,7 @@ impl LengthUnit {
         }
     }
 
-    /// "m", "cm" or "mm".
+    /// The unit named "m", "cm" or "mm".
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
             "m" => Some(Self::Metre),
@@ -122,29 +122,31 @@ impl LengthUnit {
     }
 }
 
-/// What a file may leave open.
+/// Values that a file may lack.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CameraFileOptions<'a> {
-    /// Which camera: its section, its `name` or the number of its column; needed where there are several.
+    /// The camera to read: its section, its `name` or the number of its column. Required if the file has
+    /// several.
     pub name: Option<&'a str>,
-    /// Unit of the translation; `None` is what the format has as its own.
+    /// Unit of the translation; `None` is the default unit of the format.
     pub unit: Option<LengthUnit>,
-    /// Width and height of the picture where the file has none, pixels.
+    /// Width and height of the image, pixels, for files without them.
     pub size: Option<[u32; 2]>,
-    /// Whether only the lens is wanted: a file then needs no rotation and translation.
+    /// Whether only the intrinsics are needed; the file then needs no rotation and translation.
     pub is_lens_only: bool,
-    /// Whether v of DLT coefficients grows upwards from the bottom row; `None` refuses what mirrors.
+    /// Whether v of DLT coefficients increases upwards from the bottom row; `None` refuses matrices that
+    /// mirror.
     pub v_up: Option<bool>,
 }
 
-/// Where in a file something stands.
+/// A place in a calibration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// The camera's section or element.
+    /// The section or element of the camera.
     pub section: String,
     /// The key.
     pub key: String,
-    /// The line, from 1, where it is known.
+    /// The line number, from 1, if known.
     pub line: Option<usize>,
 }
 
@@ -164,15 +166,15 @@ pub enum CameraFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The operating system's reason.
+        /// The reason given by the operating system.
         message: String,
     },
-    /// The end of the file's name is not one of a calibration.
+    /// The end of the file name is not that of a calibration format.
     #[error(
         "not a calibration by its name: .toml, .yaml, .json, .xml, or .csv and .txt for DLT coefficients"
     )]
     UnknownFormat,
-    /// The text is not of the format.
+    /// The text is not valid in its format.
     #[error("not a {format}: {message}")]
     Syntax {
         /// The format.
@@ -180,102 +182,102 @@ pub enum CameraFileError {
         /// What is wrong and where.
         message: String,
     },
-    /// Lists in lists without end.
+    /// Values are nested too deeply.
     #[error("line {line}: nested too deeply for a calibration")]
     TooDeep {
-        /// The line, from 1.
+        /// The line number, from 1.
         line: usize,
     },
-    /// A key outside any section.
+    /// A key lies outside any section.
     #[error("key `{key}` stands outside a section; each camera needs one, such as [cam]")]
     OutsideSection {
         /// The key.
         key: String,
     },
-    /// The file holds no camera.
+    /// The file contains no camera.
     #[error("the file has no camera section")]
     NoCamera,
-    /// Several cameras and none was asked for.
+    /// The file contains several cameras and no name was given.
     #[error("the file has {} cameras, choose one of: {}", names.len(), names.join(", "))]
     SeveralCameras {
         /// Their sections.
         names: Vec<String>,
     },
-    /// The camera asked for is not there.
+    /// The requested camera is not in the file.
     #[error("no camera `{name}` in the file, it has: {}", names.join(", "))]
     UnknownCamera {
-        /// The camera asked for.
+        /// The name requested.
         name: String,
         /// The sections of the file.
         names: Vec<String>,
     },
-    /// A key that means nothing here.
+    /// A key of a section is unknown.
     #[error(
         "[{section}]: unknown key `{key}` (line {line}); known are name, size, matrix, distortions, rotation, translation, fisheye"
     )]
     UnknownKey {
-        /// The camera's section.
+        /// The section of the camera.
         section: String,
         /// The key.
         key: String,
-        /// Its line, from 1.
+        /// The line number, from 1.
         line: usize,
     },
-    /// A key that is needed.
+    /// A required key is missing.
     #[error("[{section}]: missing key `{key}`")]
     MissingKey {
-        /// The camera's section.
+        /// The section of the camera.
         section: String,
         /// The key.
         key: &'static str,
     },
-    /// The file says how the lens images, but not where the camera stands.
+    /// The file has intrinsics but neither rotation nor translation.
     #[error(
         "[{section}]: neither rotation nor translation: the file says how the camera images, not where it stands"
     )]
     NoPlace {
-        /// The camera's section.
+        /// The section of the camera.
         section: String,
     },
-    /// A value of another kind, shape or range.
+    /// A value has the wrong type, shape or range.
     #[error("{place}: expected {expected}, got {got}")]
     Value {
-        /// Where it stands.
+        /// The place of the value.
         place: Place,
         /// What is supported.
         expected: &'static str,
-        /// What the file says.
+        /// The value in the file.
         got: String,
     },
-    /// Well-formed values that make no camera.
+    /// Well-formed values that do not describe a valid camera.
     #[error("{place}: {source}")]
     Camera {
-        /// Where they stand.
+        /// The place of the values.
         place: Place,
-        /// What is wrong with it.
+        /// Why the camera is invalid.
         source: CameraError,
     },
-    /// XML that is neither OpenCV's nor Tsai's.
+    /// The XML is neither OpenCV's nor Tsai's.
     #[error("not a Tsai calibration in XML: attribute `{key}` is missing")]
     NotTsai {
         /// The first parameter that was not found.
         key: &'static str,
     },
-    /// The format does not hold the size of the picture.
+    /// The format does not contain the image size.
     #[error("a {format} does not say how large the picture is: give its size")]
     SizeNeeded {
         /// The format.
         format: FileFormat,
     },
-    /// DLT coefficients whose matrix has no inverse.
+    /// The matrix of the DLT coefficients has no inverse.
     #[error("the DLT coefficients are no camera: their matrix has no inverse")]
     DegenerateDlt,
-    /// DLT coefficients whose matrix mirrors.
+    /// The matrix of the DLT coefficients mirrors.
     #[error(
         "the DLT coefficients mirror: either v is counted upwards, as DLTdv does, or the origin lies behind the camera; say which"
     )]
     MirroredDlt,
-    /// DLT coefficients with skewed pixels.
+    /// The DLT coefficients have too much skew.
     #[error(
         "the DLT coefficients are skewed by {skew_px:.1} px at a focal length of {focal_px:.0} px: no pixels are"
     )]
@@ -285,26 +287,26 @@ pub enum CameraFileError {
         /// Focal length along u, pixels.
         focal_px: f64,
     },
-    /// DLT coefficients that make no camera.
+    /// The DLT coefficients do not describe a valid camera.
     #[error("DLT coefficients: {source}")]
     Dlt {
-        /// What is wrong with it.
+        /// Why the camera is invalid.
         source: CameraError,
     },
-    /// The lens cannot be written with k1, k2 and k3.
+    /// The lens cannot be written as k1, k2 and k3.
     #[error("the lens cannot be written as k1, k2, k3: they would be off by {error_px:.2} px")]
     Lens {
-        /// Largest difference in the picture, pixels.
+        /// Largest difference in the image, pixels.
         error_px: f64,
     },
 }
 
 impl Camera {
-    /// Reads a camera from a file, its format by the end of its name.
+    /// Reads a camera from a file; the end of the file name determines the format.
     ///
     /// # Errors
     ///
-    /// Files that cannot be read, are not of the format or describe no camera; all but the first do not name
+    /// The file cannot be read, is not valid in its format or describes no camera. Only the first error names
     /// the file.
     pub fn from_file(path: &Path, options: &CameraFileOptions<'_>) -> Result<Self, CameraFileError> {
         let unreadable = |message: String| CameraFileError::Read { path: path.to_owned(), message };
@@ -325,7 +327,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// Text that is not of the format or describes no camera.
+    /// The text is not valid in its format or describes no camera.
     pub fn from_text(
         text: &str,
         format: FileFormat,
@@ -348,8 +350,8 @@ impl Camera {
         entry::camera(&root, format, options)
     }
 
-    /// Reads a camera from TOML; `name` is its section or its `name` key and may be `None` if the file has only
-    /// one.
+    /// Reads a camera from TOML; `name` is its section or its `name` key and may be `None` if the file has
+    /// only one camera.
     ///
     /// # Errors
     ///

@@ -1,38 +1,38 @@
-//! What a calibration file says, whatever it is written in: values, lists and tables with their lines.
+//! The content of a calibration file, whatever its format: values, lists and tables with their line numbers.
 
 use std::fmt;
 
 use super::CameraFileError;
 
-/// Files nest two or three levels deep; readers recurse, so that there has to be an end.
+/// Largest nesting depth: files nest two or three levels deep, and the readers recurse.
 pub(super) const MAX_DEPTH: usize = 24;
 
-/// A value and the line it begins in, from 1.
+/// A value and the line number at which it begins, from 1.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Node {
     pub(super) line: usize,
     pub(super) value: Value,
 }
 
-/// What stands there.
+/// The value of a node.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Value {
     /// Nothing.
     Null,
     /// true or false.
     Bool(bool),
-    /// Any number, NaN and infinite ones as well.
+    /// Any number, including NaN and infinities.
     Number(f64),
     /// Any other text.
     Text(String),
     /// Values in order.
     List(Vec<Node>),
-    /// Values with names, in order.
+    /// Named values, in order.
     Table(Vec<(String, Node)>),
 }
 
 impl Node {
-    /// A scalar as YAML and XML write it: without saying what it is.
+    /// A scalar as YAML and XML write it, without a type.
     pub(super) fn from_text(line: usize, text: &str) -> Self {
         let value = match text {
             "" | "~" | "null" => Value::Null,
@@ -43,7 +43,7 @@ impl Node {
         Self { line, value }
     }
 
-    /// The entries, if it is a table.
+    /// The entries, if the node is a table.
     pub(super) fn table(&self) -> Option<&[(String, Self)]> {
         match &self.value {
             Value::Table(entries) => Some(entries),
@@ -51,14 +51,14 @@ impl Node {
         }
     }
 
-    /// The first entry of a table under any of some names, in the order of the names.
+    /// The first entry of a table under any of several names, in the order of the names.
     pub(super) fn entry(&self, aliases: &[&str]) -> Option<(&str, &Self)> {
         let entries = self.table()?;
         let under = |alias: &&str| entries.iter().find(|(key, _)| plain(key) == **alias);
         aliases.iter().find_map(under).map(|(key, node)| (key.as_str(), node))
     }
 
-    /// The text, if it is one.
+    /// The text, if the node is text.
     pub(super) fn text(&self) -> Option<&str> {
         match &self.value {
             Value::Text(text) => Some(text),
@@ -66,7 +66,7 @@ impl Node {
         }
     }
 
-    /// The number, if it is a finite one.
+    /// The number, if the node is a finite number.
     pub(super) fn number(&self) -> Option<f64> {
         match self.value {
             Value::Number(number) if number.is_finite() => Some(number),
@@ -74,9 +74,9 @@ impl Node {
         }
     }
 
-    /// All numbers row by row: of a list, of lists in a list, or of a table of `rows`, `cols` and `data`.
+    /// All numbers row by row: of a list, of a list of lists, or of a table of `rows`, `cols` and `data`.
     ///
-    /// `None` if anything else is among them, or if their count is not that of the matrix.
+    /// `None` if any other value is among them, or if their count differs from that of the matrix.
     pub(super) fn numbers(&self) -> Option<Vec<f64>> {
         match &self.value {
             Value::List(items) => {
@@ -89,7 +89,7 @@ impl Node {
             Value::Table(_) => {
                 let side = |key| self.entry(&[key])?.1.number();
                 let data = self.entry(&["data"])?.1.numbers()?;
-                // OpenCV 5 writes arrays of one dimension as `opencv-nd-matrix` with `sizes`.
+                // OpenCV 5 writes one-dimensional arrays as `opencv-nd-matrix` with `sizes`.
                 let count = match self.entry(&["sizes"]) {
                     Some((_, sizes)) => sizes.number().or_else(|| Some(sizes.numbers()?.iter().product()))?,
                     None => side("rows")? * side("cols")?,
@@ -101,23 +101,23 @@ impl Node {
     }
 }
 
-/// A key without what writers do differently: capitals and underscores.
+/// A key without the differences between writers: capitals and underscores.
 pub(super) fn plain(key: &str) -> String {
     key.chars().filter(|c| !matches!(c, '_' | '-')).flat_map(char::to_lowercase).collect()
 }
 
-/// The line a byte lies in, from 1.
+/// The line number of a byte, from 1.
 pub(super) fn line_of(text: &str, byte: usize) -> usize {
     1 + text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
 }
 
-/// Refuses what is nested deeper than any calibration.
+/// Refuses values nested deeper than in any calibration.
 pub(super) fn check_depth(depth: usize, line: usize) -> Result<(), CameraFileError> {
     if depth <= MAX_DEPTH { Ok(()) } else { Err(CameraFileError::TooDeep { line }) }
 }
 
 impl fmt::Display for Node {
-    /// At most a line of it.
+    /// At most one line of the value.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut text = String::new();
         write_short(&mut text, self);

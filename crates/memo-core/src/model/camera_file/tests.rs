@@ -237,7 +237,7 @@ fn the_unit_is_checked_and_told_in_both_readings() {
     assert!(said.contains("4.6 mm from the world's origin, a 1.7 m person there 373087 px high"), "{said}");
 }
 
-/// The eleven coefficients of a camera, and v counted upwards.
+/// The eleven coefficients of a camera; `v_up`: v increases upwards.
 fn coefficients(camera: &Camera, v_up: bool) -> [f64; 11] {
     let mut p = camera.matrix();
     if v_up {
@@ -332,7 +332,7 @@ fn endless_nesting_is_refused() {
     }
 }
 
-/// A piece of a file replaced, doubled, taken out or moved.
+/// Parts of a file replaced, duplicated, removed or moved.
 fn mutated(text: &str, edits: &[(usize, usize, u8, u8)]) -> String {
     let mut bytes = text.as_bytes().to_vec();
     for &(at, length, kind, byte) in edits {
@@ -351,7 +351,7 @@ fn mutated(text: &str, edits: &[(usize, usize, u8, u8)]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// No change of a file makes a reader panic or hang, or give an invalid camera.
+/// No change to a file makes a reader panic, hang or return an invalid camera.
 #[test]
 fn mutated_files_are_read_or_refused() {
     let cases = if std::env::var_os("MEMO_FULL").is_some() { 100_000 } else { 1_000 };

@@ -1,4 +1,4 @@
-//! TOML, with lines.
+//! TOML with line numbers.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};

@@ -1,4 +1,4 @@
-//! A camera as TOML, one section, that Pose2Sim and anipose read.
+//! Writes a camera as a TOML section that Pose2Sim and anipose can read.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Vector3};
@@ -7,27 +7,27 @@ use super::CameraFileError;
 use crate::model::camera::Camera;
 use crate::model::distortion::Distortion;
 
-/// Largest difference between a lens and the k1, k2, k3 it is written as, pixels.
+/// Largest difference between a lens and the k1, k2, k3 written for it, pixels.
 const MAX_LENS_ERROR_PX: f64 = 0.1;
 const LENS_SAMPLES: usize = 200;
 
-/// A lens in OpenCV's coefficients.
+/// A lens as OpenCV's coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestLens {
-    /// k1, k2, p1, p2, k3; zeros where none come near.
+    /// k1, k2, p1, p2, k3; all zero where no coefficients approximate the lens.
     pub coefficients: [f64; 5],
-    /// By how much they miss the lens somewhere in the picture, pixels.
+    /// Largest difference from the lens in the image, pixels.
     pub error_px: f64,
 }
 
 impl Camera {
     /// The camera as a section `[name]` of TOML.
     ///
-    /// Tsai's lens is written as the k1, k2, k3 nearest to it over the picture.
+    /// Tsai's lens is written as the k1, k2, k3 that fit it best over the image.
     ///
     /// # Errors
     ///
-    /// A lens that these would miss by more than 0.1 px.
+    /// The fitted coefficients differ from the lens by more than 0.1 px.
     pub fn to_toml_string(&self, name: &str) -> Result<String, CameraFileError> {
         let [k1, k2, p1, p2, k3] = self.opencv_distortion()?;
         let (f, c, r, t) = (self.focal_px, self.centre_px, self.rotation_vector(), self.translation);
@@ -42,12 +42,12 @@ impl Camera {
         ))
     }
 
-    /// Axis times angle, radians, of the rotation: what OpenCV calls its vector.
+    /// The rotation vector of the camera as in OpenCV: axis times angle, radians.
     pub fn rotation_vector(&self) -> DVec3 {
         DQuat::from_mat3(&self.rotation).to_scaled_axis()
     }
 
-    /// The rotation matrix of a vector as [`Camera::rotation_vector`] gives it.
+    /// The rotation matrix for a vector as returned by [`Camera::rotation_vector`].
     pub fn rotation_of_vector(vector: DVec3) -> DMat3 {
         DMat3::from_quat(DQuat::from_scaled_axis(vector))
     }
@@ -56,13 +56,13 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// A Tsai lens that these would miss by more than 0.1 px somewhere in the picture.
+    /// A Tsai lens from which the fitted coefficients differ by more than 0.1 px somewhere in the image.
     pub fn opencv_distortion(&self) -> Result<[f64; 5], CameraFileError> {
         let NearestLens { coefficients, error_px } = self.nearest_opencv_lens();
         if error_px <= MAX_LENS_ERROR_PX { Ok(coefficients) } else { Err(CameraFileError::Lens { error_px }) }
     }
 
-    /// The lens in OpenCV's coefficients, or those nearest to it over the picture.
+    /// The lens as OpenCV's coefficients, or the coefficients that fit it best over the image.
     pub fn nearest_opencv_lens(&self) -> NearestLens {
         match self.distortion {
             Distortion::None => NearestLens { coefficients: [0.0; 5], error_px: 0.0 },
@@ -73,7 +73,7 @@ impl Camera {
         }
     }
 
-    /// Least squares of r_d = r (1 + k1 r² + k2 r⁴ + k3 r⁶) over the radii of the picture.
+    /// Least squares of r_d = r (1 + k1 r² + k2 r⁴ + k3 r⁶) over the radii of the image.
     fn nearest_radial(&self) -> NearestLens {
         let (width, height) = (f64::from(self.size[0]), f64::from(self.size[1]));
         let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
@@ -81,7 +81,7 @@ impl Camera {
             .map(|(u, v)| ((glam::DVec2::new(u, v) - self.centre_px) / self.focal_px).length())
             .into_iter()
             .fold(0.0, f64::max);
-        // Distorted radii up to the corner, with the ideal radii they belong to.
+        // Distorted radii up to the corner, with their ideal radii.
         let sampled = (1..=LENS_SAMPLES).filter_map(|i| {
             let distorted = reach * i as f64 / LENS_SAMPLES as f64;
             self.distortion.undistort(glam::DVec2::new(distorted, 0.0)).map(|ideal| (ideal.x, distorted))
@@ -110,7 +110,7 @@ impl Camera {
     }
 }
 
-/// A TOML string; control characters by their numbers.
+/// A TOML string; control characters are written as their numbers.
 fn quoted(name: &str) -> String {
     let escaped = name.chars().map(|c| match c {
         '"' | '\\' => format!("\\{c}"),

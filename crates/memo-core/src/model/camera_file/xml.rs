@@ -7,7 +7,7 @@ use super::node::{Node, Value, check_depth};
 use super::{CameraFileError, FileFormat, Place};
 use crate::model::camera::{Camera, TsaiParameters};
 
-/// Calibrations have some hundred; a file with more is something else.
+/// Largest number of nodes; calibrations have some hundred.
 const MAX_NODES: u32 = 1_000_000;
 
 pub(super) fn parse(text: &str) -> Result<Document<'_>, CameraFileError> {
@@ -19,12 +19,13 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>, CameraFileError> {
     Document::parse_with_options(text.trim_start_matches('\u{feff}'), options).map_err(syntax)
 }
 
-/// Whether it is of OpenCV; otherwise Tsai's parameters are expected.
+/// Whether OpenCV wrote the document; otherwise Tsai's parameters are expected.
 pub(super) fn is_opencv(document: &Document<'_>) -> bool {
     document.root_element().has_tag_name("opencv_storage")
 }
 
-/// What OpenCV wrote: elements are keys, `<_>` are items of a list, matrices hold numbers between blanks.
+/// Reads OpenCV's XML: elements are keys, `<_>` are items of a list, matrices hold numbers separated by
+/// blanks.
 pub(super) fn opencv(document: &Document<'_>) -> Result<Node, CameraFileError> {
     node(document, document.root_element(), 0)
 }
@@ -97,7 +98,7 @@ fn numbers<const N: usize>(
     Ok(found)
 }
 
-/// The attribute of that name, in whichever element.
+/// The attribute with that name, in any element.
 fn number(document: &Document<'_>, key: &'static str) -> Result<f64, CameraFileError> {
     let having = document.descendants().find(|element| element.has_attribute(key));
     let missing = || CameraFileError::NotTsai { key };

@@ -1,14 +1,14 @@
 //! YAML as OpenCV's `FileStorage`, ROS and PyYAML write it.
 //!
-//! OpenCV up to 4 begins its files with `%YAML:1.0`, which is no YAML: that line is left out. Anchors and
-//! aliases are refused; of several documents the first is read.
+//! OpenCV up to version 4 begins its files with `%YAML:1.0`, which is not valid YAML: that line is removed.
+//! Anchors and aliases are refused; of several documents only the first is read.
 
 use saphyr_parser::{Event, Parser, ScalarStyle, Span};
 
 use super::node::{Node, Value, check_depth};
 use super::{CameraFileError, FileFormat};
 
-/// A list or table whose end has not come yet.
+/// A list or table whose end has not been read yet.
 enum Open {
     List(usize, Vec<Node>),
     Table(usize, Vec<(String, Node)>, Option<String>),

@@ -6,7 +6,7 @@ fn level() -> Camera {
     Camera::level([960, 540], 0.9, 1.3, 6.0).unwrap()
 }
 
-/// The level camera turned about its own centre.
+/// The level camera rotated about its own centre.
 fn turned(roll: f64, pitch: f64, yaw: f64) -> Camera {
     let level = level();
     let turn = DMat3::from_rotation_z(roll) * DMat3::from_rotation_x(pitch) * DMat3::from_rotation_y(yaw);
@@ -23,7 +23,7 @@ fn options() -> PositionOptions {
     PositionOptions::default()
 }
 
-/// T* X* + b* of eq. (6) as printed, with the paper's second column our third.
+/// T* X* + b* of eq. (6) as printed; the paper's second column is our third.
 fn equation_6(camera: &Camera, found: &FootPosition, height_m: f64) -> Vector6<f64> {
     let t = camera.matrix();
     let (x_u, x_o, foot) = (found.bottom_px, found.top_px, found.point_in_world);
@@ -46,7 +46,7 @@ fn a_level_camera_reads_depth_off_the_height() {
     let midpoints = Midpoints { bottom_px: DVec2::new(500.0, 400.0), top_px: DVec2::new(504.0, 200.0) };
     let found = position_from_rectangle(&camera, &midpoints, 1.7, &options()).unwrap();
     assert!((found.depth_m - camera.focal_px.y * 1.7 / 200.0).abs() < 1e-12);
-    // Verticals are parallel columns: both midpoints move to the middle one.
+    // Verticals are parallel columns: both midpoints move to the column halfway between them.
     assert!((found.bottom_px - DVec2::new(502.0, 400.0)).length() < 1e-10);
     assert!((found.top_px - DVec2::new(502.0, 200.0)).length() < 1e-10);
     assert!((found.bottom_shift_px - 2.0).abs() < 1e-10);
@@ -106,7 +106,7 @@ fn a_certain_row_rules_the_fit() {
     assert!((feet - head).length() > 0.2);
     assert!((sure(1e-4, 10.0, 0.0) - feet).length() < 2e-2);
     assert!((sure(10.0, 1e-4, 0.0) - head).length() < 2e-2);
-    // A height nobody knows leaves the feet alone.
+    // With an unknown height the position is that of the feet.
     assert!((sure(1.0, 1.0, 1e3) - feet).length() < 2e-2);
 }
 
@@ -123,7 +123,7 @@ fn the_fit_is_the_likeliest_place_and_height() {
     let mut midpoints = seen(&camera, DVec3::new(0.6, 1.5, 0.0), 1.7).unwrap();
     midpoints.bottom_px += DVec2::new(1.0, 4.0);
     midpoints.top_px += DVec2::new(1.0, -1.0);
-    // Minus twice the logarithm of the likelihood, least over the height.
+    // Minus twice the log-likelihood, minimised over the height.
     let cost = |place: DVec2| {
         let at_height = |height: f64| {
             let model = seen(&camera, place.extend(0.0), height).unwrap();
@@ -173,7 +173,7 @@ fn no_person_fits_these() {
 
 #[test]
 fn a_person_around_the_vertical_vanishing_point_is_refused() {
-    // Looking straight down from 3 m: verticals spread from the centre of the image.
+    // Looking straight down from 3 m: verticals diverge from the centre of the image.
     let camera = turned(0.0, std::f64::consts::FRAC_PI_2, 0.0);
     let c = camera.centre_px;
     let across = Midpoints { bottom_px: c - DVec2::Y * 80.0, top_px: c + DVec2::Y * 20.0 };
@@ -181,15 +181,16 @@ fn a_person_around_the_vertical_vanishing_point_is_refused() {
     assert!(matches!(error, PositionError::UpsideDown { .. }), "{error}");
     let outward = Midpoints { bottom_px: c + DVec2::Y * 80.0, top_px: c + DVec2::Y * 200.0 };
     assert!(position_from_rectangle(&camera, &outward, 1.2, &options()).is_ok());
-    // Looking straight up: what stands on the ground points inward, and no further than the centre.
+    // Looking straight up: an upright person on the ground points towards the centre of the image, but not
+    // beyond it.
     let camera = turned(0.0, -std::f64::consts::FRAC_PI_2, 0.0);
     let past = Midpoints { bottom_px: c + DVec2::Y * 80.0, top_px: c - DVec2::Y * 20.0 };
     let error = position_from_rectangle(&camera, &past, 1.2, &options()).unwrap_err();
     assert!(matches!(error, PositionError::AtVanishingPoint { .. }), "{error}");
 }
 
-/// Rays cast by hand through the shifted midpoints: the sole lies on the one, the head, as much higher as the
-/// person is, on the other.
+/// Rays through the shifted midpoints, computed independently: the sole lies on one ray; the head, higher by
+/// the height of the person, lies on the other.
 #[test]
 fn sole_and_head_lie_on_the_rays_through_the_shifted_midpoints() {
     let camera = turned(0.15, 0.35, 0.2);
@@ -205,7 +206,7 @@ fn sole_and_head_lie_on_the_rays_through_the_shifted_midpoints() {
     let distance = |point: DVec3, pixel: DVec2| ray(pixel).cross(point - from).length();
     assert!(distance(found.point_in_world, found.bottom_px) < 1e-9);
     assert!(distance(found.point_in_world + DVec3::Z * 1.7, found.top_px) < 1e-9);
-    // The places on both rays that come nearest to being one below the other.
+    // The points on both rays that come closest to lying one below the other.
     let [a, b] = [found.bottom_px, found.top_px].map(ray);
     let gap = |s: f64, t: f64| (from + b * t - from - a * s - DVec3::Z * 1.7).length();
     let (s, t) =
@@ -213,8 +214,8 @@ fn sole_and_head_lie_on_the_rays_through_the_shifted_midpoints() {
     assert!(gap(s, t) < 1e-9 && gap(s * 1.001, t) > 1e-3 && gap(s, t * 1.001) > 1e-3);
 }
 
-/// Limbs swing the middle of a walker's rectangle by 0.07 to 0.1 m: with the default options the place of one
-/// 200 to 300 pixels high is as uncertain aside.
+/// Limbs move the centre of a walker's rectangle by 0.07 to 0.1 m: with the default options, the sideways
+/// position of a walker 200 to 300 pixels high has that uncertainty.
 #[test]
 fn a_walker_is_as_uncertain_as_limbs_swing() {
     let camera = level();
@@ -266,7 +267,7 @@ proptest! {
         };
         let residual = equation_6(&camera, &found, 1.7);
         prop_assert!(residual.amax() < 1e-8 * (1.0 + found.depth_m), "{residual}");
-        // No other line through the vanishing point is nearer.
+        // No other line through the vanishing point is closer.
         let v = camera.vanishing_point_of_vertical();
         let cost = |turn: f64| {
             let through = DVec2::from_angle(turn).rotate(found.top_px - found.bottom_px).normalize();
@@ -289,7 +290,7 @@ proptest! {
         let find = [position_from_rectangle, position_from_feet, position_on_ground][way];
         let midpoints = seen(&camera, DVec3::new(x, y, 0.0), 1.7).unwrap();
         let found = find(&camera, &midpoints, 1.7, &options).unwrap();
-        // All sixteen corners of the cube of one sd have exactly the unit covariance.
+        // The sixteen corners of the cube of one standard deviation have exactly the unit covariance.
         let mut spread = DMat3::ZERO;
         for corner in 0..16 {
             let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };

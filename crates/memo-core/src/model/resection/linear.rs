@@ -8,12 +8,14 @@
 //!       |  p   q  -r/f |      | p q r |
 //! ```
 //!
-//! Each point gives two equations (2) in the twelve elements of `[T]`; together A W = 0 (3). W is the right
-//! singular vector of A's smallest singular value: the solution for six points, least squares for more.
+//! Each point gives two equations (2) in the twelve elements of `[T]`; together they are A W = 0 (3). W is
+//! the right singular vector of the smallest singular value of A: the exact solution for six points, the
+//! least-squares solution for more.
 //!
-//! Nothing makes `[R]` a rotation, and small heads magnify noise: printed to five digits, the paper's own input
-//! puts the camera 4 cm off. With 1 px of noise on a head at 4 m and 480 px/m nearly half the solutions are
-//! refused and the others are off by some 3 m: in images, use [`super::resect`].
+//! Limits: `[R]` is not constrained to be a rotation, and small heads magnify noise: the paper's own input,
+//! printed to five digits, places the camera 4 cm off. With 1 px of noise on a head at 4 m and 480 px/m,
+//! nearly half the solutions are refused and the others are off by some 3 m. For measured images use
+//! [`super::resect`].
 
 use super::{MIN_SHAPE_RATIO, ResectionError, Shape};
 use super::{centroid_and_spread, checked_shape, nearest_rotation, right_svd};
@@ -22,7 +24,7 @@ use nalgebra::DMatrix;
 
 /// Points needed by eq. (3).
 pub(super) const LINEAR_POINTS: usize = 6;
-/// The last but one singular value of A must exceed this share of the first.
+/// Smallest allowed ratio of the last but one to the first singular value of A.
 const MIN_RATIO: f64 = 1e-9;
 
 /// The coordinates in which eq. (3) is solved.
@@ -31,7 +33,7 @@ pub enum Conditioning {
     /// Centred and scaled to unit spread in head and image (Hartley 1997), which balances the equations.
     #[default]
     Normalised,
-    /// As they are, as the paper does.
+    /// Unchanged, as in the paper.
     AsPrinted,
 }
 
@@ -44,9 +46,9 @@ pub struct LinearResection {
     pub rotation: DMat3,
     /// f in image units, from the norm of the third column.
     pub focal: f64,
-    /// (x0, y0, z0) by eq. (5), in the head's frame. Meaningful if image and head have the same unit.
+    /// (x0, y0, z0) by eq. (5), in the head's frame. Meaningful only if image and head have the same unit.
     pub camera_position: DVec3,
-    /// Last but one over first singular value of A: the smaller, the less `[T]` is determined.
+    /// Ratio of the last but one to the first singular value of A: the smaller, the less `[T]` is determined.
     pub singular_ratio: f64,
     /// Determinant of `[R]`: 1 without noise.
     pub determinant: f64,
@@ -57,7 +59,7 @@ pub struct LinearResection {
 pub struct PaperView {
     /// `[R]`.
     pub rotation: DMat3,
-    /// (x0, y0, z0): f in front of the centre of projection, in the head's frame.
+    /// (x0, y0, z0): the point at distance f in front of the centre of projection, in the head's frame.
     pub camera_position: DVec3,
     /// f, in the unit of head and image.
     pub focal: f64,
@@ -66,13 +68,13 @@ pub struct PaperView {
 /// Eqs. (1)-(5) on six or more points.
 ///
 /// `points_in_head` in any unit; `image_points` (x' right, **y' up**) relative to the principal point, in the
-/// same unit if [`LinearResection::camera_position`] is to make sense. k of eq. (4) comes from the first column,
-/// its sign such that H > 0.
+/// same unit if [`LinearResection::camera_position`] is to be meaningful. k of eq. (4) comes from the first
+/// column; its sign is such that H > 0.
 ///
 /// # Errors
 ///
-/// Bad or too few points, coplanar ones, configurations that leave `[T]` undetermined, and solutions that put
-/// points behind the camera or mirror the head, which noise can bring about.
+/// Invalid, too few or coplanar points, configurations that leave `[T]` undetermined, and solutions that
+/// place points behind the camera or mirror the head, which noise can cause.
 pub fn linear_resection(
     points_in_head: &[DVec3],
     image_points: &[DVec2],
@@ -117,7 +119,8 @@ fn normalisations(shape: &Shape, image_points: &[DVec2]) -> [Change; 2] {
     ]
 }
 
-/// The columns of `[S]` with A W = 0, eq. (3), and the ratio that tells whether it is the only one.
+/// The columns of `[S]` with A W = 0, eq. (3), and the singular ratio, which shows whether the solution is
+/// unique.
 fn null_vector(head: &[DVec3], image: &[DVec2]) -> Result<([DVec4; 3], f64), ResectionError> {
     let mut equations = DMatrix::zeros(2 * head.len(), 12);
     for (i, (point, image)) in head.iter().zip(image).enumerate() {
@@ -140,7 +143,7 @@ fn null_vector(head: &[DVec3], image: &[DVec2]) -> Result<([DVec4; 3], f64), Res
     Ok(([column(0), column(1), column(2)], ratio))
 }
 
-/// `[S]` for the coordinates before the changes.
+/// `[S]` in the original coordinates.
 ///
 /// With p~ = s (p - o): p~ S = s p S_123 + (S_4 - s o S_123). With q~ = s' (q - o'): X = X~ / s' + o' H.
 fn undo_changes(solution: [DVec4; 3], head: Change, image: Change) -> [DVec4; 3] {
@@ -183,7 +186,7 @@ fn interpret(
 }
 
 impl LinearResection {
-    /// A head point in the paper's camera frame, as Table 2(d).
+    /// A head point in the paper's camera frame, as in Table 2(d).
     pub fn point_in_paper_camera(&self, point_in_head: DVec3) -> DVec3 {
         self.view().point_in_paper_camera(point_in_head)
     }
@@ -200,13 +203,13 @@ impl LinearResection {
         (opencv_rows(self.rotation), DVec3::new(t41, -t42, t44 * self.focal))
     }
 
-    /// The rotation of `camera_from_head`, OpenCV axes, nearest to `[R]`; `None` if there is none.
+    /// The rotation of `camera_from_head`, OpenCV axes, nearest to `[R]`; `None` if the decomposition fails.
     pub fn nearest_rotation(&self) -> Option<DMat3> {
         nearest_rotation(opencv_rows(self.rotation))
     }
 }
 
-/// Rows (a g p), -(b h q), -(c i r): the paper's camera axes with y turned down and z forward.
+/// Rows (a g p), -(b h q), -(c i r): the paper's camera axes with y down and z forward.
 fn opencv_rows(rotation: DMat3) -> DMat3 {
     DMat3::from_cols(rotation.x_axis, -rotation.y_axis, -rotation.z_axis).transpose()
 }
@@ -222,13 +225,14 @@ impl PaperView {
         }
     }
 
-    /// A head point in the paper's camera frame: ((x, y, z) - (x0, y0, z0)) `[R]` with the third axis turned.
+    /// A head point in the paper's camera frame: ((x, y, z) - (x0, y0, z0)) `[R]` with the third axis
+    /// inverted.
     pub fn point_in_paper_camera(&self, point_in_head: DVec3) -> DVec3 {
         let turned = self.rotation.transpose() * (point_in_head - self.camera_position);
         turned * DVec3::new(1.0, 1.0, -1.0)
     }
 
-    /// `[T]` of this camera: its columns.
+    /// `[T]` of this camera, as columns.
     pub fn transform(&self) -> [DVec4; 3] {
         let [a, b, c] = [self.rotation.x_axis, self.rotation.y_axis, -self.rotation.z_axis / self.focal];
         let column = |axis: DVec3, constant: f64| axis.extend(constant - axis.dot(self.camera_position));
@@ -247,7 +251,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Points before a camera at the origin of the OpenCV axes, image y up.
+    /// Points in front of a camera at the origin of the OpenCV axes, image y up.
     fn seen(points: &[DVec3], (rotation, translation): (DMat3, DVec3), focal: f64) -> Vec<DVec2> {
         let project = |p: &DVec3| {
             let q = rotation * *p + translation;
@@ -294,7 +298,8 @@ mod tests {
         );
     }
 
-    /// Points on a twisted cubic through the centre of projection: every camera on it sees the same image.
+    /// Points on a twisted cubic through the centre of projection: every camera on the cubic gets the same
+    /// image.
     #[test]
     fn a_critical_curve_is_recognised() {
         let cubic = |t: f64| DVec3::new(t, t * t, t * t * t);
@@ -323,7 +328,7 @@ mod tests {
         );
     }
 
-    /// Points seen through the centre of projection by a camera in their midst.
+    /// Points seen by a camera in their midst, some of them behind the centre of projection.
     #[test]
     fn points_behind_the_camera_are_refused() {
         let points: Vec<DVec3> =
@@ -334,7 +339,8 @@ mod tests {
     }
 
     proptest! {
-        /// Without noise both conditionings recover the camera, from shapes as flat as a hundredth.
+        /// Without noise both kinds of conditioning recover the camera, from shapes with a flatness down to a
+        /// hundredth.
         #[test]
         fn a_planted_camera_is_recovered(
             shape in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 6..12),
@@ -351,7 +357,7 @@ mod tests {
             let image = seen(&points, truth, focal);
             for conditioning in [Conditioning::Normalised, Conditioning::AsPrinted] {
                 let linear = linear_resection(&points, &image, conditioning);
-                // Six points can come near a critical curve by chance.
+                // Six points can be close to a critical curve by chance.
                 prop_assume!(linear.as_ref().is_ok_and(|l| l.singular_ratio > 1e-5));
                 let linear = linear.unwrap();
                 let tolerance = 1e-12 / linear.singular_ratio;

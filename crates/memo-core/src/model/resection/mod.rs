@@ -1,7 +1,7 @@
-//! The pose of known points from their image: resection.
+//! Resection: the pose of known points from their image.
 //!
-//! Lee and Chen (1985, section 2.1) find a head by it, from six feature points; a camera is calibrated by it, from
-//! measured places.
+//! Lee and Chen (1985, section 2.1) determine the pose of a head from six feature points; a camera is
+//! calibrated in the same way from points with measured positions.
 //!
 //! | function | needs | gives |
 //! |---|---|---|
@@ -21,15 +21,15 @@
 //! x = x_paper,   y = -y_paper,   z = z_paper + f
 //! ```
 //!
-//! Its "camera position" is that origin, which presupposes that image and head have the same unit. Only
-//! [`LinearResection`], [`PaperView`] and what reproduces Table 2 use the paper's axes.
+//! Its "camera position" is that origin, which requires that image and head have the same unit. Only
+//! [`LinearResection`], [`PaperView`] and the reproduction of Table 2 use the paper's axes.
 //!
-//! # What it cannot do
+//! # Limits
 //!
-//! A head is 20 cm. Seen from 4 m at 480 px/m its neck's depth is uncertain by 5 to 7 cm for each pixel of
-//! noise and its facing by 1 to 3 degrees; with f free the depth is next to undetermined. Points are taken as
-//! matched and independent, with one standard deviation: outliers are not searched for, but show in
-//! [`ResectedPose::chi_squared`] if that is given.
+//! A head is 20 cm long. Seen from 4 m at 480 px/m, the depth of its neck is uncertain by 5 to 7 cm per pixel
+//! of noise and its facing direction by 1 to 3 degrees; with f free the depth is nearly undetermined. Points
+//! are assumed to be matched and independent, with one common standard deviation. Outliers are not searched
+//! for; they increase [`ResectedPose::chi_squared`] if the standard deviation is given.
 
 mod linear;
 mod pose;
@@ -48,27 +48,27 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3};
 use thiserror::Error;
 
-/// Largest coordinate taken, in the caller's unit.
+/// Largest accepted coordinate, in the caller's unit.
 pub const MAX_COORDINATE: f64 = 1e9;
-/// Smallest spread of points taken, in the caller's unit.
+/// Smallest accepted spread of points, in the caller's unit.
 pub const MIN_SPREAD: f64 = 1e-9;
 /// Points are collinear or coplanar below this ratio of the singular values of their centred coordinates.
 pub const MIN_SHAPE_RATIO: f64 = 1e-6;
 
-/// Why the head could not be found.
+/// Why no pose of the head was found.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ResectionError {
-    /// Not enough points.
+    /// There are not enough points.
     #[error("{method} needs at least {needed} points, got {count}")]
     TooFewPoints {
-        /// What was asked for.
+        /// The method requested.
         method: &'static str,
         /// Points given.
         count: usize,
         /// Points needed.
         needed: usize,
     },
-    /// Points are not paired.
+    /// The numbers of head points and image points differ.
     #[error("{} but {}", counted(*head, "head point"), counted(*image, "image point"))]
     Unpaired {
         /// Number of head points.
@@ -76,74 +76,74 @@ pub enum ResectionError {
         /// Number of image points.
         image: usize,
     },
-    /// A coordinate is NaN, infinite or absurdly large.
+    /// A coordinate is NaN, infinite or larger than [`MAX_COORDINATE`].
     #[error("{kind} point {index} must be finite and at most {MAX_COORDINATE:e} in size, got {value}")]
     Coordinate {
         /// "head" or "image".
         kind: &'static str,
-        /// Number of the point.
+        /// Index of the point.
         index: usize,
         /// The offending coordinate.
         value: f64,
     },
-    /// Two head points are one.
+    /// Two head points coincide.
     #[error("head points {first} and {second} coincide")]
     Duplicate {
-        /// Number of one point.
+        /// Index of one point.
         first: usize,
-        /// Number of the other.
+        /// Index of the other point.
         second: usize,
     },
-    /// The head points lie on one line: the rotation about it cannot be seen.
+    /// The head points lie on one line: the rotation about it is undetermined.
     #[error("head points are collinear: singular value ratio {ratio:.1e}, needed {MIN_SHAPE_RATIO:e}")]
     Collinear {
         /// Second over first singular value of the centred points.
         ratio: f64,
     },
-    /// The head points lie in one plane, from which eq. (3) does not determine `[T]`.
+    /// The head points lie in one plane; eq. (3) then does not determine `[T]`.
     #[error("head points are coplanar: singular value ratio {ratio:.1e}, needed {MIN_SHAPE_RATIO:e}")]
     Coplanar {
         /// Third over first singular value of the centred points.
         ratio: f64,
     },
-    /// All image points are one.
+    /// All image points coincide.
     #[error("image points lie within {spread:.1e} of each other")]
     ImageSpread {
         /// Root mean square distance from their centroid.
         spread: f64,
     },
-    /// The equations leave more than one solution.
+    /// The equations have more than one solution.
     #[error("the points leave the answer undetermined: singular value ratio {ratio:.1e}, needed {needed:e}")]
     Undetermined {
-        /// Ratio of the singular value that must not vanish to the first.
+        /// Ratio of the singular value that must not vanish to the largest one.
         ratio: f64,
-        /// Its least value.
+        /// Smallest allowed ratio.
         needed: f64,
     },
     /// The linear solution puts points on both sides of the camera.
     #[error("the linear solution puts point {index} behind the camera (H = {scale:.3e})")]
     BehindCamera {
-        /// Number of the point.
+        /// Index of the point.
         index: usize,
         /// Its homogeneous scale H of eq. (1).
         scale: f64,
     },
-    /// The linear solution is a mirrored head.
+    /// The linear solution mirrors the head.
     #[error("the linear solution is no rotation: determinant {determinant:.3}")]
     Mirrored {
         /// Determinant of `[R]`.
         determinant: f64,
     },
-    /// The search ended nowhere.
+    /// The search converged from no start.
     #[error("none of {starts} starting poses led to a pose with all points in front of the camera")]
     NoPose {
-        /// Poses tried.
+        /// Number of poses tried.
         starts: usize,
     },
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The camera is invalid or does not image a pixel.
+    /// The camera is invalid, or its lens model does not cover a pixel.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// The body height is implausible.
@@ -151,7 +151,7 @@ pub enum ResectionError {
     Body(#[from] BodyError),
 }
 
-/// The centroid of points, and what their spread is.
+/// The centroid of points and their spread.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
     centroid: DVec3,
@@ -163,7 +163,7 @@ struct Shape {
     thin_axis: DVec3,
 }
 
-/// Refuses points that are unpaired, too few, not finite, duplicate or collinear.
+/// Returns an error for points that are unpaired, too few, not finite, duplicate or collinear.
 fn checked_shape(
     method: &'static str,
     needed: usize,
@@ -234,7 +234,7 @@ fn centroid_and_spread(points: &[DVec2]) -> (DVec2, f64) {
     (centroid, (sum_sq / count).sqrt())
 }
 
-/// Singular values, greatest first, and Vᵀ; `None` if the iteration does not end.
+/// Singular values in descending order, and Vᵀ; `None` if the iteration does not converge.
 fn right_svd(matrix: DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let svd = matrix.try_svd(false, true, f64::EPSILON, 10_000)?;
     let v_t = svd.v_t?;

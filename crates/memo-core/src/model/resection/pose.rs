@@ -1,4 +1,4 @@
-//! A pose of the head with its covariance, and what follows from it.
+//! A pose of the head with its covariance, and the quantities derived from it.
 
 use super::PaperView;
 use glam::{DMat3, DVec2, DVec3};
@@ -26,10 +26,11 @@ impl PointEstimate {
     }
 }
 
-/// Where the head faces: the normal of the head plane, the head's x axis.
+/// The facing direction of the head: the normal of the head plane, the head's x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
-    /// Unit vector in the camera (x right, y down, z forward): towards -z for a face seen from the front.
+    /// Unit vector in camera axes (x right, y down, z forward); it points towards -z for a face seen from the
+    /// front.
     pub direction: DVec3,
     /// First-order covariance of the direction.
     pub covariance: DMat3,
@@ -40,13 +41,13 @@ pub struct Facing {
 }
 
 impl Facing {
-    /// Root mean square angle between the true direction and this, radians.
+    /// Root mean square angle between the true direction and this direction, radians.
     pub fn sd_rad(&self) -> f64 {
         self.turn_sd_rad.hypot(self.nod_sd_rad)
     }
 }
 
-/// A least-squares pose of the head, OpenCV axes.
+/// A least-squares pose of the head, in OpenCV axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResectedPose {
     /// Rotation of `camera_from_head`: x_cam = R x_head + t.
@@ -61,19 +62,20 @@ pub struct ResectedPose {
     pub residuals: Vec<DVec2>,
     /// Standard deviation of an image coordinate, given or estimated, image units.
     pub image_sd: f64,
-    /// Sum of the squared residuals over `image_sd`²; about `degrees_of_freedom` if model and noise hold.
-    /// Says nothing if `image_sd` was estimated.
+    /// Sum of the squared residuals divided by `image_sd`²; about `degrees_of_freedom` if model and noise are
+    /// correct. Carries no information if `image_sd` was estimated.
     pub chi_squared: f64,
-    /// Image coordinates less parameters.
+    /// Number of image coordinates minus number of parameters.
     pub degrees_of_freedom: usize,
-    /// Probability among the poses of a solution, which are taken as equally likely beforehand.
+    /// Probability among the poses of a solution, with equal prior probabilities.
     pub probability: f64,
-    /// Of rotation vector w (in the head's frame, R -> R exp w), translation and focal length.
+    /// Covariance of rotation vector w (in the head's frame, R -> R exp w), translation and focal length.
     pub(super) covariance: Matrix7,
 }
 
 impl ResectedPose {
-    /// Covariance of (w, t): w the rotation vector in the head's frame that turns R into R exp(w), radians.
+    /// Covariance of (w, t): w is the rotation vector in the head's frame that turns R into R exp(w),
+    /// radians.
     pub fn covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(0, 0).into_owned()
     }
@@ -94,7 +96,7 @@ impl ResectedPose {
         (sum / self.residuals.len().max(1) as f64).sqrt()
     }
 
-    /// A head point in the camera, whether it was seen or not: q = R p + t, dq = R (w x p) + dt.
+    /// A head point in camera axes, whether it was measured or not: q = R p + t, dq = R (w x p) + dt.
     pub fn point_in_camera(&self, point_in_head: DVec3) -> PointEstimate {
         let mut jacobian = Matrix3x7::zeros();
         jacobian.fixed_view_mut::<3, 6>(0, 0).copy_from(&point_jacobian(self.rotation, point_in_head));
@@ -118,7 +120,8 @@ impl ResectedPose {
         PaperView::from_opencv(self.rotation, self.translation, self.focal.x)
     }
 
-    /// A head point in the paper's camera frame: as [`Self::point_in_camera`] with y turned and z less f.
+    /// A head point in the paper's camera frame: as [`Self::point_in_camera`] with y inverted and z reduced
+    /// by f.
     pub fn point_in_paper_camera(&self, point_in_head: DVec3) -> PointEstimate {
         let mut jacobian = Matrix3x7::zeros();
         jacobian.fixed_view_mut::<3, 6>(0, 0).copy_from(&point_jacobian(self.rotation, point_in_head));
@@ -165,7 +168,7 @@ impl ResectedPose {
     }
 }
 
-/// Derivative of R exp(w) p + t by (w, t) at w = 0.
+/// Derivative of R exp(w) p + t with respect to (w, t) at w = 0.
 pub(super) fn point_jacobian(rotation: DMat3, point: DVec3) -> Matrix3x6<f64> {
     let mut jacobian = Matrix3x6::zeros();
     for axis in 0..3 {
@@ -184,7 +187,7 @@ mod tests {
     use super::*;
     use crate::posture::head::HeadModel;
 
-    /// A head seen aslant from 3 m, its points off by a pixel.
+    /// A head seen obliquely from 3 m, with point errors of a pixel.
     fn pose() -> ResectedPose {
         let model = HeadModel::lee_chen();
         let turn = DMat3::from_rotation_y(0.5) * DMat3::from_rotation_x(0.2);
@@ -201,7 +204,7 @@ mod tests {
         resect(&model.points_m, &image, known, &options).unwrap().best().clone()
     }
 
-    /// The paper's axes turn y and shift z: so does the covariance.
+    /// The paper's axes invert y and shift z: the covariance is transformed in the same way.
     #[test]
     fn the_paper_s_axes_turn_the_covariance() {
         let pose = pose();
@@ -215,7 +218,7 @@ mod tests {
         assert!((paper.position - shifted).length() < 1e-9);
     }
 
-    /// Turning moves the facing to the head's side, nodding up and down.
+    /// Turning moves the facing direction to the side of the head, nodding up and down.
     #[test]
     fn turning_and_nodding_are_the_facing_s_own_directions() {
         let pose = pose();

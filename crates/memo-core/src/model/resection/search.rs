@@ -1,22 +1,24 @@
-//! Every pose of the head that explains its image points: reprojection least squares over true rotations.
+//! All poses of the head that fit its image points: reprojection least squares over proper rotations.
 //!
 //! ```text
 //! q_i = R (p_i - c) + t_c,   u_i = fx q_x / q_z,   v_i = fy q_y / q_z,   least sum |(u_i, v_i) - measured|²
 //! ```
 //!
-//! with c the centroid of the head points, R -> R exp(w), by Levenberg and Marquardt's method (Moré 1978's
-//! scaling). The sum has several minima: the flatter the head and the farther away, the more alike are the
-//! pose and its mirror (Necker's reversal). So the search starts from the linear solution, from all poses in
-//! which three of four widespread points lie on their rays, and from the mirror of each minimum found, and
-//! keeps all minima that the noise cannot tell apart. With the focal length free, or where those starts lead
-//! nowhere, it starts from 24 rotations that leave none farther than 63 degrees away.
+//! with c the centroid of the head points, R -> R exp(w), by the method of Levenberg and Marquardt (scaling
+//! of Moré 1978). The sum has several minima: the flatter the head and the farther away it is, the more
+//! similar are the pose and its mirror (Necker's reversal). The search therefore starts from the linear
+//! solution, from all poses in which three of four widespread points lie on their rays, and from the mirror
+//! of each minimum found. It keeps all minima that the noise does not distinguish. With the focal length
+//! free, or where those starts fail, it starts from 24 rotations; every rotation is within 63 degrees of one
+//! of them.
 //!
-//! Covariance: image_sd² (JᵀJ)⁻¹ at the minimum. It is first-order: where the depth's standard deviation is
-//! more than a tenth of the depth, the true distribution is skewed towards the far side.
+//! Covariance: image_sd² (JᵀJ)⁻¹ at the minimum. It is first-order: where the standard deviation of the depth
+//! is more than a tenth of the depth, the true distribution is skewed towards the far side.
 //!
-//! What it cannot do: promise every minimum. Of exact images none was missed in 100,000 draws each of four to
-//! eight points, of four points of which two nearly coincide, and of points as far away as a thousand times their
-//! size (`no_planted_pose_is_missed`); the 24 rotations alone missed 7 of 100,000 of the second kind.
+//! Limits: finding every minimum is not guaranteed. In exact images none was missed in 100,000 draws each of
+//! four to eight points, of four points of which two nearly coincide, and of points as far away as a thousand
+//! times their size (`no_planted_pose_is_missed`); the 24 rotations alone missed 7 of 100,000 of the second
+//! kind.
 
 use super::linear::LINEAR_POINTS;
 use super::pose::{Matrix7, Vector7, point_jacobian};
@@ -30,17 +32,17 @@ use crate::option_error::OptionError;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
 
-/// Points needed with the focal length known: three leave up to four poses, the fourth leaves two equations
-/// to spare.
+/// Points needed with the focal length known: three points have up to four poses; the fourth adds two
+/// redundant equations.
 const KNOWN_FOCAL_POINTS: usize = 4;
 /// Points needed with the focal length free, as for the linear solution.
 const FREE_FOCAL_POINTS: usize = LINEAR_POINTS;
-/// Least ratio of the singular values of the Jacobian with columns of unit length.
+/// Smallest allowed ratio of the singular values of the Jacobian with columns of unit length.
 const MIN_RATIO: f64 = 1e-9;
 const MAX_ITERATIONS: usize = 200;
-/// Points must lie this share of the head's radius in front of the camera.
+/// Smallest depth of a point in front of the camera, as a fraction of the head's radius.
 const MIN_DEPTH: f64 = 1e-6;
-/// Two minima are one below this rotation (radians) and relative translation.
+/// Two minima are the same pose below this rotation (radians) and relative translation.
 const SAME_POSE: f64 = 1e-3;
 
 /// What is known about the focal length.
@@ -48,33 +50,33 @@ const SAME_POSE: f64 = 1e-3;
 pub enum Focal {
     /// Focal lengths along u and v, image units.
     Known(DVec2),
-    /// One focal length for u and v, to be estimated.
+    /// Unknown: one focal length for u and v is estimated.
     Free,
 }
 
-/// How certain the image points are and which poses are returned.
+/// Uncertainty of the image points, and which poses are returned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResectionOptions {
-    /// Standard deviation of each image coordinate, image units; `None` estimates it from the residuals,
-    /// which with six points leaves it uncertain by a third.
+    /// Standard deviation of each image coordinate, image units; `None` estimates it from the residuals. With
+    /// six points that estimate is uncertain by a third.
     pub image_sd: Option<f64>,
-    /// Poses less probable than this are left out, in (0, 1).
+    /// Smallest probability of a returned pose, in (0, 1).
     pub min_probability: f64,
 }
 
 impl Default for ResectionOptions {
     fn default() -> Self {
-        // One pose in a hundred frames is no longer worth a branch downstream.
+        // A pose that is correct in one frame of a hundred is not worth a branch in later stages.
         Self { image_sd: None, min_probability: 0.01 }
     }
 }
 
-/// All poses that the image points leave possible.
+/// All poses consistent with the image points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resection {
-    /// Most probable first, never empty.
+    /// The poses, most probable first; never empty.
     pub poses: Vec<ResectedPose>,
-    /// Distinct minima found, including those left out as improbable.
+    /// Number of distinct minima found, including the improbable ones that are not returned.
     pub minima: usize,
 }
 
@@ -90,15 +92,15 @@ impl Resection {
     }
 }
 
-/// The head's pose in a camera, from pixels as the lens shows them.
+/// The pose of the head relative to a camera, from distorted pixels.
 ///
-/// `points_in_head` in metres, `pixels` in their order. `camera_from_head` of the answer uses the camera's
-/// intrinsics alone; `camera.rotation.transpose()` takes its directions into the world. `image_sd` is in
-/// pixels; what undistortion does to the noise is neglected.
+/// `points_in_head` in metres, `pixels` in the same order. The `camera_from_head` of the result uses only the
+/// intrinsics of the camera; `camera.rotation.transpose()` turns its directions into the world. `image_sd` is
+/// in pixels; the effect of undistortion on the noise is neglected.
 ///
 /// # Errors
 ///
-/// Those of [`resect`], and of an invalid camera or a pixel beyond the fold of its lens.
+/// The errors of [`resect`], an invalid camera, or a pixel beyond the fold of the lens model.
 pub fn resect_in_image(
     camera: &Camera,
     points_in_head: &[DVec3],
@@ -119,8 +121,8 @@ pub fn resect_in_image(
 ///
 /// # Errors
 ///
-/// Fewer than four points (six with the focal length free), bad, duplicate or collinear ones, options out of
-/// range, and points that leave the pose undetermined.
+/// Fewer than four points (six with the focal length free), invalid, duplicate or collinear points, options
+/// out of range, and points that leave the pose undetermined.
 pub fn resect(
     points_in_head: &[DVec3],
     image_points: &[DVec2],
@@ -140,7 +142,8 @@ pub fn resect(
         is_focal_free: focal == Focal::Free,
         shape,
     };
-    // 1. Minima from the closed forms, if need be from all directions, then from the mirrors of those found.
+    // 1. Find minima from the closed forms, if necessary from all directions, then from the mirrors of those
+    //    found.
     let mut starts = closed_form_starts(&problem, points_in_head, focal);
     let mut minima = Vec::new();
     starts.iter().for_each(|start| problem.collect_minimum(*start, &mut minima));
@@ -158,7 +161,7 @@ pub fn resect(
         return Err(ResectionError::NoPose { starts: starts.len() });
     }
     minima.sort_by(|a, b| a.sum_sq.total_cmp(&b.sum_sq));
-    // 2. Which of them the noise leaves possible, and how certain each is.
+    // 2. Select those that the noise permits, and compute their uncertainties.
     problem.solution(&minima, options)
 }
 
@@ -175,8 +178,8 @@ fn check_options(focal: Focal, options: &ResectionOptions) -> Result<(), Resecti
     Ok(OptionError::unless(got > 0.0 && got < 1.0, "min_probability", "between 0 and 1", got)?)
 }
 
-/// The linear solution if there is one; with the focal length known, also the poses of three points, each three
-/// of the four widest.
+/// The linear solution if it exists; with the focal length known, also the poses from each three of the four
+/// widest points.
 fn closed_form_starts(problem: &Problem, points_in_head: &[DVec3], focal: Focal) -> Vec<State> {
     let unit = match focal {
         Focal::Known(focal) => focal,
@@ -202,7 +205,8 @@ fn closed_form_starts(problem: &Problem, points_in_head: &[DVec3], focal: Focal)
     starts
 }
 
-/// The point farthest from the origin, that farthest from it, from their line, and from the nearest of the three.
+/// Four widespread points: the point farthest from the origin, then the point farthest from it, from their
+/// line, and from the nearest of the three.
 fn widest_four(points: &[DVec3]) -> [usize; 4] {
     let farthest = |taken: &[usize], distance: &dyn Fn(DVec3) -> f64| {
         let others = (0..points.len()).filter(|i| !taken.contains(i));
@@ -217,10 +221,10 @@ fn widest_four(points: &[DVec3]) -> [usize; 4] {
     [a, b, c, d]
 }
 
-/// The 24 rotations of a cube.
+/// Starts from the 24 rotations of a cube.
 ///
-/// With the focal length free, they are tried at three distances, 5, 15 and 45 times the head's radius, that the
-/// image's size turns into focal lengths.
+/// With the focal length free, each is tried at three distances, 5, 15 and 45 times the head's radius; the
+/// size of the image converts these into focal lengths.
 fn starts_in_all_directions(problem: &Problem, focal: Focal) -> Vec<State> {
     let focals: Vec<DVec2> = match focal {
         Focal::Known(focal) => vec![focal],
@@ -231,7 +235,7 @@ fn starts_in_all_directions(problem: &Problem, focal: Focal) -> Vec<State> {
     starts.collect()
 }
 
-/// The rotations that take a cube into itself.
+/// The rotations that map a cube onto itself.
 fn cube_rotations() -> Vec<DMat3> {
     let signs = [1.0, -1.0];
     let mut rotations = Vec::with_capacity(24);
@@ -279,10 +283,10 @@ struct Minimum {
     sum_sq: f64,
 }
 
-/// A step downhill.
+/// A step that decreases the sum of squares.
 struct Descent {
     to: Minimum,
-    /// How far the image points moved, the parameters taken one by one, image units squared.
+    /// How far the image points move, summed over separate changes of each parameter, image units squared.
     moved_sq: f64,
 }
 
@@ -299,7 +303,7 @@ impl Problem<'_> {
         if self.is_focal_free { 7 } else { 6 }
     }
 
-    /// Projected minus measured; `None` if a point is not in front of the camera.
+    /// Projected minus measured points; `None` if a point is not in front of the camera.
     fn residuals(&self, state: &State) -> Option<Vec<DVec2>> {
         let least_depth = MIN_DEPTH * self.shape.radius;
         let residual = |(point, image): (&DVec3, &DVec2)| {
@@ -318,7 +322,7 @@ impl Problem<'_> {
         sum.filter(|sum| sum.is_finite()).unwrap_or(f64::INFINITY)
     }
 
-    /// The two rows of J of a point, by (w, t, f); the last column is zero if f is known.
+    /// The two rows of J for a point, with respect to (w, t, f); the last column is zero if f is known.
     ///
     /// d(u, v) = diag(fx, fy) [1/qz, 0, -qx/qz²; 0, 1/qz, -qy/qz²] dq + (qx, qy)/qz df.
     fn jacobian_rows(&self, state: &State, point: DVec3) -> [Vector7; 2] {
@@ -336,7 +340,7 @@ impl Problem<'_> {
         })
     }
 
-    /// JᵀJ and Jᵀr. With f known an equation 1 df = 0 keeps JᵀJ regular.
+    /// JᵀJ and Jᵀr. With f known, an added equation 1 df = 0 keeps JᵀJ regular.
     fn normal_equations(&self, state: &State, residuals: &[DVec2]) -> (Matrix7, Vector7) {
         let (mut normal, mut gradient) = (Matrix7::zeros(), Vector7::zeros());
         normal[(6, 6)] = if self.is_focal_free { 0.0 } else { 1.0 };
@@ -349,8 +353,8 @@ impl Problem<'_> {
         (normal, gradient)
     }
 
-    /// A rotation and the translation that suits it best: linear in t,
-    /// t_x - x t_z = -(R p)_x + x (R p)_z with x = u / fx, likewise for y.
+    /// A rotation and the translation that fits best, from equations linear in t: t_x - x t_z = -(R p)_x + x
+    /// (R p)_z with x = u / fx, likewise for y.
     fn start(&self, rotation: DMat3, focal: DVec2) -> Option<State> {
         let (mut normal, mut right) = (DMat3::ZERO, DVec3::ZERO);
         for (point, image) in self.centred.iter().zip(self.image) {
@@ -366,14 +370,15 @@ impl Problem<'_> {
         if self.sum_sq(&solved).is_finite() {
             return Some(solved);
         }
-        // As far away as the image is small.
+        // The depth follows from the size of the image.
         let (centroid, _) = centroid_and_spread(self.image);
         let depth = (self.shape.radius * focal.min_element() / self.spread).max(3.0 * self.shape.radius);
         let far = State { rotation, centre: (centroid / focal).extend(1.0) * depth, focal };
         self.sum_sq(&far).is_finite().then_some(far)
     }
 
-    /// Necker's reversal of a pose: mirrored along the line of sight and in the head's flattest plane.
+    /// Necker's reversal of a pose: mirrored along the line of sight and in the plane in which the head is
+    /// flattest.
     fn mirrored(&self, state: &State) -> DMat3 {
         let reflection = |axis: DVec3| {
             let scaled = 2.0 * axis;
@@ -382,7 +387,7 @@ impl Problem<'_> {
         reflection(state.centre.normalize()) * state.rotation * reflection(self.shape.thin_axis.normalize())
     }
 
-    /// Descends from a start and adds the minimum unless it is known.
+    /// Descends from a start and adds the minimum unless it is already known.
     fn collect_minimum(&self, start: State, minima: &mut Vec<Minimum>) {
         if let Some(minimum) = self.minimum(start)
             && !minima.iter().any(|known| known.state.is_near(&minimum.state))
@@ -391,17 +396,17 @@ impl Problem<'_> {
         }
     }
 
-    /// Levenberg and Marquardt's method; `None` if it does not settle.
+    /// The method of Levenberg and Marquardt; `None` if it does not converge.
     fn minimum(&self, start: State) -> Option<Minimum> {
         let mut current = Minimum { state: start, sum_sq: self.sum_sq(&start) };
         let mut damping = 1e-3;
         for _ in 0..MAX_ITERATIONS {
             let residuals = self.residuals(&current.state)?;
             let (normal, gradient) = self.normal_equations(&current.state, &residuals);
-            // What moves the image by less than this is rounding.
+            // Movements of the image smaller than this are rounding.
             let still_sq = (1e-12 * self.spread).powi(2).max(1e-20 * current.sum_sq);
             let Some(descent) = self.descent(&current, &normal, &gradient, &mut damping) else {
-                // No step helps: at a minimum if the slope is nil.
+                // No step helps: this is a minimum if the gradient is zero.
                 let diagonal = normal.diagonal();
                 let flat = |(slope, square): (&f64, &f64)| slope * slope <= square * 1e4 * still_sq;
                 return gradient.iter().zip(&diagonal).all(flat).then_some(current);
@@ -414,7 +419,8 @@ impl Problem<'_> {
         None
     }
 
-    /// The first step (JᵀJ + damping diag JᵀJ) s = -Jᵀr that does not go up, with ever more damping.
+    /// The first step (JᵀJ + damping diag JᵀJ) s = -Jᵀr that does not increase the sum, with increasing
+    /// damping.
     fn descent(
         &self,
         from: &Minimum,
@@ -451,9 +457,9 @@ impl Problem<'_> {
         let weights: Vec<f64> = minima
             .iter()
             .map(|minimum| match options.image_sd {
-                // Normal noise: exp(-chi²/2).
+                // Known normal noise: exp(-chi²/2).
                 Some(sd) => (-0.5 * (minimum.sum_sq - least) / (sd * sd)).exp(),
-                // Of unknown size, with prior 1/sd: (sum of squares)^(-dof/2).
+                // Noise of unknown size, with prior 1/sd: (sum of squares)^(-dof/2).
                 None if minimum.sum_sq == least => 1.0,
                 None => (least / minimum.sum_sq).powf(0.5 * degrees_of_freedom as f64),
             })
@@ -497,8 +503,8 @@ impl Problem<'_> {
         })
     }
 
-    /// (JᵀJ)⁻¹ by the singular values of J with columns of unit length: J D⁻¹ = U S Vᵀ gives
-    /// D⁻¹ V S⁻² Vᵀ D⁻¹.
+    /// (JᵀJ)⁻¹ from the singular values of J with columns of unit length: J D⁻¹ = U S Vᵀ gives D⁻¹ V S⁻² Vᵀ
+    /// D⁻¹.
     fn inverse_normal(&self, state: &State) -> Result<Matrix7, ResectionError> {
         let undetermined = |ratio| ResectionError::Undetermined { ratio, needed: MIN_RATIO };
         let rows: Vec<Vector7> =

@@ -1,4 +1,4 @@
-//! The rotations under which three points lie on three rays, in closed form: where the search for a pose starts.
+//! The rotations for which three points lie on three rays, in closed form: starts for the search for a pose.
 //!
 //! Source: Grunert 1841, reviewed by Haralick, Lee, Ottenberg and Nölle 1994 (IJCV 13, 331-356). The distances
 //! s_1, s_2 = u s_1, s_3 = v s_1 of the points along their unit rays satisfy, with c_ij the cosine between two
@@ -10,30 +10,32 @@
 //! s_1² (u² + v² - 2 u v c_23) = |p_2 p_3|²
 //! ```
 //!
-//! With A = |p_2 p_3|² / |p_1 p_3|², C = |p_1 p_2|² / |p_1 p_3|² and Q = 1 + v² - 2 v c_13, the third less the
-//! first is u D = N with D = 2 (c_12 - v c_23) and N = (A - C) Q + 1 - v²; the first times D² is the quartic
+//! With A = |p_2 p_3|² / |p_1 p_3|², C = |p_1 p_2|² / |p_1 p_3|² and Q = 1 + v² - 2 v c_13, the third
+//! equation minus the first is u D = N with D = 2 (c_12 - v c_23) and N = (A - C) Q + 1 - v²; the first times
+//! D² is the quartic
 //!
 //! ```text
 //! N² - 2 N D c_12 + D² (1 - C Q) = 0.
 //! ```
 //!
-//! Where rounding or noise makes two of its roots complex, their real part is taken, near which the two met.
+//! Where rounding or noise makes two of its roots complex, their real part is used, because the two real
+//! roots met near it.
 //!
-//! What it cannot do: be exact where two roots are one, or far away, where all four draw together; the search
-//! takes the poses as starts.
+//! Limits: the result is not exact where two roots coincide, or for distant points, where all four approach
+//! each other; the search uses these poses as starts only.
 
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix4;
 use nalgebra::linalg::Schur;
 
-/// Of the two roots u that belong to a v, the one that satisfies u D = N so many times worse is left out,
+/// Of the two roots u for one v, a root is dropped if its error in u D = N is larger by this factor.
 const TOLD_APART: f64 = 10.0;
-/// unless the difference is one that the rounding of a double root makes.
+/// Errors in u D = N up to this are the rounding of a double root: both roots are kept.
 const ROUNDING: f64 = 1e-6;
 
-/// At most eight rotations that take the points onto the rays, which are of unit length.
+/// At most eight rotations that map the points onto the rays; the rays have unit length.
 ///
-/// None if the points lie on a line.
+/// Empty if the points lie on a line.
 pub(super) fn rotations_onto_rays(points: [DVec3; 3], rays: [DVec3; 3]) -> Vec<DMat3> {
     let Some(axes) = triangle_axes(points) else {
         return Vec::new();
@@ -42,7 +44,7 @@ pub(super) fn rotations_onto_rays(points: [DVec3; 3], rays: [DVec3; 3]) -> Vec<D
     let [c12, c13, c23] = [rays[0].dot(rays[1]), rays[0].dot(rays[2]), rays[1].dot(rays[2])];
     let side_sq = p1.distance_squared(p3);
     let (a, c) = (p2.distance_squared(p3) / side_sq, p1.distance_squared(p2) / side_sq);
-    // Polynomials in v, the constant first.
+    // Polynomials in v, the constant coefficient first.
     let q = [1.0, -2.0 * c13, 1.0];
     let n = [(a - c) * q[0] + 1.0, (a - c) * q[1], (a - c) * q[2] - 1.0];
     let d = [2.0 * c12, -2.0 * c23];
@@ -67,7 +69,8 @@ pub(super) fn rotations_onto_rays(points: [DVec3; 3], rays: [DVec3; 3]) -> Vec<D
     rotations
 }
 
-/// Right-handed axes: along the side from the first corner to the second, in the triangle, and normal to it.
+/// Right-handed axes: along the side from the first corner to the second, perpendicular to it in the plane of
+/// the triangle, and normal to the triangle.
 fn triangle_axes(corners: [DVec3; 3]) -> Option<DMat3> {
     let along = (corners[1] - corners[0]).try_normalize()?;
     let normal = along.cross(corners[2] - corners[0]).try_normalize()?;
@@ -90,7 +93,8 @@ fn value(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// Real parts of the roots, as eigenvalues of the companion matrix; none if the leading coefficient vanishes.
+/// Real parts of the roots, as eigenvalues of the companion matrix; empty if the leading coefficient
+/// vanishes.
 fn real_parts_of_roots(quartic: &[f64; 5]) -> Vec<f64> {
     let mut companion = Matrix4::zeros();
     for row in 0..4 {
@@ -105,7 +109,7 @@ fn real_parts_of_roots(quartic: &[f64; 5]) -> Vec<f64> {
     let schur = Schur::try_new(companion, f64::EPSILON, 1000);
     let mut roots: Vec<f64> =
         schur.map_or(Vec::new(), |schur| schur.complex_eigenvalues().iter().map(|root| root.re).collect());
-    // A complex pair has one real part.
+    // Both roots of a complex pair have the same real part.
     roots.dedup();
     roots
 }
@@ -134,12 +138,12 @@ mod tests {
         }
         errors.sort_by(f64::total_cmp);
         assert!(errors[500] < 1e-12, "{}", errors[500]);
-        // The worst are double roots.
+        // The largest errors come from double roots.
         assert!(errors[999] < 1e-2, "{}", errors[999]);
     }
 
-    /// Seen symmetrically, D vanishes at the double root v = 1, and both u belong to it. A double root keeps half
-    /// of the digits.
+    /// Seen symmetrically, D vanishes at the double root v = 1, and both u belong to it. A double root has
+    /// half of the digits.
     #[test]
     fn an_isosceles_triangle_seen_symmetrically_is_found() {
         for (height, nod) in
@@ -151,7 +155,8 @@ mod tests {
         }
     }
 
-    /// Distances along the rays by least squares on what the turned sides leave; in front of the eye they are positive.
+    /// Distances along the rays by least squares on the rotated sides; in front of the centre of projection
+    /// they are positive.
     #[test]
     fn no_rotation_puts_the_triangle_on_the_rays_behind_the_eye() {
         let mut random = Random::new(11);
@@ -174,7 +179,8 @@ mod tests {
                 });
                 let b = nalgebra::SVector::<f64, 6>::from_fn(|row, _| sides[row / 3][row % 3]);
                 let distances = a.svd(true, true).solve(&b, 1e-12).unwrap();
-                // Roots that are nearly double are given by their middle, which does not put it there exactly.
+                // For nearly double roots the midpoint is returned, which does not satisfy the equations
+                // exactly.
                 if (a * distances - b).norm() < 1e-6 {
                     assert!(distances.min() > 0.0, "{distances}");
                     exact += 1;

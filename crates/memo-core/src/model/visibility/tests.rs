@@ -3,7 +3,8 @@ use glam::{DAffine3, DMat3, DQuat, DVec2};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-/// A cylinder from one end's centre to the other's, its x axis as near to `forward` as possible.
+/// A cylinder from the centre of one end to that of the other; its x axis is as close to `forward` as
+/// possible.
 fn limb(bottom: DVec3, top: DVec3, forward: DVec3, a: f64, b: f64) -> EllipticCylinder {
     let z = (top - bottom).normalize();
     let y = z.cross(forward).normalize();
@@ -12,8 +13,8 @@ fn limb(bottom: DVec3, top: DVec3, forward: DVec3, a: f64, b: f64) -> EllipticCy
     EllipticCylinder { world_from_cylinder: pose, semi_axes: DVec2::new(a, b), half_length }
 }
 
-/// A man of 1.8 m walking along +x, joints penetrating; `swing_rad` moves the right leg and the left arm
-/// forward.
+/// A person of 1.8 m walking along +x, with overlapping joints; `swing_rad` moves the right leg and the left
+/// arm forward.
 pub(in crate::model) fn walker(swing_rad: f64) -> Vec<EllipticCylinder> {
     let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
     let along = |from: DVec3, angle: f64, length: f64, a: f64, b: f64| {
@@ -57,7 +58,7 @@ fn scaled(cylinder: &EllipticCylinder, factor: f64) -> EllipticCylinder {
     }
 }
 
-/// Whether the sight line from the camera to a point meets the solid: ray against slab and quadric.
+/// Whether the line of sight from the camera to a point intersects the solid: ray against slab and quadric.
 fn is_hidden(point: DVec3, k: &EllipticCylinder, camera: DVec3) -> bool {
     let (c, p) = (k.cylinder_from_world(camera), k.cylinder_from_world(point));
     let d = p - c;
@@ -74,8 +75,7 @@ fn is_hidden(point: DVec3, k: &EllipticCylinder, camera: DVec3) -> bool {
     s0 <= s1 && (c + d * nearest).length_squared() <= 1.0
 }
 
-/// Compares membership at regular samples, leaving out those within 1e-6 of the surface's size of a
-/// change.
+/// Compares visibility at regular samples, except within 1e-6 of the size of the surface from a change.
 fn check_against_samples(start: DVec3, end: DVec3, k: &EllipticCylinder, camera: DVec3) {
     let hidden = hidden_interval(start, end, k, camera);
     let (smaller, larger) = (scaled(k, 1.0 - 1e-6), scaled(k, 1.0 + 1e-6));
@@ -105,7 +105,7 @@ fn vector(range: f64) -> impl Strategy<Value = DVec3> {
     [-range..range, -range..range, -range..range].prop_map(DVec3::from)
 }
 
-/// Coordinates on a coarse grid: tangent, coplanar, collinear and coinciding draws are frequent.
+/// Coordinates on a coarse grid: tangent, coplanar, collinear and coincident draws are frequent.
 fn grid_vector() -> impl Strategy<Value = DVec3> {
     [-4..=4i32, -4..=4i32, -4..=4i32].prop_map(|v| DVec3::from(v.map(|x| f64::from(x) * 0.5)))
 }
@@ -120,7 +120,7 @@ fn cylinder() -> impl Strategy<Value = EllipticCylinder> {
     })
 }
 
-/// The hidden share of a segment along y behind or in a post of radius 1 and half length 1, seen from x =
+/// The hidden interval of a segment along y, behind or in a post of radius 1 and half length 1, seen from x =
 /// 2.
 #[test]
 fn a_post_hides_the_tangents_chord() {
@@ -130,7 +130,7 @@ fn a_post_hides_the_tangents_chord() {
         let (start, end) = (DVec3::new(x, -10.0, z), DVec3::new(x, 10.0, z));
         hidden_interval(start, end, &post, camera).map(|(t0, t1)| (20.0 * t0 - 10.0, 20.0 * t1 - 10.0))
     };
-    // Behind: the tangent planes make 30 degrees with the line of sight.
+    // Behind: the tangent planes make an angle of 30 degrees with the line of sight.
     let (y0, y1) = hidden(-1.0, 0.0).unwrap();
     let expected = 3.0 / 3.0_f64.sqrt();
     assert!((y0 + expected).abs() < 1e-7 && (y1 - expected).abs() < 1e-7);
@@ -140,11 +140,11 @@ fn a_post_hides_the_tangents_chord() {
     // In front, and beside the camera.
     assert_eq!(hidden(1.5, 0.0), None);
     assert_eq!(hidden(3.0, 0.0), None);
-    // Four times as far as the near side, the shadow ends at z = 4; from the far side at z = 4/3.
+    // Four times as far as the near side: the shadow ends at z = 4; from the far side it ends at z = 4/3.
     assert_eq!(hidden(-2.0, 4.1), None);
     assert!(hidden(-2.0, 3.9).is_some());
-    // Above the near side's shadow only the rim bounds what is hidden: (s y)² + (2 - 4 s)² = 1 with s =
-    // 1/z.
+    // Above the shadow of the near side only the end ellipse bounds the hidden set: (s y)² + (2 - 4 s)² = 1
+    // with s = 1/z.
     let (y0, y1) = hidden(-2.0, 3.0).unwrap();
     let expected = 3.0 * (1.0 - (2.0 - 4.0 / 3.0_f64).powi(2)).sqrt();
     assert!((y0 + expected).abs() < 1e-6 && (y1 - expected).abs() < 1e-6, "{y0} {y1} {expected}");
@@ -177,8 +177,8 @@ fn a_segment_through_the_camera_is_hidden_on_one_side_only() {
     let (t0, t1) = along(DVec3::new(-2.0, 0.0, 0.0)).unwrap();
     assert!((t0 - 0.625).abs() < 1e-8 && t1 == 1.0);
     assert_eq!(along(DVec3::new(2.0, 3.0, 0.0)), None);
-    // Half of it behind the camera, passing beside it: hidden on the post's side, from the tangent plane
-    // on.
+    // Half of the segment is behind the camera and passes beside it: it is hidden on the side of the post,
+    // from the tangent plane on.
     let (start, end) = (DVec3::new(-4.0, 0.0, 0.0), DVec3::new(8.0, 1e-3, 0.0));
     let (t0, t1) = hidden_interval(start, end, &post, camera).unwrap();
     assert!(t0 == 0.0 && t1 > 0.25 && t1 < 0.5, "{t1}");
@@ -202,7 +202,7 @@ fn contact_does_not_hide() {
     let post = upright(1.0, 0.5, 1.0);
     let raised =
         |z: f64| EllipticCylinder { world_from_cylinder: DAffine3::from_translation(DVec3::Z * z), ..post };
-    // In a row, touching or overlapping: the common outline stays visible.
+    // In a row, touching or overlapping: the common contour stays visible.
     for step in [2.0, 1.5] {
         let length: f64 =
             visible(&[raised(step), post], camera).iter().map(|s| (s.end - s.start).length()).sum();
@@ -226,7 +226,7 @@ fn one_part_shows_both_lines_and_a_hidden_part_none() {
     assert!(lines[0].start.y < 0.0 && lines[1].start.y > 0.0 && lines[0].start.z < lines[0].end.z);
     let lines = visible(&[small, upright(1.0, 1.0, 1.0)], camera);
     assert!(lines.len() == 2 && lines.iter().all(|s| s.part == 1));
-    // A part inside another is hidden, one that sticks out shows the rest.
+    // A part inside another part is hidden; a part that sticks out is visible outside.
     let inner = upright(0.3, 0.3, 2.0);
     let lines = visible(&[inner, upright(1.0, 1.0, 1.0)], camera);
     assert_eq!(lines.iter().filter(|s| s.part == 0).count(), 4);
@@ -245,7 +245,7 @@ fn nothing_is_visible_from_inside_and_a_flat_part_is_ignored() {
     assert!(visible(&[], camera).is_empty());
 }
 
-/// A camera in the plane of an end, to rounding: the cone over that end is flat.
+/// A camera in the plane of an end, up to rounding: the cone over that end is flat.
 #[test]
 fn from_the_plane_of_an_end_the_other_end_and_the_side_hide() {
     let post = upright(0.5, 1.0, 0.5);
@@ -278,7 +278,7 @@ fn memory_kept_between_views_changes_nothing() {
     }
 }
 
-/// No point of a visible chord of an end ellipse is hidden by another part or behind its own.
+/// No point of a visible chord of an end ellipse is hidden by another part or by its own.
 #[test]
 fn visible_end_ellipses_are_hidden_by_nothing() {
     let options = VisibilityOptions { rims: true, rim_chords: 64 };
@@ -290,7 +290,7 @@ fn visible_end_ellipses_are_hidden_by_nothing() {
         assert!(out.iter().filter(is_rim).count() > 200);
         for segment in out.iter().filter(is_rim) {
             let point = segment.start.lerp(segment.end, 0.5);
-            // A chord lies inside its own ellipse by up to 0.13 % of the semi-axis.
+            // A chord lies inside its ellipse by up to 0.13 % of the semi-axis.
             assert!(bodies.iter().enumerate().all(|(part, k)| {
                 !is_hidden(point, &scaled(k, if part == segment.part { 0.995 } else { 1.0 - 1e-9 }), camera)
             }));
@@ -298,7 +298,7 @@ fn visible_end_ellipses_are_hidden_by_nothing() {
     }
 }
 
-/// On every contour of a walker, the visible length is that of the points no other part hides.
+/// On every contour of a walker, the visible length is that of the points that no other part hides.
 #[test]
 fn walker_agrees_with_samples() {
     for (swing, camera) in viewpoints().iter().enumerate().map(|(i, c)| (0.1 * i as f64 - 0.6, c)) {
@@ -339,7 +339,7 @@ proptest! {
         check_against_samples(p, q, &upright(0.5, 1.0, 0.5), camera);
     }
 
-    /// The visible pieces are what the hidden intervals of all other parts leave, each part taken alone.
+    /// The visible pieces are the complement of the hidden intervals of all other parts, each computed alone.
     #[test]
     fn visible_pieces_are_what_no_part_hides(
         bodies in proptest::collection::vec(cylinder().prop_map(|k| scaled(&k, 0.5)), 1..9),

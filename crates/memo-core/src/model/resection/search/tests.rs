@@ -4,10 +4,10 @@ use crate::posture::head::{HeadModel, HeadPoint};
 use crate::synth::Random;
 use proptest::prelude::*;
 
-/// 480 px/m at 4 m, the scale at which the keypoints of a walker were examined.
+/// 480 px/m at 4 m, the scale at which the keypoints of a walker were measured.
 const FOCAL_PX: f64 = 1920.0;
 
-/// A head turned by the angle from facing the camera, its centroid `depth_m` away.
+/// A head rotated by the angle from facing the camera; its centroid is `depth_m` away.
 fn turned(turn_rad: f64, nod_rad: f64, depth_m: f64) -> (DMat3, DVec3) {
     let facing = DMat3::from_cols(DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X);
     let rotation = facing * DMat3::from_rotation_y(turn_rad) * DMat3::from_rotation_z(nod_rad);
@@ -41,7 +41,7 @@ fn with_sd(image_sd: f64) -> ResectionOptions {
     ResectionOptions { image_sd: Some(image_sd), ..ResectionOptions::default() }
 }
 
-/// OpenCV 5: solvePnP (SQPNP), then solvePnPRefineLM, on pixels undistorted to the last digit.
+/// OpenCV 5: solvePnP (SQPNP), then solvePnPRefineLM, on pixels undistorted to full precision.
 #[test]
 fn the_pose_in_an_image_is_that_of_opencv() {
     let camera = Camera {
@@ -130,7 +130,7 @@ fn covariance_is_what_noise_does() {
     assert!((chi_squared - 6.0).abs() < 0.6, "{chi_squared}");
 }
 
-/// With the focal length free, at a noise that leaves it known to 3 %.
+/// With the focal length free, at a noise with which it is known to 3 %.
 #[test]
 fn covariance_holds_with_a_free_focal_length() {
     let points = HeadModel::lee_chen().points_m;
@@ -154,8 +154,9 @@ fn covariance_holds_with_a_free_focal_length() {
     }
 }
 
-/// At 4 m and 480 px/m a pixel of noise makes the neck's depth uncertain by 4.6 to 7.1 cm and the facing
-/// wrong by 1.3 to 3 degrees in the median; three pixels, three times that. Found first by other code.
+/// At 4 m and 480 px/m, one pixel of noise makes the depth of the neck uncertain by 4.6 to 7.1 cm and the
+/// facing direction wrong by 1.3 to 3 degrees in the median; three pixels, three times that. First measured
+/// with independent code.
 #[test]
 fn what_a_head_tells_at_four_metres() {
     let points = HeadModel::lee_chen().points_m;
@@ -189,7 +190,8 @@ fn what_a_head_tells_at_four_metres() {
     }
 }
 
-/// A flat face far away has two poses; the probabilities say how often the first is the true one.
+/// A flat face far away has two poses; the probabilities are the frequencies with which the first is the true
+/// one.
 #[test]
 fn probabilities_of_two_poses_are_those_of_being_right() {
     let points =
@@ -218,7 +220,7 @@ fn probabilities_of_two_poses_are_those_of_being_right() {
     assert!(promised < 0.95 * ambiguous, "no test of probabilities near one");
 }
 
-/// Why the linear solution is not for images: 1 px of noise, 4 m, seen from the front.
+/// Why the linear solution is unsuitable for images: 1 px of noise, 4 m, seen from the front.
 #[test]
 fn the_linear_solution_breaks_where_least_squares_hold() {
     let points = HeadModel::lee_chen().points_m;
@@ -301,9 +303,9 @@ fn the_24_rotations_are_all_different_rotations() {
     }
 }
 
-/// A pose and points in it: 4 to 8 of any shape down to a ten-thousandth of flatness, or with a `gap` four of
-/// which two are so far apart. `log_depth` of the figure's half width. `None` where a point is too close to
-/// the camera or all are nearly on a line.
+/// A pose and points in it: 4 to 8 points of any shape with a flatness down to a ten-thousandth, or with a
+/// `gap` four points, two of which are that far apart. `log_depth` is log10 of the depth in half widths of the
+/// figure. `None` where a point is too close to the camera or all points are nearly on a line.
 fn planted(random: &mut Random, gap: Option<f64>, log_depth: f64) -> Option<(Vec<DVec3>, DMat3, DVec3)> {
     let count = if gap.is_some() { 4 } else { random.uniform(4.0, 9.0) as usize };
     let cube = |random: &mut Random| DVec3::from_array(std::array::from_fn(|_| random.uniform(-1.0, 1.0)));
@@ -321,8 +323,8 @@ fn planted(random: &mut Random, gap: Option<f64>, log_depth: f64) -> Option<(Vec
     (is_in_front && shape_of_ratio(&points) > 0.1).then_some((points, rotation, translation))
 }
 
-/// Of the family of the property test, of four points of which two are a tenth to a thousandth of the half
-/// width apart, and of the first family from as far as a thousand half widths away; 100,000 draws of each with
+/// Draws of the property test below, of four points of which two are a tenth to a thousandth of the half
+/// width apart, and of the first kind from as far as a thousand half widths away; 100,000 draws of each with
 /// `MEMO_FULL=1`.
 #[test]
 fn no_planted_pose_is_missed() {
@@ -375,7 +377,7 @@ fn unit_vectors() -> impl Strategy<Value = DVec3> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Any shape, down to a ten-thousandth of flatness, any rotation, from close by to far away.
+    /// Any shape with a flatness down to a ten-thousandth, any rotation, from close up to far away.
     #[test]
     fn a_planted_pose_is_among_the_poses(
         shape in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 4..9),
