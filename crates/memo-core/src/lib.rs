@@ -1,11 +1,11 @@
 //! 3D human motion from one fixed camera by explicit geometry.
 //!
-//! No training, no drawing, no files of results: frames, keypoints or tracks of dots go in, positions, postures
-//! and limbs with their uncertainty come out, and every stage in between can be called alone.
+//! No training, no drawing, no result files. The inputs are frames, keypoints or tracks of dots. The outputs are
+//! positions, postures and limbs with their uncertainty. Every stage in between can be called alone.
 //!
 //! # A walker through frames
 //!
-//! Frames are borrowed grey values. Here they are drawn; from a camera they are
+//! Frames are borrowed grey values. This example draws them; frames of a camera are
 //! [`image::Frame::new`]`(&bytes, width, height, stride)`.
 //!
 //! ```
@@ -31,14 +31,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `tracker.current()` is what is known while frames still come; [`track::result::TrackedWalk::events`] and
-//! [`gait_parameters`](track::result::TrackedWalk::gait_parameters) are what a finished walk says.
+//! `tracker.current()` is the filtered estimate while frames are still coming.
+//! [`track::result::TrackedWalk::events`] and [`gait_parameters`](track::result::TrackedWalk::gait_parameters)
+//! are the gait events and gait parameters of a finished walk.
 //!
 //! # Postures from keypoints
 //!
-//! Image points of joints, a camera, lengths or a height: [`posture::sequence::postures`] gives every posture
-//! they allow and the likeliest motion. [`keypoints::Detector`] makes the fourteen joints of the points
-//! of a detector, and [`model::Camera::from_file`] reads the camera.
+//! The inputs are image points of joints, a camera, and segment lengths or a body height.
+//! [`posture::sequence::postures`] returns every posture they allow and the most probable motion.
+//! [`keypoints::Detector`] converts the points of a detector to the fourteen joints, and
+//! [`model::Camera::from_file`] reads the camera.
 //!
 //! ```
 //! use memo_core::glam::DVec2;
@@ -98,17 +100,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # The other ways in
+//! # Other entry points
 //!
-//! * A camera that nobody calibrated: [`calibrate`], from measured points or from a person who walks.
+//! * A camera that is not calibrated: [`calibrate`], from measured points or from a walking person.
 //! * A stage alone: [`image`] from pixels to edges, [`model`] from a phase to visible contours, [`track::score`]
-//!   where the two meet.
+//!   for the similarity of the two.
 //!
 //! # Errors, threads, versions
 //!
-//! Bad input is a typed error with the offending values, one enum a concept, which may grow. Every type is
-//! [`Send`] and [`Sync`]. Points and matrices of the interface are those of [`glam`] and [`nalgebra`], which are
-//! re-exported in the versions used here.
+//! Bad input is a typed error that holds the offending values. There is one error enum per concept; each may get
+//! more variants. Every type is [`Send`] and [`Sync`]. Points and matrices of the interface are types of [`glam`]
+//! and [`nalgebra`], which are re-exported in the versions used here.
 //!
 //! # Conventions
 //!
@@ -118,7 +120,7 @@
 //! * Body: x forward, y to the body's left, z up; origin at the centre of the torso.
 //! * Heading: angle of the body's forward axis about world Z, 0 along world X.
 //! * Gait phase in [0, 1), 0 = right heel strike; the left side is at phase + 0.5.
-//! * Angles in radians inside, flexion positive; files say `_deg` where they hold degrees.
+//! * Angles are in radians, flexion positive; names in files end in `_deg` where the values are degrees.
 
 pub use {glam, nalgebra};
 
@@ -156,7 +158,7 @@ pub use track::tracker::{TrackError, Tracker};
 
 #[cfg(test)]
 mod tests {
-    /// Compiles only while all of it may go to another thread.
+    /// Compiles only if all these types may be sent to another thread.
     #[test]
     fn what_people_hold_is_send_and_sync() {
         fn sent_and_shared<T: Send + Sync + 'static>() {}

@@ -1,8 +1,8 @@
-//! How far a long call is, for whoever waits for it, and the wish that it stop.
+//! Progress and cancellation of long calls.
 //!
-//! The caller keeps one [`Progress`], hands it to a call whose name ends in `_with_progress`, and looks at it
-//! from another thread. Work is counted in units of about the same length, such as frames; the count changes
-//! no result.
+//! The caller keeps one [`Progress`], passes it to a call whose name ends in `_with_progress`, and reads it from
+//! another thread. Work is counted in units of about the same duration, such as frames. The count does not change
+//! the result.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use thiserror::Error;
@@ -12,7 +12,7 @@ use thiserror::Error;
 #[error("stopped before the end")]
 pub struct Stopped;
 
-/// Units of work done and to do, and whether to go on.
+/// Units of work done, units in all, and whether the call is cancelled.
 #[derive(Debug, Default)]
 pub struct Progress {
     done: AtomicUsize,
@@ -21,32 +21,32 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Nothing done and nothing to do.
+    /// No unit done, total not known, not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks the call to end with [`Stopped`] as soon as it can.
+    /// Cancels the call: it returns [`Stopped`] as soon as it can.
     pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::Relaxed);
     }
 
-    /// Units done.
+    /// Number of units done.
     pub fn done(&self) -> usize {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Units in all; 0 before the call knows.
+    /// Number of units in all; 0 while it is not known.
     pub fn total(&self) -> usize {
         self.total.load(Ordering::Relaxed)
     }
 
-    /// Says how many units there are in all.
+    /// Sets the number of units in all.
     pub(crate) fn expect(&self, total: usize) {
         self.total.store(total, Ordering::Relaxed);
     }
 
-    /// Counts units as done, unless the call is to end.
+    /// Counts units as done; [`Stopped`] if the call is cancelled.
     pub(crate) fn advance(&self, units: usize) -> Result<(), Stopped> {
         self.done.fetch_add(units, Ordering::Relaxed);
         if self.is_stopped.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }

@@ -1,4 +1,4 @@
-//! All traffic with numpy.
+//! Conversions between numpy arrays and core types.
 
 use crate::error::value_error;
 use glam::DVec2;
@@ -11,20 +11,19 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-/// An 8-bit grey frame of shape (H, W): numpy's own memory where it is contiguous, a copy where it has other
-/// strides.
+/// An 8-bit grey frame of shape (H, W): the memory of numpy if its rows are contiguous, a copy for other strides.
 ///
-/// Keep it alive while the interpreter lock is released. As with numpy's own functions, a thread that writes
-/// into the array meanwhile makes the result depend on when it does.
+/// Keep it alive while the interpreter lock is released. If another thread writes into the array in that time, the
+/// result depends on when it writes, as for numpy's own functions.
 pub enum FrameArray<'py> {
-    /// Rows follow one another in memory.
+    /// Rows are contiguous in memory.
     Borrowed(PyReadonlyArray2<'py, u8>),
-    /// Turned, cropped or padded.
+    /// Transposed, cropped or padded arrays.
     Copied(Image<u8>),
 }
 
 impl FrameArray<'_> {
-    /// The frame, to be read without the interpreter lock.
+    /// The frame; it can be read without the interpreter lock.
     pub fn as_frame(&self) -> PyResult<Frame<'_>> {
         match self {
             Self::Borrowed(array) => {
@@ -35,7 +34,7 @@ impl FrameArray<'_> {
         }
     }
 
-    /// The frame in memory of its own, for another thread.
+    /// The frame in its own memory, for another thread.
     pub fn into_image(self) -> PyResult<Image<u8>> {
         match self {
             Self::Borrowed(array) => {
@@ -47,7 +46,7 @@ impl FrameArray<'_> {
     }
 }
 
-/// Takes an array of shape (H, W), dtype uint8, with any strides.
+/// Reads a frame: an array of shape (H, W), dtype uint8, with any strides.
 pub fn frame_from_numpy<'py>(frame: &Bound<'py, PyAny>) -> PyResult<FrameArray<'py>> {
     let wanted = "wanted a grey frame: numpy array of shape (H, W), dtype uint8";
     let Ok(array) = frame.cast::<PyUntypedArray>() else {
@@ -74,7 +73,7 @@ pub fn frame_from_numpy<'py>(frame: &Bound<'py, PyAny>) -> PyResult<FrameArray<'
     Image::from_vec(width, height, pixels).map(FrameArray::Copied).map_err(value_error)
 }
 
-/// What came: shape and dtype of an array, the type of anything else.
+/// Description of the object for messages: shape and dtype of an array, the type of anything else.
 fn describe(object: &Bound<'_, PyAny>) -> PyResult<String> {
     match object.cast::<PyUntypedArray>() {
         Ok(array) => Ok(format!("shape {:?}, dtype {}", array.shape(), array.dtype())),
@@ -82,7 +81,7 @@ fn describe(object: &Bound<'_, PyAny>) -> PyResult<String> {
     }
 }
 
-/// A boolean mask of shape (H, W).
+/// Reads a boolean mask of shape (H, W).
 pub fn mask_from_numpy(mask: &Bound<'_, PyAny>) -> PyResult<Mask> {
     let Ok(array) = mask.cast::<PyArray2<bool>>() else {
         let wanted = "wanted a mask: numpy array of shape (H, W), dtype bool";
@@ -128,17 +127,17 @@ pub fn numpy_from_column<T: numpy::Element>(py: Python<'_>, column: Vec<T>) -> B
     column.into_pyarray(py)
 }
 
-/// Points (N, 3): an array of any number type, or a sequence of triples.
+/// Reads points (N, 3): an array of any number type, or a sequence of triples.
 pub fn points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
     numbers_from_numpy(points, "points")
 }
 
-/// Pixels (N, 2): an array of any number type, or a sequence of pairs.
+/// Reads pixels (N, 2): an array of any number type, or a sequence of pairs.
 pub fn pixels_from_numpy(pixels: &Bound<'_, PyAny>) -> PyResult<Vec<DVec2>> {
     Ok(numbers_from_numpy(pixels, "pixels")?.into_iter().map(DVec2::from_array).collect())
 }
 
-/// What numpy makes of the object, as rows of N numbers.
+/// Rows of N numbers from any object that numpy converts.
 fn numbers_from_numpy<const N: usize>(object: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<[f64; N]>> {
     let wanted = format!("wanted {what}: numpy array of shape (N, {N})");
     let (rows, shape) = vectors_from_numpy(object, &wanted)?;
@@ -183,7 +182,7 @@ pub fn numpy_of_shape<const N: usize>(
     rows.flatten().collect::<Vec<f64>>().into_pyarray(py).reshape(shape)
 }
 
-/// Line segments of shape (N, 2, 2).
+/// Reads line segments of shape (N, 2, 2).
 pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2]; 2]>> {
     let wanted = "wanted segments: numpy array of shape (N, 2, 2), dtype float64";
     let Ok(array) = segments.cast::<PyArray3<f64>>() else {
@@ -198,7 +197,7 @@ pub fn segments_from_numpy(segments: &Bound<'_, PyAny>) -> PyResult<Vec<[[f32; 2
     Ok((0..view.dim().0).map(|s| [0, 1].map(|e| [at(s, e, 0), at(s, e, 1)])).collect())
 }
 
-/// Points over time of shape (T, K, D): the flat values with T and K.
+/// Reads points over time of shape (T, K, D): the flat values with T and K.
 pub fn motion_from_numpy<const D: usize>(
     points: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<[f64; D]>, usize, usize)> {
@@ -220,7 +219,7 @@ pub fn motion_from_numpy<const D: usize>(
     ))
 }
 
-/// Image vectors of shape (N, `each`, 2) in numpy's own memory, which must be contiguous.
+/// Reads image vectors of shape (N, `each`, 2) from numpy's own memory, which must be contiguous.
 pub fn rows_from_numpy<'py>(points: &Bound<'py, PyAny>, each: usize) -> PyResult<PyReadonlyArray3<'py, f64>> {
     let wanted =
         format!("wanted image vectors: contiguous numpy array of shape (N, {each}, 2), dtype float64");
@@ -244,13 +243,13 @@ pub fn numpy_from_flat<T: numpy::Element>(
 pub struct Track {
     /// Number of frames T.
     pub frames: usize,
-    /// Number of points in a frame K.
+    /// Number of points per frame K.
     pub joints: usize,
-    /// Frame after frame, T * K points in pixels, NaN where missing.
+    /// T * K points in pixels, frame by frame, NaN for missing points.
     pub points_px: Vec<DVec2>,
 }
 
-/// Image points of shape (T, K, 2).
+/// Reads image points of shape (T, K, 2).
 pub fn track_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Track> {
     let wanted = "wanted image points: numpy array of shape (T, K, 2), dtype float64";
     let Ok(array) = points.cast::<PyArray3<f64>>() else {
@@ -266,7 +265,7 @@ pub fn track_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Track> {
     Ok(Track { frames, joints, points_px })
 }
 
-/// Scores of shape (T, K) that belong to a track.
+/// Reads scores of shape (T, K) for a track.
 pub fn scores_from_numpy(scores: &Bound<'_, PyAny>, track: &Track) -> PyResult<Vec<f64>> {
     let (frames, joints) = (track.frames, track.joints);
     let wanted = format!("wanted scores: numpy array of shape ({frames}, {joints}), dtype float64");
@@ -281,7 +280,7 @@ pub fn scores_from_numpy(scores: &Bound<'_, PyAny>, track: &Track) -> PyResult<V
     Ok(view.iter().copied().collect())
 }
 
-/// Image points, frame after frame, as an array of shape (T, joints, 2).
+/// Image points, frame by frame, as an array of shape (T, joints, 2).
 pub fn numpy_from_track(
     py: Python<'_>,
     points_px: Vec<DVec2>,
@@ -296,7 +295,7 @@ pub fn numpy_from_track(
         .reshape([frames, joints, 2])
 }
 
-/// Times of shape (T,), s.
+/// Reads times of shape (T,), s.
 pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let wanted = "wanted times: numpy array of shape (T,), dtype float64";
     let Ok(array) = times.cast::<PyArray1<f64>>() else {
@@ -305,7 +304,7 @@ pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.try_readonly()?.as_array().iter().copied().collect())
 }
 
-/// The six points of the head over time, of shape (T, 6, 2).
+/// Reads the six points of the head over time, shape (T, 6, 2).
 pub fn head_points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[DVec2; 6]>> {
     let track = track_from_numpy(points)?;
     if track.joints != 6 {

@@ -1,4 +1,4 @@
-//! Cameras from measured points and from a walker.
+//! Calibration from measured points and from a walker.
 
 use crate::array::{
     motion_from_numpy, numpy_from_column, numpy_from_rows, pixels_from_numpy, points_from_numpy,
@@ -16,7 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The camera that shows places (N, 3), metres, at pixels (N, 2).
+/// The camera that projects points (N, 3), metres, to pixels (N, 2).
 #[pyfunction]
 #[pyo3(signature = (places, pixels, size, *, focal_px=None, lens=None))]
 pub fn calibrate_points<'py>(
@@ -46,8 +46,9 @@ pub fn calibrate_points<'py>(
     Ok(dict)
 }
 
-/// The camera that sees a person of `height_m` with feet (N, 2) and head (N, 2), pixels in the order of time; the
-/// shares (N,) are the heights of the two points above the ground, 0 and 1 if they are soles and crown.
+/// The camera that sees a person of `height_m` with feet (N, 2) and heads (N, 2), pixels in order of time. The
+/// shares (N,) are the heights of the two points above the ground, relative to the body height: 0 and 1 for soles
+/// and crown.
 #[pyfunction]
 #[pyo3(signature = (feet, heads, size, height_m, *, foot_share=None, head_share=None, focal_px=None, lens=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -94,8 +95,8 @@ pub fn calibrate_walker<'py>(
     Ok(dict)
 }
 
-/// Where joints (T, K, 2) over time show a person from head to feet: feet (N, 2), heads (N, 2), and the heights of
-/// both as shares of the person's, (N,) each.
+/// Feet and heads of a person from joints over time (T, K, 2): feet (N, 2), heads (N, 2), and the heights of both
+/// as shares of the body height, (N,) each.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "four arrays")]
 pub fn walker_sightings<'py>(
@@ -143,7 +144,7 @@ fn known_lens(focal_px: Option<f64>, lens: Option<PyCamera>) -> PyResult<KnownLe
     }
 }
 
-/// (value, standard deviation) by name.
+/// A dict of (value, standard deviation) by name.
 fn estimates<'py>(py: Python<'py>, estimates: &[Estimate]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for estimate in estimates {

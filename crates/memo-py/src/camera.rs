@@ -19,13 +19,13 @@ use pyo3::types::PyDict;
 #[derive(Clone, PartialEq)]
 pub struct PyCamera(pub Camera);
 
-/// All that a camera is, to the last bit, for pickling: size, (fx, fy), (cx, cy), lens with its coefficients, the rotation
-/// column by column, translation.
+/// All parameters of a camera, to the last bit, for pickling: size, (fx, fy), (cx, cy), lens with its
+/// coefficients, the rotation column by column, translation.
 type Parameters = ((u32, u32), (f64, f64), (f64, f64), (String, Vec<f64>), Vec<f64>, (f64, f64, f64));
 
 const POINTS: &str = "wanted points: numpy array of shape (..., 3)";
 
-/// The camera of `Camera.__reduce__`.
+/// The camera from the parameters of `Camera.__reduce__`.
 #[pyfunction(name = "_camera")]
 pub fn camera_of_parameters(
     size: (u32, u32),
@@ -140,11 +140,12 @@ impl PyCamera {
         camera.map(Self).map_err(|error| PyValueError::new_err(format!("{}: {error}", path.display())))
     }
 
-    /// Reads a calibration: TOML (Pose2Sim, anipose), YAML, JSON or XML (OpenCV, ROS), XML of Tsai's parameters, or a
-    /// table of DLT coefficients. `name` chooses one of several cameras; `unit` of lengths is "m", "cm" or "mm";
-    /// `size` of the picture where the file has none; `v_up` says whether v of DLT coefficients grows upwards.
+    /// Reads a calibration: TOML (Pose2Sim, anipose), YAML, JSON or XML (OpenCV, ROS), XML with Tsai's
+    /// parameters, or a table of DLT coefficients. `name` chooses one of several cameras. `unit` of lengths is
+    /// "m", "cm" or "mm". `size` is the image size if the file does not give it. `v_up` tells whether v of DLT
+    /// coefficients increases upward.
     #[staticmethod]
-    /// With `lens_only` a file needs no rotation and translation, and those of the answer mean nothing.
+    /// With `lens_only` the file needs no rotation and translation; those of the result are not valid.
     #[pyo3(signature = (path, name=None, unit=None, *, size=None, v_up=None, lens_only=false))]
     fn from_file(
         path: std::path::PathBuf,
@@ -170,7 +171,7 @@ impl PyCamera {
         })
     }
 
-    /// Writes the camera as a section `[name]` of a TOML file, as Pose2Sim and anipose do.
+    /// Writes the camera as a section `[name]` of a TOML file, in the format of Pose2Sim and anipose.
     #[pyo3(signature = (path, name="cam"))]
     fn to_toml(&self, py: Python<'_>, path: std::path::PathBuf, name: &str) -> PyResult<()> {
         let text = self.0.to_toml_string(name).map_err(value_error)?;
@@ -178,13 +179,13 @@ impl PyCamera {
         Ok(())
     }
 
-    /// Distance in pixels between a point (x, y, z) and that `height_m` above it, without distortion; NaN if the
-    /// camera cannot see both.
+    /// Distance in pixels between a point (x, y, z) and the point `height_m` above it, without distortion; NaN if
+    /// the camera does not see both.
     fn pixel_height(&self, point: (f64, f64, f64), height_m: f64) -> f64 {
         self.0.pixel_height_at(DVec3::from(point), height_m).unwrap_or(f64::NAN)
     }
 
-    /// From Tsai's parameters, lengths in mm, angles in radians.
+    /// A camera from Tsai's parameters, lengths in mm, angles in radians.
     #[staticmethod]
     #[pyo3(signature = (*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad))]
     #[allow(clippy::too_many_arguments, reason = "Tsai's model has this many parameters")]
@@ -211,8 +212,8 @@ impl PyCamera {
         Camera::from_tsai(&tsai).map(Self).map_err(value_error)
     }
 
-    /// A level camera without distortion, looking along world Y, the origin on the ground `distance_m` before
-    /// it.
+    /// A level camera without distortion that looks along world Y. The origin is on the ground, `distance_m` in
+    /// front of it.
     #[staticmethod]
     fn level(size: (u32, u32), fov_deg: f64, camera_height_m: f64, distance_m: f64) -> PyResult<Self> {
         Camera::level(size.into(), fov_deg.to_radians(), camera_height_m, distance_m)
@@ -220,7 +221,7 @@ impl PyCamera {
             .map_err(value_error)
     }
 
-    /// From what `parameters` gives.
+    /// A camera from the result of `parameters`.
     #[staticmethod]
     pub fn from_parameters(parameters: &Bound<'_, PyDict>) -> PyResult<Self> {
         let matrix: [[f64; 3]; 3] = parameter(parameters, "matrix")?;
@@ -239,15 +240,15 @@ impl PyCamera {
         camera.validated().map(Self).map_err(value_error)
     }
 
-    /// The camera of the same pictures with `n` by `n` pixels averaged to one, as `VideoReader` with `shrink=n`
-    /// gives them.
+    /// The camera for the same images with `n` by `n` pixels averaged to one, as in `VideoReader` with
+    /// `shrink=n`.
     fn shrunk(&self, n: u32) -> PyResult<Self> {
         self.0.shrunk(n).map(Self).map_err(value_error)
     }
 
-    /// As a section of a Pose2Sim TOML file holds them: `size`, `matrix`, `distortions` (k1, k2, p1, p2, k3),
-    /// `rotation` (axis times angle), `translation` (metres). Of Tsai's lens the distortions are those nearest over
-    /// the picture, zeros where none are, and `tsai_kappa` is the number itself.
+    /// The parameters as in a section of a Pose2Sim TOML file: `size`, `matrix`, `distortions` (k1, k2, p1, p2,
+    /// k3), `rotation` (axis times angle), `translation` (metres). For Tsai's lens `distortions` is the best
+    /// approximation over the image, or zeros if there is none, and `tsai_kappa` is the exact coefficient.
     pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let Camera { size, focal_px: f, centre_px: c, distortion, translation, .. } = &self.0;
         let dict = PyDict::new(py);
@@ -268,13 +269,13 @@ impl PyCamera {
         self.0.size.into()
     }
 
-    /// The centre of projection in the world, metres.
+    /// The centre of projection in world axes, metres.
     #[getter]
     fn position(&self) -> (f64, f64, f64) {
         self.0.position().into()
     }
 
-    /// Pixels (..., 2) of world points (..., 3), metres; NaN for points the camera cannot see.
+    /// Pixels (N, 2) of world points (N, 3); NaN for points the camera does not see.
     fn project<'py>(
         &self,
         py: Python<'py>,
@@ -285,7 +286,7 @@ impl PyCamera {
         numpy_of_shape(py, points.into_iter().map(pixel), shape)
     }
 
-    /// World points (..., 3), metres, in the camera's axes: x right, y down, z forward.
+    /// World points (N, 3) in the camera's axes, metres: x right, y down, z forward.
     fn camera_from_world<'py>(
         &self,
         py: Python<'py>,
@@ -296,8 +297,8 @@ impl PyCamera {
         numpy_of_shape(py, points.into_iter().map(in_camera), shape)
     }
 
-    /// Where the rays of pixels (..., 2) meet the plane `z_m` metres above the ground, (..., 3), metres; NaN where
-    /// they do not.
+    /// Points (N, 3) at which the rays of pixels (N, 2) meet the plane `z_m` metres above the ground; NaN for
+    /// rays that do not meet it.
     #[pyo3(signature = (pixels, z_m=0.0))]
     fn ground_points<'py>(
         &self,
@@ -313,8 +314,8 @@ impl PyCamera {
         numpy_of_shape(py, pixels.into_iter().map(point), shape)
     }
 
-    /// Where a person of known height stands, (x, y, z) in metres, from the rectangle around them: eq. (6).
-    /// Depth hangs on the rectangle's height; the ground is not used, so z tells how well camera, height and
+    /// Position (x, y, z), metres, of a person of known height from the bounding rectangle: eq. (6). Depth
+    /// depends on the rectangle's height. The ground is not used, so z shows how well camera, height and
     /// rectangle agree.
     fn position_from_rectangle(
         &self,
@@ -325,7 +326,7 @@ impl PyCamera {
         self.standing_point(position_from_rectangle, bottom_px, top_px, height_m)
     }
 
-    /// As `position_from_rectangle`, by least squares with the soles on the ground z = 0.
+    /// As `position_from_rectangle`, but by least squares with the soles on the ground z = 0.
     fn position_on_ground(
         &self,
         bottom_px: (f64, f64),
@@ -394,7 +395,7 @@ fn parameter<'py, T: FromPyObjectOwned<'py>>(parameters: &Bound<'py, PyDict>, ke
     })
 }
 
-/// A way from the midpoints of a rectangle to a standing place.
+/// A function that computes a position from the midpoints of a rectangle.
 type PositionFn = fn(&Camera, &Midpoints, f64, &PositionOptions) -> Result<FootPosition, PositionError>;
 
 impl PyCamera {

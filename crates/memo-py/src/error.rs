@@ -1,4 +1,4 @@
-//! All exceptions: every error of the core is a `ValueError` with the core's message, a panic an `InternalError`.
+//! Exceptions: every error of the core is a `ValueError` with the core's message, a panic is an `InternalError`.
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::panic::PanicException;
@@ -9,8 +9,8 @@ pub fn value_error(error: impl std::error::Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Makes an ordinary exception, `memo.InternalError`, of what PyO3 raises for a panic in any binding: an exception of
-/// its own that `except Exception` does not catch.
+/// Converts panics in any binding to an ordinary exception, `memo.InternalError`. PyO3 raises an exception that
+/// `except Exception` does not catch.
 pub fn add_internal_error(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     let panic = py.get_type::<PanicException>();

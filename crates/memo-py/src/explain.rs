@@ -1,4 +1,5 @@
-//! A finished walk from its record: frames looked at again as the tracker did (`Explainer`), contours drawn again.
+//! A finished walk from its record: frames compared with the model again as in tracking (`Explainer`), and
+//! contours.
 
 use crate::array::{
     frame_from_numpy, numpy_from_column, numpy_from_image, numpy_from_rows, numpy_from_segments,
@@ -24,7 +25,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::{HashMap, HashSet};
 
-/// What is needed beside the video to look at a walk's frames again, as plain numbers.
+/// The record of a walk, as plain numbers: with the video, it is enough to compare the walk's frames again.
 pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk) -> PyResult<Bound<'py, PyDict>> {
     let steps = walk.steps();
     let deviation =
@@ -48,7 +49,7 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk) -> PyResult<Bound<'py
     Ok(dict)
 }
 
-/// A walk as its record tells it.
+/// A walk read from its record.
 struct Recorded {
     camera: Camera,
     walker: Walker,
@@ -56,7 +57,7 @@ struct Recorded {
     looks: HashMap<usize, Look>,
 }
 
-/// Most heights a grid can have: the tracker's own has eleven.
+/// Maximum number of heights of a grid; the tracker's own has eleven.
 const MOST_HEIGHTS: usize = 1000;
 
 impl Recorded {
@@ -81,8 +82,8 @@ impl Recorded {
     }
 }
 
-/// Visible contours of a recorded walk, as `Walk.contours` gives them, where rows of a table have the centre of the
-/// torso, (N, 3) metres, and the gait phase, (N,); a row that has them not has no contours. `tracker` has the
+/// Visible contours of a recorded walk, as returned by `Walk.contours`. The rows of a table have the centre of
+/// the torso, (N, 3) metres, and the gait phase, (N,); a row without them has no contours. `tracker` has the
 /// options of the run.
 #[pyfunction]
 pub fn recorded_contours<'py>(
@@ -110,7 +111,7 @@ pub fn recorded_contours<'py>(
     torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
 }
 
-/// The options a tracker works with.
+/// The options of a tracker.
 fn options_of(tracker: &Bound<'_, PyTracker>) -> PyResult<TrackerOptions> {
     tracker.get().read(tracker.py(), |tracker| tracker.options().clone())
 }
@@ -188,7 +189,7 @@ fn refused(key: &str, why: String) -> PyErr {
     PyValueError::new_err(format!("record of a walk: {key}: {why}"))
 }
 
-/// Frames in, the wanted ones explained, one frame later.
+/// Explains selected frames of a stream, one frame late.
 #[pyclass(name = "Explainer", module = "memo._memo")]
 pub struct PyExplainer {
     options: TrackerOptions,
@@ -199,8 +200,8 @@ pub struct PyExplainer {
 
 #[pymethods]
 impl PyExplainer {
-    /// From a tracker with the options of the run, the records of its walks, and the frames wanted, counted from
-    /// the first given.
+    /// `tracker` has the options of the run. `records` are those of its walks. `wanted` are the frames to explain,
+    /// counted from the first frame given.
     #[new]
     fn new(
         tracker: &Bound<'_, PyTracker>,
@@ -213,8 +214,8 @@ impl PyExplainer {
         Ok(Self { options, walks, wanted, stream })
     }
 
-    /// Takes the next frame, (H, W) uint8, and its time in seconds; gives the frame before, if it is wanted and
-    /// in a walk.
+    /// Adds the next frame, (H, W) uint8, and its time in seconds. Returns the explanation of the frame before,
+    /// if it was requested and is part of a walk.
     fn update<'py>(
         &mut self,
         py: Python<'py>,
@@ -230,7 +231,7 @@ impl PyExplainer {
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }
 
-    /// Gives the last frame.
+    /// Returns the explanation of the last frame.
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(stream) = self.stream.take() else { return Ok(None) };
         let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
@@ -289,7 +290,7 @@ fn dict_of<'py>(
     Ok(dict)
 }
 
-/// The model's lines in image pixels with what answers each.
+/// Adds the model's lines in image pixels with the edge matched with each.
 fn set_model(dict: &Bound<'_, PyDict>, why: &Explanation, camera: &Camera) -> PyResult<()> {
     let py = dict.py();
     let count = why.lines.len();

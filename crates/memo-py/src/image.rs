@@ -1,4 +1,4 @@
-//! Image evidence: changes, background, edges, velocities.
+//! Image evidence: changed pixels, background, edges, velocities.
 
 use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
 use crate::error::value_error;
@@ -12,7 +12,7 @@ use memo_core::image::{
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-/// Pixels that changed between two frames (eq. 1); `threshold` in grey levels, by default from the noise.
+/// Mask of pixels that changed between two frames (eq. 1); `threshold` in grey levels, by default from the noise.
 #[pyfunction]
 #[pyo3(signature = (a, b, threshold=None))]
 pub fn change_mask<'py>(
@@ -29,8 +29,8 @@ pub fn change_mask<'py>(
     numpy_from_image(py, mask)
 }
 
-/// Candidate regions of a change mask after the binary operations: (n, 5) of left, top, right, bottom
-/// (inclusive) and area, largest first.
+/// Candidate regions of a change mask after the binary operations: (n, 5) of left, top, right, bottom (inclusive)
+/// and area, largest first.
 #[pyfunction]
 pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mask = mask_from_numpy(mask)?;
@@ -44,8 +44,8 @@ pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResul
     numpy_from_rows(py, found.iter().map(row).collect())
 }
 
-/// Silhouettes of what moves before a static background, for a clip of frames (T, H, W): eq. (1) against the
-/// temporal median, cut to the pixels that differ by `threshold` grey levels.
+/// Silhouettes of moving regions for a static camera, for a clip of frames (T, H, W): eq. (1) against the
+/// temporal median, restricted to pixels that differ from it by `threshold` grey levels.
 #[pyfunction]
 #[pyo3(signature = (frames, threshold=25.0))]
 pub fn silhouettes<'py>(
@@ -90,8 +90,8 @@ pub fn edge_segments<'py>(
 /// The components of a velocity field, (H, W) each.
 type Velocities<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
 
-/// Velocity (u, v) of the pixels of a region from one frame to the next, two (H, W) arrays of pixels per
-/// frame, NaN where nothing is known.
+/// Velocity (u, v) of the pixels of a region from one frame to the next: two (H, W) arrays in pixels per frame,
+/// NaN where it is not known.
 #[pyfunction]
 pub fn velocity_field<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Points of keypoint detectors: their names and orders, and the joints of the stick figure from them.
+//! Keypoint detectors: names and orders of their points, and the joints of the stick figure.
 
 use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
 use crate::error::value_error;
@@ -15,23 +15,23 @@ pub fn keypoint_layouts() -> Vec<&'static str> {
     LAYOUTS.iter().map(|layout| layout.name).collect()
 }
 
-/// The joints of a layout in order.
+/// The name of a layout and its joints in order.
 #[pyfunction]
 pub fn keypoint_layout(name: &str) -> PyResult<(&'static str, Vec<&'static str>)> {
     let layout = Layout::by_name(name).map_err(value_error)?;
     Ok((layout.name, layout.joints.to_vec()))
 }
 
-/// The layout that points (T, K, 2) are in, by their number and, where two have as many, by whether neck and
-/// middle of the hips lie where one of them has them.
+/// The layout of points (T, K, 2), from their number. If several layouts have this number, the positions of neck
+/// and middle of the hips decide.
 #[pyfunction]
 pub fn guess_layout(points: &Bound<'_, PyAny>) -> PyResult<&'static str> {
     let track = track_from_numpy(points)?;
     Layout::from_points(track.joints, &track.points_px).map(|layout| layout.name).map_err(value_error)
 }
 
-/// The name here of a joint that is spelt in any known way; None for what is like no known name. A near miss is
-/// an error.
+/// The standard name of a joint in any known spelling; `None` if the name is unlike all known names. A name that
+/// is nearly a known one is an error.
 #[pyfunction]
 pub fn joint_name(name: &str) -> PyResult<Option<&'static str>> {
     match core_joint_name(name) {
@@ -41,7 +41,7 @@ pub fn joint_name(name: &str) -> PyResult<Option<&'static str>> {
     }
 }
 
-/// A layout's name, or the names of the points one by one.
+/// A layout's name, or the names of the points.
 #[derive(FromPyObject)]
 pub enum LayoutOrNames {
     /// The name of a layout.
@@ -63,8 +63,8 @@ impl LayoutOrNames {
 /// Points (T, N, 2) and weights (T, N).
 type PointsAndWeights<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// The 14 joints of the stick figure, neck to left ankle, from points (T, K, 2) and scores (T, K); NaN and
-/// weight 0 where a source is missing.
+/// The 14 joints of the stick figure, neck to left ankle, from points (T, K, 2) and scores (T, K): points (T, 14,
+/// 2) and weights (T, 14). NaN and weight 0 if a source point is missing.
 #[pyfunction]
 pub fn stick_joints<'py>(
     py: Python<'py>,
@@ -75,7 +75,7 @@ pub fn stick_joints<'py>(
     collect(py, &layout_or_names, points, scores, Detector::stick_joints)
 }
 
-/// The 6 head points neck, nose, right eye, left eye, right ear, left ear, as `stick_joints`.
+/// The 6 head points neck, nose, right eye, left eye, right ear, left ear; formats as in `stick_joints`.
 #[pyfunction]
 pub fn head_points<'py>(
     py: Python<'py>,
@@ -109,7 +109,7 @@ fn collect<'py, const N: usize>(
     Ok((numpy_from_track(py, points, N)?, weights))
 }
 
-/// Pairs of right and left points: (group "legs", "arms" or "head", part, place of the right, of the left).
+/// Pairs of right and left points: (group "legs", "arms" or "head", part, index of the right, index of the left).
 #[pyfunction]
 pub fn side_pairs(
     layout_or_names: LayoutOrNames,
@@ -118,7 +118,7 @@ pub fn side_pairs(
     Ok(pairs.into_iter().map(|pair| (pair.group.name(), pair.part, pair.right, pair.left)).collect())
 }
 
-/// Marks the most prominent person among all people: frames (N), in order, points (N, K, 2), scores (N, K).
+/// True for detections of the most prominent person: frames (N,) in order, points (N, K, 2), scores (N, K).
 #[pyfunction]
 pub fn follow_person(
     py: Python<'_>,

@@ -1,4 +1,5 @@
-//! Python bindings of memo-core: convert, release the interpreter lock, one call, convert back.
+//! Python bindings of memo-core. Each converts its arguments, releases the interpreter lock, makes one call and
+//! converts the result.
 
 mod array;
 mod calibrate;

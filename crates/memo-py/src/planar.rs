@@ -16,8 +16,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::sync::Arc;
 
-/// z1, z2, z3 of N rods from three views each (N, 3, 2), image vectors from pivot to end; NaN where there is
-/// none.
+/// Depths z1, z2, z3 (N, 3) of N rods from three views each: image vectors (N, 3, 2) from pivot to end. NaN for
+/// rods without a solution.
 #[pyfunction]
 pub fn planar_rods<'py>(py: Python<'py>, views: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let views = rows_from_numpy(views, 3)?;
@@ -28,8 +28,8 @@ pub fn planar_rods<'py>(py: Python<'py>, views: &Bound<'py, PyAny>) -> PyResult<
     numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 3])
 }
 
-/// Depths of N hinges from two views each (N, 4, 2): image vectors from the pivot to the first end in both
-/// views, then to the second. (N, 4) in the same order; NaN where there is none.
+/// Depths (N, 4) of N hinges from two views each: image vectors (N, 4, 2) from the pivot to the first end in both
+/// views, then to the second; depths in the same order. NaN for hinges without a solution.
 #[pyfunction]
 pub fn planar_hinges<'py>(
     py: Python<'py>,
@@ -43,15 +43,15 @@ pub fn planar_hinges<'py>(
     numpy_from_flat(py, depths.into_flattened(), vec![problems.len(), 4])
 }
 
-/// Reads unnamed tracks (T, K, 2), NaN for unseen, as a linkage of limbs in planar motion.
+/// Finds a linkage of limbs in planar motion in unnamed tracks (T, K, 2), NaN for points not seen.
 ///
-/// `names`: those of the points where they are joints (`RKN` or `right_knee`), so that joint limits tell
-/// limbs from their mirrors. `scales` (T,): scale of each frame, divided out. `focal_px`: focal length in
-/// pixels. `progress` is called with the windows done and their number.
+/// `names`: names of the points that are joints (`RKN` or `right_knee`); joint limits then distinguish limbs from
+/// their mirror images. `scales` (T,): scale of each frame, by which its points are divided. `focal_px`: focal
+/// length in pixels. `progress` is called with the number of windows done and the number of all windows.
 ///
-/// Returns windows (a list of dicts), depth (T, K) against the first point of each chain with NaN where
-/// unknown, sources (T,) of "planar", "carried", "unknown", and perspective_px: by how much perspective moves
-/// a point at most, None without `focal_px`.
+/// Returns windows (a list of dicts); depth (T, K) relative to the first point of each chain, NaN if unknown;
+/// sources (T,) of "planar", "carried" or "unknown"; and perspective_px, the largest displacement of a point by
+/// perspective, None without `focal_px`.
 #[pyfunction]
 #[pyo3(signature = (
     tracks, times_s, noise_px=0.0, *, window_s=1.2, size_px=None, carry=false, false_target_rate=0.01,

@@ -14,7 +14,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The model of the body walking through the origin: positions (T, 13, 3) in metres, times_s, names, cycle_s.
+/// Motion of the body model walking through the origin: positions (T, 13, 3) in metres, times_s, names, cycle_s.
 #[pyfunction]
 #[pyo3(signature = (frames=60, *, rate_hz=60.0, speed_mps=1.3, heading_deg=0.0, phase=0.0, height_m=1.75))]
 pub fn walker_motion<'py>(
@@ -39,10 +39,10 @@ pub fn walker_motion<'py>(
     Ok(result)
 }
 
-/// A point-light display of points over time (T, K, 3), world metres, Z up, NaN for unknown.
+/// A point-light display of points over time (T, K, 3), world metres, Z up, NaN if unknown.
 ///
-/// Returns times_s (T,), positions_px (T, N, 2) with NaN where a dot is not visible, visible (T, N), labels
-/// (T, N): index of the point shown, or of a limb's first end, -1 for noise; limb_ends (T, N): index of the
+/// Returns times_s (T,); positions_px (T, N, 2), NaN for dots that are not visible; visible (T, N); labels (T,
+/// N), the index of the point shown or of a limb's first end, -1 for noise; limb_ends (T, N), the index of the
 /// limb's second end or -1; fractions (T, N) along the limb.
 #[pyfunction]
 #[pyo3(signature = (

@@ -1,7 +1,7 @@
-//! The threads of this process that the core computes with.
+//! Thread pool of this process.
 //!
-//! A child made by `fork` has a copy of its parent's memory but none of its threads: what waits for them waits for
-//! ever. Rayon's global pool is made once, so the core never runs on it from here; it runs on a pool that knows its
+//! A child made by `fork` has a copy of its parent's memory but none of its threads, so waiting for them never
+//! ends. Rayon's global pool is made only once. So the core does not use it from here, but a pool that knows its
 //! process.
 
 use pyo3::exceptions::PyRuntimeError;
@@ -9,14 +9,15 @@ use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Mutex, PoisonError};
 
-/// The pool and the process whose threads it has. A parent's pool is leaked in the child: its threads are not there
-/// to be joined.
+/// The pool and the process that has its threads. In a forked child the parent's pool is leaked, because its
+/// threads do not exist there and cannot be joined.
 ///
-/// Locked only by a thread that is attached to the interpreter and does not detach meanwhile. Python forks on such a
-/// thread too, so no child finds it locked.
+/// Locked only by a thread that is attached to the interpreter and does not detach in that time. Python forks on
+/// such a thread too, so no child finds it locked.
 static POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
 
-/// A thread that waits for a part of its work takes up that of other calls, on top of its own. Unused, it costs nothing.
+/// A thread that waits for a part of its work runs work of other calls on the same stack. An unused stack costs
+/// nothing.
 const STACK_BYTES: usize = 16 << 20;
 
 /// The pool of this process; `RAYON_NUM_THREADS` sets its size.
@@ -39,7 +40,7 @@ fn build() -> PyResult<ThreadPool> {
         .stack_size(STACK_BYTES)
         .build()
         .map_err(|error| PyRuntimeError::new_err(format!("no threads to compute with: {error}")))?;
-    // What the threads initialise once for the whole process is done before anybody can fork.
+    // Runs the threads' one-time initialisation of the process before any fork.
     pool.broadcast(|_| ());
     Ok(pool)
 }

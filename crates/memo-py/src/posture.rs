@@ -23,17 +23,18 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
 
-/// One distance for all frames, or one a frame.
+/// One distance for all frames, or one per frame.
 #[derive(FromPyObject)]
 pub enum Distances {
-    /// The same for all.
+    /// The same for all frames.
     One(f64),
-    /// One each.
+    /// One per frame.
     Each(Vec<f64>),
 }
 
-/// Postures of one person: times (T,) s, points (T, 14, 2) px of the stick figure's joints with NaN where
-/// missing, weights (T, 14). World axes in metres, Z up. `progress` is called with the work done and in all.
+/// Postures of one person: times (T,) s, points (T, 14, 2) px of the stick figure's joints with NaN if missing,
+/// weights (T, 14). Results in world axes, metres, Z up. `progress` is called with the work done and the work in
+/// all.
 #[pyfunction]
 #[pyo3(signature = (
     times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=2.0, rules="walking",
@@ -96,9 +97,9 @@ pub fn posture<'py>(
     dict_from_postures(py, found)
 }
 
-/// All postures that one view allows: rays (14, 3), unit vectors in camera axes with NaN where a joint is not
-/// seen, and the neck's place (3,) in metres. The surviving postures (N, 14, 3), camera axes, in the order of
-/// the walk. The trunk says where up and forward is.
+/// All postures that one view allows. `rays` (14, 3) are unit vectors in camera axes with NaN for joints that are
+/// not seen; the neck's position (3,) is in metres. Returns the surviving postures (N, 14, 3), camera axes,
+/// metres, in depth-first order. Upward and forward directions are those of the trunk.
 #[pyfunction]
 #[pyo3(signature = (rays, neck, lengths, *, rules="physical", strength="measured", noise_rad=0.0))]
 pub fn posture_tree<'py>(
@@ -131,7 +132,7 @@ fn named<T>(what: &str, name: &str, of: impl Fn(&str) -> Option<T>, all: &[&str]
     of(name).ok_or_else(|| PyValueError::new_err(format!("wanted {what} as one of {all:?}; got {name:?}")))
 }
 
-/// All 17 lengths by their names.
+/// All 17 lengths from their names.
 fn lengths_from_names(named: HashMap<String, f64>) -> PyResult<SegmentLengths> {
     let mut lengths = SegmentLengths::lee_chen();
     let names: Vec<String> = lengths.named().map(|(name, _)| name).collect();
@@ -212,7 +213,7 @@ fn set_neck(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()> {
     dict.set_item("anchor_conflicts", conflicts)
 }
 
-/// What each frame alone allows.
+/// Adds the results of each frame alone.
 fn set_frames(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()> {
     let py = dict.py();
     let levels = |of: fn(&LevelCount) -> u32| -> PyResult<Bound<'_, PyArray2<i64>>> {

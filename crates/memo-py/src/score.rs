@@ -6,8 +6,8 @@ use memo_core::track::score::{EdgeLine, ModelLine, SimilarityOptions, similarity
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-/// Similarity (eqs. 7 and 11) of model lines (N, 2, 2) and edges (M, 2, 2) in pixels: the value, and per
-/// answered line a row of line, edge, overlap l, distance d, angle (radians), s_i.
+/// Similarity (eqs. 7 and 11) of model lines (N, 2, 2) and edges (M, 2, 2) in pixels: the value, and for each
+/// matched line a row of line, edge, overlap l, distance d, angle (radians), s_i.
 #[pyfunction]
 #[pyo3(signature = (
     lines, edges, *, c_l=SimilarityOptions::DEFAULT.c_l, c_d=SimilarityOptions::DEFAULT.c_d,

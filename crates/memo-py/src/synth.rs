@@ -11,7 +11,7 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-/// Half a day at 25 frames per second.
+/// Maximum number of frames: half a day at 25 frames per second.
 const MOST_FRAMES: usize = 1_000_000;
 
 /// Centre of the torso, phase, and joints (2, 6, 3) or joint angles.
@@ -37,13 +37,13 @@ fn joints_array(py: Python<'_>, sides: [SideJoints; 2]) -> PyResult<Bound<'_, Py
     numpy::PyArray1::from_vec(py, joints).reshape([2, 6, 3])
 }
 
-/// Right hip, knee, shoulder, elbow, then left, degrees.
+/// Angles of right hip, knee, shoulder, elbow, then left, degrees.
 fn angles_deg(sides: [SideAngles; 2]) -> [f64; 8] {
     let [[a, b, c, d], [e, f, g, h]] = sides.map(|s| [s.hip, s.knee, s.shoulder, s.elbow]);
     [a, b, c, d, e, f, g, h].map(f64::to_degrees)
 }
 
-/// A person in clothes who walks through a room, whose body and gait are not the model's.
+/// A clothed person who walks through a room; body and gait differ from the model's.
 #[pyclass(name = "ClothedScene", module = "memo._memo", frozen)]
 pub struct PyClothedScene(ClothedScene);
 
@@ -98,8 +98,8 @@ impl PyClothedScene {
         self.0.time_s(index)
     }
 
-    /// The truth of a frame: torso centre (x, y, z), phase, the 12 joints as (2, 6, 3) in the order right then
-    /// left shoulder, elbow, wrist, hip, knee, ankle, and the eight joint angles, degrees; None unless somebody walks.
+    /// The true state in a frame: torso centre (x, y, z), phase, the 12 joints (2, 6, 3) in the order right then
+    /// left shoulder, elbow, wrist, hip, knee, ankle, and the eight joint angles, degrees. None if nobody walks.
     #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
     fn truth<'py>(
         &self,
@@ -128,13 +128,13 @@ impl PyClothedScene {
         self.0.height_m
     }
 
-    /// Mean speed, metres a second.
+    /// Mean speed, m/s.
     #[getter]
     fn speed_mps(&self) -> f64 {
         self.0.speed_mps
     }
 
-    /// Direction faced, radians.
+    /// Direction the body faces, radians about world Z.
     #[getter]
     fn heading_rad(&self) -> f64 {
         self.0.heading_rad
@@ -145,7 +145,7 @@ impl PyClothedScene {
     }
 }
 
-/// The model as a walker before a wall with everything known; frames are drawn when asked for.
+/// A synthetic walker in front of a wall with known parameters; frames are drawn on request.
 #[pyclass(name = "Scene", module = "memo._memo", frozen)]
 pub struct PyScene(SynthScene);
 
@@ -179,8 +179,8 @@ impl PyScene {
         self.0.time_s(index)
     }
 
-    /// The truth of a frame: torso centre (x, y, z), phase, the 12 joints (12, 3) in the order right then
-    /// left shoulder, elbow, wrist, hip, knee, ankle; None before the walker is there.
+    /// The true state in a frame: torso centre (x, y, z), phase, the 12 joints (12, 3) in the order right then
+    /// left shoulder, elbow, wrist, hip, knee, ankle. None before the walker appears.
     #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
     fn truth<'py>(
         &self,
@@ -192,7 +192,7 @@ impl PyScene {
         Ok(Some((truth.posed.torso_centre.into(), truth.hypothesis.phase, joints)))
     }
 
-    /// Joint angles of a phase, degrees: right hip, knee, shoulder, elbow, then left.
+    /// Joint angles at a phase, degrees: right hip, knee, shoulder, elbow, then left.
     fn angles_deg(&self, phase: f64) -> [f64; 8] {
         let p = self.0.walker.gait.posture(phase, &self.0.walker.style);
         angles_deg([p.right, p.left])
@@ -210,13 +210,13 @@ impl PyScene {
         self.0.walker.body.height_m
     }
 
-    /// Speed of the walker, metres a second.
+    /// Speed of the walker, m/s.
     #[getter]
     fn speed_mps(&self) -> f64 {
         self.0.speed_mps
     }
 
-    /// Direction faced, radians.
+    /// Direction the body faces, radians about world Z.
     #[getter]
     fn heading_rad(&self) -> f64 {
         self.0.path.heading_rad

@@ -1,4 +1,4 @@
-//! `Tracker` and the walks it finds.
+//! `Tracker` and its walks.
 
 use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
 use crate::camera::PyCamera;
@@ -25,28 +25,28 @@ use pyo3::types::PyDict;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Tracks one walker at a time through a stream of grey frames; memory does not grow with the stream.
+/// Tracks one walker at a time in a stream of grey frames; memory does not grow with the length of the stream.
 ///
-/// An interrupted call keeps running in the background: the frame is taken, and the next call waits for it.
+/// An interrupted call keeps running in the background: its frame is processed, and the next call waits for it.
 #[pyclass(name = "Tracker", module = "memo._memo", frozen)]
 pub struct PyTracker(Arc<Shared>);
 
-/// A tracker that calls take turns with.
+/// A tracker shared by calls, one at a time.
 struct Shared {
-    /// Not there while a call works with it. No call waits for it on a thread of the pool, which may be the one that
-    /// works with it.
+    /// `None` while a call uses it. No call waits for it on a thread of the pool, because that thread may be the
+    /// one that uses it.
     tracker: Mutex<Option<Box<Tracker>>>,
-    /// It is there again.
+    /// Notifies that the tracker is back.
     returned: Condvar,
-    /// Calls under way, in the lower half; the process they run in, in the upper.
+    /// The number of current calls in the lower half, and their process in the upper half.
     calls: AtomicU64,
 }
 
-/// A call under way, waiting or at work.
+/// A call that waits or runs.
 struct Call(Arc<Shared>);
 
 impl Call {
-    /// A child forked during a call of its parent would wait for that call for ever, so it is refused.
+    /// A child forked during a call of its parent would wait for that call forever, so it gets an error.
     fn enter(shared: &Arc<Shared>) -> PyResult<Self> {
         let process = u64::from(std::process::id()) << 32;
         let counted = |calls: u64| {
@@ -61,7 +61,7 @@ impl Call {
         }
     }
 
-    /// Takes the tracker once other calls have returned it.
+    /// Takes the tracker when other calls have returned it.
     fn taken(self, py: Python<'_>) -> PyResult<Taken> {
         loop {
             let taken = py.detach(|| {
@@ -86,7 +86,7 @@ impl Drop for Call {
     }
 }
 
-/// A tracker that is returned when this is dropped.
+/// A tracker that is returned on drop.
 struct Taken {
     tracker: Option<Box<Tracker>>,
     call: Call,
@@ -106,12 +106,12 @@ impl Drop for Taken {
 }
 
 impl PyTracker {
-    /// Looks at the tracker, once no interrupted call is under way any more.
+    /// Reads the tracker when no interrupted call is running.
     pub fn read<T>(&self, py: Python<'_>, look: impl FnOnce(&mut Tracker) -> T) -> PyResult<T> {
         Ok(Call::enter(&self.0)?.taken(py)?.with(look))
     }
 
-    /// Calls the tracker on the threads of this process.
+    /// Runs a call of the tracker on the threads of this process.
     fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -173,23 +173,23 @@ impl PyTracker {
         Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
     }
 
-    /// Takes the next frame, (H, W) uint8, and its time in seconds.
+    /// Adds the next frame, (H, W) uint8, and its time in seconds.
     fn update(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
         let image = frame_from_numpy(frame)?.into_image()?;
         self.call(py, move |tracker| tracker.update(&image.as_frame(), time_s))?.map_err(value_error)
     }
 
-    /// Ends the stream.
+    /// Ends the stream: processes the last frame and ends the current walk.
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         self.call(py, Tracker::finish)?.map_err(value_error)
     }
 
-    /// The walks that have ended since this was last asked.
+    /// The walks that have ended since the last call.
     fn take_finished(&self, py: Python<'_>) -> PyResult<Vec<PyWalk>> {
         Ok(self.read(py, Tracker::take_finished)?.into_iter().map(PyWalk::new).collect())
     }
 
-    /// Filtered state of the walk under way: a dict of time, position, phase, speed and `p_swapped`, or None.
+    /// Filtered state of the current walk: a dict of time, position, phase, speed and `p_swapped`, or None.
     fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(now) = self.read(py, |tracker| tracker.current())? else { return Ok(None) };
         let dict = PyDict::new(py);
@@ -205,7 +205,7 @@ impl PyTracker {
         Ok(Some(dict))
     }
 
-    /// What happened while nobody was followed: numbers of frames.
+    /// Counts over the whole stream; if nobody was followed, they show why.
     fn seek_report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let report = self.read(py, |tracker| tracker.seek_report())?;
         let dict = PyDict::new(py);
@@ -221,7 +221,7 @@ fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
     PyValueError::new_err(format!("{name} must be {wanted}, got {got:?}"))
 }
 
-/// One walk that has ended.
+/// A finished walk.
 #[pyclass(name = "Walk", module = "memo._memo", frozen)]
 pub struct PyWalk {
     pub(crate) walk: TrackedWalk,
@@ -242,7 +242,7 @@ impl PyWalk {
 /// Segments (n, 2, 2) and the body part of each (n,).
 pub type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
 
-/// Visible pieces in image pixels; those the camera does not see are left out.
+/// Visible pieces of contours in image pixels; pieces the camera does not see are omitted.
 pub fn segments_with_parts<'py>(
     py: Python<'py>,
     visible: &[VisibleSegment],
@@ -255,7 +255,7 @@ pub fn segments_with_parts<'py>(
 
 #[pymethods]
 impl PyWalk {
-    /// The columns of `track.csv`, an array each.
+    /// The columns of `track.csv`, one array per column.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let frames: Vec<i64> = self.rows.iter().map(|row| row.frame as i64).collect();
@@ -292,7 +292,7 @@ impl PyWalk {
         Ok(dict)
     }
 
-    /// Gait parameters: (parameter, side, value, unit, low, high, n); side "" for both, NaN where unknown.
+    /// Gait parameters: (parameter, side, value, unit, low, high, n); side "" for both, NaN if unknown.
     #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
     fn gait_parameters(&self) -> Vec<(&'static str, &'static str, f64, &'static str, f64, f64, usize)> {
         let line = |p: GaitParameter| {
@@ -303,7 +303,7 @@ impl PyWalk {
         self.walk.gait_parameters().into_iter().map(line).collect()
     }
 
-    /// What is needed beside the video to look at the frames again, as plain numbers: see `Explainer`.
+    /// The record of the walk, as plain numbers: see `Explainer`.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         record_of(py, &self.walk)
     }
@@ -313,8 +313,8 @@ impl PyWalk {
         self.walk.events().into_iter().map(|e| (e.time_s, e.frame, e.kind.name(), e.side.name())).collect()
     }
 
-    /// Best measured hypotheses per frame, (rows, 3): x or place along the path in world x, z in metres,
-    /// phase; NaN where none.
+    /// Best measured hypotheses per frame, (rows, 3): world x of the position along the path and z in metres,
+    /// phase; NaN for frames without a measurement.
     fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let path = &self.walk.walk.path;
         let row = |measured: &Option<Hypothesis>| match measured {
@@ -327,7 +327,7 @@ impl PyWalk {
         numpy_from_rows(py, self.walk.steps().iter().map(|step| row(&step.measured)).collect())
     }
 
-    /// Visible contours of a row's model in image pixels, (segments, 2, 2), and the body part of each
+    /// Visible contours of the model in a row, in image pixels: (segments, 2, 2), and the body part of each
     /// segment.
     fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
         let Some(row) = self.rows.get(row) else {
@@ -341,8 +341,8 @@ impl PyWalk {
         )
     }
 
-    /// The starting phase: frames, best phase of each, similarity (frames, phases), and what the two rules
-    /// chose.
+    /// The starting phase: frames, best phase of each, similarity (frames, phases), and the lines chosen by the
+    /// two rules.
     fn start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let start = &self.walk.start;
         let dict = PyDict::new(py);
@@ -363,7 +363,7 @@ impl PyWalk {
         Ok(dict)
     }
 
-    /// The camera given or guessed.
+    /// The camera, given or assumed.
     #[getter]
     fn camera(&self) -> PyCamera {
         PyCamera(self.walk.camera.clone())
@@ -378,7 +378,7 @@ impl PyWalk {
         }
     }
 
-    /// Probability that the person walks the other way round.
+    /// Probability that the person walks in the other direction.
     #[getter]
     fn p_other_direction(&self) -> f64 {
         self.walk.start.p_other_direction
@@ -391,8 +391,7 @@ impl PyWalk {
     }
 
     /// Fitted deviation from the average: hip and knee (radians), shoulder and hip height (fractions of body
-    /// height), relative gain of similarity, and whether it was believed and used; None where no fit was
-    /// made.
+    /// height), relative gain of similarity, and whether the fit was accepted and used. None if no fit was made.
     #[getter]
     fn deviation(&self) -> Option<(f64, f64, f64, f64, f64, bool)> {
         self.walk.person_fit.map(|fit| {

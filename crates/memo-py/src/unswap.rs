@@ -1,4 +1,4 @@
-//! Repair of exchanged left and right labels.
+//! Correction of swapped left and right labels.
 
 use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track_from_numpy};
 use crate::error::value_error;
@@ -11,9 +11,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 
-/// Undoes exchanges of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN where
-/// missing, scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk
-/// outwards. Returns, per limb, arrays over frames and `p_global`, the probability that most labels are right.
+/// Corrects swaps of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN if missing,
+/// scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk outwards.
+/// Returns, per limb, arrays over frames and `p_global`, the probability that most labels are right.
 #[pyfunction]
 #[pyo3(signature = (
     times_s, points, scores=None, *, groups, as_is_nats=None, partial_begin_nats=None,
@@ -58,7 +58,7 @@ pub fn unswap<'py>(
     dict_from_unswapped(py, found, &groups)
 }
 
-/// Limbs in the order given.
+/// Limbs in the given order.
 fn groups_from_dict(groups: &Bound<'_, PyDict>) -> PyResult<Vec<LimbGroup>> {
     let wanted = "wanted groups as {limb: {level: [(left, right), ...]}}";
     let bad = |got: &Bound<'_, PyAny>| {

@@ -1,5 +1,5 @@
-//! Running the core without the interpreter lock: on the threads of this process, with Ctrl-C heard and progress
-//! reported.
+//! Runs the core without the interpreter lock, on the threads of this process. Ctrl-C interrupts it, and progress
+//! is reported.
 
 use crate::pool::pool;
 use memo_core::progress::Progress;
@@ -13,17 +13,17 @@ use std::time::Duration;
 /// Signals are checked this often.
 pub const LOOK: Duration = Duration::from_millis(50);
 
-/// Work to be done on another thread.
+/// Work for another thread.
 type Job = Box<dyn FnOnce() + Send>;
 
-/// Runs what is short and may use several threads. What does not use them needs `Python::detach` alone.
+/// Runs short work that may use several threads. Work on one thread needs only `Python::detach`.
 pub fn pooled<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = pool(py)?;
     Ok(py.detach(|| pool.install(work)))
 }
 
-/// Runs what may last longer than a moment and does not use several threads. After Ctrl-C it keeps running in the
-/// background; its result is discarded.
+/// Runs longer work that does not use several threads. After Ctrl-C it keeps running detached, and its result is
+/// discarded.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -32,8 +32,9 @@ pub fn interruptible<T: Send + 'static>(
     awaited(py, None, start, |_| work())
 }
 
-/// Runs what may last for seconds and may use several threads, and calls `callback` with the units done and their
-/// number as they change. After Ctrl-C, or when the callback raises, the work is cancelled; it ends in the background.
+/// Runs work that may take seconds and may use several threads, and calls `callback` with the units done and
+/// their number when they change. After Ctrl-C, or if the callback raises, the work is cancelled and ends in the
+/// background.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
@@ -47,7 +48,7 @@ pub fn watched<T: Send + 'static>(
     awaited(py, callback, start, work)
 }
 
-/// Panics as a bug in the core would, in one of the ways in which bindings call it; for tests.
+/// Panics like a bug in the core, in one of the ways in which bindings call it; for tests.
 #[pyfunction(name = "_panic")]
 pub fn panic_on_purpose(py: Python<'_>, message: String, way: &str) -> PyResult<()> {
     match way {
@@ -69,7 +70,7 @@ fn awaited<T: Send + 'static>(
     let progress = Arc::new(Progress::new());
     let (sender, mut receiver) = channel();
     let of_worker = Arc::clone(&progress);
-    // Nobody listens any more after an interrupt: sending may fail.
+    // After an interrupt there is no receiver, so sending may fail.
     let job = move || drop(sender.send(catch_unwind(AssertUnwindSafe(|| work(&of_worker)))));
     start(Box::new(job))?;
     let mut told = 0;
@@ -87,8 +88,8 @@ fn awaited<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 let heard = py.check_signals().and_then(|()| tell(callback, &progress, &mut told));
                 if std::process::id() != process {
-                    // Forked by the callback or a signal handler. The thread that computes is the parent's, and
-                    // dropping the receiver might wait for it.
+                    // The callback or a signal handler has forked this process. The computing thread is the
+                    // parent's, and dropping the receiver might wait for it.
                     std::mem::forget(receiver);
                     heard?;
                     let message = "the process was forked during this call: the parent has its result";

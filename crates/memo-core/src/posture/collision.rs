@@ -1,13 +1,13 @@
-//! Parts of the body cannot be in one place (Lee and Chen 1985, section 3.2 C: arms and torso, arms and legs;
-//! here also leg and leg).
+//! Collisions: two body parts cannot be in one place (Lee and Chen 1985, section 3.2 C: arms and torso, arms and
+//! legs; here also leg and leg).
 //!
-//! Limbs are capsules about their segments, the torso is the quadrilateral of shoulders and hips, two
-//! triangles. A clearance is the distance of the two axes; where a limb passes through the torso it is
-//! negative: minus the shortest way out, over the border or by an end.
+//! Limbs are capsules about their segments. The torso is the quadrilateral of shoulders and hips, two triangles.
+//! A clearance is the distance of the two axes. If a limb passes through the torso, the clearance is minus the
+//! shortest way out, over the border or by an end.
 //!
-//! The paper gives no radii. The default ones are half of the 3 cm at which no true arm and leg of four walks,
-//! a jump and a bout of punching collide (the least true distance of arm and leg in walking is 10 cm);
-//! without noise no true forearm there passes the quadrilateral. Radii of flesh were not tried.
+//! The paper gives no radii. The default radii are half of 3 cm: at 3 cm no true arm and leg of four walks, a
+//! jump and a bout of punching collide (the smallest true distance of arm and leg in walking is 10 cm). Without
+//! noise, no true forearm in these data passes through the quadrilateral. Radii of flesh were not tested.
 
 use glam::DVec3;
 
@@ -15,34 +15,35 @@ use super::constraint::{Constraint, Violation};
 use super::placed::{Placed, PlacedFigure};
 use crate::model::skeleton::{Joint, PerJoint, Side};
 
-/// Radii of the parts of the body.
+/// Radii of body parts and tolerances of collisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Collisions {
     /// Radius of upper arm and forearm, metres.
     pub arm_m: f64,
     /// Radius of thigh and shank, metres.
     pub leg_m: f64,
-    /// Least clearance of arm and torso quadrilateral, metres; 0: the forearm must not pass through it.
+    /// Minimum clearance of arm and torso quadrilateral, metres; 0: the forearm must not pass through it.
     pub torso_m: f64,
-    /// The part of the upper arm next to its shoulder, a corner of the torso, that is not looked at.
+    /// Share of the upper arm next to the shoulder that is ignored, because the shoulder is a corner of the
+    /// torso.
     pub shoulder_part: f64,
-    /// Every clearance may fall short by this many standard deviations of the propagated noise.
+    /// Every clearance may be too small by this many standard deviations of the propagated noise.
     pub noise_factor: f64,
 }
 
 impl Collisions {
-    /// Stick figures whatever the noise: the forearm must not pass through the torso, arms and legs stay 3 cm
-    /// apart.
+    /// Stick figures without noise: the forearm must not pass through the torso, and arms and legs are at least 3
+    /// cm apart.
     pub fn paper() -> Self {
         Self { noise_factor: 0.0, ..Self::measured() }
     }
 
-    /// The same with room for noise.
+    /// The same with a margin for noise.
     pub fn measured() -> Self {
         Self { arm_m: 0.015, leg_m: 0.015, torso_m: 0.0, shoulder_part: 1.0 / 3.0, noise_factor: 1.5 }
     }
 
-    /// Checks one constraint; None where it holds or is no collision.
+    /// Checks one constraint; `None` if it holds or is not a collision.
     pub(crate) fn check(&self, constraint: Constraint, figure: &PlacedFigure) -> Option<Violation> {
         use Constraint as C;
         match constraint {
@@ -60,7 +61,7 @@ impl Collisions {
         }
     }
 
-    /// The segments that must not meet, by the joints they end at: one or two of a limb and one of another;
+    /// The segments that must not collide, by the joints they end at: one or two of a limb and one of another;
     /// and the sum of their radii.
     fn limbs(&self, constraint: Constraint) -> Option<([Option<Joint>; 2], Joint, f64)> {
         use Constraint as C;
@@ -77,8 +78,8 @@ impl Collisions {
         })
     }
 
-    /// Whether the rays of a view keep two parts of the body so far apart that no choice of roots can break
-    /// the constraint.
+    /// True if the rays of a view keep two body parts so far apart that no choice of roots can break the
+    /// constraint.
     pub(crate) fn is_out_of_reach(&self, constraint: Constraint, spans: &PerJoint<Span>) -> bool {
         use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
         let segment = |end: Joint| [end.start().unwrap_or(end), end].map(|joint| spans[joint]);
@@ -95,7 +96,7 @@ impl Collisions {
         }
     }
 
-    /// Standard deviation of a limb's place against the body's, metres: that of its outer end.
+    /// Standard deviation of a limb's position relative to the body's, metres: that of its outer end.
     fn spread(&self, upper: &Placed, lower: Option<&Placed>) -> f64 {
         let lower = lower.map_or(0.0, |placed| placed.sd_m);
         self.noise_factor * upper.sd_m.hypot(lower).hypot(upper.lateral_m)
@@ -135,7 +136,7 @@ impl Collisions {
     ) -> Option<Violation> {
         let violation = |a: Joint| {
             let [[a0, a1], [b0, b1]] = [a, b].map(|end| ends(figure, end));
-            // Spheres about the segments first: most pairs are far apart.
+            // Bounding spheres of the segments first: most pairs are far apart.
             let apart_sq = 0.25 * (a0 + a1 - b0 - b1).length_squared();
             let reach = radii_m + 0.5 * (figure[a].length_m + figure[b].length_m);
             if apart_sq > reach * reach {
@@ -166,7 +167,7 @@ impl Collisions {
     }
 }
 
-/// How far along its ray a joint can be.
+/// The range of distances along its ray in which a joint can be.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Span {
     pub ray: DVec3,
@@ -175,16 +176,16 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// Least and greatest component along a vector.
+    /// Smallest and largest component along a vector.
     fn along(&self, direction: DVec3) -> [f64; 2] {
         let [a, b] = [self.near_m, self.far_m].map(|k| k * self.ray.dot(direction));
         [a.min(b), a.max(b)]
     }
 }
 
-/// Whether a segment without its first part is farther than a distance from a polygon or other segment,
-/// wherever their corners are on their rays: whether they are apart along the normal of a plane through the
-/// camera and two corners.
+/// True if a segment without its first part is farther than `least_m` from a polygon or another segment, for all
+/// positions of the corners on their rays: if they are apart along the normal of a plane through the camera and
+/// two corners.
 fn apart([start, end]: &[Span; 2], part: f64, other: &[Span], least_m: f64) -> bool {
     let edges = (0..other.len()).map(|i| [&other[i], &other[(i + 1) % other.len()]]);
     std::iter::once([start, end]).chain(edges).any(|[a, b]| {
@@ -200,7 +201,7 @@ fn apart([start, end]: &[Span; 2], part: f64, other: &[Span], least_m: f64) -> b
     })
 }
 
-/// More than what rounding can do to a distance.
+/// More than the effect of rounding on a distance.
 const ROUNDING_M: f64 = 1e-9;
 
 /// The two ends of the segment that ends at a joint.
@@ -214,8 +215,8 @@ impl Default for Collisions {
     }
 }
 
-/// Distance of two segments in space (Ericson 2005, Real-Time Collision Detection, 5.1.9). Either may be a
-/// point.
+/// Distance of two segments in space, metres (Ericson 2005, Real-Time Collision Detection, 5.1.9). Either may be
+/// a point.
 pub fn segment_distance(a0: DVec3, a1: DVec3, b0: DVec3, b1: DVec3) -> f64 {
     let (u, v, r) = (a1 - a0, b1 - b0, a0 - b0);
     let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
@@ -230,7 +231,7 @@ pub fn segment_distance(a0: DVec3, a1: DVec3, b0: DVec3, b1: DVec3) -> f64 {
     (r + s * u - t * v).length()
 }
 
-/// Whether a segment lies wholly on one side of the planes of both triangles, so that it passes neither.
+/// True if a segment is on one side of the planes of both triangles, so that it crosses neither.
 fn passes_beside(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> bool {
     triangles(corners).iter().all(|[a, b, c]| {
         let normal = (b - a).cross(c - a);
@@ -242,10 +243,10 @@ fn triangles(corners: &[DVec3; 4]) -> [[DVec3; 3]; 2] {
     [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]
 }
 
-/// Clearance of a segment and a quadrilateral in space, metres: their distance, or minus the shortest way
-/// out where the segment passes through it.
+/// Clearance of a segment and a quadrilateral in space, metres: their distance, or minus the shortest way out if
+/// the segment passes through it.
 ///
-/// The quadrilateral is that of two triangles that share the diagonal from its first to its third corner.
+/// The quadrilateral consists of two triangles that share the diagonal from its first to its third corner.
 pub fn quadrilateral_clearance(corners: &[DVec3; 4], start: DVec3, end: DVec3) -> f64 {
     let border = |p: DVec3| {
         (0..4).map(|i| segment_distance(p, p, corners[i], corners[(i + 1) % 4])).fold(f64::MAX, f64::min)
@@ -260,7 +261,8 @@ pub fn quadrilateral_clearance(corners: &[DVec3; 4], start: DVec3, end: DVec3) -
     clearance
 }
 
-/// Where a segment crosses a triangle, and the shorter distance of its ends from the triangle's plane.
+/// The point at which a segment crosses a triangle, and the smaller distance of its ends from the triangle's
+/// plane.
 fn crossing([a, b, c]: &[DVec3; 3], start: DVec3, end: DVec3) -> Option<(DVec3, f64)> {
     let normal = (b - a).cross(c - a).try_normalize()?;
     let [from, to] = [start, end].map(|p| normal.dot(p - a));

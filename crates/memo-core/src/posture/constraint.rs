@@ -1,7 +1,6 @@
-//! What a posture can be refused for: every constraint by name, and the sentence that says what was wrong
-//! (Lee and Chen 1985, sections 3.2 and 3.3).
+//! Constraints on postures: names, and a message for each violation (Lee and Chen 1985, sections 3.2 and 3.3).
 //!
-//! A constraint belongs to the level of the last joint it needs; there it is tried first, and there it cuts.
+//! A constraint belongs to the level of the last joint it needs. It is evaluated at that level and cuts there.
 
 use std::fmt;
 
@@ -90,9 +89,9 @@ pub enum Constraint {
     ShankShank,
     /// Both knees flexed (rule 5).
     OneKneeFlexed,
-    /// One knee flexed, and the other leg does not stand upright (rule 5).
+    /// One knee flexed and the other leg not upright (rule 5).
     OtherLegUpright,
-    /// Arm and leg of a side both swung forward or both back (rule 2).
+    /// Arm and leg of one side both swung forward or both back (rule 2).
     ArmOpposesLeg(Side),
     /// An arm through a thigh.
     ArmThigh {
@@ -113,21 +112,21 @@ pub enum Constraint {
 /// Number of constraints.
 pub const CONSTRAINT_COUNT: usize = 80;
 
-/// What kind of knowledge a constraint expresses.
+/// Kind of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ConstraintKind {
-    /// Table 1.
+    /// A joint angle (Table 1).
     Angle,
-    /// A rigid part's distance.
+    /// A distance within a rigid part.
     Distance,
-    /// Two parts of the body in one place.
+    /// A collision of two body parts.
     Collision,
     /// A rule of a motion model.
     Rule,
 }
 
 impl ConstraintKind {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Angle => "angle",
@@ -142,8 +141,8 @@ use Constraint as C;
 use Side::{Left, Right};
 
 impl Constraint {
-    /// All constraints, in the order in which those of one level are tried: those of the trunk, of one limb,
-    /// of both arms or legs, of an arm and a leg.
+    /// All constraints, in the order in which those of one level are evaluated: of the trunk, of one limb, of
+    /// both arms or legs, of an arm and a leg.
     pub const ALL: [Self; CONSTRAINT_COUNT] = [
         C::Rigid(RigidDistance::Shoulders),
         C::Rigid(RigidDistance::RightShoulderPelvis),
@@ -227,7 +226,7 @@ impl Constraint {
         C::ArmShank { arm: Left, leg: Left },
     ];
 
-    /// The kind of knowledge.
+    /// Kind of the constraint.
     pub fn kind(self) -> ConstraintKind {
         match self {
             C::Rigid(_) => ConstraintKind::Distance,
@@ -245,8 +244,8 @@ impl Constraint {
         }
     }
 
-    /// The limb joints it needs beside those of the trunk it needs: shoulders, pelvis and hips are not named
-    /// for limbs, whose joints cannot be known without them.
+    /// The joints it needs. For limbs, shoulders, pelvis and hips are not listed: limb joints cannot be known
+    /// without them.
     pub(crate) fn joints(self) -> JointSet {
         use Joint::{LeftHip, LeftShoulder, Neck, Pelvis, RightHip, RightShoulder};
         let torso = JointSet::of(&[Neck, RightShoulder, LeftShoulder, Pelvis]);
@@ -293,12 +292,12 @@ impl Constraint {
         }
     }
 
-    /// The last of the joints it needs: the level at which it cuts.
+    /// The last of the joints it needs: the level at which it is evaluated.
     pub fn level(self) -> Joint {
         self.joints().last()
     }
 
-    /// Its name in tables, such as `left_knee_extension`.
+    /// The name in tables, such as `left_knee_extension`.
     pub fn name(self) -> String {
         let of = |side: Side, what: &str| format!("{}_{what}", side.name());
         match self {
@@ -354,7 +353,7 @@ impl Constraint {
         Self::ALL.into_iter().find(|constraint| constraint.name() == name)
     }
 
-    /// What breaks it, as one plain sentence without numbers.
+    /// A description of the violation, one sentence without numbers.
     pub fn description(self) -> String {
         let sentence = self.sentence();
         let what = sentence.trim_end_matches(" by").trim_end_matches(": clearance");
@@ -368,7 +367,7 @@ impl Constraint {
         }
     }
 
-    /// What is measured, as the start of a sentence that a value follows.
+    /// The measured quantity, as the start of a sentence that ends with the value.
     fn sentence(self) -> String {
         match self {
             C::Rigid(d) => {
@@ -474,13 +473,13 @@ pub struct Violation {
     pub constraint: Constraint,
     /// The level at which it cut the branch.
     pub joint: Joint,
-    /// What was measured; a clearance is negative within a part of the body.
+    /// The measured value; a clearance is negative inside a body part.
     pub value: f64,
-    /// The most that was allowed, with all margins; for a clearance the least.
+    /// The largest allowed value, all margins included; for a clearance the smallest.
     pub limit: f64,
-    /// By how much the limit is passed, never negative.
+    /// Amount by which the limit is exceeded, never negative.
     pub excess: f64,
-    /// Unit of the three.
+    /// Unit of value, limit and excess.
     pub unit: Unit,
 }
 
@@ -496,7 +495,7 @@ impl Violation {
         (excess > 0.0).then_some(Self { constraint, joint, value, limit, excess, unit: Unit::Metres })
     }
 
-    /// The excess in units at which it starts to be serious: 10 degrees, 2 cm.
+    /// The excess divided by an excess that is serious: 10 degrees or 2 cm.
     pub fn severity(&self) -> f64 {
         match self.unit {
             Unit::Radians => self.excess / 10f64.to_radians(),
@@ -513,7 +512,7 @@ impl fmt::Display for Violation {
         };
         let [value, limit] = [self.value, self.limit].map(|v| v * scale);
         let most = if self.constraint.kind() == ConstraintKind::Collision { "least" } else { "most" };
-        // Enough digits that value and limit can be told apart.
+        // Enough digits to distinguish value and limit.
         let digits = if (value - limit).abs() >= 1.0 { 0 } else { 2 };
         write!(
             f,

@@ -1,4 +1,4 @@
-//! Figures posed by hand, as tests of single constraints need them.
+//! Hand-made figures for tests of single constraints.
 //!
 //! Axes are those of an upright trunk: x forward, y down, z to the left, metres.
 
@@ -18,7 +18,7 @@ pub(super) const WIDTH_M: f64 = 0.4;
 /// Length of the trunk, neck to pelvis.
 pub(super) const TRUNK_M: f64 = 0.5;
 
-/// Somebody who stands still: limbs straight down, hips below and beside the pelvis.
+/// A standing person: limbs straight down, hips below and beside the pelvis.
 pub(super) fn standing() -> StickFigure {
     let mut figure = StickFigure::UNKNOWN;
     figure[Joint::Neck] = DVec3::ZERO;
@@ -40,25 +40,25 @@ pub(super) fn outward(side: Side) -> DVec3 {
     if side == Side::Left { DVec3::Z } else { DVec3::NEG_Z }
 }
 
-/// The direction of a segment that hung down and was turned forward by an angle.
+/// The direction of a segment that hangs down, rotated forward by an angle.
 pub(super) fn forward_deg(angle_deg: f64) -> DVec3 {
     let (sine, cosine) = angle_deg.to_radians().sin_cos();
     DVec3::new(sine, cosine, 0.0)
 }
 
-/// The direction of a segment of a side that hung down and was turned outward by an angle.
+/// The direction of a segment of a side that hangs down, rotated outward by an angle.
 pub(super) fn outward_deg(side: Side, angle_deg: f64) -> DVec3 {
     let (sine, cosine) = angle_deg.to_radians().sin_cos();
     sine * outward(side) + DVec3::Y * cosine
 }
 
-/// The same figure with the segment that ends at a joint in another direction, what is beyond it shifted along.
+/// The same figure with another direction of the segment that ends at a joint; the joints beyond it are shifted.
 pub(super) fn turned(figure: &StickFigure, end: Joint, direction: DVec3) -> StickFigure {
     let segment = figure.segment(end).length() * direction.normalize();
     shifted(figure, end, segment - figure.segment(end))
 }
 
-/// The same figure with a joint and what is beyond it shifted.
+/// The same figure with a joint and the joints beyond it shifted.
 pub(super) fn shifted(figure: &StickFigure, end: Joint, by: DVec3) -> StickFigure {
     let mut shifted = *figure;
     for joint in Joint::ALL.into_iter().skip(1) {

@@ -1,35 +1,36 @@
 //! Grouping of similar postures (Lee and Chen 1985, section 3.4).
 //!
-//! The distance of two postures is the largest distance of a joint. Complete linkage: of all groups the two
-//! whose farthest members are nearest are joined, while these are within the given distance, so no two
-//! members of a group differ by more in any joint. Ties go to the groups of the earliest members. The result
-//! does not depend on threads; on the order of the postures only through ties.
+//! The distance of two postures is the largest distance of a joint. Groups are formed by complete linkage: the
+//! two groups whose farthest members are nearest are joined, as long as these are within the given distance. So
+//! no two members of a group differ by more in any joint. Among equal pairs, the groups of the earliest members
+//! are joined. The result does not depend on threads; it depends on the order of the postures only for equal
+//! distances.
 
 use crate::model::skeleton::{Joint, StickFigure};
 
-/// The distance within which the paper's figures look alike: 10 cm.
+/// The distance within which the paper's figures look similar: 10 cm.
 pub const DEFAULT_GROUP_M: f64 = 0.10;
 
-/// Postures that look alike.
+/// A group of similar postures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PostureGroup {
-    /// The member whose farthest fellow is nearest: the middle of the group.
+    /// The member with the smallest distance to its farthest fellow: the middle of the group.
     pub representative: usize,
-    /// All members, ascending, as places in the list given.
+    /// Indices of all members in the given list, ascending.
     pub members: Vec<usize>,
-    /// Largest distance of two members, metres.
+    /// Largest distance between two members, metres.
     pub diameter_m: f64,
 }
 
-/// The largest distance of a joint known in both figures, metres; 0 where there is none.
+/// The largest distance of a joint known in both figures, metres; 0 if there is none.
 pub fn figure_distance(a: &StickFigure, b: &StickFigure) -> f64 {
     let apart_sq = |joint: Joint| (a[joint] - b[joint]).length_squared();
-    // max skips the NaN of unknown joints.
+    // `max` skips the NaN of unknown joints.
     Joint::ALL.into_iter().map(apart_sq).fold(0.0, f64::max).sqrt()
 }
 
-/// Groups postures by complete linkage within a distance, metres. Groups come in the order of their first
-/// members. A distance that is NaN or negative leaves each posture alone.
+/// Groups postures by complete linkage within a distance, metres. Groups are in the order of their first members.
+/// If the distance is NaN or negative, each posture is its own group.
 pub fn group(figures: &[StickFigure], within_m: f64) -> Vec<PostureGroup> {
     let n = figures.len();
     let mut apart = vec![0f64; n * n];
@@ -50,8 +51,8 @@ fn describe(members: Vec<usize>, apart: &[f64], n: usize) -> PostureGroup {
     PostureGroup { representative, members, diameter_m }
 }
 
-/// Joins the nearest two clusters again and again; each cluster stands at its first member. The nearest
-/// neighbour of every cluster is kept, so that a step costs about n.
+/// Joins the two nearest clusters repeatedly; each cluster has the index of its first member. The nearest
+/// neighbour of every cluster is kept, so a step costs about n.
 fn complete_linkage(mut apart: Vec<f64>, n: usize, within_m: f64) -> Vec<Vec<usize>> {
     let mut members: Vec<Vec<usize>> = (0..n).map(|i| vec![i]).collect();
     let nearest_of = |apart: &[f64], members: &[Vec<usize>], i: usize| {
@@ -116,7 +117,7 @@ mod tests {
     }
 
     proptest! {
-        /// The plain algorithm: look through all pairs of groups for the nearest.
+        /// Compares with the plain algorithm, which searches all pairs of groups for the nearest.
         #[test]
         fn groups_are_those_of_the_plain_algorithm(
             places in prop::collection::vec((0.0..0.5_f64, 0.0..0.3_f64), 1..24), within_m in 0.02..0.3_f64

@@ -17,11 +17,11 @@ pub enum HeadPoint {
 }
 
 impl HeadPoint {
-    /// All points in order.
+    /// All points, in order.
     pub const ALL: [Self; 6] =
         [Self::Neck, Self::Nose, Self::RightEye, Self::LeftEye, Self::RightEar, Self::LeftEar];
 
-    /// As printed in Table A.2.
+    /// The name in Table A.2.
     pub fn name(self) -> &'static str {
         ["Neck", "Nose", "Right eye", "Left eye", "Right ear", "Left ear"][self as usize]
     }
@@ -42,12 +42,12 @@ pub(crate) const TABLE_A2_POINTS_CM: [DVec3; 6] = [
 
 /// Body height of the person of Tables A.1 and A.2, metres.
 ///
-/// Not printed. The eyes are 13.0 cm above the neck (A.2), the ankles 131.2 cm below it (A.1: neck to hips
-/// 56.2, hips to ankles 75). Eyes at 0.936 and ankles at 0.039 of body height (Drillis and Contini 1966) make
-/// it 1.608.
+/// Not printed. The eyes are 13.0 cm above the neck (A.2), the ankles 131.2 cm below it (A.1: neck to hips 56.2,
+/// hips to ankles 75). With eyes at 0.936 and ankles at 0.039 of body height (Drillis and Contini 1966), it is
+/// 1.608.
 pub const LEE_CHEN_BODY_HEIGHT_M: f64 = 1.608;
 
-/// A rigid head: where its feature points are.
+/// A rigid head: the positions of its feature points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadModel {
     /// The points in the head's frame (x forward, y up, z right), metres, in the order of [`HeadPoint::ALL`].
@@ -62,7 +62,7 @@ impl HeadModel {
 
     /// The same head scaled to a person of `height_m`.
     ///
-    /// Heads vary less than bodies: of a child's head this is too small.
+    /// Heads vary less than bodies: for a child this head is too small.
     ///
     /// # Errors
     ///

@@ -1,14 +1,15 @@
-//! Segment lengths from a sequence of one view, when nobody measured them.
+//! Segment lengths estimated from a sequence of one view, for people who were not measured.
 //!
-//! A segment is never seen longer than it is: with the neck's distance known roughly, the largest extents that
-//! its image shows over a sequence come near to its length if it once stands across the view. Left and right
-//! are taken as equal. That is put together with the proportions of the body (Drillis and Contini 1966, by
-//! [`SegmentLengths::from_height`]) as a prior.
+//! A segment is never seen longer than it is. With an approximate distance of the neck, the largest extents in
+//! the images of a sequence are close to its length if it is once perpendicular to the viewing direction. Left
+//! and right are assumed equal. These extents are combined with the proportions of the body (Drillis and Contini
+//! 1966, by [`SegmentLengths::from_height`]) as a prior.
 //!
-//! Drillis and Contini print means alone. The spreads of [`SPREAD`] are those of four motion-captured walkers
-//! about these means; with four persons they are rough. Segments that never turn across the view (widths from the
-//! side, forearms from the front) stay with the prior, and the result says so. The overall scale cannot be seen
-//! in one view: it comes from body height, from the ground or a given distance, or is assumed ([`ScaleFrom`]).
+//! Drillis and Contini give means only. The spreads of [`SPREAD`] are those of four motion-captured walkers about
+//! these means; with four people they are rough. Segments that are never perpendicular to the viewing direction
+//! (widths from the side, forearms from the front) keep the prior, and the result states this. The overall scale
+//! is not visible in one view: it comes from body height, from the ground or a given distance, or is assumed
+//! ([`ScaleFrom`]).
 
 use crate::estimate::median::median;
 use crate::option_error::OptionError;
@@ -20,42 +21,42 @@ use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, fro
 use super::lift::JointRays;
 use crate::model::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
 
-/// What a length rests on.
+/// Basis of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LengthBasis {
-    /// Its own extents in the images, pooled with those of the other side.
+    /// The segment's own extents in the images, pooled with those of the other side.
     Measured,
     /// The extents of the other side alone.
     Pooled,
-    /// The proportions of the body: it was not seen, or never across the view.
+    /// The proportions of the body: the segment was not seen, or never perpendicular to the viewing direction.
     Prior,
 }
 
-/// Where the scale of all lengths comes from.
+/// Source of the scale of all lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ScaleFrom {
-    /// The body height that was given.
+    /// The given body height.
     BodyHeight,
-    /// The distance of the person by the feet on the ground.
+    /// The person's distance, from the feet on the ground.
     Ground,
-    /// The distance of the person that was given.
+    /// The given distance of the person.
     Distance,
-    /// Nothing: an adult of mean height is assumed.
+    /// None: an adult of mean height is assumed.
     Assumed,
 }
 
-/// A body's lengths before anything is seen.
+/// Prior of the lengths, before any image is used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LengthPrior {
     /// The lengths.
     pub lengths: SegmentLengths,
     /// Relative standard deviation of their common scale.
     pub scale_sd: f64,
-    /// Where the scale comes from.
+    /// Source of the scale.
     pub scale_from: ScaleFrom,
 }
 
-/// Height assumed of an adult, metres: between the means of women and men in most populations.
+/// Assumed height of an adult, metres: between the means of women and men in most populations.
 pub const ASSUMED_HEIGHT_M: f64 = 1.70;
 /// Relative standard deviation of adult height over both sexes.
 const ASSUMED_HEIGHT_SD: f64 = 0.06;
@@ -63,7 +64,7 @@ const ASSUMED_HEIGHT_SD: f64 = 0.06;
 const KNOWN_HEIGHT_SD: f64 = 0.02;
 
 impl LengthPrior {
-    /// Of a person of known height; without it, of an adult of [`ASSUMED_HEIGHT_M`].
+    /// The prior for a person of known height, or for an adult of [`ASSUMED_HEIGHT_M`].
     pub fn from_height(height_m: Option<f64>) -> Result<Self, LengthError> {
         let lengths = SegmentLengths::from_height(height_m.unwrap_or(ASSUMED_HEIGHT_M))?;
         Ok(match height_m {
@@ -73,18 +74,18 @@ impl LengthPrior {
     }
 }
 
-/// One length with what is known of it.
+/// One length with its uncertainty and basis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LengthEstimate {
     /// The name, as in [`SegmentLengths::named`].
     pub segment: String,
     /// The length, metres.
     pub length_m: f64,
-    /// Its standard deviation, metres, the common scale included.
+    /// Its standard deviation, metres, including that of the common scale.
     pub sd_m: f64,
-    /// What it rests on.
+    /// The basis of the length.
     pub basis: LengthBasis,
-    /// The largest extent seen (80 %, less the noise, both sides), metres; NaN if not seen.
+    /// The largest extent seen (80 % quantile, less the noise, both sides), metres; NaN if not seen.
     pub seen_m: f64,
 }
 
@@ -97,11 +98,11 @@ pub struct LengthFit {
     pub estimates: Vec<LengthEstimate>,
     /// Standard deviations of the 13 segments, metres, by ending joint; 0 at the neck.
     pub sd_m: PerJoint<f64>,
-    /// The scale against the prior's lengths.
+    /// The scale relative to the prior's lengths.
     pub scale: f64,
     /// Its relative standard deviation.
     pub scale_sd: f64,
-    /// Where the scale comes from.
+    /// Source of the scale.
     pub scale_from: ScaleFrom,
 }
 
@@ -109,13 +110,13 @@ pub struct LengthFit {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LengthFitError {
-    /// Too few frames with an anchor.
+    /// Too few frames have an anchor.
     #[error("lengths need at least {MIN_FRAMES} frames with a known distance of the neck, got {frames}")]
     TooFewFrames {
-        /// Frames with an anchor.
+        /// Number of frames with an anchor.
         frames: usize,
     },
-    /// Frames and anchors do not go together.
+    /// There are not as many anchors as frames.
     #[error("{} but {}", counted(*frames, "frame"), counted(*anchors, "anchor"))]
     Counts {
         /// Number of frames.
@@ -126,7 +127,7 @@ pub enum LengthFitError {
     /// No frame gave an anchor; the error of the last one.
     #[error("no frame gives the neck's distance: {0}")]
     NoAnchor(#[from] AnchorError),
-    /// The prior's or the resulting lengths make no sense.
+    /// The prior's or the resulting lengths are not valid.
     #[error(transparent)]
     Length(#[from] LengthError),
     /// An option is outside its range.
@@ -134,29 +135,29 @@ pub enum LengthFitError {
     Option(#[from] OptionError),
 }
 
-/// Frames that are needed at least.
+/// Minimum number of frames.
 pub const MIN_FRAMES: usize = 5;
-/// Of a longer sequence so many frames, evenly spaced, are used to find distances.
+/// If a sequence is longer, this many evenly spaced frames are used to find distances.
 const MOST_FRAMES: usize = 32;
-/// Rounds of lengths and anchors.
+/// Number of rounds of lengths and anchors.
 const ROUNDS: usize = 3;
 
-/// A group of segments of equal length: what is known of it beforehand.
+/// A group of segments of equal length, with its prior.
 struct Group {
     pairs: &'static [[Joint; 2]],
     /// Relative standard deviation between persons of the same height.
     spread: f64,
-    /// Probability that the segment never stands across the view in a sequence.
+    /// Probability that the segment is never perpendicular to the viewing direction in a sequence.
     hidden: f64,
-    /// Whether the scale of the body may be read from it.
+    /// True if the scale of the body may be estimated from it.
     tells_scale: bool,
 }
 
-/// The relative spreads of limbs, of trunk and forearm, and of widths between persons of the same height.
+/// Relative spread between people of the same height: of limbs, of trunk and forearm, and of widths.
 ///
-/// Root mean square deviations of four walkers from Drillis and Contini's means: thigh 5 %, shank 12 %, upper
-/// arm 7 %; forearm 23 % (two walkers have hinges instead of wrists) and neck to pelvis 24 % (the pelvis joint
-/// is a convention); width of the shoulders 21 %, of the hips 24 %.
+/// Root mean square deviations of four walkers from the means of Drillis and Contini: thigh 5 %, shank 12 %,
+/// upper arm 7 %; forearm 23 % (two walkers have hinges instead of wrists) and neck to pelvis 24 % (the pelvis
+/// joint is a convention); width of the shoulders 21 %, of the hips 24 %.
 pub const SPREAD: [f64; 3] = [0.08, 0.20, 0.22];
 
 const GROUPS: [Group; 10] = {
@@ -178,16 +179,17 @@ const GROUPS: [Group; 10] = {
     ]
 };
 
-/// Mean shortening of a segment in its best views, tilts of up to 10 degrees.
+/// Mean foreshortening of a segment in its best views: tilts of up to 10 degrees.
 const SHORTENING: f64 = 0.01;
-/// Relative standard deviation of an extent through the segment's own depth, a few centimetres off the neck's.
+/// Relative standard deviation of an extent, due to the depth of the segment, a few centimetres from the neck's.
 const DEPTH_SD: f64 = 0.03;
 
-/// Lengths from rays and distances of the neck.
+/// Segment lengths from rays and distances of the neck.
 ///
-/// `up` is the vertical in camera axes, if known: joints are then taken to lie in the vertical plane across the
-/// view through the neck, else in the plane across the neck's ray. `scale_in_anchors` says whence anchors that
-/// do not rest on the prior's lengths alone have their scale (ground or given distance; none: trunk).
+/// `up` is the vertical in camera axes, if known. Joints are then assumed to lie in the vertical plane through
+/// the neck that is perpendicular to the viewing direction; without `up`, in the plane perpendicular to the
+/// neck's ray. `scale_in_anchors` is the source of the scale of anchors that do not depend on the prior's lengths
+/// alone (ground or given distance; `None`: trunk).
 pub fn estimate(
     rays: &[JointRays],
     anchors: &[Option<Anchor>],
@@ -248,10 +250,11 @@ pub fn estimate(
     Ok(fit)
 }
 
-/// Lengths and distances of the neck in turn, a few rounds: each rests on the other.
+/// Estimates lengths and distances of the neck in turn, in a few rounds, because each depends on the other.
 ///
-/// With the ground, anchors come from the feet on it and tell the scale; without, from the trunk, and the
-/// scale stays the prior's. Returns the lengths; take anchors anew with them and their `scale_sd`.
+/// With the ground, anchors come from the feet on it and determine the scale. Without it, they come from the
+/// trunk, and the scale is the prior's. Returns the lengths; compute anchors again with them and their
+/// `scale_sd`.
 pub fn estimate_from_sequence(
     rays: &[JointRays],
     ground: Option<&Ground>,
@@ -287,12 +290,12 @@ pub fn estimate_from_sequence(
     fit.ok_or(LengthFitError::TooFewFrames { frames: rays.len() })
 }
 
-/// The largest extent of a segment over the frames: their 80 % quantile without what noise adds to it. NaN if
+/// The largest extent of a segment over the frames: the 80 % quantile without the contribution of noise. NaN if
 /// seen in fewer than [`MIN_FRAMES`].
 ///
-/// Extents pile up at their upper end, so the spread is taken above the median alone: with u = (q80 - q50)/0.84
-/// and the noise e of an extent, q50 + 0.84 sqrt(u² - e²). `scatter` is that of the distances from frame to
-/// frame, relative.
+/// Extents accumulate at their upper end, so the spread is taken only above the median: with u = (q80 - q50)/0.84
+/// and the noise e of an extent, q50 + 0.84 sqrt(u² - e²). `scatter` is the relative scatter of the distances
+/// from frame to frame.
 fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVec3>, scatter: f64) -> f64 {
     let mut noise_sq = 0.0;
     let mut extents: Vec<f64> = Vec::with_capacity(frames.len());
@@ -323,7 +326,7 @@ fn envelope(frames: &[(&JointRays, &Anchor)], [a, b]: [Joint; 2], up: Option<DVe
     middle + 0.84 * (spread * spread - noise_sq).max(0.0).sqrt()
 }
 
-/// Relative standard deviation of the distances from frame to frame, without steady motion.
+/// Relative standard deviation of the distances from frame to frame, without the steady motion.
 fn frame_scatter(frames: &[(&JointRays, &Anchor)]) -> f64 {
     let steps: Vec<f64> = frames.windows(2).map(|w| (w[1].1.distance_m / w[0].1.distance_m).ln()).collect();
     let drift = median(&mut steps.clone()).unwrap_or(0.0);
@@ -336,12 +339,12 @@ fn mean_of_seen(sides: &[f64]) -> f64 {
     seen.iter().sum::<f64>() / seen.len() as f64
 }
 
-/// Relative standard deviation of the distances, as if common to all frames.
+/// Relative standard deviation of the distances, assumed common to all frames.
 fn relative_sd(frames: &[(&JointRays, &Anchor)]) -> f64 {
     frames.iter().map(|(_, a)| a.sd_depth_m / a.distance_m).sum::<f64>() / frames.len() as f64
 }
 
-/// The scale by the segments that turn across the view, and by the prior.
+/// The scale from the prior and from segments that become perpendicular to the viewing direction.
 fn scale_seen(pooled: &[f64], prior: &LengthPrior, distance_sd: f64) -> (f64, f64) {
     let ratios: Vec<(f64, f64)> = GROUPS
         .iter()
@@ -364,10 +367,11 @@ fn scale_seen(pooled: &[f64], prior: &LengthPrior, distance_sd: f64) -> (f64, f6
 
 const GRID: usize = 400;
 
-/// Mean and standard deviation of a length of expected value and spread whose largest extent was `seen`.
+/// Mean and standard deviation of a length with this expected value and spread whose largest extent was `seen`.
 ///
-/// The extent is the length times c, disturbed by [`DEPTH_SD`]: c = 1 - x with x exponential of mean
-/// [`SHORTENING`] if the segment once stands across the view, any c below 1 if it never does.
+/// The extent is the length times c, with the relative error [`DEPTH_SD`]. If the segment is once perpendicular
+/// to the viewing direction, c = 1 - x with x exponential of mean [`SHORTENING`]; if it never is, c is uniform
+/// below 1.
 fn posterior(expected: f64, group: &Group, seen: f64, scale_sd: f64) -> (f64, f64) {
     let spread = group.spread.hypot(scale_sd);
     if !seen.is_finite() {
@@ -390,7 +394,8 @@ fn posterior(expected: f64, group: &Group, seen: f64, scale_sd: f64) -> (f64, f6
     (mean, (second / total - mean * mean).max(0.0).sqrt())
 }
 
-/// Density of seen over true length: a normal of [`DEPTH_SD`] folded with the shortening, by six steps of it.
+/// Density of extent over length: a normal density of [`DEPTH_SD`] convolved with the foreshortening in six
+/// steps.
 fn likelihood(ratio: f64, hidden: f64) -> f64 {
     let normal = |x: f64| (-0.5 * (x / DEPTH_SD).powi(2)).exp() / DEPTH_SD / std::f64::consts::TAU.sqrt();
     // Quantiles of an exponential distribution at (i + 1/2)/6.
@@ -448,7 +453,7 @@ mod tests {
         let width = &GROUPS[7];
         let (length, sd) = posterior(0.38, width, 0.10, 0.02);
         assert!((length - 0.38).abs() < 0.04 && sd > 0.05, "{length} {sd}");
-        // Nothing is shorter than it was seen.
+        // Nothing is shorter than its extent in the image.
         let (length, _) = posterior(0.38, width, 0.45, 0.02);
         assert!(length > 0.44, "{length}");
     }
@@ -465,11 +470,12 @@ mod tests {
         assert!(LengthPrior::from_height(Some(175.0)).is_err());
     }
 
-    /// A segment that stands across the view in front of somebody 5 m away, so long in each frame.
+    /// A segment perpendicular to the viewing direction in front of a person 5 m away, with this extent in each
+    /// frame.
     fn seen(extents: &[f64], noise_rad: f64, pitch_rad: f64, lean_rad: f64) -> (Vec<JointRays>, Vec<Anchor>) {
         use crate::posture::anchor::from_given;
         let frame = |extent: &f64| {
-            // Camera axes turned about x: a camera that looks down sees the vertical tilted.
+            // Camera axes rotated about x: for a camera that looks down, the vertical is tilted.
             let turn = glam::DMat3::from_rotation_x(pitch_rad);
             let neck = turn * DVec3::new(0.0, -0.4, 5.0);
             let along = turn * DVec3::new(lean_rad.sin(), lean_rad.cos(), 0.0);
@@ -485,8 +491,7 @@ mod tests {
         extents.iter().map(frame).unzip()
     }
 
-    /// The largest of extents that spread by 3 cm of themselves and by as much of noise: 0.84 of their own
-    /// spread above the middle.
+    /// The largest of extents that have a spread of 3 cm and noise of 3 cm: 0.84 of the spread above the median.
     #[test]
     fn noise_does_not_lengthen_a_segment() {
         use crate::synth::Random;
@@ -505,13 +510,13 @@ mod tests {
         assert!((quiet - 0.4 - 0.84 * 0.03 * 2f64.sqrt()).abs() < 0.004, "{quiet}");
         let noisy = of(noise_rad, 0.0);
         assert!((noisy - 0.4 - 0.84 * 0.03).abs() < 0.004, "{noisy}");
-        // Distances that scatter by 7.5 % make 3 cm of 40 too.
+        // Distances that scatter by 7.5 % give 3 cm of 40 cm too.
         let scattered = of(0.0, 0.075);
         assert!((scattered - 0.4 - 0.84 * 0.03).abs() < 0.004, "{scattered}");
         assert!(envelope(&[], pair, None, 0.0).is_nan());
     }
 
-    /// Joints in the vertical plane through the neck are seen as long as they are, if the vertical is known.
+    /// If the vertical is known, joints in the vertical plane through the neck are seen at full length.
     #[test]
     fn a_camera_that_looks_down_sees_upright_segments_in_full() {
         for (pitch_rad, lean_rad) in [(0.5f64, 0.0), (0.5, 0.7), (-0.3, 0.4)] {
@@ -542,8 +547,8 @@ mod tests {
         assert!((relative_sd(&frames[..1]) - 0.1 / anchors[0].distance_m).abs() < 1e-12);
     }
 
-    /// Three limbs, 8 % of spread and 3 % of depth each, seen a tenth longer than they should, one percent
-    /// shortened as in the best views; distances known to 2 %; the height assumed to 6 %.
+    /// Three limbs with 8 % spread and 3 % depth error each, seen a tenth longer than expected, with one per cent
+    /// foreshortening as in the best views; distances known to 2 %; the height assumed to 6 %.
     #[test]
     fn the_scale_is_that_of_the_limbs_and_of_the_prior() {
         let prior = LengthPrior::from_height(None).unwrap();
@@ -557,12 +562,13 @@ mod tests {
         assert!((sd - (measured + known).sqrt().recip()).abs() < 1e-12, "{sd}");
         assert!((scale - (1.1 * measured + known) / (measured + known)).abs() < 1e-9, "{scale}");
         assert_eq!(scale_seen(&[f64::NAN; 10], &prior, 0.02), (1.0, 0.06));
-        // Widths and forearms vary too much between people to tell their size.
+        // Widths and forearms vary too much between people to determine the scale.
         let telling: Vec<usize> = (0..10).filter(|&i| GROUPS[i].tells_scale).collect();
         assert_eq!(telling, [3, 5, 6]);
     }
 
-    /// A shank seen by 20 frames on one side alone: measured there, pooled on the other; the rest by proportion.
+    /// A shank seen in 20 frames on one side only: measured on that side, pooled on the other; the rest by
+    /// proportion.
     #[test]
     fn lengths_say_what_they_rest_on() {
         let prior = LengthPrior::from_height(Some(1.75)).unwrap();
@@ -578,13 +584,13 @@ mod tests {
         assert!((right.length_m / shank - 1.05).abs() < 0.03, "{}", right.length_m);
         let thigh = of("right_hip_to_right_knee");
         assert_eq!(thigh.basis, LengthBasis::Prior);
-        // Of the 8 % between people and of the 2 % of a known height.
+        // From the 8 % between people and the 2 % for a known height.
         let expected = thigh.length_m * 0.08f64.hypot(0.02);
         assert!((thigh.sd_m - expected).abs() < 1e-9, "{}", thigh.sd_m);
         assert!(right.sd_m > 0.02 * right.length_m && right.sd_m < 0.06 * right.length_m, "{}", right.sd_m);
         assert_eq!((fit.scale, fit.scale_sd, fit.scale_from), (1.0, 0.02, ScaleFrom::BodyHeight));
         assert_eq!(fit.sd_m[Joint::RightAnkle], right.sd_m);
-        // A scale no surer than before is the prior's, whatever it might have been read from.
+        // A scale that is no more certain than the prior is the prior's, whatever its source would be.
         let again = estimate(&rays, &anchors, up, &prior, Some(ScaleFrom::Ground)).unwrap();
         assert_eq!(again.scale_from, ScaleFrom::BodyHeight);
         let assumed = LengthPrior::from_height(None).unwrap();
@@ -593,8 +599,8 @@ mod tests {
         assert_eq!(again.unwrap().scale_from, ScaleFrom::Ground);
     }
 
-    /// The posterior of a length against one drawn from the same description: people's spread, then how near
-    /// to across the view the segment stands and how far from the neck, or not across at all.
+    /// Compares the posterior of a length with one sampled from the same model: the spread over people, then the
+    /// angle of the segment to the viewing direction, its depth relative to the neck, or never perpendicular.
     #[test]
     fn a_posterior_is_that_of_drawn_people() {
         use crate::synth::Random;

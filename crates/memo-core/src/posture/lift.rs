@@ -1,30 +1,31 @@
-//! From an image point to the two places its joint can be at (Lee and Chen 1985, section 2.2, eqs. 6-7).
+//! From an image point to the two possible positions of its joint (Lee and Chen 1985, section 2.2, eqs. 6-7).
 //!
-//! Axes are the camera's (OpenCV: x right, y down, z forward); the paper's camera is left-handed with y up,
-//! which changes neither the equation nor its roots. Instead of the paper's k along the image point the
-//! distance along a unit ray is solved for: the same two points, and well conditioned at any focal length.
+//! Axes are the camera's (OpenCV: x right, y down, z forward). The paper's camera is left-handed with y up, which
+//! changes neither the equation nor its roots. Instead of the paper's k along the image point, the unknown is the
+//! distance along a unit ray: it gives the same two points and is well conditioned at any focal length.
 
 use glam::{DVec2, DVec3};
 
 use crate::model::camera::{Camera, CameraError};
 use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint};
 
-/// What one view shows of a stick figure.
+/// Rays and weights of the joints in one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRays {
-    /// Unit vectors from the camera through the joints, camera axes; NaN where a joint is not seen.
+    /// Unit vectors from the camera through the joints, camera axes; NaN if a joint is not seen.
     pub ray: PerJoint<DVec3>,
     /// Weights of the joints, 0 to 1: a detector's scores, 1 for a measured point.
     pub weight: PerJoint<f64>,
-    /// Standard deviation of a joint across its ray, as an angle, radians: that of a pixel over the focal length.
+    /// Standard deviation of a joint across its ray, as an angle, radians: that of a pixel divided by the focal
+    /// length.
     pub noise_rad: f64,
 }
 
 impl JointRays {
     /// The rays of the pixels at which a camera shows the joints (NaN: not seen).
     ///
-    /// `noise_px` is the standard deviation of a pixel coordinate. A pixel that no lens point maps to is
-    /// an error; so is a pixel that is infinite.
+    /// `noise_px` is the standard deviation of a pixel coordinate. An infinite pixel, or a pixel to which the
+    /// lens maps nothing, is an error.
     pub fn from_pixels(
         camera: &Camera,
         pixels: &PerJoint<DVec2>,
@@ -55,42 +56,42 @@ impl JointRays {
         }
     }
 
-    /// Whether a joint is seen.
+    /// True if a joint is seen.
     pub fn sees(&self, joint: Joint) -> bool {
         !self.ray[joint].is_nan()
     }
 }
 
-/// How many places a segment of given length leaves its ending joint.
+/// Number of possible positions of a segment's ending joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RootKind {
     /// Two.
     Two,
-    /// One: the segment stands perpendicular to the ray, or nearly (the paper's degenerate case).
+    /// One: the segment is perpendicular to the ray, or nearly (the paper's degenerate case).
     Degenerate,
-    /// None: the ray passes the starting joint at a distance greater than the length. The nearest point on
-    /// the ray stands for it.
+    /// None: the distance of the ray from the starting joint is greater than the length. The nearest point on the
+    /// ray is used instead.
     None {
-        /// By how much the nearest point on the ray is too far, metres.
+        /// Distance of the nearest point on the ray, less the length, metres.
         gap_m: f64,
     },
 }
 
-/// The places where an ending joint can be.
+/// The possible positions of an ending joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roots {
-    /// The place nearer to the camera.
+    /// The position nearer to the camera.
     pub near: DVec3,
-    /// The place farther from it; the same as `near` where there is but one.
+    /// The position farther from it; the same as `near` if there is only one.
     pub far: DVec3,
-    /// How many there are.
+    /// Number of positions.
     pub kind: RootKind,
     /// Standard deviation of the segment's extent along the ray, metres, from the noise of its two image points.
     pub sd_m: f64,
 }
 
 impl Roots {
-    /// The candidates: two, or one.
+    /// The positions and their number, two or one.
     pub fn candidates(&self) -> ([DVec3; 2], usize) {
         let count = if self.kind == RootKind::Two { 2 } else { 1 };
         ([self.near, self.far], count)
@@ -103,8 +104,8 @@ impl Roots {
 /// l_se² = |x_s - k r|²   =>   k = x_s·r ± sqrt(l_se² - d²),   d² = |x_s|² - (x_s·r)²
 /// ```
 ///
-/// Roots nearer to each other than `merge_m` are taken for one, their middle. A root behind the camera
-/// (k <= 0) does not count. `noise_rad` is the noise of an image point as an angle.
+/// Roots closer together than `merge_m` are merged into their middle. A root behind the camera (k <= 0) does not
+/// count. `noise_rad` is the noise of an image point as an angle.
 pub fn roots(start: DVec3, ray: DVec3, length_m: f64, noise_rad: f64, merge_m: f64) -> Roots {
     let middle = start.dot(ray);
     let across = (start - middle * ray).length();
@@ -131,7 +132,7 @@ pub fn roots(start: DVec3, ray: DVec3, length_m: f64, noise_rad: f64, merge_m: f
 
 /// Standard deviation of a segment's extent h = sqrt(l² - d²) along the ray, for an error e of d or of l.
 ///
-/// It feels the error most where the segment is nearly perpendicular to the ray; sqrt(h² + 2 d e + e²) - h
+/// The error has the largest effect if the segment is nearly perpendicular to the ray. sqrt(h² + 2 d e + e²) - h
 /// is d e / h for small errors and stays finite at h = 0.
 pub fn extent_sd(extent_m: f64, across_m: f64, error_m: f64) -> f64 {
     (extent_m * extent_m + 2.0 * across_m * error_m + error_m * error_m).sqrt() - extent_m
@@ -143,7 +144,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The paper's own way: x' and k of eq. (6) in its left-handed camera with the image plane at f.
+        /// The paper's own form: x' and k of eq. (6) in its left-handed camera with the image plane at f.
         #[test]
         fn roots_are_those_of_the_papers_quadratic(
             sx in -1.0..1.0_f64, sy in -1.0..1.0_f64, sz in 2.0..8.0_f64,
@@ -181,7 +182,7 @@ mod tests {
         assert!((found.near - start).dot(ray).abs() < 1e-12);
     }
 
-    /// Monte Carlo: the spread of the extent along the ray is the one stated, away from the degenerate case.
+    /// Monte Carlo: the spread of the extent along the ray is the stated one, away from the degenerate case.
     #[test]
     fn noise_of_the_image_reaches_the_depth_as_stated() {
         let (start, end) = (DVec3::new(0.1, 0.2, 4.0), DVec3::new(0.3, 0.3, 4.25));
@@ -205,8 +206,8 @@ mod tests {
         assert!((sd / stated - 1.0).abs() < 0.1, "measured {sd}, stated {stated}");
     }
 
-    /// Only what is in front of the camera counts: with the start one metre ahead and a ray to the side, a
-    /// long segment has one end before the camera and one behind it, and a ray away from the start none.
+    /// Only positions in front of the camera count. With the start one metre ahead and a ray to the side, a long
+    /// segment has one end in front of the camera and one behind it; a ray away from the start has none.
     #[test]
     fn roots_behind_the_camera_do_not_count() {
         let start = DVec3::new(0.0, 0.0, 1.0);
@@ -219,19 +220,20 @@ mod tests {
         assert_eq!(one.candidates().1, 1);
         let both = roots(start, aside, 0.9, 0.0, 0.0);
         assert_eq!((both.kind, both.candidates().1), (RootKind::Two, 2));
-        // Away from the start: both roots behind, the camera itself the nearest point of the ray, 1 m off.
+        // Away from the start: both roots are behind, and the camera itself is the nearest point of the ray, 1 m
+        // off.
         let away = DVec3::new(0.8, 0.0, -0.6);
         let none = roots(start, away, 0.9, 0.0, 0.0);
         assert_eq!(none.near, DVec3::ZERO);
         let RootKind::None { gap_m } = none.kind else { panic!("{:?}", none.kind) };
         assert!((gap_m - 0.1).abs() < 1e-12);
-        // And where the segment is too short to reach the ray's line anyway.
+        // The same if the segment is too short to reach the line of the ray.
         let short = roots(start, away, 0.5, 0.0, 0.0);
         assert_eq!(short.near, DVec3::ZERO);
         assert!(matches!(short.kind, RootKind::None { .. }));
     }
 
-    /// Roots as near as the limit are one, in their middle, and not where they are farther apart.
+    /// Roots within the limit are merged into their middle; roots farther apart are not.
     #[test]
     fn roots_merge_within_the_distance_between_them() {
         let (start, ray) = (DVec3::new(0.3, 0.0, 3.0), DVec3::Z);
@@ -242,8 +244,8 @@ mod tests {
         assert_eq!(roots(start, ray, 0.5, 0.0, 0.79).kind, RootKind::Two);
     }
 
-    /// Where the segment stands across the ray a longer one reaches sqrt((l + e)² - l²) along it; elsewhere
-    /// a small error e of the distance across changes sqrt(l² - d²) by d e / sqrt(l² - d²).
+    /// If the segment is perpendicular to the ray, a longer one reaches sqrt((l + e)² - l²) along it. Elsewhere a
+    /// small error e of the distance across changes sqrt(l² - d²) by d e / sqrt(l² - d²).
     #[test]
     fn the_noise_of_an_extent_is_that_of_a_side_of_its_triangle() {
         for error in [1e-3, 0.01, 0.1] {
@@ -257,7 +259,7 @@ mod tests {
         }
     }
 
-    /// Rays of pixels go through the lens, and their noise is that of a pixel over the focal length.
+    /// Rays of pixels are undistorted, and their noise is that of a pixel divided by the focal length.
     #[test]
     fn rays_of_pixels_undo_the_lens() {
         let mut camera = Camera::level([1280, 720], 1.0, 1.2, 4.0).unwrap();

@@ -1,4 +1,4 @@
-//! A posture against the [limits of the joints](crate::model::limits) (Lee and Chen 1985, section 3.2 A and B),
+//! Checks a posture against the [joint limits](crate::model::limits) (Lee and Chen 1985, section 3.2 A and B),
 //! with the noise of its limbs.
 
 use std::f64::consts::FRAC_PI_2;
@@ -12,7 +12,7 @@ use crate::model::limits::{AngleRange, AngleReading, Limits};
 use crate::model::skeleton::{RigidDistance, SegmentLengths, Side};
 
 impl Limits {
-    /// Checks one constraint of angle or distance; None where it holds or is none of these.
+    /// Checks one constraint of angle or distance; `None` if it holds or is of another kind.
     pub(crate) fn check(
         &self,
         constraint: Constraint,
@@ -55,13 +55,13 @@ impl Limits {
         }
     }
 
-    /// Passing a bound from within; the bound and the excess as angles, the margin in standard deviations.
+    /// The violation of a bound from within; bound and excess are angles, the margin is in standard deviations.
     fn beyond(&self, constraint: Constraint, bound: f64, excess: f64, sd: f64) -> Option<Violation> {
         let margin = if self.noise_factor == 0.0 { 0.0 } else { self.noise_factor * sd };
         Violation::over(constraint, bound + excess, bound + margin, Unit::Radians)
     }
 
-    /// The tolerance grows by the noise along the distance and by the lengthening that noise across it makes.
+    /// The tolerance is increased by the noise along the distance, and by the lengthening due to noise across it.
     fn check_distance(
         &self,
         distance: RigidDistance,
@@ -109,8 +109,8 @@ impl Limits {
         self.beyond(constraint, bound, excess, limb.direction_sd(towards).hypot(trunk.torso_sd.z))
     }
 
-    /// The excess of a projected angle as a turn of the limb, whose component along the axis of projection
-    /// is given.
+    /// The excess of a projected angle as a rotation of the limb, whose component along the axis of projection is
+    /// given.
     fn turn(&self, excess: f64, along_axis: f64) -> f64 {
         if self.reading == AngleReading::Literal {
             return excess;
@@ -143,7 +143,7 @@ impl Limits {
         self.beyond(constraint, bound, excess.abs(), sd)
     }
 
-    /// `sense` is 1 where flexion has w_z >= 0 (elbow), -1 where it has w_z <= 0 (knee).
+    /// `sense` is 1 if flexion has w_z >= 0 (elbow), -1 if it has w_z <= 0 (knee).
     fn check_hinge(
         &self,
         constraint: Constraint,

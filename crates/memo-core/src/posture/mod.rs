@@ -1,5 +1,5 @@
-//! One view, known lengths: every 3D posture the joints of one picture allow (Lee and Chen 1985), and one of
-//! them a frame for a sequence.
+//! Postures from one view with known segment lengths: every 3D posture that the joints of one image allow (Lee
+//! and Chen 1985), and one posture per frame for a sequence.
 
 pub mod anchor;
 pub mod collision;

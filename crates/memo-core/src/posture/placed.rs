@@ -1,4 +1,4 @@
-//! A stick figure prepared for being judged: directions, lengths and the noise of each segment, and the
+//! A stick figure prepared for evaluating constraints: directions, lengths and noise of each segment, and the
 //! axes of its trunk.
 //!
 //! Noise of a segment is taken to first order: its vector has the standard deviation `sd_m` along the ray of
@@ -15,7 +15,7 @@ use super::lift::{RootKind, Roots};
 use crate::model::angles::{PartAngles, hip_axes, knee_rad, swing_rad, trunk_axes};
 use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 
-/// A joint in its place, and the segment that ends there.
+/// A joint at a position, and the segment that ends there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Placed {
     /// The joint, camera axes, metres.
@@ -30,11 +30,11 @@ pub(crate) struct Placed {
     /// Standard deviation of the segment across the ray.
     pub lateral_m: f64,
     pub kind: RootKind,
-    /// Tells places apart that are asked about on one trunk, below [`MOST_PLACES`].
+    /// Number that distinguishes the positions evaluated on one trunk, below [`MOST_PLACES`].
     pub number: u8,
 }
 
-/// More than the places that all choices of roots give the joints of one view.
+/// More than the number of positions that all choices of roots give the joints of one view.
 pub(crate) const MOST_PLACES: usize = 96;
 
 impl Placed {
@@ -69,7 +69,7 @@ impl Placed {
         (self.lateral_m.powi(2) + self.sd_m.powi(2) * across).sqrt() / self.length_m
     }
 
-    /// Standard deviation of the ending joint against the starting joint along a vector, metres.
+    /// Standard deviation of the ending joint relative to the starting joint along a vector, metres.
     pub fn along(&self, towards: DVec3) -> f64 {
         let depth = self.sd_m * self.ray.dot(towards);
         (self.lateral_m * self.lateral_m + depth * depth).sqrt()
@@ -89,7 +89,7 @@ pub(crate) fn placed_points(figure: &StickFigure) -> PerJoint<Placed> {
     }))
 }
 
-/// All joints in their places.
+/// All joints at their positions.
 pub(crate) type PlacedFigure<'a> = PerJoint<&'a Placed>;
 
 impl<'a> PlacedFigure<'a> {
@@ -110,30 +110,30 @@ impl<'a> PlacedFigure<'a> {
     }
 }
 
-/// What is known about the surroundings of a figure, in its own axes (for a tree the camera's).
+/// Directions in a figure's surroundings, in the axes of the figure (for a tree, the camera's).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bearings {
-    /// Direction against gravity; without it the trunk's, from pelvis to neck, stands for it.
+    /// Upward direction, against gravity; `None` uses the trunk's, from pelvis to neck.
     pub up: Option<DVec3>,
-    /// The direction the person moves in.
+    /// The moving direction.
     pub heading: Option<DVec3>,
-    /// Axes of the head in the sense of the trunk's: x the way the face looks, y down, z to its left.
+    /// Axes of the head, like those of the trunk: x the direction the face looks, y down, z to its left.
     pub head: Option<DMat3>,
 }
 
-/// Where the moving direction was taken from.
+/// Source of the moving direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum HeadingSource {
-    /// It was given.
+    /// Given by the caller.
     Given,
-    /// The way the face looks, the paper's normal of the head plane.
+    /// The direction the face looks: the paper's normal of the head plane.
     Head,
     /// The forward axis of the trunk, a different one in each branch.
     Trunk,
 }
 
 impl HeadingSource {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Given => "given",
@@ -144,7 +144,7 @@ impl HeadingSource {
 }
 
 impl Bearings {
-    /// Which source is used: a direction that was given before the head's, and that before the trunk's.
+    /// The source in use: a given direction first, then the head's, then the trunk's.
     pub fn heading_source(&self) -> HeadingSource {
         match (self.heading, self.head) {
             (Some(_), _) => HeadingSource::Given,
@@ -154,29 +154,29 @@ impl Bearings {
     }
 }
 
-/// Axes of a figure's trunk, how well they are known, and the directions of its motion.
+/// Axes of a figure's trunk with their uncertainty, and the directions of its motion.
 #[derive(Debug, Clone)]
 pub(crate) struct Trunk {
     /// Columns x, y, z; NaN where unknown.
     pub torso: DMat3,
-    /// Standard deviation of a turn of the torso about its x, y, z, radians.
+    /// Standard deviation of a rotation of the torso about its x, y, z, radians.
     pub torso_sd: DVec3,
     pub hips: DMat3,
-    /// Of the hips against the torso.
+    /// Angles of the hips relative to the torso.
     pub hip_angles: PartAngles,
     pub up: DVec3,
-    /// Across the moving direction, level.
+    /// Horizontal direction across the moving direction.
     pub lateral: DVec3,
     /// Standard deviation of that direction.
     pub lateral_sd: f64,
     /// Normal of the plane of the body without swing, forward: perpendicular to the trunk (rule 3).
     pub body_normal: DVec3,
-    /// Angles of limbs on the torso, once asked for: flexion of a limb against it, flexion at a knee.
+    /// Cached angles of limbs relative to the torso: flexion of a limb, flexion at a knee.
     swings: Rc<Memo>,
     knees: Rc<Memo>,
 }
 
-/// A number of each place, NaN where not yet known.
+/// One number per position, NaN if not yet known.
 #[derive(Debug, Clone)]
 struct Memo([Cell<f64>; MOST_PLACES]);
 
@@ -210,7 +210,7 @@ impl Trunk {
         }
     }
 
-    /// Of shoulders and pelvis, without the hips.
+    /// The trunk from shoulders and pelvis, without the hips.
     pub fn of_torso(figure: &PlacedFigure, bearings: &Bearings) -> Self {
         let torso = trunk_axes(&figure.points()).unwrap_or(DMat3::NAN);
         let torso_sd = torso_sd(figure, &torso);
@@ -234,13 +234,13 @@ impl Trunk {
         }
     }
 
-    /// The same with hips.
+    /// The same with the hips.
     pub fn with_hips(&self, figure: &PlacedFigure) -> Self {
         let hips = hip_axes(&figure.points()).unwrap_or(DMat3::NAN);
         Self { hips, hip_angles: PartAngles::of_hips(&self.torso, &hips), ..self.clone() }
     }
 
-    /// Standard deviation of a turn of the hips about their x, y, z, radians.
+    /// Standard deviation of a rotation of the hips about their x, y, z, radians.
     pub fn hips_sd(&self, figure: &PlacedFigure) -> DVec3 {
         let [right, left] = [figure[Joint::RightHip], figure[Joint::LeftHip]];
         let drop = (0.5 * (right.point + left.point) - figure[Joint::Pelvis].point).length();
@@ -250,12 +250,12 @@ impl Trunk {
         DVec3::new(0.5 * both(z) / drop, both(x) / width, 0.5 * both(x) / drop)
     }
 
-    /// Flexion (+) or extension of a limb against the torso.
+    /// Flexion (+) or extension of a limb relative to the torso.
     pub fn swing_rad(&self, limb: &Placed) -> f64 {
         self.swings.get(limb, || swing_rad(&self.torso, limb.unit))
     }
 
-    /// Flexion (+) or extension at a knee; the shank's place must tell that of the thigh.
+    /// Flexion (+) or extension at a knee; the position of the shank must determine that of the thigh.
     pub fn knee_rad(&self, thigh: &Placed, shank: &Placed) -> f64 {
         self.knees.get(shank, || knee_rad(&self.torso, thigh.unit, shank.unit))
     }

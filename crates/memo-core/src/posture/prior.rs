@@ -1,112 +1,112 @@
-//! What a person is expected to do, softly: means and standard deviations of angles and accelerations.
+//! Soft prior of the motion: means and standard deviations of angles and accelerations.
 //!
-//! The hard limits of the interpretation tree say what cannot be; these say what is usual, for choosing among
-//! what can. Angles against upright axes: x the moving direction, y down, z to the left.
+//! The hard limits of the interpretation tree exclude what is impossible. This prior describes what is usual, for
+//! choosing among the possible postures. Angles are relative to upright axes: x the moving direction, y down, z
+//! to the left.
 //!
-//! Chosen on four walks of motion capture (two Plug-in-Gait walkers of BTKData, CMU 02_01 and 12_01); the
-//! spreads are two to three times what one walker shows, so that people may differ.
+//! Chosen on four walks of motion capture (two Plug-in-Gait walkers of BTKData, CMU 02_01 and 12_01). The spreads
+//! are two to three times those of one walker, to allow for differences between people.
 
 use crate::model::skeleton::Joint;
 
-/// A quantity's usual value and spread, radians.
+/// Usual value and spread of an angle, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Soft {
     /// Usual value.
     pub mean_rad: f64,
-    /// Standard deviation between people and moments.
+    /// Standard deviation over people and time.
     pub sd_rad: f64,
 }
 
-/// A squared deviation never counts for more than this many squared standard deviations: an outlier is an
-/// outlier.
+/// A squared deviation is capped at this many squared standard deviations, to limit the effect of outliers.
 const CAP: f64 = 25.0;
 
-/// A squared deviation in standard deviations; 0 for what is not known (NaN).
+/// A squared deviation in standard deviations, capped; 0 if it is not known (NaN).
 pub fn chi_sq(deviation: f64) -> f64 {
     capped(deviation * deviation)
 }
 
-/// The same of a square.
+/// The same for a value that is already squared.
 pub fn capped(square: f64) -> f64 {
     if square.is_nan() { 0.0 } else { square.min(CAP) }
 }
 
 impl Soft {
-    /// Anything goes.
+    /// No prior: any value costs nothing.
     pub const FREE: Self = Self { mean_rad: 0.0, sd_rad: f64::INFINITY };
 
-    /// From degrees.
+    /// The same from degrees.
     pub fn degrees(mean_deg: f64, sd_deg: f64) -> Self {
         Self { mean_rad: mean_deg.to_radians(), sd_rad: sd_deg.to_radians() }
     }
 
-    /// Squared deviation of a value measured with a standard deviation; 0 for NaN.
+    /// Cost of a value measured with a standard deviation: its squared deviation; 0 for NaN.
     pub fn cost(&self, value_rad: f64, noise_rad: f64) -> f64 {
         chi_sq((value_rad - self.mean_rad) / self.sd_rad.hypot(noise_rad))
     }
 
-    /// The same for values below the mean alone: the mean is a limit.
+    /// The same only for values below the mean: the mean is a limit.
     pub fn cost_beyond(&self, value_rad: f64, noise_rad: f64) -> f64 {
         self.cost(value_rad.min(self.mean_rad), noise_rad)
     }
 }
 
-/// What is usual of a limb's segment.
+/// Prior of a limb's segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentPrior {
-    /// Against the vertical in the moving direction, forward positive.
+    /// Angle from the vertical in the moving direction, forward positive.
     pub swing: Soft,
-    /// Out of the vertical plane of the moving direction, outward positive, at no swing.
+    /// Angle out of the vertical plane of the moving direction, outward positive, at swing 0.
     pub outward: Soft,
-    /// How much farther outward for each radian of swing: arms swing forwards in front of the body.
+    /// Outward angle per radian of swing: arms that swing forward move in front of the body.
     pub outward_per_swing: f64,
-    /// Acceleration of the segment's end against its start, m/s².
+    /// Acceleration of the segment's end relative to its start, m/s².
     pub acceleration_mps2: f64,
-    /// Standard deviation of the segment's apparent length, as a fraction: the centres of joints are no pivots.
+    /// Relative standard deviation of the segment's apparent length: the centres of joints are not exact pivots.
     pub length_sd: f64,
 }
 
-/// What a person is expected to do.
+/// Prior of a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPrior {
     /// Upper arm, forearm, thigh, shank.
     pub segments: [SegmentPrior; 4],
-    /// Least flexion of elbow and knee, with the softness of the limit.
+    /// Minimum flexion of elbow and knee, with the softness of the limit.
     pub least_bend: [Soft; 2],
     /// Sum of the swings of both upper arms and of both thighs: they swing in opposition (Rule 1).
     pub opposition: [Soft; 2],
-    /// Sum of the swings of arm and leg of a side in their standard deviations: in opposition too (Rule 2).
+    /// Sum of the swings of arm and leg of a side in their standard deviations: also in opposition (Rule 2).
     pub same_side: Soft,
-    /// Trunk against the vertical, forward positive.
+    /// Angle of the trunk from the vertical, forward positive.
     pub trunk_lean: Soft,
-    /// Trunk against the vertical, to the left positive.
+    /// Angle of the trunk from the vertical, to the left positive.
     pub trunk_roll: Soft,
-    /// Line of the shoulders about the vertical.
+    /// Rotation of the shoulder line about the vertical.
     pub shoulder_turn: Soft,
-    /// Line of the hips about the vertical.
+    /// Rotation of the hip line about the vertical.
     pub hip_turn: Soft,
-    /// How far the neck may lie before or behind where the lengths of the torso put it, metres.
+    /// Standard deviation of the neck's forward position relative to that from the lengths of the torso, metres.
     pub neck_forward_sd_m: f64,
     /// Standard deviation of the distances within the trunk, metres.
     pub rigid_m: f64,
-    /// Standard deviation of the apparent lengths of the trunk's segments, as a fraction.
+    /// Relative standard deviation of the apparent lengths of the trunk's segments.
     pub trunk_length_sd: f64,
-    /// Cost of a torso that faces against the hips.
+    /// Cost of a torso that faces opposite to the hips.
     pub hips_against_torso: f64,
-    /// Acceleration of a joint of the trunk against its starting joint, m/s².
+    /// Acceleration of a joint of the trunk relative to its starting joint, m/s².
     pub trunk_acceleration_mps2: f64,
-    /// Height of the lower ankle above that of a foot on the ground, standard deviation, metres: the heel
-    /// lifted, and the error of the neck's distance.
+    /// Standard deviation of the height of the lower ankle above that of a foot on the ground, metres: lifted
+    /// heel and error of the neck's distance.
     pub support_sd_m: f64,
-    /// By how much differences of cost are too sure of themselves; margins are divided by it. Measured: the
-    /// share of mirrored segments by margin, on four walks in three views at 1 and 3 px.
+    /// Factor by which differences of cost are overconfident; margins are divided by it. Measured as the share of
+    /// mirrored segments by margin, on four walks in three views at 1 and 3 px.
     pub overconfidence: f64,
-    /// Time after which another frame is new evidence, seconds.
+    /// Time after which another frame is independent evidence, seconds.
     pub independence_s: f64,
 }
 
 impl MotionPrior {
-    /// A walking person.
+    /// Prior of a walking person.
     pub fn walking() -> Self {
         let segment =
             |swing: (f64, f64), outward: (f64, f64), outward_per_swing, acceleration_mps2, length_sd| {
@@ -143,11 +143,11 @@ impl MotionPrior {
         }
     }
 
-    /// Anybody doing anything: what joints allow, a trunk more upright than not, and inertia.
+    /// Prior for any motion: ranges of the joints, a trunk rather upright, and inertia.
     ///
-    /// Swings are wide, with their middles between the limits of the joints (thighs and arms go farther
-    /// forwards than back, and outwards than across); link without moving direction, so that they are of the
-    /// trunk's own.
+    /// Swings have wide spreads and means in the middle of the joint limits (thighs and arms move farther forward
+    /// than back, and outwards than across). Use it without a moving direction, so that swings are relative to
+    /// the trunk.
     pub fn any() -> Self {
         let segment = |swing: Soft, outward: Soft, acceleration_mps2| SegmentPrior {
             swing,
@@ -175,7 +175,7 @@ impl MotionPrior {
         }
     }
 
-    /// Standard deviation of the apparent length of the segment that ends at a joint, as a fraction.
+    /// Relative standard deviation of the apparent length of the segment that ends at a joint.
     pub(crate) fn length_sd(&self, end: Joint) -> f64 {
         match end {
             Joint::RightElbow | Joint::LeftElbow => self.segments[0].length_sd,
@@ -197,12 +197,12 @@ mod tests {
         let soft = Soft::degrees(10.0, 3.0);
         let deg = |angle: f64| angle.to_radians();
         assert!((soft.cost(deg(16.0), 0.0) - 4.0).abs() < 1e-12);
-        // 5 degrees of spread and noise together.
+        // Spread and noise together are 5 degrees.
         assert!((soft.cost(deg(20.0), deg(4.0)) - 4.0).abs() < 1e-12);
         assert!((soft.cost(deg(90.0), 0.0) - 25.0).abs() < 1e-12);
         assert_eq!(soft.cost(f64::NAN, 0.0), 0.0);
         assert_eq!(Soft::FREE.cost(deg(90.0), 0.0), 0.0);
-        // A limit counts below it alone.
+        // Only values below the limit cost.
         assert!((soft.cost_beyond(deg(7.0), 0.0) - 1.0).abs() < 1e-12);
         assert_eq!(soft.cost_beyond(deg(30.0), 0.0), 0.0);
         assert_eq!([chi_sq(-2.0), chi_sq(9.0), capped(7.0), capped(f64::NAN)], [4.0, 25.0, 7.0, 0.0]);
@@ -225,7 +225,7 @@ mod tests {
             let ratio = segment.swing.sd_rad / variance.sqrt();
             assert!((1.0..4.5).contains(&ratio), "{ratio}");
         }
-        // Both sides together swing about twice the mean of one; elbows bend a little more than knees do.
+        // The sum of both sides is about twice the mean of one; elbows bend a little more than knees.
         for (both, inner) in prior.opposition.iter().zip([0, 2]) {
             assert!((both.mean_rad - 2.0 * prior.segments[inner].swing.mean_rad).abs() < 1e-12);
         }

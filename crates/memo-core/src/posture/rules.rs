@@ -1,16 +1,16 @@
-//! What a motion allows beyond what a body can do: rules, each with its tolerance, and models of motions made
-//! of them (Lee and Chen 1985, section 3.3).
+//! Rules of motion beyond the limits of the body, each with a tolerance, and motion models made of rules (Lee and
+//! Chen 1985, section 3.3).
 //!
-//! Rules compare swings: the angle of a segment from the trunk's y in its sagittal plane, forward positive.
-//! An elbow or a knee that swings less than the tolerance is "too close to the torso" for rules 1 and 2.
-//! Rule 3 can be read of the joint against the plane of the body (section 4.2 of the paper) or of the upper
-//! against the lower segment; both are here. A walker's thigh swings forward while the shank hangs back, so
-//! the second reading does not hold for legs; shoulders lie behind any plane through the neck, so the first
-//! does not hold for arms. Rules are of straight-line walking: who turns or stands breaks them.
+//! Rules compare swings: the angle of a segment from the trunk's y in its sagittal plane, forward positive. An
+//! elbow or a knee that swings less than the tolerance is "too close to the torso" for rules 1 and 2. Rule 3 has
+//! two readings: the joint against the plane of the body (section 4.2 of the paper), or the upper against the
+//! lower segment; both are implemented. A walker's thigh swings forward while the shank is behind it, so the
+//! second reading does not hold for legs. Shoulders are behind any plane through the neck, so the first does not
+//! hold for arms. The rules are for straight-line walking: people who turn or stand break them.
 //!
-//! Tolerances of the measured strength were chosen on four walks of motion capture (two Plug-in-Gait, two
-//! CMU) as the least multiples of 5 degrees at which no more than about one true frame in a hundred is cut;
-//! the noise factor on the same walks in three views at 3 px.
+//! Tolerances of the measured strength were chosen on four walks of motion capture (two Plug-in-Gait, two CMU).
+//! They are the smallest multiples of 5 degrees at which no more than about one true frame in a hundred is cut.
+//! The noise factor was chosen on the same walks in three views at 3 px.
 
 use glam::DVec3;
 
@@ -18,14 +18,14 @@ use super::constraint::{Constraint, Unit, Violation};
 use super::placed::{Placed, PlacedFigure, Trunk};
 use crate::model::skeleton::{Joint, Side};
 
-/// A rule by name.
+/// A rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Rule {
     /// Rule 1: the arms do not swing to one side by more than the angle.
     ArmsOpposed,
-    /// Rule 1: nor do the legs.
+    /// Rule 1: the legs do not swing to one side by more than the angle.
     LegsOpposed,
-    /// Rule 2: nor do the arm and the leg of a side.
+    /// Rule 2: the arm and the leg of a side do not swing to one side by more than the angle.
     ArmOpposesLeg,
     /// Rule 3, joint against the body plane: a shoulder off it by more than the distance and an upper arm by
     /// more than the angle are on the same side of it.
@@ -97,7 +97,7 @@ impl Rule {
         Self::ALL.into_iter().find(|rule| rule.name() == name)
     }
 
-    /// The paper's number; none for the rules of standing.
+    /// The number in the paper; `None` for the rules of standing.
     pub fn number(self) -> Option<u8> {
         Some(match self {
             Self::ArmsOpposed | Self::LegsOpposed => 1,
@@ -131,36 +131,36 @@ impl Rule {
     }
 }
 
-/// What a rule tolerates.
+/// Tolerance of a rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Radians.
+    /// Angle, radians.
     pub angle_rad: f64,
-    /// Metres; only of [`Rule::ShoulderElbow`] and [`Rule::HipKnee`].
+    /// Distance, metres; only for [`Rule::ShoulderElbow`] and [`Rule::HipKnee`].
     pub distance_m: f64,
 }
 
 impl Tolerance {
-    /// Of an angle in degrees.
+    /// A tolerance for an angle in degrees.
     pub fn from_deg(angle_deg: f64) -> Self {
         Self { angle_rad: angle_deg.to_radians(), distance_m: 0.0 }
     }
 
-    /// With a distance of the joint from the body plane.
+    /// The same with a distance of the joint from the body plane.
     #[must_use]
     pub fn with_distance_m(self, distance_m: f64) -> Self {
         Self { distance_m, ..self }
     }
 }
 
-/// A set of rules.
+/// A motion model: a set of rules with tolerances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionModel {
-    /// Tolerances of the rules that apply, in the order of [`Rule::ALL`].
+    /// Tolerance of each rule in the order of [`Rule::ALL`]; `None` for rules that do not apply.
     pub tolerances: [Option<Tolerance>; RULE_COUNT],
-    /// A knee flexed by more is flexed for [`Rule::OtherLegUpright`], radians.
+    /// A knee counts as flexed for [`Rule::OtherLegUpright`] above this angle, radians.
     pub knee_flexed_rad: f64,
-    /// Every tolerance of an angle grows by this many standard deviations of the propagated noise.
+    /// Every angle tolerance is increased by this many standard deviations of the propagated noise.
     pub noise_factor: f64,
 }
 
@@ -170,7 +170,7 @@ impl MotionModel {
         Self { tolerances: [None; RULE_COUNT], knee_flexed_rad: 40f64.to_radians(), noise_factor: 1.0 }
     }
 
-    /// Rules 1 to 5 at tolerances that true walking keeps.
+    /// Rules 1 to 5 with tolerances that true walking keeps.
     pub fn walking() -> Self {
         Self::walking_general()
             .with(Rule::HipKnee, Tolerance::from_deg(10.0).with_distance_m(0.03))
@@ -181,7 +181,7 @@ impl MotionModel {
             .with(Rule::OtherLegUpright, Tolerance::from_deg(20.0))
     }
 
-    /// Rules 1 and 2 alone, at tolerances that true walking keeps.
+    /// Only rules 1 and 2, with tolerances that true walking keeps.
     pub fn walking_general() -> Self {
         Self::without_rules()
             .with(Rule::ArmsOpposed, Tolerance::from_deg(15.0))
@@ -189,7 +189,8 @@ impl MotionModel {
             .with(Rule::ArmOpposesLeg, Tolerance::from_deg(15.0))
     }
 
-    /// Rules 1 to 5 as tight as the paper's examples ask; true walking breaks them in nine frames of ten.
+    /// Rules 1 to 5 with the tight tolerances of the paper's examples; true walking breaks them in nine frames of
+    /// ten.
     pub fn walking_paper() -> Self {
         let joint = Tolerance::from_deg(5.0).with_distance_m(0.01);
         let model = Self::walking_general_paper()
@@ -202,7 +203,7 @@ impl MotionModel {
         Self { knee_flexed_rad: 15f64.to_radians(), ..model }
     }
 
-    /// Rules 1 and 2 with the dead zone of 10 degrees at which the paper's tables are met.
+    /// Rules 1 and 2 with the dead zone of 10 degrees that reproduces the paper's tables.
     pub fn walking_general_paper() -> Self {
         let model = [Rule::ArmsOpposed, Rule::LegsOpposed, Rule::ArmOpposesLeg]
             .into_iter()
@@ -210,8 +211,8 @@ impl MotionModel {
         Self { noise_factor: 0.0, ..model }
     }
 
-    /// An example, not measured on running: arms and legs oppose each other, limbs stay in the moving plane;
-    /// both knees may be flexed and no leg need be upright.
+    /// An example, not validated on running: arms and legs are in opposition, limbs stay in the moving plane;
+    /// both knees may be flexed, and no leg has to be upright.
     pub fn running() -> Self {
         Self::without_rules()
             .with(Rule::ArmsOpposed, Tolerance::from_deg(25.0))
@@ -221,26 +222,26 @@ impl MotionModel {
             .with(Rule::LegPlane, Tolerance::from_deg(25.0))
     }
 
-    /// An example, not measured: both legs upright, both knees straight; the arms are free.
+    /// An example, not validated: both legs upright, both knees straight; the arms are free.
     pub fn standing() -> Self {
         Self::without_rules()
             .with(Rule::LegsUpright, Tolerance::from_deg(15.0))
             .with(Rule::KneesStraight, Tolerance::from_deg(30.0))
     }
 
-    /// The same with a rule.
+    /// The same model with another rule.
     #[must_use]
     pub fn with(mut self, rule: Rule, tolerance: Tolerance) -> Self {
         self.tolerances[rule as usize] = Some(tolerance);
         self
     }
 
-    /// The tolerance of a rule that applies.
+    /// The tolerance of a rule; `None` if it does not apply.
     pub fn tolerance(&self, rule: Rule) -> Option<Tolerance> {
         self.tolerances[rule as usize]
     }
 
-    /// Checks one constraint; None where it holds, does not apply or is no rule.
+    /// Checks one constraint; `None` if it holds, does not apply or is not a rule.
     pub(crate) fn check(
         &self,
         constraint: Constraint,
@@ -285,7 +286,7 @@ impl MotionModel {
         Violation::over(constraint, value, limit, Unit::Radians)
     }
 
-    /// An angle drawn towards 0 by its noise.
+    /// An angle moved towards 0 by its noise.
     fn sure(&self, angle: f64, sd: f64) -> f64 {
         if self.noise_factor == 0.0 {
             return angle;
@@ -299,7 +300,8 @@ impl MotionModel {
         self.sure(trunk.swing_rad(limb), limb.direction_sd(towards).hypot(trunk.torso_sd.z))
     }
 
-    /// A knee's flexion drawn towards 0 by its noise; as it is where that does not pass a tolerance anyway.
+    /// The flexion of a knee, moved towards 0 by its noise. It is not moved if it does not exceed a tolerance
+    /// anyway.
     fn sure_flexion(&self, figure: &PlacedFigure, trunk: &Trunk, side: Side, tolerance: f64) -> f64 {
         let [thigh, shank] = [figure[side.knee()], figure[side.ankle()]];
         let flexion = trunk.knee_rad(thigh, shank);

@@ -1,9 +1,9 @@
-//! How uncertain the joints of a chosen figure are: noise carried from the neck down the limbs.
+//! Uncertainty of the joints of a chosen figure: noise propagated from the neck down the limbs.
 //!
-//! Each joint is placed by eq. (7) of Lee and Chen (1985) from its starting joint, so its error is made of the
+//! Each joint is placed by eq. (7) of Lee and Chen (1985) from its starting joint, so its error consists of the
 //! neck's distance, the noise of all image points between neck and joint, and the errors of their segments'
-//! lengths. First order: a linear map from these independent causes to the joints, whose rows give the
-//! covariance. The choice between the two roots is taken as right; a wrong root is not in these figures.
+//! lengths. To first order this is a linear map from these independent causes to the joints, whose rows give the
+//! covariance. The choice between the two roots is assumed right: the error of a wrong root is not included.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, Matrix3};
@@ -12,16 +12,16 @@ use thiserror::Error;
 use super::lift::JointRays;
 use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
 
-/// What the uncertainty comes from.
+/// Standard deviations of the causes of uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Causes {
     /// Standard deviation of the neck's distance along its ray, metres.
     pub anchor_sd_m: f64,
-    /// Standard deviation of each segment's length about the common scale, metres, by ending joint; the neck's
+    /// Standard deviation of each segment's length for a known scale, metres, by ending joint; that of the neck
     /// is not used.
     pub length_sd_m: PerJoint<f64>,
-    /// Relative standard deviation of the scale of all lengths. If the neck's distance was found by these
-    /// lengths, its part `anchor_scale_sd_m` moves with it.
+    /// Relative standard deviation of the scale of all lengths. If the neck's distance was estimated with these
+    /// lengths, its part `anchor_scale_sd_m` varies together with the scale.
     pub scale_sd: f64,
     /// The part of `anchor_sd_m` that is due to the scale of the lengths, metres (`sd_scale_m` of an anchor).
     pub anchor_scale_sd_m: f64,
@@ -31,7 +31,7 @@ pub struct Causes {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum UncertaintyError {
-    /// A standard deviation must be zero or positive.
+    /// A standard deviation is negative or not finite.
     #[error("{what} must not be negative and must be finite, got {value}")]
     Negative {
         /// Its name.
@@ -39,20 +39,20 @@ pub enum UncertaintyError {
         /// Its value.
         value: f64,
     },
-    /// The part cannot exceed the whole.
+    /// A part exceeds the whole.
     #[error(
         "the part of the anchor's deviation due to the scale, {part_m} m, exceeds the whole, {whole_m} m"
     )]
     PartExceedsWhole {
-        /// The part.
+        /// The part, metres.
         part_m: f64,
-        /// The whole.
+        /// The whole, metres.
         whole_m: f64,
     },
     /// The figure has no neck in front of the camera.
     #[error("the neck is unknown or at the camera: {neck}")]
     NoNeck {
-        /// Where it is.
+        /// Position of the neck, metres.
         neck: DVec3,
     },
 }
@@ -62,33 +62,33 @@ pub enum UncertaintyError {
 pub struct FigureUncertainty {
     /// Rows: x, y, z of each joint in turn; columns: independent causes, each scaled by its standard deviation.
     effects: DMatrix<f64>,
-    /// Standard deviation of each joint's place, camera axes: root of the covariance's trace, metres; NaN where
-    /// the joint or its chain is not known.
+    /// Standard deviation of each joint's position, camera axes: square root of the covariance's trace, metres;
+    /// NaN if the joint or a joint of its chain is not known.
     pub absolute_sd_m: PerJoint<f64>,
-    /// The same for the place relative to the neck.
+    /// The same for the position relative to the neck.
     pub relative_sd_m: PerJoint<f64>,
     /// Standard deviation along the joint's ray, metres.
     pub along_ray_sd_m: PerJoint<f64>,
 }
 
 impl FigureUncertainty {
-    /// Covariance of a joint's place in camera axes, m².
+    /// Covariance of a joint's position in camera axes, m².
     pub fn covariance(&self, joint: Joint) -> Matrix3<f64> {
         let rows = self.effects.rows(3 * joint as usize, 3);
         (rows * rows.transpose()).fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// Covariance of the place relative to another joint, m².
+    /// Covariance of the position relative to another joint, m².
     pub fn relative_covariance(&self, joint: Joint, to: Joint) -> Matrix3<f64> {
         let rows = self.effects.rows(3 * joint as usize, 3) - self.effects.rows(3 * to as usize, 3);
         (&rows * rows.transpose()).fixed_view::<3, 3>(0, 0).into_owned()
     }
 }
 
-/// Columns: scale, the rest of the neck's distance, two image directions a joint, a length a segment.
+/// Columns: scale, the rest of the neck's distance, two image directions per joint, one length per segment.
 const CAUSES: usize = 2 + 2 * JOINT_COUNT + JOINT_COUNT;
 
-/// Carries noise from the neck to every joint of a figure in camera axes.
+/// Propagates noise from the neck to every joint of a figure in camera axes.
 ///
 /// For a segment x_e - x_s = w + h r with x_e = k r and w across the ray, differentiation of w² + h² = l² gives
 ///
@@ -96,9 +96,9 @@ const CAUSES: usize = 2 + 2 * JOINT_COUNT + JOINT_COUNT;
 /// dk = r·dx_s + q / h,   q = l dl + w·dx_s - k w·dr,      dx_e = r dk + k dr
 /// ```
 ///
-/// Where the extent h along the ray vanishes the root is not linear in q; with s the standard deviation of q,
-/// h is replaced by s / (sqrt(h² + 2 s) - h), so that the result is the change that one standard deviation
-/// makes. `rays` gives the noise alone; the points of the figure are taken as the rays' directions.
+/// If the extent h along the ray is 0, the root is not linear in q. So h is replaced by s / (sqrt(h² + 2 s) - h),
+/// where s is the standard deviation of q: the result is the change for one standard deviation. `rays` is used
+/// only for its noise; the directions of the rays are those of the figure's joints.
 pub fn propagate(
     figure: &StickFigure,
     rays: &JointRays,
@@ -150,7 +150,7 @@ fn check(noise_rad: f64, causes: &Causes) -> Result<(), UncertaintyError> {
     if part_m > whole_m { Err(UncertaintyError::PartExceedsWhole { part_m, whole_m }) } else { Ok(()) }
 }
 
-/// What each cause does to a joint, one standard deviation of it; NaN where the chain is broken.
+/// Effect of one standard deviation of each cause on a joint; NaN if the chain is broken.
 fn joint_effects(
     figure: &StickFigure,
     joint: Joint,
@@ -180,7 +180,7 @@ fn joint_effects(
     q[0] += length * length * causes.scale_sd;
     q[2 + 2 * JOINT_COUNT + joint as usize] += length * causes.length_sd_m[joint];
     let s = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // s / (sqrt(h² + 2 s) - h) without cancellation: half the sum of root and h.
+    // s / (sqrt(h² + 2 s) - h) without cancellation: half the sum of square root and h.
     let effective = 0.5 * ((h * h + 2.0 * s).sqrt() + h.abs());
     let inverse = if effective > 0.0 { 1.0f64.copysign(h) / effective } else { 0.0 };
     std::array::from_fn(|c| across[c] + r * (r.dot(of_start(c)) + q[c] * inverse))
@@ -222,7 +222,7 @@ mod tests {
         f64::from(random.normal_pair()[0])
     }
 
-    /// The figure built anew by eq. (7) from disturbed causes, on the same side of every root.
+    /// The figure computed again by eq. (7) from disturbed causes, on the same side of every root.
     fn disturbed(truth: &StickFigure, noise_rad: f64, causes: &Causes, random: &mut Random) -> StickFigure {
         let scale = normal(random);
         let own = (causes.anchor_sd_m.powi(2) - causes.anchor_scale_sd_m.powi(2)).sqrt();
@@ -244,7 +244,7 @@ mod tests {
         figure
     }
 
-    /// Measured over stated standard deviations, absolute and relative to the neck, of every joint.
+    /// Measured divided by stated standard deviations, absolute and relative to the neck, of every joint.
     fn ratios(truth: &StickFigure, noise_rad: f64, causes: &Causes) -> Vec<(Joint, f64, f64)> {
         let rays = JointRays { noise_rad, ..JointRays::from_points(truth) };
         let stated = propagate(truth, &rays, causes).unwrap();
@@ -293,7 +293,7 @@ mod tests {
         }
     }
 
-    /// Seen square on, the roots meet: the first order would be infinite.
+    /// Seen perpendicular to the viewing direction, the roots are equal: the first order would be infinite.
     #[test]
     fn where_roots_meet_the_deviation_stays_finite_and_of_the_right_size() {
         let mut square = figure();
@@ -363,7 +363,7 @@ mod tests {
         assert!(matches!(error, UncertaintyError::PartExceedsWhole { .. }));
     }
 
-    /// Across its ray a joint is off by the noise of its own image point alone; along it by all else.
+    /// Across its ray, a joint's error is the noise of its own image point only; along it, all other causes.
     #[test]
     fn deviations_along_the_rays_are_those_of_a_monte_carlo() {
         let truth = figure();

@@ -1,4 +1,4 @@
-//! The walk under way: whether it goes on, and what its first frames say of path, person and distance.
+//! The current walk: whether it continues, and the fit of path, person and distance to its first frames.
 
 use super::locate::{Sighting, locate_slanting};
 use super::options::TrackerOptions;
@@ -8,25 +8,25 @@ use super::start::{StartReport, start};
 use super::walk::{Beginning, FrameEdges, Walk};
 use crate::model::Camera;
 
-/// Slower than this nobody walks, metres a second.
+/// Nobody walks slower than this, m/s.
 pub(super) const SLOWEST_MPS: f64 = 0.25;
-/// Slower than this no legs walk, gait cycles a second.
+/// Minimum cadence of a walk, gait cycles per second.
 const SLOWEST_HZ: f64 = 0.3;
-/// No stride, two steps, is shorter or longer than these shares of the body height. Some 90 walks, motion-captured, on
-/// video and drawn, had 0.60 to 1.05.
+/// Range of stride lengths (two steps) as shares of the body height. Some 90 walks (motion-captured, on video and
+/// drawn) had 0.60 to 1.05.
 const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
-/// A slanting path must explain the frames better than one parallel to the image by this share of similarity:
-/// seen from above a walk can seem to slant, and then fits worse.
+/// Relative gain of similarity that an oblique path needs over a path parallel to the image plane. Seen from
+/// above, a walk can look oblique, but then it fits worse.
 const SLANT_GAIN: f64 = 0.02;
-/// Number of last frames that tell whether a walk goes on.
+/// Number of last frames that decide whether a walk continues.
 const RECENT_FRAMES: usize = 12;
-/// A walk ends when their similarity falls below this share of the walk's mean.
+/// A walk ends if the mean similarity of those frames is below this share of the walk's mean.
 const LOST_SHARE: f64 = 0.45;
 
 /// Frames kept for fitting.
 type Kept = [(Option<Sighting>, FrameEdges)];
 
-/// The walk under way.
+/// The current walk.
 #[derive(Debug)]
 pub(super) struct Active {
     pub(super) camera: Camera,
@@ -41,7 +41,7 @@ pub(super) struct Active {
 }
 
 impl Active {
-    /// Whether over the last frames the person stood still or the model found little.
+    /// True if in the last frames the person stood still or the model matched little.
     pub(super) fn is_over(&self) -> bool {
         let twin = &self.walk.twins[self.walk.best()];
         let count = twin.steps.len();
@@ -59,11 +59,11 @@ impl Active {
         stopped || lost
     }
 
-    /// Whether what was followed walked: over all frames it got on, and as far with each cycle as legs of its height
-    /// carry.
+    /// True if the moving thing walked: over all frames it moved on, and its displacement per cycle is possible
+    /// for legs of its height.
     ///
-    /// Arms that swing and things that are carried along can look like a walker for half a second; the legs of a model
-    /// that follows them do not go with the way.
+    /// Swinging arms and carried things can look like a walker for half a second, but then the legs of the model
+    /// do not fit the displacement.
     pub(super) fn is_walk(&self) -> bool {
         let twin = &self.walk.twins[self.walk.best()];
         let (Some(first), Some(last)) = (twin.steps.first(), twin.steps.last()) else { return false };
@@ -76,10 +76,10 @@ impl Active {
             && STRIDE_HEIGHTS.contains(&stride)
     }
 
-    /// Takes off the frames in which the person was not there yet, and those in which the walk was already
-    /// over.
+    /// Removes the frames before the person appeared and those after the walk was over.
     ///
-    /// A person who appears between two frames changes the empty one too, eq. (1) looking both ways.
+    /// A person who appears between two frames also changes the empty frame, because eq. (1) uses both
+    /// neighbours.
     pub(super) fn trim(&mut self) {
         let twin = &self.walk.twins[self.walk.best()];
         let low = LOST_SHARE * twin.similarity_sum / twin.steps.len() as f64;
@@ -89,7 +89,8 @@ impl Active {
         self.walk.keep(absent.min(end)..end);
     }
 
-    /// Fits the person to the kept frames and follows them again if that is believed; once.
+    /// Fits the person to the kept frames and, if the fit is accepted, follows them again. This happens once per
+    /// walk.
     pub(super) fn refit(&mut self, options: &TrackerOptions) {
         if std::mem::replace(&mut self.fitted, true) {
             return;
@@ -109,7 +110,7 @@ impl Active {
         }
     }
 
-    /// Starts again on a slanting path where the sightings show one and the contours agree.
+    /// Starts again on an oblique path if the sightings show one and the contours fit it better.
     fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
         let crown_m = self.walk.walker.level_crown_height_m();
@@ -128,8 +129,8 @@ impl Active {
         }
     }
 
-    /// Of a body known to be average the apparent size tells the distance; a deviating one could as well be
-    /// nearer or farther.
+    /// For a body assumed average, the apparent size determines the distance. A body that differs could as well
+    /// be nearer or farther.
     fn refit_distance(&mut self, kept: &Kept, options: &TrackerOptions, person: &PersonOptions) {
         let Walk { walker, path, beginning, .. } = &self.walk;
         let scene = Scene { walker, camera: &self.camera, path };
@@ -143,7 +144,7 @@ impl Active {
         self.follow_again(walk, kept, options);
     }
 
-    /// The kept frames with where the better twin saw the person in them.
+    /// The kept frames with the better twin's hypothesis of each.
     fn frames<'a>(&self, kept: &'a Kept) -> Vec<(&'a FrameEdges, Hypothesis)> {
         let twin = &self.walk.twins[self.walk.best()];
         kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect()
@@ -175,7 +176,7 @@ mod tests {
     const WINDOW: Rectangle = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
     const FRAME_S: f64 = 0.05;
 
-    /// A walk of the given steps, the second twin worse.
+    /// A walk of the given steps; the second twin is worse.
     fn active(steps: Vec<Step>) -> Active {
         let mut walk = Walk::new(walker(), PATH, BEGINNING);
         walk.twins[0].similarity_sum = steps.iter().map(|s| f64::from(s.similarity)).sum();
@@ -193,7 +194,7 @@ mod tests {
         }
     }
 
-    /// A step with this similarity at a place and phase.
+    /// A step with this similarity at a position and phase.
     fn step(frame: usize, [along_m, cycles]: [f64; 2], similarity: f32) -> Step {
         let state = State {
             along: ConstantVelocity::new(along_m, 1.2, 1e-4, 1e-3),
@@ -206,13 +207,13 @@ mod tests {
         Step { frame, time_s, state, measured, similarity, look }
     }
 
-    /// A walk of `count` frames that goes well, and its last twelve at these speeds and similarity.
+    /// A good walk of `count` frames whose last twelve have these speeds and this similarity.
     fn ending(count: usize, speed_mps: f64, rate_hz: f64, similarity: f32) -> Active {
         let mut at = [0.0, 0.0];
         let next = |k: usize| {
             let is_last = k + 12 >= count;
             if k > 0 {
-                // The first of the last twelve is reached as before.
+                // The first of the last twelve frames is reached at the usual speeds.
                 let moves = if k + 12 > count { [speed_mps, rate_hz] } else { [1.2, 0.9] };
                 at = [at[0] + moves[0] * FRAME_S, at[1] + moves[1] * FRAME_S];
             }
@@ -226,7 +227,7 @@ mod tests {
         assert!(!ending(40, 1.2, 0.9, 0.5).is_over());
         assert!(!ending(40, -1.2, -0.9, 0.5).is_over(), "backwards");
         assert!(ending(40, 0.0, 0.0, 0.5).is_over());
-        // Whoever stands still or glides no longer walks: 0.25 m/s, 0.3 Hz.
+        // A person who stands still or glides no longer walks: 0.25 m/s, 0.3 Hz.
         for (speed_mps, rate_hz, is_over) in [
             (0.24, 0.9, true),
             (0.26, 0.9, false),
@@ -253,7 +254,7 @@ mod tests {
         assert!(!active(Vec::new()).is_over());
     }
 
-    /// 40 frames at these speeds throughout, by somebody 1.75 m high.
+    /// 40 frames at these speeds, of a person 1.75 m tall.
     fn steady(speed_mps: f64, rate_hz: f64) -> Active {
         let at = |k: usize| [speed_mps, rate_hz].map(|v| v * FRAME_S * k as f64);
         active((0..40).map(|k| step(k, at(k), 0.5)).collect())
@@ -267,10 +268,10 @@ mod tests {
             // Short and long strides: 0.5 and 1.2 body heights.
             (0.7 * 0.5 * 1.75, 0.7, true),
             (1.2 * 1.2 * 1.75, 1.2, true),
-            // Legs that go forward while the body goes back.
+            // The legs walk forward while the body moves backward.
             (1.2, -0.9, false),
             (-1.2, 0.9, false),
-            // Less than 0.25 m/s or 0.3 Hz, however they go together.
+            // Less than 0.25 m/s or 0.3 Hz, with a valid stride.
             (0.24, 0.35, false),
             (0.26, 0.35, true),
             (0.5, 0.29, false),
@@ -313,8 +314,8 @@ mod tests {
         assert!(lost.walk.twins[0].steps.is_empty(), "nobody was there");
     }
 
-    /// Twelve frames of the contours of somebody who walks along a path, with the rectangles of somebody who walks
-    /// along another.
+    /// Twelve frames with the contours of a person who walks along `path` and the rectangles of a person who
+    /// walks along `seen`.
     fn kept(path: &Path, seen: &Path) -> Vec<(Option<Sighting>, FrameEdges)> {
         let (walker, camera) = (walker(), camera());
         let scene = Scene { walker: &walker, camera: &camera, path };
@@ -340,7 +341,7 @@ mod tests {
         TrackerOptions { start_frames: 5, person: None, ..TrackerOptions::for_height(1.75) }
     }
 
-    /// A walk followed on a path parallel to the image through frames that are kept.
+    /// A walk followed through the kept frames on a path parallel to the image plane, then fitted.
     fn refitted(kept: Vec<(Option<Sighting>, FrameEdges)>) -> Active {
         let mut active = active(Vec::new());
         for (_, edges) in &kept {

@@ -1,33 +1,33 @@
 //! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
 //!
-//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane a
-//! height. The loops over lanes are left to the compiler's vectoriser, so every function they call is
-//! `#[inline(always)]` and the caller dispatches on the instruction set. No operation is fused or reordered:
-//! the scores are the same bits on every instruction set.
+//! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane per
+//! height. The compiler vectorises the loops over lanes, so every function they call is `#[inline(always)]` and
+//! the caller dispatches on the instruction set. No operation is fused or reordered: the scores have the same
+//! bits on every instruction set.
 //!
-//! Against the plain similarity, asin and exp are polynomials of known error and the projection is in f32
-//! (some 1e-4 px).
+//! Differences from the plain similarity: asin and exp are polynomials of known error, and the projection is in
+//! f32 (some 1e-4 px).
 #![allow(clippy::needless_range_loop, reason = "one index runs through the lanes of several arrays at once")]
 
 use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
 use crate::model::Camera;
 use glam::DVec3;
 
-/// Heights evaluated together: the printed grid has 11.
+/// Heights evaluated together: the paper's grid has 11.
 pub(super) const LANES: usize = 16;
 /// One f32 for each height.
 pub(super) type Lanes = [f32; LANES];
-/// Edges tested together for being near a line, one byte of a word each. 16 as well: loops of 8 are unrolled
-/// before they can be vectorised, which makes this test over twice as slow.
+/// Edges tested together for being near a line, one byte of a word each. It is 16 because loops of 8 are unrolled
+/// before they can be vectorised, which makes this test more than twice as slow.
 const BATCH: usize = 16;
-/// Nearest depth that is projected, metres.
+/// Minimum depth that is projected, metres.
 const NEAR_M: f32 = 1e-6;
-/// What rounding may move a window's border by, pixels.
+/// Maximum effect of rounding on a window's border, pixels.
 const SLACK_PX: f32 = 0.01;
-/// What rounding may turn an edge, as a sine.
+/// Maximum effect of rounding on the direction of an edge, as a sine.
 const SLACK_SINE: f32 = 1e-4;
 
-/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, the projection being
+/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, because the projection is
 /// linear before its division.
 #[derive(Clone, Copy)]
 struct RaisedPoint {
@@ -35,18 +35,18 @@ struct RaisedPoint {
     per_metre: [f32; 3],
 }
 
-/// The ideal pixels of a camera for a body that was posed elsewhere and is moved to its place.
+/// Projection to ideal pixels for a body that was posed elsewhere and is moved to its position.
 pub(super) struct Projection<'a> {
     camera: &'a Camera,
     place: DVec3,
     per_metre: [f32; 3],
-    /// Outermost pixels' outer borders.
+    /// Outer borders of the outermost pixels.
     low: [f32; 2],
     high: [f32; 2],
 }
 
 impl<'a> Projection<'a> {
-    /// Of points that are moved by `place` before they are projected.
+    /// The projection of points that are moved by `place` first.
     pub(super) fn new(camera: &'a Camera, place: DVec3) -> Self {
         Self {
             camera,
@@ -71,7 +71,7 @@ fn homogeneous(camera: &Camera, in_camera: DVec3) -> [f32; 3] {
     [scaled.x as f32, scaled.y as f32, in_camera.z as f32]
 }
 
-/// A model line's own axes, x along the line from its start, y across; all zeros where no line is shown.
+/// A model line's own axes, x along the line from its start, y across it; all zeros if no line is visible.
 #[derive(Clone, Copy)]
 struct Line {
     start: [f32; 2],
@@ -81,7 +81,7 @@ struct Line {
     inverse_length: f32,
 }
 
-/// A visible piece of contour at each height, cut to the image.
+/// A visible piece of contour at each height, clipped to the image.
 pub(super) struct LineLanes {
     start: [Lanes; 2],
     direction: [Lanes; 2],
@@ -90,7 +90,7 @@ pub(super) struct LineLanes {
 }
 
 impl LineLanes {
-    /// The piece from `start` to `end`, raised by each of `raised_m`.
+    /// The piece from `start` to `end`, raised by each value of `raised_m`.
     #[inline(always)]
     pub(super) fn new(projection: &Projection<'_>, start: DVec3, end: DVec3, raised_m: &Lanes) -> Self {
         let (start, end) = (projection.point(start), projection.point(end));
@@ -169,16 +169,16 @@ impl RaisedPoint {
     }
 }
 
-/// The edges of a frame, made ready for the columns of a grid.
+/// The edges of a frame, prepared for the columns of a grid.
 pub(super) struct ColumnScorer<'a> {
-    /// Those that can answer most first.
+    /// In descending order of the most they can contribute.
     edges: Vec<PreparedEdge>,
     batches: Vec<EdgeBatch>,
     options: &'a SimilarityOptions,
     constants: Constants,
 }
 
-/// What eq. (7) needs of the options.
+/// Constants of eq. (7) from the options.
 struct Constants {
     /// r / l_M.
     c_r: f32,
@@ -187,7 +187,7 @@ struct Constants {
     /// l_M / sigma_d.
     inverse_c_d_c_r: f32,
     inverse_sigma_phi: f32,
-    /// Sine of the largest angle compared; above any sine where all are.
+    /// Sine of the largest angle compared; above 1 if all angles are compared.
     sine_cut: f32,
 }
 
@@ -215,7 +215,7 @@ impl<'a> ColumnScorer<'a> {
         Self { edges, batches, options, constants: Constants::new(options) }
     }
 
-    /// w_K s_i of a line at each height: the best among the edges `near` it.
+    /// w_K s_i of a line at each height: the best of the edges in `near`.
     #[inline(always)]
     pub(super) fn best(&self, part: usize, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = match self.options.measure {
@@ -228,12 +228,12 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
-    /// By eq. (7) no edge answers more than its length: the rest is left out once every height has more than
-    /// that.
+    /// By eq. (7) no edge contributes more than its length: once every height has more than that, the remaining
+    /// edges are skipped.
     #[inline(always)]
     fn best_by_rohr(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = [0.0; LANES];
-        // Heights that show no line need no answer.
+        // Heights at which no line is visible need no edge.
         let mut least = [0.0; LANES];
         for i in 0..LANES {
             least[i] = if lines.length[i] > 0.0 { 0.0 } else { f32::INFINITY };
@@ -263,7 +263,7 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
-    /// The edges that may answer the line at one of the heights.
+    /// The edges that may match the line at one of the heights.
     #[inline(always)]
     pub(super) fn near(&self, lines: &LineLanes, near: &mut Vec<u32>) {
         near.clear();
@@ -279,7 +279,7 @@ impl<'a> ColumnScorer<'a> {
 }
 
 impl PreparedEdge {
-    /// The most an edge can answer by eq. (7): l is no longer than the edge.
+    /// The most an edge can contribute by eq. (7): l is no longer than the edge.
     #[inline(always)]
     fn most(&self) -> f32 {
         self.weight * self.length
@@ -297,7 +297,7 @@ fn rohr(line: &Line, edge: &PreparedEdge, constants: &Constants) -> f32 {
     select(cut.sine <= constants.sine_cut, value)
 }
 
-/// Eq. (10) on the uncut edge; only edges that reach the window compete.
+/// Eq. (10) on the edge that is not clipped; only edges that reach the window are compared.
 #[inline(always)]
 fn lowe(line: &Line, edge: &PreparedEdge, constants: &Constants) -> f32 {
     let half_width = constants.c_r * line.length;
@@ -313,12 +313,12 @@ fn lowe(line: &Line, edge: &PreparedEdge, constants: &Constants) -> f32 {
     select(cut.reaches, value)
 }
 
-/// An edge cut to a line's window [0, l_M] x [-r, r].
+/// An edge clipped to a line's window [0, l_M] x [-r, r].
 struct Cut {
     reaches: bool,
     overlap: f32,
     distance: f32,
-    /// Of the angle between the undirected lines.
+    /// Sine of the angle between the two lines without direction.
     sine: f32,
 }
 
@@ -339,7 +339,7 @@ impl Cut {
     }
 }
 
-/// The t between which low <= p + t d <= high (Liang and Barsky). A d of 0 is replaced by one too small to
+/// The range of t with low <= p + t d <= high (Liang and Barsky). A d of 0 is replaced by one too small to
 /// matter.
 #[inline(always)]
 fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
@@ -348,7 +348,7 @@ fn clip(p: f32, d: f32, low: f32, high: f32) -> (f32, f32) {
     (min(a, b), max(a, b))
 }
 
-/// asin² of 0 <= x <= 1 to 4e-6 of its value: a polynomial in q = x² to q = 1/2, beyond by asin x = pi/2 -
+/// asin² of 0 <= x <= 1 with relative error 4e-6: a polynomial in q = x² up to q = 1/2; above, asin x = pi/2 -
 /// asin sqrt(1 - q).
 #[inline(always)]
 fn angle_sq(sine: f32) -> f32 {
@@ -360,12 +360,12 @@ fn angle_sq(sine: f32) -> f32 {
     if q <= 0.5 { p } else { rest * rest }
 }
 
-/// e^x of x <= 0 to 3e-7 of its value plus the rounding of x; 2^-126 below -87. With n the nearest integer to
+/// e^x of x <= 0 with relative error 3e-7 plus the rounding of x; 2^-126 below -87. With n the nearest integer to
 /// x / ln 2, e^x = 2^n 2^f.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
     let y = max(x, -87.0) * std::f32::consts::LOG2_E;
-    // Adding 1.5 * 2^23 rounds to an integer, which then stands in the lowest bits.
+    // Adding 1.5 * 2^23 rounds to an integer, which is then in the lowest bits.
     let magic = 12_582_912.0;
     let shifted = y + magic;
     let f = y - (shifted - magic);
@@ -374,7 +374,7 @@ fn exp(x: f32) -> f32 {
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
 }
 
-// The standard library's own treat NaN in a way that costs two more instructions.
+// The functions of the standard library treat NaN in a way that takes two more instructions.
 #[inline(always)]
 fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -390,12 +390,12 @@ fn select(condition: bool, value: f32) -> f32 {
     if condition { value } else { 0.0 }
 }
 
-/// The rectangle that holds the windows of a line at all heights, in axes along the line's mean direction.
+/// The rectangle that contains the windows of a line at all heights, in axes along the line's mean direction.
 struct Area {
     axes: Line,
     middle: [f32; 2],
     half: [f32; 2],
-    /// At least the sine of the largest angle with the mean direction: sin (a + b) <= sin a + sin b.
+    /// An upper bound of the sine of the largest angle with the mean direction: sin (a + b) <= sin a + sin b.
     sine_cut: f32,
 }
 
@@ -426,8 +426,8 @@ impl Area {
 }
 
 impl Line {
-    /// Axes at the first height's start (the origin if it shows none) along the mean direction of all
-    /// heights.
+    /// Axes at the start of the first height's line (at the origin if it has none) along the mean direction of
+    /// all heights.
     #[inline(always)]
     fn mean(lines: &LineLanes) -> Self {
         let sum = |lanes: Lanes| reduce(lanes, |a, b| a + b);
@@ -438,7 +438,7 @@ impl Line {
     }
 }
 
-/// Folds all lanes by halves.
+/// Reduces all lanes by folding halves.
 #[inline(always)]
 fn reduce(mut lanes: Lanes, fold: impl Fn(f32, f32) -> f32) -> f32 {
     for half in [8, 4, 2, 1] {
@@ -449,10 +449,10 @@ fn reduce(mut lanes: Lanes, fold: impl Fn(f32, f32) -> f32) -> f32 {
     lanes[0]
 }
 
-/// Edges side by side; the last batch is filled up with NaN, which is near nothing.
+/// A batch of edges as a structure of arrays. The last batch is filled with NaN, which is near nothing.
 struct EdgeBatch {
     middle: [[f32; BATCH]; 2],
-    /// From the middle to the end.
+    /// Vector from the middle to the end.
     half: [[f32; BATCH]; 2],
     half_length: [f32; BATCH],
 }
@@ -468,7 +468,7 @@ impl EdgeBatch {
         }
     }
 
-    /// Byte i is 1 where edge i reaches the area and is not turned too far.
+    /// Byte i is 1 if edge i reaches the area and its angle is not too large.
     #[inline(always)]
     fn marks(&self, area: &Area) -> u128 {
         let mut marks = [0u8; BATCH];
@@ -521,8 +521,8 @@ mod tests {
         Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
     }
 
-    /// s_i at each height by the readable way, `None` where an angle is so near to the largest compared that
-    /// rounding decides.
+    /// s_i at each height by the plain similarity; `None` if an angle is so close to the largest compared angle
+    /// that rounding decides.
     fn plainly(piece: &VisibleSegment, raised_m: &Lanes, edges: &[EdgeLine]) -> Option<Lanes> {
         let options = SimilarityOptions::default();
         let mut all = [0.0; LANES];
@@ -540,7 +540,7 @@ mod tests {
         Some(all)
     }
 
-    /// An edge whose middle, length and angle are given in the line's length and direction.
+    /// An edge whose middle, length and angle are given relative to the line's length and direction.
     fn edge_about(line: &ModelLine, (along, across, length, turn_rad): (f32, f32, f32, f32)) -> EdgeLine {
         let (start, end) = (Vec2::from(line.start), Vec2::from(line.end));
         let middle = start + along * (end - start) + across * (end - start).perp();
@@ -555,7 +555,7 @@ mod tests {
     }
 
     proptest! {
-        /// Pieces that leave the image, pass behind the camera or are short are drawn too.
+        /// Also tests pieces that leave the image, pass behind the camera or are short.
         #[test]
         fn every_height_answers_as_the_plain_similarity(
             ends in prop::array::uniform3(-1.5f64..1.5),

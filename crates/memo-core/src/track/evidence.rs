@@ -1,8 +1,7 @@
-//! What each frame contributes to tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and
-//! 4.3).
+//! Evidence of each frame for tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and 4.3).
 //!
-//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late.
-//! Two frames are kept, however long the stream.
+//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two
+//! frames are kept, whatever the length of the stream.
 
 use super::score::EdgeLine;
 use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chains};
@@ -17,31 +16,31 @@ use crate::option_error::OptionError;
 use glam::DVec2;
 use thiserror::Error;
 
-/// Why a frame gave no evidence.
+/// Why a frame was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EvidenceError {
-    /// The frame does not fit the ones before.
+    /// The size of the frame differs from the frames before.
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The options of edge or line finding make no sense.
+    /// The options of edge or line detection are not valid.
     #[error(transparent)]
     Line(#[from] LineError),
-    /// A frame needs a time.
+    /// The time of a frame is not finite.
     #[error("the time of a frame must be a finite number of seconds, got {time_s}")]
     Time {
-        /// Time given.
+        /// Time given, seconds.
         time_s: f64,
     },
-    /// Frames must come in order.
+    /// The time of a frame is not after the time of the frame before.
     #[error("frame times must increase: {time_s} s came after {previous_s} s")]
     TimeOrder {
-        /// Time of the frame before.
+        /// Time of the frame before, seconds.
         previous_s: f64,
-        /// Time of this frame.
+        /// Time of this frame, seconds.
         time_s: f64,
     },
 }
@@ -49,23 +48,23 @@ pub enum EvidenceError {
 /// Options of the stages from pixels to regions and edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvidenceOptions {
-    /// Change detection, eq. (1), for where edges are looked for: the low threshold loses no limb.
+    /// Change detection, eq. (1), for the mask near which edges are searched. Its low threshold loses no limb.
     pub change: ChangeOptions,
-    /// Least threshold of the change detection for the rectangle, grey levels. 10: floor reflections and
-    /// shadows change by less; at 4 they stretch the rectangle by up to 60 px.
+    /// Minimum threshold of the change detection for the rectangle, grey levels. Default 10: floor reflections
+    /// and shadows change by less; at 4 they enlarge the rectangle by up to 60 px.
     pub rectangle_threshold: f64,
     /// Recursive binary operations.
     pub clean: CleanOptions,
-    /// A slowly varying background whose foreground joins the changes, for people who stop; needs some frames
-    /// without them.
+    /// Optional slowly varying background. Its foreground is added to the change mask, so people who stop are
+    /// still detected. It needs some frames without people.
     pub background: Option<BackgroundOptions>,
-    /// Velocity field of the changed pixels, for w_V; costs some 10 ms a frame.
+    /// Optional velocity field of the changed pixels, for w_V; about 10 ms per frame.
     pub flow: Option<FlowOptions>,
     /// Grouping of regions into candidates.
     pub group: GroupOptions,
-    /// Edge points.
+    /// Edge-point detection.
     pub edge: EdgeOptions,
-    /// Straight edges.
+    /// Fit of straight edges.
     pub line: LineOptions,
 }
 
@@ -98,8 +97,8 @@ impl EvidenceOptions {
     }
 }
 
-/// Edges are taken this far outside the moving region, pixels: the change mask covers the outline, this
-/// covers the parts of a limb that stood still between two frames.
+/// Edges are taken up to this far outside the moving region, pixels. The change mask covers the outline; this
+/// margin covers parts of a limb that did not move between two frames.
 const EDGE_MARGIN_PX: f64 = 5.0;
 
 /// The edges found in a window of a frame.
@@ -109,24 +108,24 @@ pub struct WindowEdges {
     pub chains: EdgeChains,
     /// Straight edges, in image pixels.
     pub segments: Vec<EdgeSegment>,
-    /// The same straight edges in ideal pixels of the camera, as they are compared with the model.
+    /// The same straight edges in ideal pixels of the camera, in which they are compared with the model.
     pub lines: Vec<EdgeLine>,
 }
 
-/// One frame with its change mask.
+/// One frame with its change masks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Number of the frame, from 0.
     pub frame: usize,
     /// Time of the frame, seconds.
     pub time_s: f64,
-    /// The frame.
+    /// The grey image.
     pub grey: Image<u8>,
     /// Changed pixels after the binary operations.
     pub mask: Mask,
-    /// The same with the higher threshold of the rectangle.
+    /// The same with the higher threshold for the rectangle.
     pub firm_mask: Mask,
-    /// Velocities of the changed pixels towards the next frame, where asked for and determined.
+    /// Velocities of the changed pixels towards the next frame; `None` if not requested or not determined.
     pub velocity: Option<FlowField>,
 }
 
@@ -136,8 +135,8 @@ impl Evidence {
         group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
     }
 
-    /// Straight edges in and near the changed pixels of a rectangle, with the edge points they were made of;
-    /// in the whole rectangle where nothing changed in it.
+    /// Straight edges in and near the changed pixels of a rectangle, with their edge points. If nothing changed
+    /// in the rectangle, those of the whole rectangle.
     pub fn edges(
         &self,
         window: &Rectangle,
@@ -160,7 +159,7 @@ impl Evidence {
         Ok(WindowEdges { chains, segments, lines })
     }
 
-    /// Speed of the image at a point, pixels per frame; 0 where it is not known.
+    /// Image speed at a point, pixels per frame; 0 if it is not known.
     fn speed_px(&self, point: DVec2) -> f32 {
         let at = |field: &FlowField| {
             field.at(point.x.round().max(0.0) as usize, point.y.round().max(0.0) as usize)
@@ -168,7 +167,7 @@ impl Evidence {
         self.velocity.as_ref().and_then(at).map_or(0.0, |velocity| velocity.length() as f32)
     }
 
-    /// The dilated change mask, `None` where nothing changed in the window.
+    /// The dilated change mask; `None` if nothing changed in the window.
     fn mask_near(&self, window: &Window) -> Option<Mask> {
         let rows = window.y..window.y + window.height;
         let moved = rows.clone().any(|y| self.mask.row(y)[window.x..window.x + window.width].contains(&true));
@@ -176,7 +175,7 @@ impl Evidence {
     }
 }
 
-/// Frames in, evidence out, one frame later.
+/// Evidence of a stream of frames, one frame late.
 #[derive(Debug)]
 pub struct EvidenceStream {
     options: EvidenceOptions,
@@ -187,12 +186,12 @@ pub struct EvidenceStream {
 }
 
 impl EvidenceStream {
-    /// A stream that has seen no frame.
+    /// A stream without frames.
     pub fn new(options: EvidenceOptions) -> Self {
         Self { options, detectors: detectors(&options), waiting: None, background: None, frames: 0 }
     }
 
-    /// Takes a frame and gives the evidence of the one before.
+    /// Adds a frame and returns the evidence of the frame before; `None` for the first frame.
     pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
         if !time_s.is_finite() {
             return Err(EvidenceError::Time { time_s });
@@ -209,7 +208,7 @@ impl EvidenceStream {
         self.evidence(before, masks, Some(frame))
     }
 
-    /// The evidence of the last frame.
+    /// The evidence of the last frame; `None` if there were fewer than two frames.
     pub fn finish(mut self) -> Result<Option<Evidence>, EvidenceError> {
         let last = self.waiting.take();
         let [low, firm] = std::mem::replace(&mut self.detectors, detectors(&self.options));
@@ -235,8 +234,8 @@ impl EvidenceStream {
         Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity }))
     }
 
-    /// Adds what differs from the background to the changes, then lets the background follow where nothing
-    /// is.
+    /// Adds pixels that differ from the background to the change masks, then updates the background where the low
+    /// mask is empty.
     fn add_foreground(
         &mut self,
         grey: &Image<u8>,
@@ -253,7 +252,7 @@ impl EvidenceStream {
     }
 }
 
-/// Change detection with the low threshold and with the rectangle's.
+/// Change detectors with the low threshold and with the rectangle's threshold.
 fn detectors(options: &EvidenceOptions) -> [ChangeDetector; 2] {
     let min_threshold = options.rectangle_threshold.max(options.change.min_threshold);
     [options.change, ChangeOptions { min_threshold, ..options.change }].map(ChangeDetector::new)
@@ -315,7 +314,7 @@ mod tests {
             let Some(found) = found else { continue };
             assert_eq!((found.frame, found.time_s), (k - 1, 0.5 + 0.5 * k as f64));
             assert!(found.grey == frames[k - 1], "its own picture");
-            // Where the box is, where it goes and, after the first frame, where it came from.
+            // The mask covers the box, where it goes and, after the first frame, where it was before.
             let marked = |x: usize| found.mask.at(x + 7, 47);
             assert!(marked(10 * k) && marked(10 * (k + 1)) && (k == 1 || marked(10 * (k - 1))));
         }
@@ -364,7 +363,7 @@ mod tests {
         let (mask, firm, candidates) = found(EvidenceOptions::default().rectangle_threshold);
         assert_eq!((mask, firm), ([false, true, true], [false, false, true]));
         assert!(candidates.len() == 1 && (76..=80).contains(&candidates[0]), "{candidates:?}");
-        // The rectangle's threshold is never the lower one.
+        // The rectangle's threshold is at least that of the change detection.
         let (mask, firm, candidates) = found(0.0);
         assert_eq!((mask, firm, candidates.len()), ([false, true, true], [false, true, true], 2));
     }
@@ -382,7 +381,7 @@ mod tests {
     fn before_a_background_somebody_who_stands_still_is_seen_on() {
         let mut frames = vec![blank(); 6];
         frames.extend(vec![boxed(50, 180); 30]);
-        // Fast enough to swallow the box within ten frames if it were not marked.
+        // The rate is high enough to absorb the box within ten frames if it were not masked.
         let background = BackgroundOptions { rate: 8.0, ..BackgroundOptions::default() };
         let with = EvidenceOptions { background: Some(background), ..EvidenceOptions::default() };
         let (seen, unseen) = (evidence_of(with, &frames), evidence_of(EvidenceOptions::default(), &frames));
@@ -410,7 +409,7 @@ mod tests {
         let narrow = Rectangle { left: 10, top: 20, right: 27, bottom: 50 };
         let cut = ends(&lines_of(&evidence, &narrow));
         assert!(!cut.is_empty() && cut.iter().all(|p| p[0] <= 28.0 && p[1] <= 51.0), "{cut:?}");
-        // Nothing moves about the right box: all of the rectangle counts.
+        // Nothing moves near the right box, so edges of the whole rectangle count.
         let still = Rectangle { left: 60, ..WHOLE };
         let lines = ends(&lines_of(&evidence, &still));
         assert!(lines.len() >= 8 && lines.iter().all(|p| p[0] > 75.0), "{lines:?}");
@@ -444,7 +443,7 @@ mod tests {
         };
         evidence.velocity = Some(field.clone());
         assert!(lines_of(&evidence, &WHOLE).iter().all(|l| (l.velocity - 5.0).abs() < 1e-6));
-        // Faster downwards: the upright sides differ between their ends and their middles.
+        // Speed grows downwards: at the ends of the upright sides it differs from that in their middles.
         (0..60).for_each(|y| field.v_px.row_mut(y).fill(0.1 * y as f32));
         field.u_px = Image::filled(50, 60, 0.0);
         evidence.velocity = Some(field.clone());

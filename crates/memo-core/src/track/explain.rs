@@ -1,31 +1,31 @@
-//! Why a frame was understood as it was: the terms of eqs. (7)-(11) at the chosen hypothesis, and the similarity
-//! over the whole gait cycle (Rohr 1994, section 4.3, Fig. 19).
+//! Explanation of a tracked frame: the terms of eqs. (7)-(11) at the chosen hypothesis, and the similarity over
+//! the whole gait cycle (Rohr 1994, section 4.3, Fig. 19).
 //!
-//! Nothing is kept while tracking but where each frame was looked at ([`Look`]). The frame is looked at again
-//! with the code, the window, the grid and the person the tracker used in the end, so the numbers are the ones
-//! it used. The curve is that of one place: the best grid point's. The search itself also moved the body along
-//! the path and up and down at every phase, but only near the predicted phase; a phase far away could score
-//! somewhat higher at a place of its own.
+//! While tracking, only the window and grid of each frame are kept ([`Look`]). The frame is then compared again
+//! with the same code, window, grid and fitted person that the tracker used, so the numbers are the same. The
+//! curve over the cycle is for one position: that of the best grid point. The search itself also moved the body
+//! along the path and up and down at every phase, but only near the predicted phase. So a phase far away could
+//! score somewhat higher at another position.
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, WindowEdges};
 use super::score::{ModelLine, Similarity, similarity};
 use super::search::{Axis, Grid, Hypothesis, Scene, search};
 use super::walk::{Look, WalkOptions};
 
-/// Phases of [`Explanation::cycle`]: twice as many as the search's grid has in a cycle.
+/// Number of phases of [`Explanation::cycle`]: twice as many as the search grid has in a cycle.
 const CYCLE_PHASES: usize = 100;
 
-/// What a frame showed and how the chosen hypothesis fits it.
+/// Edges, contours and similarity of a frame at the chosen hypothesis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// Edge points and straight edges of the window.
     pub edges: WindowEdges,
     /// Visible contours of the model at the chosen hypothesis, ideal pixels.
     pub lines: Vec<ModelLine>,
-    /// Eq. (11) there, with the edge that answers each line. Differs from the search's own value, whose
-    /// exponential is a fast one, by some 1e-6.
+    /// Eq. (11) at the chosen hypothesis, with the edge matched with each line. It differs from the value of the
+    /// search, which uses a fast exponential, by some 1e-6.
     pub similarity: Similarity,
-    /// Similarity over the whole cycle at the chosen place and height, by the search itself.
+    /// Similarity over the whole cycle at the chosen position and height, computed by the search.
     pub cycle: Vec<PhaseScore>,
     /// The chosen hypothesis: the best point of the tracker's grid.
     pub chosen: Hypothesis,
@@ -40,10 +40,10 @@ pub struct PhaseScore {
     pub similarity: f32,
 }
 
-/// Looks at a frame again as the tracker did.
+/// Compares a frame with the model again, as the tracker did.
 ///
-/// `scene` is the walk's with the person as fitted ([`TrackedWalk::scene`](super::result::TrackedWalk::scene)),
-/// `look` that of the frame's step.
+/// `scene` is the scene of the walk with the fitted person
+/// ([`TrackedWalk::scene`](super::result::TrackedWalk::scene)), `look` is that of the frame's step.
 pub fn explain(
     evidence: &Evidence,
     look: &Look,
@@ -53,10 +53,10 @@ pub fn explain(
 ) -> Result<Explanation, EvidenceError> {
     // 1. The edges of the window.
     let edges = evidence.edges(&look.window, Some(scene.camera), evidence_options)?;
-    // 2. The model's contours, each with the edge that answers it.
+    // 2. The model's contours, each with the edge it matches.
     let lines = scene.searched_lines(&look.best, look.heights.centre, options.hidden_lines);
     let similarity = similarity(&lines, &edges.lines, &options.similarity);
-    // 3. The other phases.
+    // 3. The similarity at all phases.
     let grid = cycle_at(look);
     let found = search(&edges.lines, scene, &grid, &options.similarity, options.hidden_lines);
     let row = nearest(&look.heights, look.best.height_m);
@@ -70,7 +70,7 @@ pub fn explain(
     Ok(Explanation { edges, lines, similarity, cycle, chosen: look.best })
 }
 
-/// All phases at the chosen place; the chosen phase is among them, and the heights are those of the search.
+/// All phases at the chosen position. The chosen phase is among them, and the heights are those of the search.
 fn cycle_at(look: &Look) -> Grid {
     let step = 1.0 / CYCLE_PHASES as f64;
     Grid {
@@ -148,7 +148,7 @@ mod tests {
                 "plain {} tracked {tracked}",
                 why.similarity.value
             );
-            // The search's own grid has every second of these phases.
+            // The search grid contains every second of these phases.
             let is_searched =
                 |p: f64| off(p).abs() < 0.05 && ((50.0 * off(p)).round() - 50.0 * off(p)).abs() < 1e-6;
             let near: Vec<f32> =

@@ -1,106 +1,108 @@
 //! Gait parameters of a walk with 95 % intervals: cadence, speed, stride and steps, side by side.
 //!
-//! What the pictures measure is the gait phase and the place of the trunk in every frame. Rate and speed come
-//! from all of them; heel strikes are where the measured phase passes 0 (right) and 1/2 (left), and a step's
-//! length is how far the trunk moved between two strikes. The model's feet land equally far ahead of the trunk
-//! on both sides and stand for the same share of the cycle. So stance and double support are the average
-//! adult's and no measurement, and a difference between how far the two feet reach is not seen: it is in the
-//! intervals of the sides by its spread over people.
+//! Two things are measured in every frame: the gait phase and the position of the trunk. Cadence and speed use
+//! all frames. A heel strike (initial contact) is the time at which the measured phase passes 0 (right) or 1/2
+//! (left). A step length is the displacement of the trunk between two strikes. The model's feet land at the same
+//! distance ahead of the trunk on both sides and are in stance for the same share of the cycle. So stance and
+//! double support are the values of average adults, not measurements, and a reach asymmetry of the two feet is
+//! not visible: the intervals of the sides contain its spread over people.
 //!
-//! The intervals are for the person's walking, of which the steps seen are a sample: not for these few steps,
-//! which are known better. Four things make them:
+//! The intervals are for the person's gait, of which the observed steps are a sample. They are wider than
+//! intervals for the observed steps alone. Four terms enter:
 //!
 //! 1. the scatter of frames or strikes about the fit, measured in the walk itself;
-//! 2. how much steps vary, `NATURAL_SHARE`, by side held against the steps seen;
-//! 3. what is common to all steps of a side, because a person is not the model: `STRIKE_SD_CYCLES`, `REACH_SD_M`;
-//! 4. for lengths the scale, that is the distance from the camera, which hangs on the height given (to 2 cm), on
-//!    the rows of sole and crown (`track::locate`), on `POSTURE_SD` and, aslant before a guessed camera, on
-//!    `FOCAL_SD`.
+//! 2. step variability, `NATURAL_SHARE`, combined by side with the variability of the observed steps;
+//! 3. errors common to all steps of a side, because a person differs from the model: `STRIKE_SD_CYCLES`,
+//!    `REACH_SD_M`;
+//! 4. for lengths, the scale, which is the distance from the camera. It depends on the body height given (to 2
+//!    cm), on the rows of sole and crown (`track::locate`), on `POSTURE_SD` and, for oblique paths seen by an
+//!    assumed camera, on `FOCAL_SD`.
 //!
-//! Where the numbers come from. Measured on four motion-captured walks (two of the Biomechanical-ToolKit data, CMU
+//! Sources of the numbers. Measured on four motion-captured walks (two of the Biomechanical-ToolKit data, CMU
 //! 02_01 and 12_01; contacts by the ankle's speed, 11 degrees of freedom): a step differs from its side's mean by
-//! 3.3 % in time and 3.6 % in length, some of it error of the contacts; the feet differ in reach by 0.012 m (root
-//! mean square). Measured on three of them as videos: `STRIKE_SD_CYCLES`. Published: lengths vary by 4.6 % of the
-//! mean at a person's own speed, and people differ in that by a third (J NeuroEng Rehabil 9:69, 2012, table 1),
-//! which is what 4 to 5 steps would tell: `PRIOR_STEPS`. Measured on drawn walkers: `REACH_COUNTS`, `POSTURE_SD`. Assumed: which
-//! fields of view cameras have, the 2 cm, and that all these deviations are normal and independent.
+//! 3.3 % in time and 3.6 % in length, part of which is error of the contacts; the feet differ in reach by 0.012 m
+//! (root mean square). Measured on videos of three of them: `STRIKE_SD_CYCLES`. Published: lengths vary by 4.6 %
+//! of the mean at a person's own speed, and people differ in that by a third (J NeuroEng Rehabil 9:69, 2012,
+//! table 1), which is as informative as 4 to 5 observed steps: `PRIOR_STEPS`. Measured on drawn walkers:
+//! `REACH_COUNTS`, `POSTURE_SD`. Assumed: the distribution of fields of view, the 2 cm, and that all these
+//! deviations are normal and independent.
 //!
-//! `tests/gait_parameters.rs` draws a population with these deviations and counts how often the intervals hold the
-//! truth; the unit tests simulate the measurements of 1,000 people without drawing them and check that the intervals
-//! are neither too narrow nor too wide. A late strike is not drawn but told: heels strike so much after the pictures
-//! show the average's strike. Not in the population, and so not tested, are people whose joint curves have another
-//! shape than the average's (nothing published says how such shapes go together over the cycle), shadows and
-//! reflections at the feet, for which the scale leaves room, and a tilted camera where none is given.
+//! `tests/gait_parameters.rs` draws a population with these deviations and counts how often the intervals contain
+//! the truth. The unit tests simulate the measurements of 1,000 people without drawing them and check that the
+//! intervals are neither too narrow nor too wide. A late strike is not drawn; the true strike times are shifted
+//! instead, relative to the drawn strike of the average gait. Not in the population, and so not tested, are
+//! people whose joint curves have another shape than the average's (nothing published says how such shapes go
+//! together over the cycle), shadows and reflections at the feet, for which the scale leaves room, and a tilted
+//! camera if none is given.
 
 use super::result::{Row, Side, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
 use crate::estimate::line::line_through;
 
-/// Above this probability that sides are interchanged, or that the person walks the other way round, nothing is
-/// told by side.
+/// If the probability that sides are swapped, or that the person walks in the other direction, is larger, no
+/// value by side is reported.
 pub const LIKELY_MISTAKEN: f64 = 0.2;
 
-/// Standard deviation over people of the phase the pictures show when a heel strikes, cycles, of each side on its
-/// own.
+/// Standard deviation over people of the image-based phase at heel strike, cycles, independent for each side.
 const STRIKE_SD_CYCLES: f64 = 0.008;
-/// Standard deviation over people by which one foot lands farther ahead of the trunk than the other, metres.
+/// Standard deviation over people of the reach asymmetry, metres: how much farther ahead of the trunk one foot
+/// lands.
 const REACH_SD_M: f64 = 0.012;
-/// By how much a step's length is wrong for each metre of that: a leg that swings farther ahead also looks farther
-/// on in the cycle.
+/// Step-length error per metre of reach asymmetry: a leg that swings farther ahead also looks later in the cycle.
 const REACH_COUNTS: f64 = 1.35;
-/// A healthy adult's step varies by this share of its length or duration.
+/// Step variability of a healthy adult, as a share of step length or step time.
 const NATURAL_SHARE: f64 = 0.03;
-/// The variation expected beforehand counts as much as this many steps that were seen.
+/// Weight of the prior step variability, in observed steps.
 const PRIOR_STEPS: f64 = 4.0;
-/// Relative standard deviation by which people walk taller or smaller than their height says, because their legs
-/// bend more or less than the average's and their feet point elsewhere.
+/// Relative standard deviation over people of the height while walking, compared with the model of the same body
+/// height: legs bend more or less than the average's, and feet point in other directions.
 const POSTURE_SD: f64 = 0.015;
-/// Relative standard deviation of the focal length that is assumed where no camera is given: fields of view from
-/// 45 to 75 degrees, equally likely, where 60 is assumed.
+/// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely,
+/// when 60 is assumed.
 const FOCAL_SD: f64 = 0.18;
-/// Frames this near to a strike, in cycles, tell its time.
+/// Frames within this distance of a strike, in cycles, are used for its time.
 const NEAR_STRIKE: f64 = 0.125;
-/// Fewer frames do not.
+/// Minimum number of frames near a strike.
 const LEAST_NEAR: usize = 3;
-/// Frames below which a walk has no parameters, and cycles it must cover.
+/// Minimum number of frames and of cycles of a walk that has gait parameters.
 const LEAST_FRAMES: usize = 8;
 const LEAST_CYCLES: f64 = 0.5;
-/// Neighbouring frames err alike: this many of them count as one.
+/// Neighbouring frames have similar errors: this many of them count as one.
 const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 const Z: f64 = 1.959_964;
-/// Share of the cycle a foot stands, and both do, per cent: adults at free speed.
+/// Stance and double support, per cent of the cycle: adults at free speed.
 const STANCE_PERCENT: f64 = 61.0;
 const DOUBLE_SUPPORT_PERCENT: f64 = 22.0;
 
-/// What is told of a walk.
+/// A gait parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum GaitQuantity {
-    /// Steps a minute.
+    /// Steps per minute.
     Cadence,
-    /// Speed in the direction faced, m/s; negative when walking backwards.
+    /// Speed in the direction the body faces, m/s; negative for backward walking.
     Speed,
-    /// Duration of a cycle of two steps, s.
+    /// Duration of a cycle (two steps), s.
     StrideTime,
-    /// Way of the trunk in a cycle, m.
+    /// Displacement of the trunk in a cycle, m.
     StrideLength,
-    /// From the other heel's strike to this side's, s.
+    /// Time from the other side's heel strike to this side's, s.
     StepTime,
-    /// Way of the trunk meanwhile, m.
+    /// Displacement of the trunk in that time, m.
     StepLength,
     /// 100 (right - left) / mean of the step times, per cent.
     StepTimeSymmetry,
     /// 100 (right - left) / mean of the step lengths, per cent.
     StepLengthSymmetry,
-    /// Share of the cycle in which a foot stands, per cent: assumed.
+    /// Stance of one foot, per cent of the cycle: assumed, not measured.
     Stance,
-    /// Share of the cycle in which both feet stand, per cent: assumed.
+    /// Stance of both feet, per cent of the cycle: assumed, not measured.
     DoubleSupport,
 }
 
 impl GaitQuantity {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cadence => "cadence",
@@ -116,7 +118,7 @@ impl GaitQuantity {
         }
     }
 
-    /// Its unit in tables.
+    /// The unit in tables.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Cadence => "1/min",
@@ -128,23 +130,23 @@ impl GaitQuantity {
     }
 }
 
-/// One line of the table.
+/// One line of the table of gait parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaitParameter {
-    /// What it is.
+    /// The gait parameter.
     pub quantity: GaitQuantity,
-    /// The side it belongs to, `None` for both.
+    /// The side, `None` for both.
     pub side: Option<Side>,
-    /// Its value in the quantity's unit; `None` where it is not known.
+    /// The value in the quantity's unit; `None` if it is not known.
     pub value: Option<f64>,
-    /// 95 % interval; `None` where the value is not known or not measured.
+    /// 95 % interval; `None` if the value is not known or not measured.
     pub interval: Option<[f64; 2]>,
-    /// Number of steps it rests on; 0 where the value is not known or not measured.
+    /// Number of steps used; 0 if the value is not known or not measured.
     pub n: usize,
 }
 
 impl TrackedWalk {
-    /// The gait parameters, the same lines for every walk.
+    /// The gait parameters with 95 % intervals. Every walk gets the same lines in the same order.
     pub fn gait_parameters(&self) -> Vec<GaitParameter> {
         let whole = Whole::of(self);
         let sides = whole.as_ref().and_then(|whole| self.sides(whole));
@@ -177,7 +179,7 @@ impl TrackedWalk {
         table
     }
 
-    /// Steps by side, where the sides are known and heels strike at known phases.
+    /// Steps by side; `None` if the sides are ambiguous or the walk is backward.
     fn sides(&self, whole: &Whole) -> Option<Sides> {
         let is_sure = self.p_swapped() <= LIKELY_MISTAKEN && self.start.p_other_direction <= LIKELY_MISTAKEN;
         if !is_sure || self.direction() == Direction::Backward {
@@ -210,8 +212,8 @@ impl TrackedWalk {
         Some(Sides { time_s, length_m })
     }
 
-    /// Relative standard deviation of lengths along the path: of the distance and the posture, and where the camera
-    /// is guessed of the focal length, which scales what goes along the line of sight.
+    /// Relative standard deviation of lengths along the path, from distance and posture. For an assumed camera
+    /// also from the focal length, which scales displacement along the line of sight.
     fn scale_sd(&self) -> f64 {
         let eye = self.camera.position().truncate();
         let nearest = self.walk.path.point(self.walk.path.along(eye), 0.0).truncate();
@@ -240,13 +242,13 @@ impl Estimate {
     }
 }
 
-/// What all frames of the walk say together.
+/// Estimates from all frames of the walk.
 #[derive(Debug, Clone, Copy)]
 struct Whole {
-    /// Cycles a second, positive.
+    /// Cadence in cycles per second, positive.
     rate_hz: Estimate,
     speed_mps: Estimate,
-    /// Half the interval of the stride's length, relative.
+    /// Half the interval of the stride length, relative.
     stride_share: f64,
     scale_sd: f64,
 }
@@ -270,8 +272,8 @@ impl Whole {
         let half_rate = half_slope(&phases, 2.0 * cycles);
         let speed_share = half_slope(&places, 2.0 * cycles) / speed_mps.abs();
         let scale_sd = walk.scale_sd();
-        // The slope of a random walk of n steps varies by sqrt(6 / 5) as much as the mean of its steps. The scatter
-        // about the line holds their variation too: the larger of both counts.
+        // The slope of a random walk of n steps varies sqrt(6 / 5) times as much as the mean of its steps. The
+        // scatter about the line contains their variation too, so the larger of both is used.
         let sampled = Z * NATURAL_SHARE * (1.2 / (2.0 * cycles).max(1.0)).sqrt();
         let rate_share = half_rate / rate_hz.abs();
         let of_place = |seen: f64| seen.max(sampled).hypot(Z * scale_sd);
@@ -295,8 +297,8 @@ impl Whole {
     }
 }
 
-/// Half the interval of a line's slope. Within a step a person deviates from the model always in the same way,
-/// so not frames count as independent but steps: sd sqrt(12) / (duration sqrt(steps)).
+/// Half the interval of a line's slope. Within a step a person deviates from the model in the same way every
+/// time, so steps and not frames count as independent: sd sqrt(12) / (duration sqrt(steps)).
 fn half_slope(points: &[(f64, f64)], steps: f64) -> f64 {
     let (slope, level) = line_through(points);
     let sum_sq: f64 = points.iter().map(|(t, x)| (x - level - slope * t).powi(2)).sum();
@@ -305,25 +307,25 @@ fn half_slope(points: &[(f64, f64)], steps: f64) -> f64 {
     Z * sd * 12f64.sqrt() / (duration_s * steps.max(1.0).sqrt())
 }
 
-/// The measured phase at the turn nearest to the filtered one, cycles.
+/// The measured phase in the cycle nearest to the filtered phase, not wrapped, cycles.
 fn unwrapped(step: &Step) -> Option<f64> {
     let (filtered, measured) = (step.state.phase.position, step.measured?.phase);
     let off = measured - filtered;
     Some(filtered + off - off.round())
 }
 
-/// A heel strike seen in the measured phases.
+/// A heel strike found in the measured phases.
 #[derive(Debug, Clone, Copy)]
 struct Strike {
     side: Side,
-    /// Half cycles since phase 0.
+    /// Number of half cycles since phase 0.
     index: i64,
     time_s: f64,
     variance_s2: f64,
 }
 
-/// Each frame near a strike says when it happens; their median is the strike. Before smoothing, which would even
-/// out the sides.
+/// Heel strikes: each frame near a strike gives an estimate of its time, and the strike is their median. The
+/// phases are those before smoothing, because smoothing would reduce the difference between the sides.
 fn strikes(steps: &[Step], rate_hz: f64) -> Vec<Strike> {
     let phases: Vec<(f64, f64)> = steps.iter().filter_map(|s| Some((s.time_s, unwrapped(s)?))).collect();
     let (slope, level) = line_through(&phases);
@@ -350,7 +352,7 @@ fn strikes(steps: &[Step], rate_hz: f64) -> Vec<Strike> {
     ((2.0 * first).ceil() as i64..=(2.0 * last).floor() as i64).filter_map(strike).collect()
 }
 
-/// A step: from one side's strike to the other's, which it is named after.
+/// A step from the other side's strike to the strike of `side`.
 #[derive(Debug, Clone, Copy)]
 struct StepTaken {
     side: Side,
@@ -371,7 +373,7 @@ fn steps_between(strikes: &[Strike], rows: &[Row]) -> Vec<StepTaken> {
         .collect()
 }
 
-/// Smoothed place along the path at a time, linear between frames.
+/// Smoothed position along the path at a time, linear between frames.
 fn place_at(rows: &[Row], time_s: f64) -> f64 {
     let after = rows.partition_point(|row| row.time_s < time_s).clamp(1, rows.len() - 1);
     let (a, b) = (&rows[after - 1], &rows[after]);
@@ -386,20 +388,20 @@ struct Sides {
     length_m: BySide,
 }
 
-/// One quantity of the steps, right and left.
+/// One quantity of the steps, by side.
 #[derive(Debug, Clone, Copy)]
 struct BySide {
     mean: [Option<Estimate>; 2],
     symmetry: Option<Estimate>,
 }
 
-/// What is known beforehand of a quantity's spread.
+/// Prior knowledge of a quantity's spread.
 struct Spread {
-    /// Of single steps.
+    /// Variance of single steps.
     prior_variance: f64,
-    /// Of what moves all strikes of one side.
+    /// Standard deviation of the shift common to all strikes of one side.
     side_sd: f64,
-    /// Relative, of all steps together.
+    /// Relative standard deviation common to all steps.
     scale_sd: f64,
 }
 
@@ -408,13 +410,13 @@ impl BySide {
         let values = [Side::Right, Side::Left]
             .map(|side| steps.iter().filter(|s| s.side == side).map(&value).collect::<Vec<f64>>());
         let means = values.each_ref().map(|v| v.iter().sum::<f64>() / v.len() as f64);
-        // 1. The variance of a step: the steps' own about their side's mean, held to what is expected.
+        // 1. The variance of a step: the observed variance about the mean of its side, combined with the prior.
         let sum_sq: f64 =
             values.iter().zip(means).flat_map(|(v, m)| v.iter().map(move |x| (x - m).powi(2))).sum();
         let freedom = steps.len() as f64 - values.iter().filter(|v| !v.is_empty()).count() as f64;
         let variance = (PRIOR_STEPS * spread.prior_variance + sum_sq) / (PRIOR_STEPS + freedom);
         let t = student_quantile(PRIOR_STEPS + freedom);
-        // 2. A side's mean. A late strike of one side makes its own step longer and the other's shorter.
+        // 2. The mean of a side. A late strike of one side makes its own step longer and the other's shorter.
         let share = |side: usize| variance / values[side].len() as f64;
         let mean = [0, 1].map(|side| {
             let scatter = t * share(side).sqrt();
@@ -422,7 +424,7 @@ impl BySide {
             let n = values[side].len();
             (n > 0).then_some(Estimate { value: means[side], half: scatter.hypot(common), n })
         });
-        // 3. Their difference, which counts such a shift twice and the scale not at all.
+        // 3. Their difference. It contains such a shift twice and does not contain the scale.
         let symmetry = (mean[0].is_some() && mean[1].is_some()).then(|| {
             let scatter = t * (share(0) + share(1)).sqrt();
             let half = scatter.hypot(Z * 2.0 * std::f64::consts::SQRT_2 * spread.side_sd);
@@ -433,8 +435,8 @@ impl BySide {
     }
 }
 
-/// 97.5 % quantile of Student's t, by its expansion about the normal one (Abramowitz and Stegun 26.7.5); 0.1 % off
-/// at 3 degrees of freedom.
+/// 97.5 % quantile of Student's t, by its expansion about the normal one (Abramowitz and Stegun 26.7.5). The
+/// error is 0.1 % at 3 degrees of freedom.
 fn student_quantile(freedom: f64) -> f64 {
     let z = Z;
     let terms = [

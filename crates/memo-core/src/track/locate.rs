@@ -1,8 +1,9 @@
-//! From rectangles to the path walked: depth, direction and speed (Rohr 1994, sections 4.2 and 6).
+//! The path from the rectangles of a person: depth, direction and speed (Rohr 1994, sections 4.2 and 6).
 //!
-//! The paper's assumption holds here too: the person walks parallel to the image plane on level ground. A
-//! single rectangle is a poor gauge (arms and feet swing its centre by 7-10 cm, reflections stretch it by
-//! half a metre of depth), so rows are pooled over the frames before they become a depth.
+//! As in the paper, [`locate`] assumes that the person walks parallel to the image plane on level ground;
+//! [`locate_slanting`] finds oblique paths. A single rectangle is not accurate (arms and feet move its centre by
+//! 7-10 cm, reflections change the depth by half a metre), so rows are pooled over the frames before they become
+//! a depth.
 
 use super::search::Path;
 use crate::estimate::line::line_through;
@@ -25,7 +26,7 @@ pub enum LocateError {
     /// No camera could be made from the person.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The person does not fit between ground and camera.
+    /// The height of the person in the image does not fit the distance found.
     #[error(
         "a person {height_m} m tall would stand {distance_m:.1} m away, where the image should show {expected_px:.0} px, not {got_px:.0} px; check height and camera"
     )]
@@ -34,14 +35,14 @@ pub enum LocateError {
         height_m: f64,
         /// Distance found, metres.
         distance_m: f64,
-        /// Pixels that such a person spans there.
+        /// Pixels that such a person would span at that distance.
         expected_px: f64,
-        /// Pixels seen.
+        /// Pixels measured.
         got_px: f64,
     },
 }
 
-/// A person's enclosing rectangle in one frame.
+/// The bounding rectangle of a person in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// Time of the frame, seconds.
@@ -52,16 +53,16 @@ pub struct Sighting {
 
 /// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
 const MASK_MARGIN_PX: f64 = 2.0;
-/// Shadows and reflections push the bottom row down and nothing pushes it up, so a low quantile stands for
-/// the soles. It needs no margin: shoes change less than hair does, and the far foot stands higher than the
+/// Shadows and reflections move the bottom row down and nothing moves it up, so a low quantile is the row of the
+/// soles. It needs no margin: shoes change less than hair does, and the far foot is higher in the image than the
 /// near one.
 const SOLE_QUANTILE: f64 = 0.3;
-/// The crown bobs evenly about its median row.
+/// The crown moves up and down symmetrically about its median row.
 const CROWN_QUANTILE: f64 = 0.5;
-/// Standard deviation of a body height that was measured, metres: shoes and hair.
+/// Standard deviation of a measured body height, metres: shoes and hair.
 const HEIGHT_SD_M: f64 = 0.02;
 
-/// The bottom row is disbelieved when it says nearer than the crown by more than this many standard
+/// The bottom row is not used if its depth is smaller than the crown's by more than this many standard
 /// deviations.
 const REFLECTION_SD: f64 = 1.0;
 
@@ -81,7 +82,7 @@ fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
     low + at.fract() * (high - low)
 }
 
-/// The camera guessed from the sightings of one person of known height; see [`Camera::from_person`].
+/// The camera assumed from the sightings of one person of known height; see [`Camera::from_person`].
 pub fn camera_from_sightings(
     sightings: &[Sighting],
     size: [u32; 2],
@@ -92,14 +93,15 @@ pub fn camera_from_sightings(
     Ok(Camera::from_person(size, field_of_view_rad, height_m, sole, crown)?)
 }
 
-/// Where and how fast somebody moves.
+/// Path, positions along it and speed of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
-    /// The line walked, facing the way the person moves; `along` is 0 where the camera's axis crosses.
+    /// The line walked, in the direction of movement. `along` is 0 where it crosses the vertical plane of the
+    /// camera's axis.
     pub path: Path,
-    /// Place along the path at each sighting, metres.
+    /// Position along the path at each sighting, metres.
     pub along_m: Vec<f64>,
-    /// Mean speed along the path, metres a second, never negative.
+    /// Mean speed along the path, m/s, never negative.
     pub speed_mps: f64,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
@@ -116,12 +118,12 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
     let foot = stand(camera, &midpoints, height_m, &options)?;
     check_size(camera, &foot.point_in_world, height_m, sole - crown)?;
-    // 2. The line runs along the image's x axis, laid on the ground.
+    // 2. The line is parallel to the image's x axis, on the ground.
     let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
     let origin = camera.position().truncate();
     let depth = (foot.point_in_world.truncate() - origin).dot(right.perp());
     let mut path = Path { origin: origin + right.perp() * depth, heading_rad: right.to_angle() };
-    // 3. Where the columns meet the vertical plane above the line, and which way they go.
+    // 3. Where the rays of the columns meet the vertical plane above the line, and the direction of movement.
     let places: Vec<(f64, f64)> =
         sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), 0.5 * (sole + crown)))).collect();
     let (speed, _) = line_through(&places);
@@ -132,20 +134,21 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<
     Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
 }
 
-/// Depth by which a path must slant over the sightings before it is believed, metres: on walks across the
-/// image the first and the last third of 40 sightings differ by up to 0.13, on one 25 degrees off by 0.43.
+/// Minimum change of depth over the sightings for an oblique path, metres. Measured between the first and the
+/// last third of 40 sightings: up to 0.13 on walks across the image, 0.43 on a path at 25 degrees.
 const SLANT_M: f64 = 0.2;
 
-/// Finds the slanting line of a person who comes nearer or goes away, where the sightings show one clearly.
+/// Finds the oblique path of a person who approaches or moves away; `None` if the sightings do not show one
+/// clearly.
 ///
-/// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` belongs to all
-/// sightings.
+/// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` has one value per
+/// sighting.
 pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Option<Course> {
     let third = sightings.len() / 3;
     if third == 0 {
         return None;
     }
-    // 1. Where the first and the last third stand, each on its own line parallel to the image.
+    // 1. Position of the first and the last third, each on its own line parallel to the image plane.
     let standing = |part: &[Sighting]| {
         let course = locate(part, camera, height_m).ok()?;
         let along = course.along_m.iter().sum::<f64>() / part.len() as f64;
@@ -159,7 +162,7 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -
         return None;
     }
     let path = Path { origin: start, heading_rad: (end - start).to_angle() };
-    // 3. Places along it.
+    // 3. Positions along it.
     let (sole, crown) = person_rows(sightings);
     let places: Vec<(f64, f64)> = sightings
         .iter()
@@ -184,8 +187,9 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -
     })
 }
 
-/// Both rows weighted, unless the soles seem nearer than the crown allows: then the bottom row is a
-/// reflection's or a shadow's, which only ever lie below the feet, and the crown decides alone.
+/// The position from both rows, weighted. If the depth from the soles is much smaller than that from the crown,
+/// the bottom row belongs to a reflection or a shadow, which are always below the feet, and only the crown is
+/// used.
 fn stand(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -204,7 +208,7 @@ fn stand(
     position_on_ground(camera, midpoints, height_m, options)
 }
 
-/// Where the ray of a pixel meets the vertical plane above the path, metres along it.
+/// Distance along the path, metres, at which the ray of a pixel meets the vertical plane above the path.
 pub(crate) fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -> f64 {
     let pixel = DVec2::new(column_px, row_px);
     let ray = camera.ray_in_world(camera.undistort(pixel).unwrap_or(pixel)).truncate();
@@ -214,7 +218,8 @@ pub(crate) fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -
     path.along(eye + t * ray)
 }
 
-/// The rows must agree with the height to within a third: a person cut off or a wrong unit does not.
+/// The rows must agree with the height within a factor of 1.5. They do not if the person is cut off or a unit is
+/// wrong.
 fn check_size(camera: &Camera, foot: &DVec3, height_m: f64, got_px: f64) -> Result<(), LocateError> {
     let expected_px = camera.pixel_height_at(*foot, height_m).unwrap_or(0.0);
     if (0.67..1.5).contains(&(got_px / expected_px)) {
@@ -265,7 +270,8 @@ mod tests {
         let bottoms = [400, 402, 404, 406, 408, 410, 470, 480, 490, 460, 450];
         let tops = [100, 103, 106, 109, 112, 115, 118, 121, 124, 127, 130];
         let seen: Vec<_> = bottoms.iter().zip(tops).map(|(b, t)| sighted(10, t, 60, *b)).collect();
-        // 30 % of the way through 400, 402, ... and 50 % through the tops; the windows of eq. (1) reach 2 px out.
+        // 30 % of the way through 400, 402, ... and 50 % through the tops; the windows of eq. (1) extend 2 px
+        // out.
         assert_eq!(person_rows(&seen), (406.0, 117.0));
     }
 
@@ -337,7 +343,7 @@ mod tests {
         assert!(locate_slanting(&slanting(&camera, 0.4)[..2], &camera, 1.8).is_none(), "no thirds");
     }
 
-    /// Seen for 1.2 s while walking 1 m/s to the right and some to the back.
+    /// Sightings over 1.2 s of a person who walks at 1 m/s to the right and at `back_mps` away from the camera.
     fn slanting(camera: &Camera, back_mps: f64) -> Vec<Sighting> {
         let at = |k: i32| {
             let time_s = f64::from(k) * 0.04;
@@ -354,8 +360,8 @@ mod tests {
         (0..31).map(at).collect()
     }
 
-    /// Depth of a person whose reflection reaches `reflected` pixels below the feet: as taken, and by the feet, the
-    /// crown and both.
+    /// Depth of a person whose reflection reaches `reflected` pixels below the feet: the depth used, and the
+    /// depths by the feet, the crown and both.
     fn stood(camera: &Camera, reflected: f64) -> (f64, [f64; 3]) {
         let [sole, crown] = [0.0, 1.8].map(|z| camera.project(DVec3::new(0.2, 0.0, z)).unwrap());
         let midpoints = Midpoints { bottom_px: sole + reflected * DVec2::Y, top_px: crown };
@@ -367,7 +373,7 @@ mod tests {
 
     #[test]
     fn only_soles_far_below_the_crown_s_place_are_taken_for_a_reflection() {
-        // A high camera: crown and soles both tell a depth.
+        // A high camera: crown and soles both determine a depth.
         let camera = Camera::level([1280, 720], 1.08, 2.6, 6.0).unwrap();
         let (found, [_, head, _]) = stood(&camera, 60.0);
         assert!(found == head && (found - 6.0).abs() < 0.01, "the crown alone: {found}");
@@ -376,7 +382,7 @@ mod tests {
             assert_eq!(found, both, "{reflected} px");
             assert!(found >= feet.min(head) - 1e-9 && found <= feet.max(head) + 1e-9);
         }
-        // The border between the two is one standard deviation of the difference.
+        // The limit between the two cases is one standard deviation of the difference.
         let options = PositionOptions { height_sd_m: 0.02, ..PositionOptions::default() };
         let excess = |reflected: f64| {
             let [sole, crown] = [0.0, 1.8].map(|z| camera.project(DVec3::new(0.2, 0.0, z)).unwrap());
@@ -409,8 +415,8 @@ mod tests {
         }
     }
 
-    /// The standard deviation against depths found with the sole's and the crown's row and the height varied by
-    /// theirs.
+    /// Compares the standard deviation with depths for rows of sole and crown and a height changed by their
+    /// standard deviations.
     #[test]
     fn the_depth_s_standard_deviation_is_that_of_rows_and_height() {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
@@ -432,7 +438,7 @@ mod tests {
             locate(&moved, &camera, height_m).unwrap().path.origin.y
         };
         let at = depth(0, 0, 1.8);
-        // Rows by their 4 and 2 px, the height by 2 cm.
+        // Rows changed by their 4 and 2 px, the height by 2 cm.
         let changes = [depth(-4, 0, 1.8) - at, depth(0, 2, 1.8) - at, depth(0, 0, 1.82) - at];
         let sum = changes.iter().map(|d| d * d).sum::<f64>().sqrt();
         assert!((course.depth_sd_m / sum - 1.0).abs() < 0.15, "{} against {sum}", course.depth_sd_m);

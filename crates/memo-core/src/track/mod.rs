@@ -1,4 +1,4 @@
-//! Where evidence and model meet: similarity, search, start, filter, tracker.
+//! Model-based tracking: similarity of model and edges, search, starting phase, filter, tracker.
 
 mod active;
 mod column;

@@ -1,4 +1,4 @@
-//! What the tracker is told.
+//! Options of the tracker.
 
 use super::evidence::EvidenceOptions;
 use super::person::PersonOptions;
@@ -8,20 +8,20 @@ use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
 use crate::option_error::OptionError;
 
-/// Which average gait the model walks with.
+/// Which average gait the model uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GaitChoice {
-    /// Fifty samples a curve.
+    /// Fifty samples per joint curve.
     #[default]
     Dense,
-    /// Ten samples a curve, the paper's form.
+    /// Ten samples per joint curve, as in the paper.
     Sampled10,
-    /// Boulic's formulas at the speed of the start: amplitude follows speed.
+    /// Boulic's formulas at the speed found by the starting phase: amplitude depends on speed.
     Boulic,
 }
 
 impl GaitChoice {
-    /// The gait of a body at a speed; Boulic's is held to the speeds its formulas cover.
+    /// The gait of a body at a speed; for Boulic's formulas the speed is clamped to the range they cover.
     fn gait(self, body: &Body, speed_mps: f64) -> Gait {
         match self {
             Self::Dense => Gait::dense(),
@@ -35,29 +35,29 @@ impl GaitChoice {
     }
 }
 
-/// What the tracker knows beforehand and how it works.
+/// What is known of the person and the camera, and options of the stages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
     /// Body height of the person, metres.
     pub height_m: f64,
-    /// The camera; without one it is guessed from field of view and height.
+    /// The camera; `None` assumes one from field of view and body height.
     pub camera: Option<Camera>,
-    /// Horizontal field of view of a guessed camera, radians.
+    /// Horizontal field of view of an assumed camera, radians.
     pub field_of_view_rad: f64,
     /// Average gait.
     pub gait: GaitChoice,
-    /// Frames of the starting phase. Printed: images 2 to 14.
+    /// Number of frames of the starting phase. The paper uses images 2 to 14.
     pub start_frames: usize,
-    /// Fit of the person's deviation from the average; `None` stays on the average.
+    /// Fit of the person's deviation from the average gait and body; `None` keeps the average.
     pub person: Option<PersonOptions>,
-    /// Frames that must be followed before the person is fitted. 40: a stride and a half at 25 images a
-    /// second.
+    /// Number of frames that must be followed before the person is fitted. 40: one and a half strides at 25
+    /// frames per second.
     pub person_frames: usize,
-    /// Cadences that are considered.
+    /// Range of cadences to consider.
     pub cadence: CadenceRange,
-    /// From pixels to regions and edges.
+    /// Options of the stages from pixels to regions and edges.
     pub evidence: EvidenceOptions,
-    /// Search and filter.
+    /// Options of search and filter.
     pub walk: WalkOptions,
 }
 
@@ -104,7 +104,7 @@ impl TrackerOptions {
         self.walk.check()
     }
 
-    /// The average walker of the given height; the gait is made for a speed, metres a second.
+    /// The average walker of the given height; the gait is made for this speed, m/s.
     pub fn walker(&self, gait_speed_mps: f64) -> Result<Walker, BodyError> {
         let body = Body::from_height(self.height_m)?;
         Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })

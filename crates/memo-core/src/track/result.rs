@@ -1,9 +1,9 @@
-//! The result: one row of position, phase, angles and joints per frame, and gait events.
+//! The result of tracking: one row of position, phase, joint angles and joints per frame, and gait events.
 //!
-//! Rows come from the smoothed states of the better twin: what all frames, later ones included, say of each
-//! frame. The printed noise of the filter is generous, so standard deviations are scaled by how far
-//! measurements really fell from predictions; to this scatter comes what no number of frames averages out:
-//! the body that is not the model's, and the distance.
+//! Rows come from the smoothed states of the better twin: each row uses all frames of the walk, later ones
+//! included. The noise that the paper gives for the filter is generous, so standard deviations are scaled by the
+//! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
+//! the difference between the person's body and the model, and the distance.
 
 use super::person::PersonFit;
 use super::search::{Hypothesis, Scene};
@@ -15,24 +15,24 @@ use glam::DVec3;
 
 pub use crate::model::skeleton::Side;
 
-/// A walk that has ended, with everything it was made of.
+/// A finished walk with all intermediate results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedWalk {
     /// Both twins with all their steps.
     pub walk: Walk,
-    /// The camera given or guessed.
+    /// The camera, given or assumed.
     pub camera: Camera,
-    /// Whether no camera was given.
+    /// True if no camera was given.
     pub camera_is_guessed: bool,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
-    /// What the starting phase found.
+    /// Report of the starting phase.
     pub start: StartReport,
-    /// The speed the average gait was made for, metres a second.
+    /// The speed for which the average gait was made, m/s.
     pub gait_speed_mps: f64,
-    /// The fit of the person, where one was made.
+    /// The fit of the person, if one was made.
     pub person_fit: Option<PersonFit>,
-    /// Options it was followed with.
+    /// The options used.
     pub options: WalkOptions,
 }
 
@@ -45,13 +45,13 @@ pub struct Row {
     pub time_s: f64,
     /// Centre of the torso, metres, world Z up.
     pub torso_centre: DVec3,
-    /// Direction faced, radians about world Z.
+    /// Direction the body faces, radians about world Z.
     pub heading_rad: f64,
-    /// Gait phase in [0, 1), 0 = right heel strike.
+    /// Gait phase in [0, 1), 0 = right heel strike (initial contact).
     pub phase: f64,
     /// Probability that left and right are swapped.
     pub p_swapped: f64,
-    /// Speed along the path, metres a second; negative when walking backwards.
+    /// Speed along the path, m/s; negative for backward walking.
     pub speed_mps: f64,
     /// Standard deviations of x, y, z (metres) and phase.
     pub sd: [f64; 4],
@@ -61,13 +61,13 @@ pub struct Row {
     pub right: SideJoints,
     /// Joints of the left side, metres.
     pub left: SideJoints,
-    /// Similarity of the frame's best hypothesis, 0 where the filter coasted.
+    /// Similarity of the best hypothesis of the frame; 0 for frames without a measurement.
     pub similarity: f64,
-    /// The hypothesis behind the row: draws the contours again.
+    /// The hypothesis of the row; it is enough to draw the contours again.
     pub hypothesis: Hypothesis,
 }
 
-/// What happens at a gait event.
+/// Kind of gait event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names say it")]
 #[non_exhaustive]
@@ -77,7 +77,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The name in files, `heel_strike` or `toe_off`.
+    /// The name in files: `heel_strike` (initial contact) or `toe_off`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -87,43 +87,44 @@ impl EventKind {
     }
 }
 
-/// A gait event between two frames.
+/// A gait event; its time lies between two frames in general.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Time, seconds.
     pub time_s: f64,
-    /// Frame number, with a fraction.
+    /// Frame number, fractional.
     pub frame: f64,
-    /// Heel strike or toe-off.
+    /// Heel strike (initial contact) or toe-off.
     pub kind: EventKind,
     /// Which foot.
     pub side: Side,
 }
 
-/// Errors common to all frames of a walk, standard deviations measured on motion-captured walks: along the
-/// path (metres), height (metres), phase (cycles; how heel strike is defined).
+/// Errors common to all frames of a walk, standard deviations measured on motion-captured walks: along the path
+/// (metres), height (metres), phase (cycles; due to the definition of heel strike).
 const COMMON_SD: [f64; 3] = [0.015, 0.02, 0.015];
 
-/// Phase of toe-off on the side whose heel strikes at 0: adults at free speed stand for 61 % of the cycle.
+/// Phase of toe-off on the side whose heel strike is at 0: in adults at free speed, stance takes 61 % of the
+/// cycle.
 const TOE_OFF_PHASE: f64 = 0.61;
 
 impl TrackedWalk {
-    /// Probability that left and right are swapped throughout.
+    /// Probability that left and right are swapped in the whole walk.
     pub fn p_swapped(&self) -> f64 {
         self.walk.swap_probability(&self.options.swap)
     }
 
-    /// Forward or backward.
+    /// Forward or backward walking.
     pub fn direction(&self) -> Direction {
         self.start.direction
     }
 
-    /// The scene of the walk.
+    /// The walker, camera and path of the walk.
     pub fn scene(&self) -> Scene<'_> {
         Scene { walker: &self.walk.walker, camera: &self.camera, path: &self.walk.path }
     }
 
-    /// Steps of the better twin, as measured and filtered.
+    /// Steps of the better twin: measurements and filtered states.
     pub fn steps(&self) -> &[Step] {
         &self.walk.twins[self.walk.best()].steps
     }
@@ -160,7 +161,8 @@ impl TrackedWalk {
         let sd = |(state, scale): (ConstantVelocity, f64), common: f64| {
             (state.position_sd() * scale).hypot(common)
         };
-        // Depth also moves the place along the path, by its share of the offset from the camera's foot point.
+        // An error of depth also shifts the position along the path, in proportion to its distance from the
+        // camera's foot point.
         let eye = self.camera.position().truncate();
         let off_axis = (hypothesis.along_m - self.walk.path.along(eye)).abs();
         let distance = (self.walk.path.point(self.walk.path.along(eye), 0.0).truncate() - eye).length();
@@ -189,8 +191,8 @@ impl TrackedWalk {
         }
     }
 
-    /// Heel strikes and toe-offs where the phase passes them; none for walking backwards, where toes land
-    /// first and the phases of contact are not known.
+    /// Heel strikes (initial contacts) and toe-offs, at the times when the phase passes them, in order of time.
+    /// Empty for backward walking, where toes land first and the phases of contact are not known.
     pub fn events(&self) -> Vec<Event> {
         if self.direction() == Direction::Backward {
             return Vec::new();
@@ -218,7 +220,7 @@ impl TrackedWalk {
     }
 }
 
-/// Where between two rows (0 to 1) the phase passes a mark, forwards or backwards.
+/// Fraction of the interval between two rows, in [0, 1), at which the phase passes a mark, in either direction.
 fn crossing(a: &Row, b: &Row, mark: f64) -> Option<f64> {
     let wrapped = |x: f64| x - x.round();
     let advance = wrapped(b.phase - a.phase);
@@ -227,7 +229,7 @@ fn crossing(a: &Row, b: &Row, mark: f64) -> Option<f64> {
     (advance != 0.0 && (0.0..1.0).contains(&t)).then_some(t)
 }
 
-/// One smoothed coordinate and the factor that makes its standard deviations honest.
+/// One smoothed coordinate, and the factor that fits its standard deviations to the observed scatter.
 struct Coordinate {
     smoothed: Vec<ConstantVelocity>,
     sd_scale: f64,

@@ -2,48 +2,49 @@
 //!
 //! Symbols of the paper: l_M `model_px`, l `overlap_px`, d `distance_px`, delta phi `angle_rad`.
 //!
-//! The search window of a model line is the rectangle of the line's length and half width r = c_r l_M about
-//! it; an edge is cut to that window before it is compared. One edge, the best, answers for each line; of equals
-//! the first. Both sides are straight lines in ideal (distortion-free) pixels. Scores are f32: they differ from f64 by some
-//! 1e-7, geometry stays f64 until it is projected.
+//! The search window of a model line is the rectangle of the line's length and half width r = c_r l_M about it.
+//! An edge is clipped to that window before it is compared. Each model line is matched with one edge, the best;
+//! with the first if several are equal. Both are straight lines in ideal (distortion-free) pixels. Scores are f32
+//! and differ from f64 by some 1e-7; geometry is f64 until it is projected.
 
 use crate::model::body::PART_COUNT;
 use crate::option_error::OptionError;
 
-/// Which measure compares one model line with one edge.
+/// Measure that compares one model line with one edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Measure {
     /// Eqs. (7), (8): Gaussian in missing length, distance and angle, weighted by the overlap.
     #[default]
     Rohr,
-    /// Eq. (10), Lowe 1987: l_GW² / ((l_M - l_GW) d delta phi) on uncut edges, for comparison. Each factor is
-    /// held above one hundredth of its window, where the measure has its pole, and the value is scaled to 1
-    /// there.
+    /// Eq. (10), Lowe 1987: l_GW² / ((l_M - l_GW) d delta phi) on edges that are not clipped, for comparison. The
+    /// measure has a pole where a factor is 0, so each factor is held above one hundredth of its window, and the
+    /// value is scaled to 1 there.
     Lowe,
 }
 
-/// Parameters of the similarity. The paper prints none of them; each default says where it comes from.
+/// Parameters of the similarity. The paper gives no values; each default states its source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimilarityOptions {
-    /// sigma_l = c_l l_M. 1: real edges are broken, and 0.5 already punishes a half-found limb so much that
-    /// single frames drop from 94 % to 81 % right on real footage; 1 to 3 behave alike.
+    /// sigma_l = c_l l_M. Default 1: real edges are broken, and 0.5 penalises a half-detected limb so much that
+    /// correct single frames drop from 94 % to 81 % on real footage. Values from 1 to 3 give similar results.
     pub c_l: f32,
-    /// sigma_d = c_d c_r l_M. 0.5: an edge at the window's border is two sigma away.
+    /// sigma_d = c_d c_r l_M. Default 0.5: an edge at the window's border is two sigma away.
     pub c_d: f32,
-    /// Half width of the search window over the line's length. 0.25 separates the two sides of a limb; 0.5
-    /// mixes them.
+    /// Half width of the search window as a share of the line's length. Default 0.25 separates the two sides of a
+    /// limb; 0.5 mixes them.
     pub c_r: f32,
-    /// sigma of the angle, radians. 12 degrees: differences of people's joint angles from the average gait.
+    /// sigma of the angle, radians. Default 12 degrees: differences of people's joint angles from the average
+    /// gait.
     pub sigma_phi_rad: f32,
     /// w_K: significance of each body part in the order of `Part::ALL`. All equal, as in the paper's
     /// experiments.
     pub part_weights: [f32; PART_COUNT],
-    /// w_G = min(1, gradient / this), grey levels per pixel; `None` weighs all edges alike, which measured
-    /// best.
+    /// w_G = min(1, gradient / this), grey levels per pixel. `None` gives all edges the same weight, which was
+    /// best in measurements.
     pub full_gradient: Option<f32>,
-    /// w_V = min(1, velocity / this), pixels per frame, where edges carry a velocity; `None` ignores it.
+    /// w_V = min(1, velocity / this), pixels per frame, for edges with a velocity; `None` ignores it.
     pub full_velocity: Option<f32>,
-    /// The measure for one pair.
+    /// The measure of a line and an edge.
     pub measure: Measure,
 }
 
@@ -96,7 +97,7 @@ pub struct EdgeLine {
     pub end: [f32; 2],
     /// Mean gradient magnitude, grey levels per pixel.
     pub gradient: f32,
-    /// Speed of the image there, pixels per frame (0 where no velocity field was computed).
+    /// Image speed at the edge, pixels per frame; 0 if no velocity field was computed.
     pub velocity: f32,
 }
 
@@ -111,18 +112,18 @@ pub struct ModelLine {
     pub end: [f32; 2],
 }
 
-/// How one model line was answered.
+/// A model line and the edge matched with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
     /// Index of the model line.
     pub line: usize,
     /// Index of the edge.
     pub edge: usize,
-    /// l: length of the cut edge projected onto the model line, pixels.
+    /// l: length of the clipped edge projected onto the model line, pixels.
     pub overlap_px: f32,
-    /// d: distance of the cut edge's midpoint from the model line, pixels.
+    /// d: distance of the clipped edge's midpoint from the model line, pixels.
     pub distance_px: f32,
-    /// Angle between the undirected lines, radians.
+    /// Angle between the two lines without direction, in [0, pi/2], radians.
     pub angle_rad: f32,
     /// s_i, weighted, pixels.
     pub similarity_px: f32,
@@ -131,15 +132,15 @@ pub struct Match {
 /// The overall similarity of eq. (11) with its parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Similarity {
-    /// s(p): sum of the weighted s_i over the sum of l_M; 0 where the model shows no line.
+    /// s(p): sum of the weighted s_i over the sum of l_M; 0 if the model shows no line.
     pub value: f32,
     /// Sum of l_M, pixels.
     pub model_px: f32,
-    /// The matched lines.
+    /// The lines that match an edge.
     pub matches: Vec<Match>,
 }
 
-/// Compares all model lines with all edges and keeps who answered whom.
+/// Compares all model lines with all edges and keeps the best edge of each line.
 pub fn similarity(lines: &[ModelLine], edges: &[EdgeLine], options: &SimilarityOptions) -> Similarity {
     let scorer = Scorer::new(edges, options);
     let mut total = 0.0;
@@ -165,13 +166,13 @@ pub fn similarity(lines: &[ModelLine], edges: &[EdgeLine], options: &SimilarityO
     Similarity { value: if model_px > 0.0 { total / model_px } else { 0.0 }, model_px, matches }
 }
 
-/// Edges made ready for many comparisons.
+/// Edges with precomputed values for many comparisons.
 struct Scorer<'a> {
     edges: Vec<PreparedEdge>,
     options: &'a SimilarityOptions,
 }
 
-/// An edge with what every comparison needs of it.
+/// An edge with the values every comparison needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PreparedEdge {
     pub(super) start: [f32; 2],
@@ -183,7 +184,7 @@ pub(super) struct PreparedEdge {
     pub(super) weight: f32,
 }
 
-/// A model line's own axes: x along the line from its start, y across.
+/// A model line's own axes: x along the line from its start, y across it.
 #[derive(Debug, Clone, Copy)]
 struct LineFrame {
     origin: [f32; 2],
@@ -203,9 +204,9 @@ struct Pair {
     angle: f32,
 }
 
-/// Lines shorter than this say nothing about direction and are left out of both sums, pixels.
+/// Lines shorter than this have no reliable direction and are left out of both sums, pixels.
 pub(super) const SHORTEST_LINE_PX: f32 = 1.0;
-/// Angles beyond this many sigma contribute less than 2 % of an edge and are not compared.
+/// Edges at an angle beyond this many sigma would contribute less than 2 % and are not compared.
 pub(super) const ANGLE_CUT_SIGMA: f32 = 2.8;
 
 impl LineFrame {
@@ -251,7 +252,7 @@ impl<'a> Scorer<'a> {
         Some(Pair { value, overlap: cut.overlap, distance: cut.distance, angle })
     }
 
-    /// Eq. (10) on the uncut edge; only edges that reach the window compete.
+    /// Eq. (10) on the edge that is not clipped; only edges that reach the window are compared.
     fn lowe(&self, frame: &LineFrame, edge: &PreparedEdge) -> Option<Pair> {
         let cut = edge.cut(frame)?;
         let [_, y0] = frame.local(edge.start);
@@ -268,7 +269,7 @@ impl<'a> Scorer<'a> {
     }
 }
 
-/// An edge cut to a line's window.
+/// An edge clipped to a line's window.
 struct Cut {
     overlap: f32,
     distance: f32,
@@ -300,7 +301,7 @@ impl PreparedEdge {
         self.direction[1] * frame.direction[0] - self.direction[0] * frame.direction[1]
     }
 
-    /// The angle between the undirected lines, `None` beyond the cut.
+    /// The angle between the two lines without direction; `None` beyond [`ANGLE_CUT_SIGMA`].
     fn angle_to(&self, frame: &LineFrame, sigma: f32) -> Option<f32> {
         let angle = self.sine_to(frame).abs().min(1.0).asin();
         (angle <= ANGLE_CUT_SIGMA * sigma).then_some(angle)
@@ -322,7 +323,7 @@ impl PreparedEdge {
     }
 }
 
-/// Narrows [t0, t1] to where low <= p + t d <= high; makes it empty where that never holds.
+/// Narrows [t0, t1] to the part where low <= p + t d <= high; makes it empty if there is none.
 fn clip(p: f32, d: f32, low: f32, high: f32, t0: &mut f32, t1: &mut f32) {
     if d.abs() < 1e-12 {
         if p < low || p > high {
@@ -399,7 +400,7 @@ mod tests {
         assert!(worse < small);
     }
 
-    /// Eq. (7) without clipping: the edge is sampled, and what lies in the line's window is kept.
+    /// Eq. (7) without clipping: the edge is sampled, and samples inside the line's window are kept.
     fn sampled(line: &ModelLine, e: &EdgeLine, o: &SimilarityOptions) -> f64 {
         let point = |p: [f32; 2]| DVec2::new(f64::from(p[0]), f64::from(p[1]));
         let (start, along) = (point(line.start), point(line.end) - point(line.start));
@@ -418,7 +419,7 @@ mod tests {
         overlap * (-0.5 * sum_sq).exp() / length
     }
 
-    /// Of undirected lines, radians.
+    /// Angle between lines without direction, radians.
     fn angle_between(a: DVec2, b: DVec2) -> f64 {
         let turn = a.angle_to(b).abs();
         turn.min(std::f64::consts::PI - turn)
@@ -473,7 +474,7 @@ mod tests {
         let found = similarity(&lines, &edges, &options);
         assert_eq!(found.model_px, 100.0);
         assert!((found.value - (0.5 * 10.0 + 0.125 * 30.0 + 60.0) / 100.0).abs() < 1e-6);
-        // A line that no edge answers counts as well, one below the shortest length does not.
+        // A line without a matching edge counts in the sum of l_M; a line below the shortest length does not.
         let unanswered = similarity(&lines, &edges[2..], &options);
         assert!((unanswered.value - 0.6).abs() < 1e-6 && unanswered.matches.len() == 1);
         let speck = ModelLine { part: 5, start: [0.0, 200.0], end: [0.9, 200.0] };
@@ -501,7 +502,7 @@ mod tests {
         assert_eq!(similarity(&[line], &edges, &SimilarityOptions::default()).matches[0].edge, 0);
     }
 
-    /// Eq. (10) is known up to a factor: ratios of two pairs are compared.
+    /// Eq. (10) is known up to a factor, so ratios of two pairs are compared.
     #[test]
     fn lowes_measure_falls_with_each_factor_of_eq_10() {
         let o = SimilarityOptions { measure: Measure::Lowe, ..SimilarityOptions::default() };

@@ -1,9 +1,9 @@
 //! Grid search over position and gait phase (Rohr 1994, sections 4.3, 5.1 and 6).
 //!
 //! Hidden-line removal leaves no analytical relation between parameters and similarity, so every point of an
-//! equally spaced grid is scored and the best one taken. Columns of the grid (one phase, one place along the
-//! path) are independent and run in parallel; each score depends on nothing but its own hypothesis, so the
-//! answer does not depend on the number of threads.
+//! equally spaced grid is scored and the best one taken. Columns of the grid (one phase, one position along the
+//! path) are independent and run in parallel. Each score depends only on its own hypothesis, so the result does
+//! not depend on the number of threads.
 
 use super::column::{ColumnScorer, LANES, Lanes, LineLanes, Projection};
 use super::score::{EdgeLine, ModelLine, SimilarityOptions};
@@ -32,7 +32,7 @@ impl Path {
         (self.origin + along_m * self.direction()).extend(height_m)
     }
 
-    /// How far along the path the foot of a point's perpendicular lies, metres.
+    /// Distance along the path of the foot of a point's perpendicular, metres.
     pub fn along(&self, point: DVec2) -> f64 {
         (point - self.origin).dot(self.direction())
     }
@@ -41,7 +41,7 @@ impl Path {
 /// One point of the search space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
-    /// Place of the torso's centre along the path, metres.
+    /// Position of the torso's centre along the path, metres.
     pub along_m: f64,
     /// Level height of the torso's centre (without the gait's vertical displacement), metres.
     pub height_m: f64,
@@ -49,14 +49,14 @@ pub struct Hypothesis {
     pub phase: f64,
 }
 
-/// Everything that turns a hypothesis into contours in the image.
+/// What maps a hypothesis to contours in the image.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// The person's body and gait.
     pub walker: &'a Walker,
     /// The camera.
     pub camera: &'a Camera,
-    /// Where the person walks and which way it faces.
+    /// The line walked and the direction the body faces.
     pub path: &'a Path,
 }
 
@@ -67,7 +67,8 @@ impl Scene<'_> {
         self.walker.pose(centre, self.path.heading_rad, hypothesis.phase)
     }
 
-    /// The hypothesis whose torso centre and gait phase these are; across the path the centre counts for nothing.
+    /// The hypothesis with this torso centre and gait phase; the component of the centre across the path is
+    /// ignored.
     pub fn hypothesis_at(&self, torso_centre: DVec3, phase: f64) -> Hypothesis {
         Hypothesis {
             along_m: self.path.along(torso_centre.truncate()),
@@ -76,21 +77,21 @@ impl Scene<'_> {
         }
     }
 
-    /// What of a hypothesis's contours is visible, in the world.
+    /// The visible contours of a hypothesis, in the world.
     pub fn visible(&self, hypothesis: &Hypothesis, options: &VisibilityOptions) -> Vec<VisibleSegment> {
         let mut visible = Vec::new();
         visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), options, &mut visible);
         visible
     }
 
-    /// The visible side lines of a hypothesis in ideal pixels, cut to the image.
+    /// The visible side lines of a hypothesis in ideal pixels, clipped to the image.
     pub fn lines(&self, hypothesis: &Hypothesis) -> Vec<ModelLine> {
         let visible = self.visible(hypothesis, &LINES_ONLY);
         visible.iter().filter_map(|segment| project(segment, self.camera)).collect()
     }
 
-    /// The side lines that [`search`] compares at a hypothesis, in ideal pixels, cut to the image: what is
-    /// visible at the middle height of the grid's column, raised to the hypothesis's own.
+    /// The side lines that [`search`] compares at a hypothesis, in ideal pixels, clipped to the image: the lines
+    /// visible at the middle height of the grid's column, raised to the height of the hypothesis.
     pub fn searched_lines(
         &self,
         hypothesis: &Hypothesis,
@@ -115,7 +116,7 @@ const LINES_ONLY: VisibilityOptions = VisibilityOptions { rims: false, rim_chord
 pub struct Axis {
     /// The value in the middle.
     pub centre: f64,
-    /// Distance of two values.
+    /// Distance between neighbouring values.
     pub step: f64,
     /// Number of values.
     pub count: usize,
@@ -132,8 +133,8 @@ impl Axis {
         self.centre + (index as f64 - 0.5 * (self.count as f64 - 1.0)) * self.step
     }
 
-    /// Where between its neighbours the vertex of the parabola through three scores lies, in value; the value
-    /// itself at either end, where a neighbour is missing.
+    /// The value at the vertex of the parabola through a score and its two neighbours. At either end, where a
+    /// neighbour is missing, the value of the grid point itself.
     fn refined(&self, index: usize, score: impl Fn(usize) -> f32) -> f64 {
         if index == 0 || index + 1 >= self.count {
             return self.at(index);
@@ -148,7 +149,7 @@ impl Axis {
 /// The search space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Along the path, metres.
+    /// Position along the path, metres.
     pub along: Axis,
     /// Level height of the torso's centre, metres.
     pub height: Axis,
@@ -156,9 +157,9 @@ pub struct Grid {
     pub phase: Axis,
 }
 
-/// Printed step along the path and in height, metres.
+/// The paper's step along the path and in height, metres.
 pub const POSITION_STEP_M: f64 = 0.02;
-/// Printed step in phase, cycles.
+/// The paper's step in phase, cycles.
 pub const PHASE_STEP: f64 = 0.02;
 
 impl Grid {
@@ -177,7 +178,8 @@ impl Grid {
         Self::whole_cycle_within(along_m, height_m, [0.2, 0.1])
     }
 
-    /// The whole cycle at places within these half widths along the path and in height, metres; 0 is one place.
+    /// The whole cycle at positions within these half widths along the path and in height, metres; 0 is one
+    /// position.
     pub fn whole_cycle_within(along_m: f64, height_m: f64, half_widths_m: [f64; 2]) -> Self {
         Self {
             along: Axis::around(along_m, half_widths_m[0], POSITION_STEP_M),
@@ -191,7 +193,7 @@ impl Grid {
         self.along.count * self.height.count * self.phase.count
     }
 
-    /// Whether the grid has no hypothesis.
+    /// True if the grid has no hypothesis.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -219,12 +221,12 @@ impl Grid {
 /// How often hidden lines are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HiddenLines {
-    /// Once for each phase and place along the path, at the middle height; the visible pieces are then moved
-    /// up and down. Seen from 6 m the view turns by less than 1 degree over the 20 cm of heights, and the
+    /// Once for each phase and position along the path, at the middle height; the visible pieces are then moved
+    /// up and down. At a distance of 6 m the view turns by less than 1 degree over the 20 cm of heights, and the
     /// score changes by less than 1 %.
     #[default]
     PerColumn,
-    /// For each hypothesis anew.
+    /// For each hypothesis.
     PerHypothesis,
 }
 
@@ -235,7 +237,7 @@ pub struct SearchResult {
     pub grid: Grid,
     /// Similarity of each hypothesis; phase varies slowest, then along, then height.
     pub scores: Vec<f32>,
-    /// Index of the highest score, the first of equals.
+    /// Index of the highest score, the first if several are equal.
     pub best_index: usize,
 }
 
@@ -250,7 +252,7 @@ impl SearchResult {
         self.scores[self.best_index]
     }
 
-    /// The best grid point moved, along each axis, to the vertex of the parabola through its neighbours.
+    /// The best grid point, moved along each axis to the vertex of the parabola through its neighbours.
     pub fn refined(&self) -> Hypothesis {
         let g = &self.grid;
         let (p, a, h) = g.split(self.best_index);
@@ -261,7 +263,7 @@ impl SearchResult {
         }
     }
 
-    /// For each phase of the grid its best hypothesis and score: the similarity curve of the paper's Figs. 19
+    /// The best hypothesis and its score for each phase of the grid: the similarity curve of the paper's Figs. 19
     /// and 21.
     pub fn curve(&self) -> Vec<(Hypothesis, f32)> {
         let slice = self.grid.along.count * self.grid.height.count;
@@ -282,8 +284,7 @@ pub fn search(
     hidden_lines: HiddenLines,
 ) -> SearchResult {
     let scorer = ColumnScorer::new(edges, options);
-    // The posture depends on the phase only: each body is posed once, at the path's origin, and moved from
-    // there.
+    // The posture depends only on the phase: each body is posed once, at the path's origin, and moved from there.
     let origin = Hypothesis { along_m: 0.0, height_m: 0.0, phase: 0.0 };
     let pose = |p: usize| scene.pose(&Hypothesis { phase: grid.phase.at(p), ..origin });
     let bodies: Vec<_> = (0..grid.phase.count).map(pose).collect();
@@ -305,7 +306,7 @@ pub fn search(
     SearchResult { grid: *grid, scores, best_index }
 }
 
-/// Index of the largest value, the first of equals.
+/// Index of the largest value, the first if several are equal.
 fn arg_max(values: &[f32]) -> usize {
     values.iter().enumerate().fold(0, |best, (i, v)| if *v > values[best] { i } else { best })
 }
@@ -319,7 +320,7 @@ struct Column {
 }
 
 impl Column {
-    /// Scores all heights at one place along the path of a body posed at the path's origin.
+    /// Scores all heights at one position along the path, for a body posed at the path's origin.
     fn score(
         &mut self,
         scorer: &ColumnScorer<'_>,
@@ -329,12 +330,12 @@ impl Column {
         heights: &Axis,
         out: &mut [f32],
     ) {
-        // 1. What is visible of the body in the middle of the column. Moving the body or the camera the other
-        //    way is the same.
+        // 1. The visible contours of the body at the middle height of the column. Moving the body is the same as
+        //    moving the camera the other way.
         let place = scene.path.point(along_m, heights.centre) - scene.path.point(0.0, 0.0);
         let seen_from = scene.camera.position() - place;
         self.view.visible_contours(&body.cylinders, seen_from, &LINES_ONLY, &mut self.visible);
-        // 2. The visible pieces raised to each height, and the edges that answer them there.
+        // 2. The visible pieces raised to each height, and the edges that can match them there.
         let projection = Projection::new(scene.camera, place);
         for (block, scores) in out.chunks_mut(LANES).enumerate() {
             let height = |i: usize| heights.at((block * LANES + i).min(heights.count - 1));
@@ -347,8 +348,8 @@ impl Column {
     }
 }
 
-/// The visible pieces of one body at several heights. A type and not a closure, because the compiler may call
-/// a closure that borrows mutably through a function without the dispatched instruction set.
+/// The visible pieces of one body at several heights. It is a type and not a closure, because the compiler may
+/// call a closure that borrows mutably through a function without the dispatched instruction set.
 struct Raised<'a> {
     scorer: &'a ColumnScorer<'a>,
     projection: &'a Projection<'a>,
@@ -377,7 +378,7 @@ impl pulp::WithSimd for Raised<'_> {
     }
 }
 
-/// A visible piece of contour as a line in ideal pixels cut to the image.
+/// A visible piece of contour as a line in ideal pixels, clipped to the image.
 pub(super) fn project(segment: &VisibleSegment, camera: &Camera) -> Option<ModelLine> {
     let start = camera.project_ideal(segment.start)?;
     let end = camera.project_ideal(segment.end)?;
@@ -389,7 +390,7 @@ pub(super) fn project(segment: &VisibleSegment, camera: &Camera) -> Option<Model
     Some(ModelLine { part: segment.part as u8, start: at(t0), end: at(t1) })
 }
 
-/// The part of a line inside the image as parameters, `None` where it lies outside.
+/// The part of a line inside the image, as parameters of its ends; `None` if the line is outside.
 fn inside_image(start: DVec2, end: DVec2, camera: &Camera) -> Option<(f64, f64)> {
     let [width, height] = camera.size.map(f64::from);
     let (d, low, high) = (end - start, DVec2::splat(-0.5), DVec2::new(width, height) - 0.5);

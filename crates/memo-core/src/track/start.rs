@@ -1,11 +1,15 @@
 //! Starting phase: from similarity curves of single frames to a line of phase over time (Rohr 1994, sections
 //! 5.1 and 6).
 //!
-//! A walker's phase grows linearly, so the estimates of 10-15 frames lie on a line; because the two legs look
-//! alike, about as many lie on its twin half a cycle away. [`two_line_rule`] is the paper's way: group the
-//! best phases of the frames on the two lines and choose by count, or by mean similarity where the counts are
-//! close. [`phase_lines`] is the better way: sum the whole similarity curves along every line. Both twins are
-//! returned; [`swap_probability`] says how far the evidence separates them.
+//! A walker's phase grows linearly, so the estimates of 10-15 frames lie on a line. Because the two legs look
+//! alike, about as many estimates lie on its twin half a cycle away. There are two methods:
+//!
+//! * [`two_line_rule`] is the paper's: assign the best phases of the frames to the two lines, and choose by
+//!   count, or by mean similarity if the counts are close.
+//! * [`phase_lines`] is the better one, and the tracker uses it: sum the whole similarity curves along every
+//!   line.
+//!
+//! Both twins are returned, and [`swap_probability`] is the probability that the wrong one was chosen.
 
 use super::locate::Course;
 use super::search::{Grid, Hypothesis, Path, Scene, search};
@@ -25,7 +29,7 @@ pub struct PhaseCurve {
 }
 
 impl PhaseCurve {
-    /// The similarity at any phase, linear between samples.
+    /// The similarity at any phase, by linear interpolation.
     pub fn at(&self, phase: f64) -> f64 {
         let n = self.scores.len();
         let x = phase.rem_euclid(1.0) * n as f64;
@@ -33,7 +37,7 @@ impl PhaseCurve {
         f64::from(self.scores[i]) * (1.0 - t) + f64::from(self.scores[(i + 1) % n]) * t
     }
 
-    /// The phase of the highest similarity, the first of equals.
+    /// The phase of the highest similarity, the first if several are equal.
     pub fn best_phase(&self) -> f64 {
         let best =
             self.scores.iter().enumerate().fold(0, |b, (i, v)| if *v > self.scores[b] { i } else { b });
@@ -46,7 +50,7 @@ impl PhaseCurve {
 pub struct PhaseLine {
     /// Phase at the first frame, in [0, 1).
     pub phase_at_start: f64,
-    /// Gait cycles a second; negative for the cycle run backwards.
+    /// Gait cycles per second; negative for a cycle run backwards.
     pub rate_hz: f64,
     /// Mean similarity along the line.
     pub similarity: f64,
@@ -59,17 +63,17 @@ impl PhaseLine {
     }
 }
 
-/// Cadences a walker may have, gait cycles a second.
+/// Range of cadences, gait cycles per second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CadenceRange {
-    /// Slowest.
+    /// Lowest cadence.
     pub low_hz: f64,
-    /// Fastest.
+    /// Highest cadence.
     pub high_hz: f64,
 }
 
 impl Default for CadenceRange {
-    /// 0.65 to 1.3 cycles a second: slow walks of 0.8 m/s to brisk ones of 2 m/s.
+    /// 0.65 to 1.3 cycles per second: slow walks of 0.8 m/s to brisk walks of 2 m/s.
     fn default() -> Self {
         Self { low_hz: 0.65, high_hz: 1.3 }
     }
@@ -80,15 +84,16 @@ impl Default for CadenceRange {
 pub struct TwinLines {
     /// The line of the highest mean similarity.
     pub best: PhaseLine,
-    /// The same line half a cycle on.
+    /// The same line shifted by half a cycle.
     pub twin: PhaseLine,
 }
 
 const RATE_STEPS: usize = 40;
 const OFFSET_STEPS: usize = 100;
 
-/// Sums the similarity curves along every line of the cadence range (both signs as given) and returns the
-/// best with its twin; `None` without curves. Of equals the line of the lowest rate and then phase is best.
+/// Sums the similarity curves along every line of the cadence range (signs as given). Returns the best line with
+/// its twin, `None` without curves. Among equal lines the one with the lowest rate, then the lowest phase, is
+/// best.
 pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLines> {
     let first = curves.first()?.time_s;
     let mean_along = |phase: f64, rate: f64| {
@@ -108,8 +113,8 @@ pub fn phase_lines(curves: &[PhaseCurve], rates: &CadenceRange) -> Option<TwinLi
     Some(TwinLines { best, twin })
 }
 
-/// The best line of constant phase: what somebody shows who does not walk but is carried along in one posture, or
-/// stands; `None` without curves.
+/// The best line of constant phase, `None` without curves. It fits a person who stands or is carried along in one
+/// posture.
 pub fn frozen_line(curves: &[PhaseCurve]) -> Option<PhaseLine> {
     if curves.is_empty() {
         return None;
@@ -124,34 +129,35 @@ pub fn frozen_line(curves: &[PhaseCurve]) -> Option<PhaseLine> {
         .reduce(|best, line| if line.similarity > best.similarity { line } else { best })
 }
 
-/// One frame's best phase and its similarity.
+/// Best phase and similarity of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhaseEstimate {
     /// Time of the frame, seconds.
     pub time_s: f64,
     /// Best phase.
     pub phase: f64,
-    /// Similarity there.
+    /// Similarity at the best phase.
     pub similarity: f64,
 }
 
-/// The paper's choice between the two lines, with the counts it rests on.
+/// The paper's choice between the two lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoLineChoice {
-    /// The chosen line, by linear regression over the estimates on it.
+    /// The chosen line, by linear regression of its estimates.
     pub line: PhaseLine,
-    /// Which estimates lie on the chosen line; the others lie half a cycle off.
+    /// True for estimates on the chosen line; the others are on the line half a cycle away.
     pub on_line: Vec<bool>,
-    /// Whether mean similarity decided (the counts were within a factor of two) rather than the count.
+    /// True if mean similarity decided (the counts were within a factor of two), false if the count did.
     pub by_similarity: bool,
 }
 
-/// Groups single-frame estimates on two lines half a cycle apart and chooses one (section 6).
+/// Assigns single-frame estimates to two lines half a cycle apart and chooses one (section 6).
 ///
-/// Rate and offset modulo half a cycle come from a vote, the sum of cos(4 pi (phase - line)) over the frames,
-/// which neither twin can sway. "Number for one line higher than half of the number for the other" is read as
-/// min > max / 2: then the line of the higher mean similarity wins, else the longer one. So the longer line wins
-/// at exactly twice the number; of equal means the voted line wins, of equal votes the lowest rate.
+/// Rate and offset modulo half a cycle maximise the sum of cos(4 pi (phase - line)) over the frames, which is the
+/// same for both twins. "Number for one line higher than half of the number for the other" is read as min > max /
+/// 2: then the line with the higher mean similarity is chosen, otherwise the line with more estimates. So the
+/// line with more estimates is chosen at exactly twice the number. If the means are equal, the line of the
+/// maximum is chosen; among equal maxima, the lowest rate. `None` without estimates.
 pub fn two_line_rule(estimates: &[PhaseEstimate], rates: &CadenceRange) -> Option<TwoLineChoice> {
     let first = estimates.first()?.time_s;
     let (rate, offset) = vote(estimates, rates, first);
@@ -172,7 +178,7 @@ pub fn two_line_rule(estimates: &[PhaseEstimate], rates: &CadenceRange) -> Optio
     Some(TwoLineChoice { line, on_line, by_similarity })
 }
 
-/// Rate and offset (modulo 1/2) on which the estimates modulo half a cycle agree best.
+/// Rate and offset (modulo 1/2) that maximise the sum of cos(4 pi (phase - line)).
 fn vote(estimates: &[PhaseEstimate], rates: &CadenceRange, first: f64) -> (f64, f64) {
     let at_rate = |step: usize| {
         let rate = rates.low_hz + (rates.high_hz - rates.low_hz) * step as f64 / RATE_STEPS as f64;
@@ -189,7 +195,7 @@ fn vote(estimates: &[PhaseEstimate], rates: &CadenceRange, first: f64) -> (f64, 
     (rate, offset)
 }
 
-/// Linear regression of phase over time on the chosen estimates, unwrapped about the voted line.
+/// Linear regression of phase over time on the chosen estimates, unwrapped about the given line.
 fn regression(
     estimates: &[PhaseEstimate],
     on_line: &[bool],
@@ -212,23 +218,23 @@ fn regression(
     PhaseLine { phase_at_start: (base + level).rem_euclid(1.0), rate_hz: rate + slope, similarity }
 }
 
-/// Which way a body moves relative to where it faces.
+/// Direction of movement relative to the direction the body faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// Ordinary walking.
+    /// Forward walking.
     Forward,
-    /// Walking backwards: the gait cycle run in reverse.
+    /// Backward walking: the gait cycle runs in reverse.
     Backward,
 }
 
-/// What the starting phase found.
+/// Report of the starting phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartReport {
-    /// The line walked and the direction faced.
+    /// The line walked and the direction the body faces.
     pub path: Path,
     /// State at the first start frame on the best line.
     pub beginning: Beginning,
-    /// Forward or backward, whichever explains the frames better.
+    /// Forward or backward, whichever has the higher similarity.
     pub direction: Direction,
     /// Probability that the other direction is the true one.
     pub p_other_direction: f64,
@@ -238,17 +244,17 @@ pub struct StartReport {
     pub other_direction: PhaseLine,
     /// Best line of constant phase, in the chosen direction.
     pub frozen: PhaseLine,
-    /// The paper's choice on the same frames, for comparison.
+    /// The choice of the paper's rule on the same frames, for comparison.
     pub two_line_rule: TwoLineChoice,
-    /// Similarity over the whole cycle, frame by frame, in the chosen direction.
+    /// Similarity over the whole cycle, one curve per frame, in the chosen direction.
     pub curves: Vec<PhaseCurve>,
     /// Frame numbers of the curves.
     pub frames: Vec<usize>,
 }
 
 impl StartReport {
-    /// Similarity along the best line over the mean over all phases: near 1 where no phase fits better than
-    /// another, as for things that do not walk.
+    /// Similarity along the best line divided by the mean over all phases. It is near 1 if no phase fits better
+    /// than another, as for things that do not walk; 0 if nothing matched at all.
     pub fn contrast(&self) -> f64 {
         let all: Vec<f64> = self.curves.iter().flat_map(|c| &c.scores).map(|s| f64::from(*s)).collect();
         let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
@@ -256,15 +262,15 @@ impl StartReport {
     }
 }
 
-/// Whole-cycle search in every frame, for one direction of facing.
+/// Whole-cycle search in every frame, for one direction the body may face.
 struct Faced {
     path: Path,
     curves: Vec<PhaseCurve>,
     hypotheses: Vec<Vec<Hypothesis>>,
 }
 
-/// Starts a walk on a handful of frames: whole-cycle search, phase lines for forward and backward walking,
-/// regression.
+/// Starts a walk on a few frames: whole-cycle search, phase lines for forward and backward walking, regression.
+/// `None` if there are no frames.
 pub fn start(
     frames: &[&FrameEdges],
     course: &Course,
@@ -273,7 +279,7 @@ pub fn start(
     rates: &CadenceRange,
     options: &WalkOptions,
 ) -> Option<StartReport> {
-    // 1. Similarity over the whole cycle, facing either way.
+    // 1. Similarity over the whole cycle, for both directions the body may face.
     let ahead = face(frames, course, false, walker, camera, options);
     let back = face(frames, course, true, walker, camera, options);
     // 2. The best line of phase over time for each direction.
@@ -289,7 +295,7 @@ pub fn start(
     let duration_s = frames.last()?.time_s - frames.first()?.time_s;
     let p_other_direction =
         swap_probability(lines.best.similarity, other.best.similarity, duration_s, &options.swap);
-    // 3. Place and speed by regression over the hypotheses on the line.
+    // 3. Position and speed by regression over the hypotheses on the line.
     let beginning = beginning(frames, &faced, &lines.best)?;
     let used = if is_forward { *rates } else { reversed };
     let two_line_rule = two_line_rule(&estimates(&faced.curves), &used)?;
@@ -332,7 +338,7 @@ fn face(
     faced
 }
 
-/// Regression of place over time, over each frame's best hypothesis at the line's phase.
+/// Regression of position over time, over each frame's best hypothesis at the line's phase.
 fn beginning(frames: &[&FrameEdges], faced: &Faced, line: &PhaseLine) -> Option<Beginning> {
     let first = frames.first()?.time_s;
     let on_line = |(frame, hypotheses): (&&FrameEdges, &Vec<Hypothesis>)| {

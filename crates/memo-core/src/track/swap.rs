@@ -1,19 +1,21 @@
-//! Which of two half-cycle twins is the true one: how sure right and left are.
+//! Probability that right and left are swapped, from the similarities of the two half-cycle twins.
 
 use crate::option_error::OptionError;
 
-/// How the margin between the twins behaves, after a handful of real and motion-captured walks: probabilities
-/// far from 1/2 mean "sure", their size is not a rate that was counted.
+/// Model of the margin between the twins, from a handful of real and motion-captured walks. A probability far
+/// from 1/2 means that the sides are known; its value is not a counted error rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwapModel {
-    /// Typical margin (S_right - S_wrong) / S_right of the summed similarity. Measured medians: 0.13 to 0.17.
+    /// Mean mu of the margin (S_right - S_wrong) / S_right of the summed similarity. Measured medians: 0.13 to
+    /// 0.17.
     pub margin: f64,
-    /// Its standard deviation over independent glimpses of one walk: wrong windows of 0.4 s had margins up to
-    /// 0.07.
+    /// Standard deviation of the margin over independent glimpses of one walk: wrong windows of 0.4 s had margins
+    /// up to 0.07.
     pub glimpse_sd: f64,
-    /// Standard deviation that no amount of time removes: people whose arms or legs differ from the average.
+    /// Standard deviation over people, which does not decrease with time: arms or legs that differ from the
+    /// average.
     pub person_sd: f64,
-    /// Frames closer than this are not independent, seconds.
+    /// Duration of a glimpse, seconds: frames closer than this are not independent.
     pub glimpse_s: f64,
 }
 
@@ -33,11 +35,10 @@ impl SwapModel {
     }
 }
 
-/// Probability that the twin with the summed similarity `other`, and not the one with `chosen`, is the true
-/// one.
+/// Probability that the twin with the summed similarity `other` is the true one, and not the twin with `chosen`.
 ///
-/// The margin m = (chosen - other) / max is taken as normal about ±mu with variance v = person² + glimpse² /
-/// n, n the number of independent glimpses in `duration_s`; then log odds = 2 mu m / v.
+/// The margin m = (chosen - other) / max is normal about ±mu with variance v = person² + glimpse² / n, where n is
+/// the number of independent glimpses in `duration_s`; then log odds = 2 mu m / v.
 pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
     let top = chosen.max(other);
     if top <= 0.0 {
@@ -53,7 +54,7 @@ pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapMo
 mod tests {
     use super::*;
 
-    /// The log odds by Bayes from the two normal densities of the margin.
+    /// The log odds by Bayes' rule from the two normal densities of the margin.
     #[test]
     fn the_swap_probability_is_bayes_rule_on_the_margin() {
         let model = SwapModel { margin: 0.11, glimpse_sd: 0.2, person_sd: 0.06, glimpse_s: 0.25 };

@@ -1,17 +1,20 @@
 //! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
 //!
-//! It seeks a moving region that could be a person, starts on 13 frames of it, follows both half-cycle twins
-//! with filters, fits the person's deviation once enough of the walk is seen, and ends the walk when the
-//! person leaves or stops walking. Then it seeks again. One person at a time: the largest moving region that
-//! is fully visible.
+//! 1. It looks for a moving region that could be a person.
+//! 2. It starts on 13 frames of that region ([`TrackerOptions::start_frames`]).
+//! 3. It follows both half-cycle twins with filters.
+//! 4. It fits the person's deviation once [`TrackerOptions::person_frames`] frames are followed.
+//! 5. It ends the walk when the person leaves the image or stops walking, and looks for a person again.
 //!
-//! Memory does not grow with the stream: two frames, the edges of at most [`TrackerOptions::person_frames`]
-//! or `start_frames` frames, whichever is more, and the rows of the walk under way, which is handed out in
-//! pieces of [`LONGEST_WALK`] frames.
+//! It tracks one person at a time: the largest moving region that is fully visible.
 //!
-//! Edges are matched within a few pixels whatever the size of the picture. Pictures longer or higher than about
-//! 1280 pixels are to be averaged down first, their camera with [`Camera::shrunk`]: a walk of 720p enlarged to
-//! 1080p was tracked as well, to 1440p it was taken for a backward one.
+//! Memory does not grow with the length of the stream. The tracker keeps two frames, the edges of at most
+//! [`TrackerOptions::person_frames`] or `start_frames` frames, whichever is more, and the rows of the current
+//! walk. A walk longer than [`LONGEST_WALK`] frames is returned in pieces of that length.
+//!
+//! Edges are matched within a few pixels, whatever the image size. Shrink images whose longer side exceeds about
+//! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as
+//! well, but enlarged to 1440p it was taken for backward walking.
 
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
@@ -32,26 +35,26 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrackError {
-    /// The body height makes no sense.
+    /// The body height is not valid.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A frame or an option was refused.
+    /// A frame or an option of the image stages was refused.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The stream has been ended.
+    /// [`Tracker::finish`] was called before.
     #[error("the stream has ended: make a new tracker for further frames")]
     Finished,
-    /// The camera belongs to images of another size.
+    /// The camera is calibrated for another image size.
     #[error(
         "the camera is calibrated for {camera_width}x{camera_height} images, the frames are {width}x{height}"
     )]
     CameraSize {
-        /// Width the camera file states.
+        /// Image width of the camera.
         camera_width: u32,
-        /// Height the camera file states.
+        /// Image height of the camera.
         camera_height: u32,
         /// Width of the frames.
         width: usize,
@@ -60,36 +63,36 @@ pub enum TrackError {
     },
 }
 
-/// A walk is handed out after this many frames and goes on as a new one.
+/// A walk of this many frames is returned and continues as a new walk.
 pub const LONGEST_WALK: usize = 20_000;
-/// A candidate is dropped after this many frames in a row without it.
+/// A candidate is dropped after this many consecutive frames without it.
 const MISSED_FRAMES: usize = 3;
-/// A comfortable walk, before the speed is known, metres a second.
+/// Speed of a comfortable walk, used before the speed is known, m/s.
 const COMFORTABLE_MPS: f64 = 1.3;
-/// Faster than this nobody walks, metres a second.
+/// Nobody walks faster than this, m/s.
 const FASTEST_MPS: f64 = 3.0;
-/// What moves is a walker when the best line of phase beats the mean over all phases by this factor.
-/// Measured: walkers 1.35 and more, 1.23 backwards; sliding boxes up to 1.20.
+/// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
+/// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
 const LEAST_CONTRAST: f64 = 1.22;
-/// A walk ends when this share of the body's height or width lies outside the image.
+/// A walk ends when this share of the body's height or width is outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
-/// Edges are looked for this far around the predicted body, pixels.
+/// Edges are searched this far around the predicted body, pixels.
 const WINDOW_MARGIN_PX: f64 = 16.0;
 
-/// Counts over the whole stream, walks included, that say why nobody was followed if nobody was.
+/// Counts over the whole stream, walks included. If nobody was followed, they show why.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SeekReport {
     /// Frames seen.
     pub frames: usize,
     /// Frames with a moving region large enough for a person.
     pub frames_with_candidate: usize,
-    /// Of these, frames in which the region was cut by the image border.
+    /// Of these, frames in which the image border cut the region.
     pub frames_cut_off: usize,
-    /// Starts refused because the region moved too slowly, did not fit the height or did not walk.
+    /// Refused starts: the region moved too slowly, did not fit the height, or did not walk.
     pub refused_starts: usize,
 }
 
-/// The latest filtered estimate of a stream.
+/// The latest filtered estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Now {
     /// Number of the frame.
@@ -98,17 +101,17 @@ pub struct Now {
     pub time_s: f64,
     /// Centre of the torso, metres.
     pub torso_centre: DVec3,
-    /// Direction faced, radians about world Z.
+    /// Direction the body faces, radians about world Z.
     pub heading_rad: f64,
-    /// Gait phase in [0, 1).
+    /// Gait phase in [0, 1), 0 = right heel strike (initial contact).
     pub phase: f64,
-    /// Probability, on what has been seen so far, that left and right are swapped.
+    /// Probability, from the frames so far, that left and right are swapped.
     pub p_swapped: f64,
-    /// Speed along the path, metres a second.
+    /// Speed along the path, m/s.
     pub speed_mps: f64,
 }
 
-/// A streaming tracker.
+/// A tracker for one stream of frames.
 #[derive(Debug)]
 pub struct Tracker {
     options: TrackerOptions,
@@ -119,12 +122,12 @@ pub struct Tracker {
     finished: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
-    /// Frames after which a walk is handed out.
+    /// Number of frames after which a walk is returned.
     longest_walk: usize,
 }
 
 impl Tracker {
-    /// A tracker that has seen no frame.
+    /// A tracker for a new stream; an error if the body height or an option is out of range.
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
         Body::from_height(options.height_m)?;
         options.check()?;
@@ -142,7 +145,7 @@ impl Tracker {
         })
     }
 
-    /// Takes the next frame. What it shows is known one frame later.
+    /// Adds the next frame. Its evidence is processed when the frame after it arrives.
     pub fn update(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<(), TrackError> {
         if self.is_finished {
             return Err(TrackError::Finished);
@@ -155,7 +158,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Ends the stream: the last frame is worked on and the walk under way ends.
+    /// Ends the stream: processes the last frame and ends the current walk.
     pub fn finish(&mut self) -> Result<(), TrackError> {
         self.is_finished = true;
         let stream = std::mem::replace(&mut self.stream, EvidenceStream::new(self.options.evidence));
@@ -166,13 +169,13 @@ impl Tracker {
         Ok(())
     }
 
-    /// The walks that have ended since this was last asked.
+    /// The walks that have ended since the last call.
     #[must_use]
     pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
         std::mem::take(&mut self.finished)
     }
 
-    /// The filtered state of the better twin at the last frame worked on, while somebody is followed.
+    /// The filtered state of the better twin at the last processed frame; `None` while nobody is followed.
     pub fn current(&self) -> Option<Now> {
         let active = self.walking.as_ref()?;
         let step = active.walk.last()?;
@@ -189,7 +192,7 @@ impl Tracker {
         })
     }
 
-    /// The options it works with.
+    /// The options in use.
     pub fn options(&self) -> &TrackerOptions {
         &self.options
     }
@@ -213,7 +216,7 @@ impl Tracker {
         if self.walking.is_some() { self.follow(evidence) } else { self.seek(evidence) }
     }
 
-    /// Collects sightings of one candidate and tries to start on them.
+    /// Collects sightings of one candidate and tries to start when there are enough.
     fn seek(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
         match self.sighting(evidence, None) {
             Some(sighting) => {
@@ -241,7 +244,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// The fully visible candidate: the largest, or the one that overlaps `expected` most.
+    /// The candidate if it is fully visible: the largest region, or the one that overlaps `expected`.
     fn sighting(&mut self, evidence: &Evidence, expected: Option<&Rectangle>) -> Option<Sighting> {
         let candidates = evidence.candidates(&self.options.evidence);
         let region = candidates.iter().find(|r| expected.is_none_or(|e| overlaps(&r.rectangle, e)))?;
@@ -275,8 +278,9 @@ impl Tracker {
         }
     }
 
-    /// 1. Camera and course from the rectangles. 2. Phase lines over the whole cycle. 3. Both twins through
-    ///    the start frames.
+    /// 1. Camera and course from the rectangles.
+    /// 2. Lines of phase over the whole cycle.
+    /// 3. Both twins followed through the start frames.
     fn begin(&self, size: [u32; 2]) -> Option<Active> {
         let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
         if feet_cut_off(&sightings, size[1] as usize) {
@@ -290,7 +294,7 @@ impl Tracker {
         let walker = self.options.walker(course.speed_mps).ok()?;
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
         let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
-        // What is carried along in one posture looks like a walker, but no phase explains it better than one that stays.
+        // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
         if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
             return None;
         }
@@ -341,14 +345,14 @@ impl Tracker {
                 active.refit(&self.options);
             }
         }
-        // On a wrongly assumed path a walk looks over, so the fit comes first.
+        // On a wrong path a walk can seem to be over, so the person is fitted first.
         if active.fitted && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
             self.end_walk();
         }
         Ok(())
     }
 
-    /// The image rectangle in which the body is expected; `None` when too much of it lies outside.
+    /// The image rectangle in which the body is expected; `None` if too much of it is outside the image.
     fn predicted_window(&self, evidence: &Evidence) -> Option<Rectangle> {
         let active = self.walking.as_ref()?;
         let predicted = active.walk.predict(active.walk.best(), evidence.time_s, &self.options.walk.filter);
@@ -409,12 +413,12 @@ fn body_box(scene: &Scene<'_>, hypothesis: &Hypothesis) -> Option<(DVec2, DVec2)
     Some(bounds)
 }
 
-/// Reflections may reach the lower border; a person is cut off only where a side or the top is.
+/// Reflections may reach the lower border, so only the sides and the top count.
 fn touches_border(r: &Rectangle, width: usize) -> bool {
     r.left <= 1 || r.top <= 1 || r.right + 2 >= width
 }
 
-/// A reflection reaches the lower border now and then, feet below the picture in most frames.
+/// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
 fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
     2 * sightings.iter().filter(|s| s.rectangle.bottom + 2 >= height).count() > sightings.len()
 }
@@ -423,13 +427,13 @@ fn overlaps(a: &Rectangle, b: &Rectangle) -> bool {
     a.gap(b) == [0, 0]
 }
 
-/// Whether two rectangles of neighbouring frames can enclose one person.
+/// True if two rectangles of neighbouring frames can enclose the same person.
 fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
     let ratio = a.height() as f64 / b.height() as f64;
     overlaps(a, b) && (0.6..1.6).contains(&ratio)
 }
 
-/// A rectangle grown by a margin, inside the image.
+/// A rectangle enlarged by a margin, clipped to the image.
 fn grown(r: &Rectangle, evidence: &Evidence, margin_px: f64) -> Rectangle {
     let m = margin_px as usize;
     Rectangle {

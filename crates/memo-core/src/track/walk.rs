@@ -1,8 +1,8 @@
-//! One walk being followed: prediction, narrow search, filter update, for both half-cycle twins (Rohr 1994,
-//! sections 5.2, 6).
+//! Following one walk: prediction, narrow search and filter update for both half-cycle twins (Rohr 1994, sections
+//! 5.2, 6).
 //!
-//! A track started half a cycle off never corrects itself: its legs fit almost as well. So both twins are
-//! followed, each with its own filters, and the similarities they collect decide between them.
+//! A track that starts half a cycle off does not correct itself, because its legs fit almost as well. So both
+//! twins are followed, each with its own filters, and the sums of their similarities decide between them.
 
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
@@ -19,7 +19,7 @@ pub struct WalkOptions {
     pub similarity: SimilarityOptions,
     /// Noise of the filter.
     pub filter: FilterOptions,
-    /// How the twins' margin turns into a probability.
+    /// Model of the margin between the twins, which turns it into a probability.
     pub swap: SwapModel,
     /// How often hidden lines are removed in the search.
     pub hidden_lines: HiddenLines,
@@ -34,22 +34,22 @@ impl WalkOptions {
     }
 }
 
-/// Smallest and largest half widths of the search: along the path, in height (metres) and in phase. The
-/// largest are the printed ones; the smallest keep three steps on each side.
+/// Smallest and largest half widths of the search: along the path, in height (metres) and in phase (cycles). The
+/// largest are the paper's; the smallest keep three steps on each side.
 const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
 
-/// How well the ground and the length of the legs fix the height of the torso, metres. The printed 10 cm is
-/// what one frame's contours fix it to.
+/// Standard deviation of the torso's height given the ground and the leg length, metres. The paper's 10 cm is the
+/// standard deviation given the contours of one frame.
 const GROUND_SD_M: f64 = 0.02;
 
 /// The filtered state of one twin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
-    /// Place along the path, metres.
+    /// Position along the path, metres.
     pub along: ConstantVelocity,
     /// Level height of the torso's centre, metres.
     pub height: ConstantVelocity,
-    /// Gait phase, cycles, not wrapped.
+    /// Gait phase, cycles, not wrapped to [0, 1).
     pub phase: ConstantVelocity,
 }
 
@@ -73,7 +73,8 @@ impl State {
         }
     }
 
-    /// Eqs. (16)-(18) for all coordinates; the measured phase is taken at the turn nearest to the state's.
+    /// Eqs. (16)-(18) for all coordinates; the measured phase is shifted to the cycle nearest to the state's
+    /// phase.
     fn update(&self, measured: &Hypothesis, options: &FilterOptions) -> Self {
         let off = measured.phase - self.phase.position;
         let phase = self.phase.position + off - off.round();
@@ -84,7 +85,7 @@ impl State {
         }
     }
 
-    /// The grid around a prediction; its size follows the predicted covariance.
+    /// The search grid around a prediction; its size depends on the predicted covariance.
     fn grid(&self) -> Grid {
         let half = |state: &ConstantVelocity, (low, high): (f64, f64)| state.position_sd().clamp(low, high);
         let [along, height, phase] = HALF_WIDTHS;
@@ -96,14 +97,14 @@ impl State {
     }
 }
 
-/// Where in a frame one twin was looked for: with the frame, all that its similarity depends on.
+/// Where one twin was searched in a frame. With the frame, this is all the similarity depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// The part of the image edges were taken from.
+    /// The part of the image from which edges were taken.
     pub window: Rectangle,
-    /// The heights of the search grid; hidden lines were removed at the middle one.
+    /// The heights of the search grid; hidden lines were removed at the middle height.
     pub heights: Axis,
-    /// The grid point of the highest similarity; the prediction where nothing was matched.
+    /// The grid point of the highest similarity; the prediction if nothing matched.
     pub best: Hypothesis,
 }
 
@@ -116,11 +117,11 @@ pub struct Step {
     pub time_s: f64,
     /// State after the frame.
     pub state: State,
-    /// The best hypothesis of the frame; `None` where nothing was matched and the filter coasted.
+    /// The best hypothesis of the frame; `None` if nothing matched, and the filter only predicted.
     pub measured: Option<Hypothesis>,
-    /// The similarity of the best grid point, 0 where nothing matched.
+    /// Similarity of the best grid point; 0 if nothing matched.
     pub similarity: f32,
-    /// Where it was looked for.
+    /// Where the twin was searched.
     pub look: Look,
 }
 
@@ -129,22 +130,22 @@ pub struct Step {
 pub struct Twin {
     /// All frames so far.
     pub steps: Vec<Step>,
-    /// Sum of the similarities over all frames, dropped ones included.
+    /// Sum of the similarities of all frames, including frames dropped from `steps`.
     pub similarity_sum: f64,
 }
 
-/// Where a walk begins.
+/// State at the beginning of a walk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beginning {
-    /// Time the values hold for, seconds.
+    /// Time of the state, seconds.
     pub time_s: f64,
-    /// Place along the path, metres.
+    /// Position along the path, metres.
     pub along_m: f64,
     /// Gait phase.
     pub phase: f64,
-    /// Speed along the path in the direction faced, metres a second.
+    /// Speed along the path in the direction the body faces, m/s.
     pub speed_mps: f64,
-    /// Gait cycles a second.
+    /// Cadence in gait cycles per second.
     pub rate_hz: f64,
 }
 
@@ -155,7 +156,7 @@ pub struct FrameEdges {
     pub frame: usize,
     /// Time of the frame, seconds.
     pub time_s: f64,
-    /// The part of the image they were taken from.
+    /// The part of the image from which they were taken.
     pub window: Rectangle,
     /// Straight edges in ideal pixels.
     pub edges: Vec<EdgeLine>,
@@ -166,9 +167,9 @@ pub struct FrameEdges {
 pub struct Walk {
     /// Body, gait and style.
     pub walker: Walker,
-    /// The line walked and the direction faced.
+    /// The line walked and the direction the body faces.
     pub path: Path,
-    /// Where it began; the second twin began half a cycle later.
+    /// State at the beginning; that of the second twin is half a cycle later.
     pub beginning: Beginning,
     /// The two half-cycle hypotheses.
     pub twins: [Twin; 2],
@@ -176,7 +177,7 @@ pub struct Walk {
 }
 
 impl Walk {
-    /// A walk at its beginning, no frame followed yet.
+    /// A walk at its beginning, with no frame followed.
     pub fn new(walker: Walker, path: Path, beginning: Beginning) -> Self {
         let twin = Twin { steps: Vec::new(), similarity_sum: 0.0 };
         Self { walker, path, beginning, twins: [twin.clone(), twin], first_time_s: None }
@@ -197,8 +198,8 @@ impl Walk {
         self.first_time_s.get_or_insert(edges.time_s);
     }
 
-    /// A twin's prediction for a time: from its last step, or from the beginning with the measurement's
-    /// uncertainty.
+    /// Prediction of a twin for a time: from its last step, or from the beginning with the uncertainty of a
+    /// measurement.
     pub fn predict(&self, twin: usize, time_s: f64, options: &FilterOptions) -> State {
         match self.twins[twin].steps.last() {
             Some(step) => step.state.predict(time_s - step.time_s, options),
@@ -206,8 +207,8 @@ impl Walk {
         }
     }
 
-    /// P_0 = R for place and phase, the 30 % deviation of section 6 for the velocities; the height is the
-    /// walker's own over the ground.
+    /// P_0 = R for position and phase, and the 30 % deviation of section 6 for the velocities. The height is that
+    /// of the walker's torso above the ground.
     fn initial_state(&self, twin: usize, time_s: f64, options: &FilterOptions) -> State {
         let b = &self.beginning;
         let dt = time_s - b.time_s;
@@ -222,12 +223,12 @@ impl Walk {
         }
     }
 
-    /// Index of the twin with the higher summed similarity, the first of equals.
+    /// Index of the twin with the larger sum of similarities, the first if they are equal.
     pub fn best(&self) -> usize {
         usize::from(self.twins[1].similarity_sum > self.twins[0].similarity_sum)
     }
 
-    /// Probability that the other twin and not the best is the true one.
+    /// Probability that the worse twin is the true one.
     pub fn swap_probability(&self, options: &SwapModel) -> f64 {
         let best = self.best();
         let duration_s = match (self.first_time_s, self.twins[best].steps.last()) {
@@ -242,7 +243,7 @@ impl Walk {
         )
     }
 
-    /// Keeps a range of the steps; the similarity sums keep what they have seen.
+    /// Keeps a range of the steps; the sums of similarities do not change.
     pub(crate) fn keep(&mut self, range: std::ops::Range<usize>) {
         for twin in &mut self.twins {
             twin.steps.truncate(range.end);
@@ -256,7 +257,7 @@ impl Walk {
     }
 }
 
-/// Searches around a prediction and updates the state with what was found.
+/// Searches around a prediction and updates the state with the result.
 fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options: &WalkOptions) -> Step {
     let grid = predicted.grid();
     let found = search(&edges.edges, scene, &grid, &options.similarity, options.hidden_lines);
@@ -282,7 +283,7 @@ mod tests {
         Walk::new(walker(), PATH, BEGINNING)
     }
 
-    /// Where the planted walker is: on the line from `BEGINNING`.
+    /// The true state of the planted walker, on the line from `BEGINNING`.
     fn truth(time_s: f64) -> Hypothesis {
         let elapsed_s = time_s - BEGINNING.time_s;
         Hypothesis {
@@ -305,7 +306,7 @@ mod tests {
         FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new() }
     }
 
-    /// Noise that differs in every coordinate.
+    /// Filter noise that differs between coordinates.
     fn filter() -> FilterOptions {
         let mut filter = FilterOptions::default();
         filter.vertical.velocity_variance_per_s = 0.3;
@@ -337,7 +338,7 @@ mod tests {
         let [first, second] = [0, 1].map(|twin| walk.predict(twin, 2.2, &filter));
         assert_eq!((first.along, first.height), (second.along, second.height));
         assert!((second.phase.position - first.phase.position - 0.5).abs() < 1e-12);
-        // At 2.2 s the walker is 0.2 s on.
+        // At 2.2 s the walker has moved for 0.2 s.
         assert!((first.along.position + 0.3 - 0.2 * 1.3).abs() < 1e-12);
         assert!((first.phase.position - 0.7 - 0.2 * 0.9).abs() < 1e-12);
         assert!((first.height.position - walker().level_torso_height_m()).abs() < 1e-12);
@@ -391,7 +392,7 @@ mod tests {
     fn the_grid_reaches_one_standard_deviation_within_its_limits() {
         let centres = |grid: &Grid| [grid.along.centre, grid.height.centre, grid.phase.centre];
         let counts = |grid: &Grid| [grid.along.count, grid.height.count, grid.phase.count];
-        // The printed grid is the largest: 40 cm, 20 cm and 0.4 of the cycle.
+        // The paper's grid is the largest: 40 cm, 20 cm and 0.4 of the cycle.
         let wide = state([0.3, 1.0], [1.2, 1.0], [0.8, 1.0]).grid();
         assert_eq!((centres(&wide), counts(&wide)), ([0.3, 1.2, 0.8], [21, 11, 21]));
         let narrow = state([0.3, 1e-3], [1.2, 1e-3], [0.8, 1e-3]).grid();
@@ -431,7 +432,7 @@ mod tests {
             assert_eq!((step.frame, step.time_s, step.measured.is_none()), (k, time_s, k == 3));
         }
         assert!(first.steps[3].state.along.position_sd() > first.steps[2].state.along.position_sd());
-        // Sums over all frames, the empty one included.
+        // The sums include all frames, also the empty one.
         for twin in [first, second] {
             let sum: f64 = twin.steps.iter().map(|s| f64::from(s.similarity)).sum();
             assert!((twin.similarity_sum - sum).abs() < 1e-9);

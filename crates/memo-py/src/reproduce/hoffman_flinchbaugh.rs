@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// More problems than this take hours.
+/// Maximum number of problems; more take hours.
 const MOST_TRIALS: usize = 100_000_000;
 
 fn checked(trials: usize) -> PyResult<usize> {
@@ -20,7 +20,7 @@ fn checked(trials: usize) -> PyResult<usize> {
     Ok(trials)
 }
 
-/// Proposition 1 on random rods seen three times: counts and largest errors by name.
+/// Proposition 1 on random rods in three views: counts and largest errors by name.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_rods<'py>(
     py: Python<'py>,
@@ -50,7 +50,7 @@ pub fn hoffman_flinchbaugh_rods<'py>(
     Ok(dict)
 }
 
-/// Proposition 2 on random hinges seen twice: counts by name. Of the first `searched`, all planes are found by
+/// Proposition 2 on random hinges in two views: counts by name. For the first `searched`, all planes are found by
 /// search.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_hinges<'py>(
@@ -77,14 +77,14 @@ pub fn hoffman_flinchbaugh_hinges<'py>(
     Ok(dict)
 }
 
-/// How many of `trials` unrelated pairs in three views, and triples in two, are read as planar.
+/// The number of `trials` unrelated pairs in three views, and triples in two, with a planar interpretation.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> PyResult<[usize; 2]> {
     let trials = checked(trials)?;
     interruptible(py, move || false_targets(trials, seed))
 }
 
-/// How many of `trials` degenerate problems are refused, by kind.
+/// The number of `trials` degenerate problems that are refused, by kind.
 #[pyfunction]
 pub fn hoffman_flinchbaugh_degenerate(
     py: Python<'_>,

@@ -31,9 +31,9 @@ pub fn segment_names() -> Vec<String> {
     SegmentLengths::lee_chen().named().map(|(name, _)| name).collect()
 }
 
-/// Table 3 (SEQ1) or 4 (SEQ2) on the walker made anew, beside the printed one: `phases`, and for each of
-/// `physical`, `rules_1_2`, `printed_physical` and `printed_rules_1_2` nodes of shape (14 levels, 3 frames);
-/// `truth_kept` (3 frames, 2).
+/// Table 3 (SEQ1) or 4 (SEQ2) on the synthetic walker, beside the printed one: `phases`; `physical`, `rules_1_2`,
+/// `printed_physical` and `printed_rules_1_2`, numbers of nodes of shape (14 levels, 3 frames); `truth_kept` (3
+/// frames, 2).
 #[pyfunction]
 #[pyo3(signature = (sequence, merge_m=lee_chen::MERGE_M))]
 pub fn lee_chen_counts<'py>(py: Python<'py>, sequence: &str, merge_m: f64) -> PyResult<Bound<'py, PyDict>> {
@@ -57,8 +57,8 @@ fn set_counts(dict: &Bound<'_, PyDict>, prefix: &str, counts: &Counts) -> PyResu
     dict.set_item(format!("{prefix}rules_1_2"), array(&counts.rules_1_2)?)
 }
 
-/// What rules 1 to 5 and grouping leave, over ten phases and three frames: a list of dicts with `phase`,
-/// `postures`, `groups`, `truth_kept` and `broken`, names of the constraints that the true posture breaks.
+/// Results of rules 1 to 5 and grouping, over ten phases and three frames: a list of dicts with `phase`,
+/// `postures`, `groups`, `truth_kept` and `broken`, the names of the constraints that the true posture breaks.
 ///
 /// `reading` is "as_printed" or "rigid_torso".
 #[pyfunction]
@@ -89,9 +89,10 @@ pub fn lee_chen_last_stage<'py>(
     stages.into_iter().map(dict_of).collect()
 }
 
-/// The postures of frame 1 that physical constraints and rules 1 and 2 leave: `figures` (N, 14, 3) and
-/// `truth` (14, 3) in camera axes, metres; `groups` of figures within 5 cm, each its representative and
-/// members; `passes`, whether a figure passes rules 3 to 5 too; `true_one`, which takes the true roots.
+/// The postures of frame 1 that satisfy the physical constraints and rules 1 and 2: `figures` (N, 14, 3) and
+/// `truth` (14, 3) in camera axes, metres; `groups` of figures within 5 cm, each with its representative and
+/// members; `passes`, whether a figure satisfies rules 3 to 5 too; `true_one`, the index of the figure with the
+/// true roots.
 #[pyfunction]
 pub fn lee_chen_figures<'py>(py: Python<'py>, sequence: &str) -> PyResult<Bound<'py, PyDict>> {
     let sequence = sequence_of(sequence)?;
@@ -135,9 +136,9 @@ pub fn lee_chen_head(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     columns.into_iter().map(dict_of).collect()
 }
 
-/// What goes into the tables, as the code has it: `angles`, names with (least, largest) in degrees (Table 1);
-/// `lengths_cm`, names with lengths (A.1); `head_cm` (6, 3) and `projections_cm` (6, 2) of the head points
-/// seen from (400, 0, 0) with f = 5 (A.2); `frame_s`; `cameras_cm`, image planes of SEQ1 and SEQ2.
+/// Inputs of the tables, as used by the code: `angles`, names with (least, largest) in degrees (Table 1);
+/// `lengths_cm`, names with lengths (A.1); `head_cm` (6, 3) and `projections_cm` (6, 2) of the head points seen
+/// from (400, 0, 0) with f = 5 (A.2); `frame_s`; `cameras_cm`, image planes of SEQ1 and SEQ2.
 #[pyfunction]
 pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let l = Limits::paper();
@@ -169,7 +170,7 @@ pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let projections = exact_projections().map(|point| point.to_array());
     dict.set_item("projections_cm", numpy_from_rows(py, projections.to_vec())?)?;
     dict.set_item("frame_s", FRAME_S)?;
-    // The lens is f behind the image plane, which is what the paper calls the camera's position.
+    // The lens is f behind the image plane, whose position the paper calls the camera's.
     let plane = |sequence: Sequence| {
         let lens = sequence.camera().lens_in_head;
         (100.0 * (lens - 0.05 * lens.normalize_or_zero())).to_array()
@@ -178,10 +179,10 @@ pub fn lee_chen_inputs(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
-/// More frames than this do not fit in the memory of most machines.
+/// Maximum number of frames; more do not fit in the memory of most machines.
 const MOST_FRAMES: usize = 1_000_000;
 
-/// The walker made anew in frames of a sequence, counted from 0: joints (frames, 14, 3) in camera axes, metres,
+/// The synthetic walker in frames of a sequence, counted from 0: joints (frames, 14, 3) in camera axes, metres,
 /// and the gait phase of each frame.
 #[pyfunction]
 #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]

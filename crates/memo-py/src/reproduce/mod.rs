@@ -1,4 +1,4 @@
-//! The papers' experiments.
+//! Experiments of the papers.
 
 pub mod hoffman_flinchbaugh;
 pub mod lee_chen;

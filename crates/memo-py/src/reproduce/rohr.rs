@@ -1,4 +1,4 @@
-//! Rohr (1994): constants, equations, model and the stages behind the figures.
+//! Rohr (1994): constants, equations, model and the stages of the figures.
 
 use crate::array::{
     frame_from_numpy, numpy_from_column, numpy_from_flat, numpy_from_image, numpy_from_rows,
@@ -23,13 +23,13 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The paper's constants as the code has them, by name.
+/// The paper's constants as used by the code, by name.
 #[pyfunction]
 pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
     rohr::numbers()
 }
 
-/// By how much the two sides of each equation differ, computed in two ways, by name.
+/// Largest difference of the two sides of each equation, computed in two ways, by name.
 #[pyfunction]
 #[pyo3(signature = (seed=0))]
 pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
@@ -76,8 +76,8 @@ pub fn body_parts(height_m: f64) -> PyResult<Vec<(String, f64, f64, f64)>> {
 /// Segments (n, 2, 2) in pixels, and for each its part and its walker.
 type Contours<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>);
 
-/// Contours of walkers on the ground, each (x_m, y_m, heading_rad, phase, height_m): what one hides of itself
-/// and of others is removed unless `hidden` is wanted too.
+/// Contours of walkers on the ground, each (x_m, y_m, heading_rad, phase, height_m). Parts hidden by the same or
+/// another walker are removed unless `hidden` is true.
 #[pyfunction]
 #[pyo3(signature = (camera, walkers, *, gait="dense", hidden=false))]
 pub fn model_contours<'py>(
@@ -124,9 +124,10 @@ pub fn model_contours<'py>(
     Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts), numpy_from_column(py, owners)))
 }
 
-/// What the image stages make of a frame between its neighbours: `changed`, eq. (1) against either; `cleaned`
-/// after the binary operations; `outlines`, a list of (n, 2) pixels; `rectangle` (left, top, right, bottom) of
-/// the largest candidate and `edges` (n, 5) in it, u0, v0, u1, v1 and gradient, or None where nothing moves.
+/// Results of the image stages for a frame with its neighbours: `changed`, eq. (1) against either neighbour;
+/// `cleaned` after the binary operations; `outlines`, a list of (n, 2) pixels; `rectangle` (left, top, right,
+/// bottom) of the largest candidate, and `edges` (n, 5) in it: u0, v0, u1, v1 and gradient; or None if nothing
+/// moves.
 #[pyfunction]
 pub fn image_stages<'py>(
     py: Python<'py>,
@@ -191,7 +192,7 @@ pub fn search_windows<'py>(
     numpy_from_flat(py, flat, vec![lines.len(), 4, 2])
 }
 
-/// The Kalman filter's state after each frame of a walk, not smoothed: (rows, 6) of world x, z in metres, phase,
+/// State of the Kalman filter after each frame of a walk, not smoothed: (rows, 6) of world x, z in metres, phase,
 /// and their standard deviations.
 #[pyfunction]
 pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -208,8 +209,8 @@ pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult
     numpy_from_rows(py, tracked.steps().iter().map(row).collect())
 }
 
-/// Visible side lines of a row's model, or of the same place at another phase: segments (n, 2, 2) in pixels and
-/// the part of each.
+/// Visible side lines of the model in a row, or at the same position with another phase: segments (n, 2, 2) in
+/// pixels and the part of each.
 #[pyfunction]
 #[pyo3(signature = (walk, row, phase=None))]
 pub fn walk_lines<'py>(
@@ -224,9 +225,9 @@ pub fn walk_lines<'py>(
     segments_with_parts(py, &visible, &walk.walk.camera)
 }
 
-/// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels to a walk's model about a row's place, over
-/// the whole cycle: `scores` (phases, along, heights) and the values of the axes, the last two as differences
-/// in metres. `along_m` and `height_m` are half widths; 0 keeps the place.
+/// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels and a walk's model near the position of a row,
+/// over the whole cycle: `scores` (phases, along, heights) and the values of the axes, the last two as
+/// differences in metres. `along_m` and `height_m` are half widths; 0 keeps the position.
 #[pyfunction]
 #[pyo3(signature = (walk, row, edges, *, along_m=0.0, height_m=0.0))]
 pub fn walk_similarity<'py>(

@@ -1,14 +1,15 @@
-//! The neck's distance from the ground under the feet and the chain of segments up to the neck.
+//! The anchor from the ground under the feet and the chain of segments up to the neck.
 //!
-//! The camera knows the ground. For every distance of the neck on a grid, the chain goes down: pelvis, hips,
-//! knees, ankles, at each segment both roots of eq. (7); what each chain claims is compared with what is known:
-//! the trunk stands upright, one ankle (the supporting one) is at its height above the ground, the other not
-//! below it, and the neck is above the middle between the ankles. The sum over all chains is the probability
-//! of the distance; either ankle may be the supporting one.
+//! The camera's position relative to the ground is known. For every distance of the neck on a grid, the chain is
+//! followed down: pelvis, hips, knees, ankles, with both roots of eq. (7) at each segment. Each chain is compared
+//! with what is known: the trunk is upright, one ankle (the supporting one) is at its height above the ground,
+//! the other is not below it, and the neck is above the middle between the ankles. The sum over all chains is the
+//! probability of the distance; either ankle may be the supporting one.
 //!
-//! Errors along the rays are carried down the chain as variances, roots that do not exist cost what their gap
-//! weighs against noise and lengths. The direction of knees is not used. Feet in the air or on something that
-//! is not the ground are not noticed in one frame; compare with the other sources ([`super::combine`]).
+//! Errors along the rays are propagated down the chain as variances. Roots that do not exist cost the square of
+//! their gap relative to noise and lengths. The bending direction of the knees is not used. Feet in the air, or
+//! on something that is not the ground, are not detected in one frame; compare with the other sources
+//! ([`super::combine`]).
 
 use glam::DVec3;
 
@@ -19,17 +20,17 @@ use super::{
 use crate::model::skeleton::{Joint, SegmentLengths, Side};
 use crate::posture::lift::{JointRays, RootKind, roots};
 
-/// Number of distances tried, evenly spaced in their logarithm: steps of 0.6 %.
+/// Number of distances tried, evenly spaced in their logarithm, in steps of 0.6 %.
 const GRID: usize = 240;
-/// Nearest and farthest distance tried over that of the extent.
+/// Range of distances tried: this factor below and above the distance of the extent.
 const RANGE: f64 = 2.0;
-/// Chains less probable than this against the best of their distance are left out: -2 ln.
+/// Chains much less probable than the best one of their distance are dropped: -2 ln of the ratio.
 const NEGLIGIBLE: f64 = 40.0;
 
-/// The neck from the ground under the feet.
+/// The anchor from the ground under the feet.
 ///
-/// `ground` is the plane on which the person stands ([`Ground::of`] for a calibrated camera). Needs neck,
-/// pelvis, and hip, knee and ankle of one side at least.
+/// `ground` is the plane on which the person is ([`Ground::of`] for a calibrated camera). Neck, pelvis, and hip,
+/// knee and ankle of at least one side must be seen.
 pub fn from_ground(
     rays: &JointRays,
     lengths: &SegmentLengths,
@@ -89,7 +90,7 @@ fn scaled(lengths: &SegmentLengths, scale: f64) -> SegmentLengths {
     scaled
 }
 
-/// A place on a ray with the variance along the ray and what it cost so far (-2 ln of its probability).
+/// A position on a ray with its variance along the ray and its cost so far (-2 ln of its probability).
 #[derive(Debug, Clone, Copy)]
 struct Link {
     point: DVec3,
@@ -106,7 +107,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// ln of the probability of the neck at a place, up to a constant.
+    /// ln of the probability of the neck at a position, up to a constant.
     fn log_density(&self, neck: DVec3) -> f64 {
         let start = Link { point: neck, variance: 0.0, cost: 0.0 };
         let mut chains = Vec::with_capacity(256);
@@ -130,7 +131,7 @@ impl Scene<'_> {
         sum.ln() - 0.5 * best
     }
 
-    /// The two places of the joint at the end of a segment, nearer one first.
+    /// The two positions of the joint at the end of a segment, nearer one first.
     fn next(&self, from: Link, to: Joint, length_m: f64) -> [Link; 2] {
         let noise_rad = self.noise_rad(from.point, length_m);
         let roots = roots(from.point, self.rays.ray[to], length_m, noise_rad, 0.0);
@@ -149,12 +150,12 @@ impl Scene<'_> {
         self.rays.noise_rad.hypot(own)
     }
 
-    /// Draws the pelvis towards the place on its ray where the trunk is vertical.
+    /// Combines the pelvis with the position on its ray at which the trunk is vertical.
     fn upright(&self, neck: DVec3, pelvis: Link) -> Link {
         let ray = self.rays.ray[Joint::Pelvis];
         let up = self.ground.up_in_camera;
         let length = self.lengths.to[Joint::Pelvis];
-        // The point of the ray whose horizontal distance from the neck is least.
+        // The point of the ray with the smallest horizontal distance from the neck.
         let flat = |v: DVec3| v - v.dot(up) * up;
         let (ray_flat, neck_flat) = (flat(ray), flat(neck));
         if ray_flat.length_squared() < 1e-6 {
@@ -172,7 +173,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The four places of an ankle below one middle of the hips.
+    /// The four positions of an ankle below one middle of the hips.
     fn ankles(&self, middle: Link, side: Side, right_is_near: bool) -> Vec<Link> {
         let [_, _, _, hips] = self.lengths.rigid;
         let free = Link { cost: 0.0, ..middle };
@@ -185,7 +186,7 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// All ways to end one trunk's chains on the ground, as costs.
+    /// Costs of all ways in which one trunk's chains end on the ground.
     fn close(&self, neck: DVec3, cost: f64, ankles: &[Vec<Link>], chains: &mut Vec<f64>) {
         let roles = |a: &Link| (a.cost + self.support(a), a.cost + self.swing(a));
         if let [right, left] = ankles {
@@ -209,7 +210,7 @@ impl Scene<'_> {
         }
     }
 
-    /// How far an ankle is above the height of a supporting one, and the variance of its height by the chain.
+    /// Height of an ankle above that of a supporting one, and the variance of its height by the chain.
     fn above(&self, ankle: &Link) -> (f64, f64) {
         let shank = 0.5 * (self.lengths.to[Joint::RightAnkle] + self.lengths.to[Joint::LeftAnkle]);
         let height = self.ground.height_m(ankle.point) - self.options.ankle_height_over_shank * shank;
@@ -235,7 +236,7 @@ impl Scene<'_> {
         let offset = middle - neck;
         let up = self.ground.up_in_camera;
         let flat = offset - offset.dot(up) * up;
-        // The chain's variance lies along the ray alone.
+        // The variance of the chain is only along the ray.
         let ray = middle.normalize_or_zero();
         let along = (ray - ray.dot(up) * up).normalize_or_zero();
         let (depth, total) = (flat.dot(along), self.options.balance_sd_m.powi(2) + variance);
@@ -250,7 +251,7 @@ mod tests {
     use super::*;
     use crate::model::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
 
-    /// Somebody upright 4 m before a level camera at 1.2 m, turned half aside, one foot lifted.
+    /// A person upright 4 m in front of a level camera at 1.2 m, facing obliquely, with one foot lifted.
     fn standing(lengths: &SegmentLengths, lifted: Side) -> StickFigure {
         let trunk = rigid_trunk(lengths);
         let turn = glam::DMat3::from_rotation_y(0.5);
@@ -275,7 +276,7 @@ mod tests {
         JointRays { noise_rad: 2e-3, ..JointRays::from_points(figure) }
     }
 
-    /// Right for left and the picture mirrored: the same distance, whichever foot stands.
+    /// Right and left swapped and the image mirrored: the same distance, whichever foot supports.
     #[test]
     fn either_foot_may_stand() {
         let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -292,7 +293,7 @@ mod tests {
         }
     }
 
-    /// The mean over all distances by another quadrature: evenly spaced, and many times finer.
+    /// The mean over all distances by another quadrature, evenly spaced and much finer.
     #[test]
     fn distances_weigh_by_their_density() {
         let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -317,7 +318,7 @@ mod tests {
         assert!((found.sd_depth_m / sd - 1.0).abs() < 0.02, "{} {sd}", found.sd_depth_m);
     }
 
-    /// The part that the lengths' scale has in the deviation is what longer and shorter lengths do.
+    /// The part of the deviation that is due to the scale is the effect of longer and shorter lengths.
     #[test]
     fn the_scale_s_part_is_what_scaled_lengths_do() {
         let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -341,7 +342,7 @@ mod tests {
         Scene { rays, lengths, ground: &GROUND, options, legs: &Side::BOTH }
     }
 
-    /// The pelvis found and the pelvis below the neck are two normal densities: their product, at its mean.
+    /// The measured pelvis and the pelvis below the neck are two normal densities: their product, at its mean.
     #[test]
     fn an_upright_trunk_and_its_image_are_put_together() {
         let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -353,7 +354,7 @@ mod tests {
         let scene = scene_of(&rays, &lengths, &options);
         for variance in [0.01, 0.2] {
             let both = scene.upright(neck, Link { point: pelvis, variance, cost: 0.0 });
-            // Along the ray the trunk's horizontal offset from the neck is least where the ray is nearest.
+            // The trunk's horizontal offset from the neck is smallest at the nearest point of the ray.
             let flat = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
             let level = flat(ray).length_squared();
             let mean = flat(neck).dot(flat(ray)) / level;
@@ -367,8 +368,8 @@ mod tests {
         }
     }
 
-    /// The height of a standing ankle is a density over heights, whatever its noise; a lifted foot may be high,
-    /// and not below the ground.
+    /// The height of a supporting ankle is a density over heights, for any noise. A lifted foot may be high, but
+    /// not below the ground.
     #[test]
     fn the_height_of_a_foot_is_a_density() {
         let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -381,7 +382,7 @@ mod tests {
             Link { point, variance, cost: 0.0 }
         };
         for variance in [0.0, 0.2, 1.0] {
-            // The slope of the ray makes height of depth: what matters is that all heights together are one.
+            // The slope of the ray converts depth to height: the densities of all heights must integrate to one.
             let mass: f64 = (-4000..4000)
                 .map(|i| (-0.5 * scene.support(&at(f64::from(i) * 1e-3, variance))).exp() * 1e-3)
                 .sum();

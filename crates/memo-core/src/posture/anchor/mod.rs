@@ -1,19 +1,19 @@
-//! Where the neck is along its ray: the place from which all other joints are found.
+//! The anchor: the neck's position along its ray, from which all other joints are found.
 //!
-//! Lee and Chen (1985, section 2.1) take it from six points of the head. A head is small, so its depth is poor;
-//! here are other sources: a given distance, the ground under the feet of a calibrated camera ([`ground`]), the
-//! rigid trunk ([`trunk`]) and the extent from neck to feet ([`from_extent`]). Each states a standard
-//! deviation, [`combine`] puts them together and [`track::smooth`] follows them over time.
+//! Lee and Chen (1985, section 2.1) compute it from six points of the head. A head is small, so its depth is not
+//! accurate. This module adds a given distance, the ground under the feet for a calibrated camera ([`ground`]),
+//! the rigid trunk ([`trunk`]) and the extent from neck to feet ([`from_extent`]). Each source gives a standard
+//! deviation. [`combine`] combines them, and [`track::smooth`] filters them over time.
 //!
-//! Distances are along the neck's unit ray from the centre of projection, not z. All sources but the given one
-//! rest on segment lengths; only the ground and a given distance tell the scale of these lengths. The feet
-//! must stand on the ground z = 0 for [`ground`]: a beam or a step under them shifts the neck.
+//! Distances are along the neck's unit ray from the centre of projection, not along z. All sources except a given
+//! distance depend on segment lengths; only the ground and a given distance determine the scale of these lengths.
+//! For [`ground`], the feet must be on the ground z = 0: a beam or a step under them shifts the neck.
 //!
-//! The constants of posture ([`AnchorOptions`]) were measured on four walks of motion capture: the neck stands
-//! above the lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk
-//! 0.005-0.012), above the middle of the ankles by 0.930-0.954 (0.013-0.022); the trunk leans forward by -1 to
-//! 12 degrees; the lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and
-//! jumping break them.
+//! The posture constants ([`AnchorOptions`]) were measured on four walks of motion capture. The neck is above the
+//! lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk 0.005-0.012),
+//! and above the middle of the ankles by 0.930-0.954 (0.013-0.022). The trunk leans forward by -1 to 12 degrees.
+//! The lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and jumping violate these
+//! assumptions.
 
 pub mod ground;
 pub mod track;
@@ -31,25 +31,25 @@ pub use ground::from_ground;
 pub use track::{DepthTrack, SmoothOptions, smooth};
 pub use trunk::{TrunkAttitude, TrunkFit, from_trunk};
 
-/// From where an anchor was taken.
+/// Source of an anchor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum AnchorSource {
-    /// The caller knows the distance.
+    /// A distance given by the caller.
     Given,
-    /// The head's feature points.
+    /// The feature points of the head.
     Head,
     /// Ankles above the known ground, and the chain of segments up to the neck.
     Ground,
     /// The rigid trunk.
     Trunk,
-    /// The angle between neck and ankles against the sum of the lengths.
+    /// The angle between neck and ankles, compared with the sum of the lengths.
     Extent,
-    /// Several of these, by their variances.
+    /// Several of these, weighted by their variances.
     Combined,
 }
 
 impl AnchorSource {
-    /// All of them.
+    /// All sources.
     pub const ALL: [Self; 6] =
         [Self::Given, Self::Head, Self::Ground, Self::Trunk, Self::Extent, Self::Combined];
 
@@ -71,33 +71,33 @@ impl AnchorSource {
     }
 }
 
-/// One of several distances that explain a frame.
+/// One of several distances that fit a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthMode {
-    /// Along the neck's ray, metres.
+    /// Distance along the neck's ray, metres.
     pub distance_m: f64,
-    /// Standard deviation about it, metres, that of the lengths included.
+    /// Standard deviation about it, metres, including that of the lengths.
     pub sd_m: f64,
-    /// Share of the probability, 0 to 1.
+    /// Probability of this mode, 0 to 1.
     pub probability: f64,
 }
 
-/// The neck's place with its uncertainty.
+/// The neck's position with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
-    /// The neck on its ray, camera axes, metres.
+    /// Position of the neck on its ray, camera axes, metres.
     pub neck: DVec3,
     /// Its distance along the ray, metres.
     pub distance_m: f64,
     /// Standard deviation of that distance, metres, over all modes.
     pub sd_depth_m: f64,
-    /// The part of it that comes from the scale of all lengths, metres: the same in every frame and in every
-    /// source that rests on lengths.
+    /// The part of `sd_depth_m` that is due to the scale of all lengths, metres. It is the same in every frame
+    /// and in every source that depends on lengths.
     pub sd_scale_m: f64,
-    /// From where it was taken.
+    /// Source of the anchor.
     pub source: AnchorSource,
-    /// The separate distances that the frame allows, most probable first; mirror attitudes of the trunk are
-    /// in [`TrunkFit::attitudes`].
+    /// The separate distances that the frame allows, most probable first. Mirror attitudes of the trunk are in
+    /// [`TrunkFit::attitudes`].
     pub modes: Vec<DepthMode>,
 }
 
@@ -113,7 +113,7 @@ impl Anchor {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum AnchorError {
-    /// A quantity must be a positive number.
+    /// A quantity is not a positive number.
     #[error("{what} must be positive and finite, got {value}")]
     NotPositive {
         /// Its name.
@@ -121,15 +121,15 @@ pub enum AnchorError {
         /// Its value.
         value: f64,
     },
-    /// The frame does not show what the source needs.
+    /// The frame does not show the joints that the source needs.
     #[error("no neck from the {}: {missing} not seen", source_name.name())]
     NotSeen {
         /// The source.
         source_name: AnchorSource,
-        /// What is missing.
+        /// The missing joints.
         missing: &'static str,
     },
-    /// What is seen fits no distance.
+    /// No distance fits the image.
     #[error("no neck from the {}: no distance{} fits", source_name.name(), between(*nearest_m, *farthest_m))]
     NothingFits {
         /// The source.
@@ -145,16 +145,16 @@ pub enum AnchorError {
         /// The source.
         source_name: AnchorSource,
     },
-    /// There is nothing to combine or to follow.
+    /// There is nothing to combine or to smooth.
     #[error("no anchor given")]
     Empty,
-    /// Anchors of different rays cannot be combined.
+    /// Anchors on different rays cannot be combined.
     #[error("anchors lie on different rays, {angle_deg:.2} degrees apart")]
     DifferentRays {
-        /// The angle.
+        /// The angle between the rays, degrees.
         angle_deg: f64,
     },
-    /// Times and anchors do not go together.
+    /// There are not as many anchors as times.
     #[error("{} but {}", counted(*times, "time"), counted(*anchors, "anchor"))]
     Counts {
         /// Number of times.
@@ -162,19 +162,19 @@ pub enum AnchorError {
         /// Number of anchors.
         anchors: usize,
     },
-    /// Times must increase.
+    /// The times do not increase.
     #[error("times must be finite and increase, got {before_s} s then {after_s} s at frame {frame}")]
     Times {
         /// The frame of the later time.
         frame: usize,
-        /// The earlier time.
+        /// The earlier time, seconds.
         before_s: f64,
-        /// The later time.
+        /// The later time, seconds.
         after_s: f64,
     },
 }
 
-/// The range that was tried, where it is one.
+/// The range of distances tried, if it is a range.
 fn between(nearest_m: f64, farthest_m: f64) -> String {
     if farthest_m.is_finite() {
         format!(" between {nearest_m:.2} and {farthest_m:.2} m")
@@ -186,7 +186,7 @@ fn between(nearest_m: f64, farthest_m: f64) -> String {
 /// The ground and the vertical in camera axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ground {
-    /// Unit vector upwards, camera axes.
+    /// Unit vector upward, camera axes.
     pub up_in_camera: DVec3,
     /// Height of the centre of projection above the ground, metres.
     pub camera_height_m: f64,
@@ -204,24 +204,26 @@ impl Ground {
     }
 }
 
-/// What is assumed about posture and lengths; the defaults are for standing and walking (module head).
+/// Assumptions about posture and lengths; the defaults are for standing and walking (see the head of the module).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AnchorOptions {
-    /// Relative standard deviation of the scale of all lengths. 0.02: lengths measured on the person.
+    /// Relative standard deviation of the scale of all lengths. Default 0.02: lengths measured on the person.
     pub scale_sd: f64,
-    /// Relative standard deviation of a single length about that scale.
+    /// Relative standard deviation of a single length for a known scale.
     pub length_sd: f64,
-    /// Standard deviation of a joint against the rigid trunk, metres: hips and shoulders turn against each other.
+    /// Standard deviation of a joint relative to the rigid trunk, metres: hips and shoulders rotate relative to
+    /// each other.
     pub rigidity_sd_m: f64,
-    /// Standard deviation of the trunk's lean from the vertical, radians, each way.
+    /// Standard deviation of the trunk's lean from the vertical, radians, per direction.
     pub lean_sd_rad: f64,
-    /// Height of the supporting ankle above the ground, over the shank.
+    /// Height of the supporting ankle above the ground, as a share of the shank.
     pub ankle_height_over_shank: f64,
     /// Its standard deviation, metres.
     pub ankle_height_sd_m: f64,
     /// Height of the higher ankle above the lower, root mean square, metres.
     pub swing_height_m: f64,
-    /// Horizontal distance of the neck from the middle of the ankles, standard deviation each way, metres.
+    /// Standard deviation of the horizontal distance of the neck from the middle of the ankles, per direction,
+    /// metres.
     pub balance_sd_m: f64,
 }
 
@@ -241,7 +243,7 @@ impl Default for AnchorOptions {
 }
 
 impl AnchorOptions {
-    /// Refuses values that are not positive numbers; the scale may be known exactly.
+    /// An error for values that are not positive numbers. The scale's deviation may be 0.
     fn check(&self) -> Result<(), AnchorError> {
         positive("length_sd", self.length_sd)?;
         positive("rigidity_sd_m", self.rigidity_sd_m)?;
@@ -258,7 +260,7 @@ fn positive(what: &'static str, value: f64) -> Result<(), AnchorError> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(AnchorError::NotPositive { what, value }) }
 }
 
-/// What every source asks of its input: sound lengths and noise, and the neck's ray.
+/// Checks of every source: valid lengths and noise. Returns the neck's ray.
 fn neck_ray(rays: &JointRays, source_name: AnchorSource) -> Result<DVec3, AnchorError> {
     if !(rays.noise_rad >= 0.0 && rays.noise_rad.is_finite()) {
         return Err(AnchorError::NotPositive { what: "noise_rad", value: rays.noise_rad });
@@ -274,14 +276,14 @@ fn check_lengths(lengths: &SegmentLengths) -> Result<(), AnchorError> {
     bad.map_or(Ok(()), |(_, value)| Err(AnchorError::NotPositive { what: "a segment length", value }))
 }
 
-/// A unit vector upwards, or what is wrong with it.
+/// Checks an upward direction and normalises it.
 fn check_up(up: DVec3) -> Result<DVec3, AnchorError> {
     let length = up.length();
     positive("length of the vector upwards", length)?;
     Ok(up / length)
 }
 
-/// The neck at a known distance along its ray.
+/// The anchor at a known distance along the neck's ray.
 pub fn from_given(rays: &JointRays, distance_m: f64, sd_m: f64) -> Result<Anchor, AnchorError> {
     let ray = neck_ray(rays, AnchorSource::Given)?;
     positive("distance_m", distance_m)?;
@@ -289,17 +291,19 @@ pub fn from_given(rays: &JointRays, distance_m: f64, sd_m: f64) -> Result<Anchor
     Ok(Anchor::single(ray, distance_m, sd_m, 0.0, AnchorSource::Given))
 }
 
-/// Height of the neck above the middle of the ankles over trunk, thigh and shank together: mean and standard
-/// deviation over four walks and their walkers.
+/// Height of the neck above the middle of the ankles, divided by trunk, thigh and shank together: mean and
+/// standard deviation over four walks and their walkers.
 const RISE_OVER_MIDDLE: (f64, f64) = (0.943, 0.022);
-/// The same above the one ankle that is seen, which may be the lower or the higher one.
+/// The same above a single visible ankle, which may be the lower or the higher one.
 const RISE_OVER_ONE: (f64, f64) = (0.95, 0.035);
 /// Horizontal distance of one ankle from the neck, standard deviation, metres.
 const ONE_ANKLE_OFFSET_M: f64 = 0.17;
-/// Tilt of neck to ankles against the image where the vertical is not known, standard deviation, radians.
+/// Standard deviation of the tilt of the line from neck to ankles against the image plane if the vertical is not
+/// known, radians.
 const UNKNOWN_TILT_RAD: f64 = 0.26;
 
-/// The neck from the angle between it and the ankles: weak, for standing and walking.
+/// The anchor from the angle between neck and ankles. It has a large standard deviation and is for standing and
+/// walking.
 ///
 /// With unit rays n and f to the neck and to the middle of the ankles, rise s and a horizontal offset o of
 /// mean 0:
@@ -308,8 +312,8 @@ const UNKNOWN_TILT_RAD: f64 = 0.26;
 /// k n - k_f f = s up + o     =>     k = w·(s up + o),   w = the row of the pseudo-inverse of (n, -f) for k
 /// ```
 ///
-/// `up` is the vertical in camera axes; without it, neck to feet are taken to stand across the view within
-/// 15 degrees.
+/// `up` is the vertical in camera axes. Without it, the line from neck to feet is assumed perpendicular to the
+/// viewing direction within 15 degrees.
 pub fn from_extent(
     rays: &JointRays,
     lengths: &SegmentLengths,
@@ -357,7 +361,7 @@ pub fn from_extent(
     Ok(Anchor::single(n, distance_m, sd, scale, AnchorSource::Extent))
 }
 
-/// Neck to hips, thigh and shank in a line, metres.
+/// Trunk (neck to hips), thigh and shank in a line, metres.
 fn standing_span_m(lengths: &SegmentLengths) -> f64 {
     let pair = |right: Joint| 0.5 * (lengths.to[right] + lengths.to[right.mirrored()]);
     lengths.to[Joint::Pelvis]
@@ -366,41 +370,41 @@ fn standing_span_m(lengths: &SegmentLengths) -> f64 {
         + pair(Joint::RightAnkle)
 }
 
-/// From the pelvis joint to the middle of the hips, metres.
+/// Distance from the pelvis joint to the middle of the hips, metres.
 fn pelvis_to_hip_line_m(lengths: &SegmentLengths) -> f64 {
     let [_, _, _, hips] = lengths.rigid;
     let hip = 0.5 * (lengths.to[Joint::RightHip] + lengths.to[Joint::LeftHip]);
     (hip * hip - 0.25 * hips * hips).max(0.0).sqrt()
 }
 
-/// Two sources that contradict each other.
+/// Two sources that disagree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conflict {
     /// The sources.
     pub sources: [AnchorSource; 2],
     /// Their distances, metres.
     pub distances_m: [f64; 2],
-    /// The difference over its standard deviation.
+    /// The difference divided by its standard deviation.
     pub sigmas: f64,
 }
 
-/// Several anchors as one.
+/// Several anchors combined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Combination {
-    /// The anchor; its standard deviation is widened where the sources scatter more than they state.
+    /// The anchor. Its standard deviation is increased if the sources scatter more than they state.
     pub anchor: Anchor,
     /// Pairs of sources more than [`CONFLICT_SIGMAS`] apart.
     pub conflicts: Vec<Conflict>,
 }
 
-/// Beyond this many standard deviations two sources contradict each other.
+/// Two sources conflict if they differ by more than this many standard deviations.
 pub const CONFLICT_SIGMAS: f64 = 3.0;
 
-/// The mean of several anchors of one frame by their variances.
+/// The mean of several anchors of one frame, weighted by their variances.
 ///
-/// Weights are 1/sd². What the sources have of the scale of the lengths (`sd_scale_m`) is common to them and
-/// does not average out. If the sum of squared deviations χ² exceeds its degrees of freedom, the standard
-/// deviation grows by sqrt(χ²/(n-1)).
+/// Weights are 1/sd². The part due to the scale of the lengths (`sd_scale_m`) is common to all sources and does
+/// not average out. If the sum of squared deviations χ² exceeds its degrees of freedom, the standard deviation is
+/// multiplied by sqrt(χ²/(n-1)).
 pub fn combine(anchors: &[Anchor]) -> Result<Combination, AnchorError> {
     let first = anchors.first().ok_or(AnchorError::Empty)?;
     let ray = first.neck.normalize();
@@ -433,7 +437,7 @@ pub fn combine(anchors: &[Anchor]) -> Result<Combination, AnchorError> {
 fn conflicts(anchors: &[Anchor]) -> Vec<Conflict> {
     let pairs = anchors.iter().enumerate().flat_map(|(i, a)| anchors[i + 1..].iter().map(move |b| (a, b)));
     let conflict = |(a, b): (&Anchor, &Anchor)| {
-        // The common scale shifts both by the same share.
+        // The common scale shifts both by the same factor.
         let own = |x: &Anchor| (x.sd_depth_m.powi(2) - x.sd_scale_m.powi(2)).max(0.0);
         let sd = (own(a) + own(b) + (a.sd_scale_m - b.sd_scale_m).powi(2)).sqrt();
         let sigmas = (a.distance_m - b.distance_m).abs() / sd;
@@ -447,8 +451,8 @@ fn conflicts(anchors: &[Anchor]) -> Vec<Conflict> {
 const NORMAL_NODES: [(f64, f64); 3] =
     [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
 
-/// The anchor of a probability over distances: mean, standard deviation and modes parted at valleys below
-/// half the lower summit.
+/// The anchor of a probability over distances: mean, standard deviation and modes. Modes are separated at valleys
+/// below half of the lower peak.
 fn anchor_of_density(
     ray: DVec3,
     distances: &[f64],
@@ -480,7 +484,7 @@ fn moments(distances: &[f64], density: &[f64]) -> Option<(f64, f64, f64)> {
     Some((mean, variance.sqrt(), total))
 }
 
-/// Where a density falls into separate summits: the ends and the deepest points of real valleys.
+/// The limits of the separate peaks of a density: both ends and the deepest points of the valleys between them.
 fn parted(density: &[f64]) -> Vec<usize> {
     let mut bounds = vec![0];
     let (mut summit, mut valley, mut at) = (0.0_f64, f64::INFINITY, 0);

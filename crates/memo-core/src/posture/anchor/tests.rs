@@ -3,7 +3,7 @@ use crate::model::skeleton::StickFigure;
 use glam::DMat3;
 use proptest::prelude::*;
 
-/// Someone upright with legs a little apart, facing an azimuth, seen by a level camera 1.2 m high.
+/// A person upright with legs slightly apart, facing an azimuth, seen by a level camera at 1.2 m.
 fn standing(
     lengths: &SegmentLengths,
     distance_m: f64,
@@ -31,14 +31,14 @@ fn standing(
     (figure, Ground { up_in_camera: -DVec3::Y, camera_height_m: 1.2 })
 }
 
-/// Lengths known well, so that the planted distance must be found.
+/// Lengths are certain, so that the planted distance must be found.
 fn exact() -> AnchorOptions {
     AnchorOptions { scale_sd: 0.001, length_sd: 0.002, ankle_height_sd_m: 0.005, ..AnchorOptions::default() }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
-    /// All facings, the trunk square on and edge on included.
+    /// All facing directions, including the trunk perpendicular to the view and edge on.
     #[test]
     fn a_planted_distance_is_found(
         distance in 2.0..9.0_f64, azimuth in 0.0..std::f64::consts::TAU, stride in 0.0..0.4_f64, height in 1.4..2.0_f64,
@@ -58,7 +58,7 @@ proptest! {
     }
 }
 
-/// The mirror attitude of a trunk turned half away fits nearly as well, at nearly the same distance.
+/// The mirror attitude of a trunk at an oblique angle fits nearly as well, at nearly the same distance.
 #[test]
 fn the_trunks_mirror_attitude_is_kept() {
     let lengths = SegmentLengths::from_height(1.75).unwrap();
@@ -68,7 +68,7 @@ fn the_trunks_mirror_attitude_is_kept() {
     assert!(fit.attitudes.len() >= 2, "{:?}", fit.attitudes);
     let [a, b] = [fit.attitudes[0], fit.attitudes[1]];
     assert!((a.depth.distance_m - b.depth.distance_m).abs() < a.depth.sd_m);
-    // Mirrored through the image: the facings' depth components are opposite.
+    // Mirrored through the image: the depth components of the facing directions are opposite.
     let facing = |a: &TrunkAttitude| a.camera_from_trunk.z_axis.z;
     assert!(
         (facing(&a) + facing(&b)).abs() < 0.25 && facing(&a).abs() > 0.3,
@@ -115,7 +115,7 @@ fn bad_input_is_refused_with_its_values() {
     let mut broken = lengths;
     broken.to[Joint::Pelvis] = f64::INFINITY;
     assert!(from_trunk(&rays, &broken, None, &options).is_err());
-    // One leg is enough; none is not; nor is a frame without the neck.
+    // One leg is enough; no leg is not, nor is a frame without the neck.
     figure[Joint::RightKnee] = DVec3::NAN;
     let one_leg = from_ground(&JointRays::from_points(&figure), &lengths, &ground, &options).unwrap();
     assert!((one_leg.distance_m - figure[Joint::Neck].length()).abs() < 3.0 * one_leg.sd_depth_m);
@@ -138,7 +138,7 @@ fn a_density_of_two_summits_has_two_modes() {
     assert!((first.probability - 2.0 / 3.0).abs() < 0.01 && (first.sd_m - 0.05).abs() < 0.005);
 }
 
-/// Two sources of 5 cm, of which the scale that they share is 4 cm: only their own 3 cm average out.
+/// Two sources of 5 cm with a common scale part of 4 cm: only their own 3 cm average out.
 #[test]
 fn what_sources_share_does_not_average_out() {
     let ray = DVec3::Z;
@@ -147,29 +147,29 @@ fn what_sources_share_does_not_average_out() {
     let expected = (0.03f64 * 0.03 / 2.0 + 0.04 * 0.04).sqrt();
     assert!((both.anchor.sd_depth_m - expected).abs() < 1e-12, "{both:?}");
     assert!((both.anchor.sd_scale_m - 0.04).abs() < 1e-12);
-    // 15 cm apart is 3.54 deviations of the difference, in which the shared part is not.
+    // 15 cm apart is 3.54 deviations of the difference, which does not contain the common part.
     let apart = combine(&[anchor(4.0, AnchorSource::Ground), anchor(4.15, AnchorSource::Trunk)]).unwrap();
     let [conflict] = apart.conflicts[..] else { panic!("{apart:?}") };
     assert!((conflict.sigmas - 0.15 / (2.0 * 0.03f64 * 0.03).sqrt()).abs() < 1e-9);
-    // One source without scale: the scale of the other one is in the difference.
+    // One source has no scale part: the scale of the other one is in the difference.
     let given = Anchor::single(ray, 4.15, 0.03, 0.0, AnchorSource::Given);
     let found = combine(&[anchor(4.0, AnchorSource::Ground), given]).unwrap();
     assert!(found.conflicts.is_empty(), "{found:?}");
 }
 
-/// Somebody standing, seen by rays, with the neck's true distance.
+/// A standing person, seen as rays, with the neck's true distance.
 fn seen(azimuth: f64) -> (JointRays, SegmentLengths, DVec3, f64) {
     let lengths = SegmentLengths::from_height(1.75).unwrap();
     let (figure, ground) = standing(&lengths, 5.0, azimuth, 0.2);
     (JointRays::from_points(&figure), lengths, ground.up_in_camera, figure[Joint::Neck].length())
 }
 
-/// All causes of the extent's deviation but those that are asked for made as small as can be.
+/// All causes of the extent's deviation as small as possible.
 fn hardly_any() -> AnchorOptions {
     AnchorOptions { scale_sd: 0.0, balance_sd_m: 1e-9, ..AnchorOptions::default() }
 }
 
-/// Each part of the extent's deviation against what its cause does to the distance, moved by a little.
+/// Each part of the extent's deviation against the change of distance for a small change of its cause.
 #[test]
 fn the_extent_is_as_unsure_as_its_causes_make_it() {
     let (rays, lengths, up, _) = seen(0.4);
@@ -178,12 +178,12 @@ fn the_extent_is_as_unsure_as_its_causes_make_it() {
     let sd = |rays: &JointRays, options: &AnchorOptions| {
         from_extent(rays, &lengths, Some(up), options).unwrap().sd_depth_m
     };
-    // The rise alone: 0.022 of 0.943 of the distance.
+    // Only the rise: 0.022 of 0.943 of the distance.
     let rise = sd(&rays, &hardly_any());
     let expected = distance(&rays) * 0.022 / 0.943;
     assert!((rise / expected - 1.0).abs() < 1e-6, "{rise} {expected}");
     let beside = |sd: f64| (sd * sd - rise * rise).sqrt();
-    // Image noise of neck and ankles, each ray turned in two directions.
+    // Image noise of neck and ankles, each ray rotated in two directions.
     let noise_rad = 1e-3;
     let mut square = 0.0;
     for joint in [Joint::Neck, Joint::RightAnkle, Joint::LeftAnkle] {
@@ -198,10 +198,10 @@ fn the_extent_is_as_unsure_as_its_causes_make_it() {
         }
     }
     let found = beside(sd(&JointRays { noise_rad, ..rays }, &hardly_any()));
-    // Of the exact slopes the formula takes the one across the vertical for both directions.
+    // The formula uses the exact slope across the vertical for both directions.
     let ratio = found / (noise_rad * square.sqrt());
     assert!((1.0..1.1).contains(&ratio), "{ratio}");
-    // The ankles off the neck's vertical by a decimetre, to the side and to the front.
+    // The ankles 10 cm from the neck's vertical, to the side and to the front.
     let neck = 5.0 * rays.ray[Joint::Neck];
     let standing = |aside: DVec3| {
         let feet = (neck - up * 0.943 * standing_span_m(&lengths) + aside).normalize();
@@ -226,7 +226,8 @@ fn the_extent_is_as_unsure_as_its_causes_make_it() {
     assert!((scale.sd_depth_m - rise.hypot(scale.sd_scale_m)).abs() < 1e-9);
 }
 
-/// Without the vertical, neck to feet may be tilted by 15 degrees: the rise times 0.26 beside the balance.
+/// Without the vertical, the line from neck to feet may be tilted by 15 degrees: the rise times 0.26 beside the
+/// balance.
 #[test]
 fn an_unknown_tilt_is_a_larger_offset() {
     let (rays, lengths, ..) = seen(0.4);
@@ -269,7 +270,7 @@ fn the_neck_is_as_high_above_the_feet_as_measured_walkers() {
     assert!(matches!(error, AnchorError::UpsideDown { .. }), "{error}");
 }
 
-/// What a foot is above the ground of a camera at 1.2 m that looks down.
+/// The height of a foot above the ground for a camera at 1.2 m that looks down.
 #[test]
 fn the_ground_is_the_world_s_plane() {
     let mut camera = Camera::level([640, 480], 1.0, 1.2, 3.0).unwrap();

@@ -1,10 +1,10 @@
-//! The neck's distance over a sequence: constant velocity, uneven times, missing frames, outliers.
+//! The neck's distance over a sequence: constant velocity, unequal intervals, missing frames, outliers.
 //!
 //! A Kalman filter with Rauch-Tung-Striebel smoothing ([`crate::estimate::kalman`]), repeated with weights: a
-//! frame far off the track counts less (Huber's weights). What all frames have wrong together (lengths,
-//! posture of the person) does not average out. It is told from the scatter: a stated variance beyond the
-//! scatter of the frames about the track is taken to be common, and stays in the result; scatter that is
-//! alike in neighbouring frames (the steps of a walk) counts as fewer frames.
+//! frame far from the track gets less weight (Huber's weights). Errors common to all frames (lengths, posture of
+//! the person) do not average out. They are estimated from the scatter: the part of a stated variance that
+//! exceeds the scatter of the frames about the track is assumed common and stays in the result. Scatter that is
+//! correlated between neighbouring frames (the steps of a walk) counts as fewer frames.
 
 use crate::estimate::median::median;
 use glam::DVec3;
@@ -12,15 +12,15 @@ use glam::DVec3;
 use super::{Anchor, AnchorError, positive};
 use crate::estimate::kalman::{ConstantVelocity, Noise, smooth as smooth_states};
 
-/// How a track of distances is smoothed.
+/// Options of [`smooth`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmoothOptions {
-    /// Variance that the velocity gains per second, (m/s)²/s. 0.1: a walker's speed changes by 0.3 m/s in a
-    /// second.
+    /// Increase of the velocity's variance per second, (m/s)²/s. Default 0.1: a walker's speed changes by 0.3 m/s
+    /// in a second.
     pub velocity_variance_per_s: f64,
-    /// Standard deviation of the velocity before anything is seen, m/s.
+    /// Prior standard deviation of the velocity, m/s.
     pub velocity_sd_m_per_s: f64,
-    /// Residuals beyond this many standard deviations count less.
+    /// Residuals beyond this many standard deviations get less weight.
     pub robust_sigmas: f64,
 }
 
@@ -33,37 +33,37 @@ impl Default for SmoothOptions {
 /// Distances of the neck over a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthTrack {
-    /// Distance along the neck's ray in each frame, metres, missing frames included.
+    /// Distance along the neck's ray in each frame, metres, including frames without an anchor.
     pub distance_m: Vec<f64>,
     /// Its standard deviation, metres.
     pub sd_m: Vec<f64>,
-    /// Residual of each frame's anchor over its standard deviation; NaN where there was none.
+    /// Residual of each frame's anchor divided by its standard deviation; NaN for frames without an anchor.
     pub residual_sigmas: Vec<f64>,
     /// Standard deviation of the frames about the track, metres.
     pub scatter_m: f64,
-    /// Correlation of neighbouring residuals, 0 to 1.
+    /// Correlation of residuals of neighbouring frames, 0 to 1.
     pub correlation: f64,
-    /// What is common to all frames and does not average out, standard deviation, metres.
+    /// Standard deviation of the error common to all frames, metres.
     pub common_sd_m: f64,
 }
 
 impl DepthTrack {
-    /// The neck of a frame on its ray.
+    /// Position of the neck of a frame on its ray.
     pub fn neck(&self, frame: usize, ray: DVec3) -> DVec3 {
         ray * self.distance_m[frame]
     }
 
-    /// Frames whose anchor lies beyond so many standard deviations from the track.
+    /// Frames whose anchor is more than this many standard deviations from the track.
     pub fn outliers(&self, sigmas: f64) -> Vec<usize> {
         (0..self.residual_sigmas.len()).filter(|&i| self.residual_sigmas[i].abs() > sigmas).collect()
     }
 }
 
 const PASSES: usize = 6;
-/// Correlation beyond this is a drift of the track rather than of its noise.
+/// A larger correlation is a drift of the track and not of its noise.
 const MOST_CORRELATION: f64 = 0.9;
 
-/// Smooths the distances of a sequence; `None` where a frame has no anchor.
+/// Smooths the distances of a sequence; `None` for frames without an anchor.
 pub fn smooth(
     times_s: &[f64],
     anchors: &[Option<Anchor>],
@@ -77,7 +77,7 @@ pub fn smooth(
         .map(|a| a.as_ref().map_or((f64::NAN, f64::INFINITY), |a| (a.distance_m, a.sd_depth_m.powi(2))))
         .collect();
     let stated = median(&mut seen.iter().map(|&i| measured[i].1).collect::<Vec<_>>()).unwrap_or(0.0);
-    // What an anchor states relative to the others; the scale of it is measured below.
+    // Stated deviations relative to each other; their scale is measured below.
     let relative: Vec<f64> = measured.iter().map(|m| m.1 / stated).collect();
     let mut scatter_sq = stated;
     let mut correlation = 0.0;
@@ -91,7 +91,7 @@ pub fn smooth(
         let residuals: Vec<f64> = seen.iter().map(|&i| residual(i)).collect();
         let spread =
             1.4826 * median(&mut residuals.iter().map(|r| r.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
-        // Never below a tenth of what is stated: a few frames can lie on a line by chance.
+        // At least a tenth of the stated deviation: a few frames can lie on a line by chance.
         scatter_sq = (spread * spread).max(0.01 * stated);
         correlation = neighbour_correlation(&seen, &residuals, 3.0 * scatter_sq.sqrt());
         for (&i, r) in seen.iter().zip(&residuals) {
@@ -130,7 +130,7 @@ fn check(times_s: &[f64], anchors: &[Option<Anchor>], options: &SmoothOptions) -
     if anchors.iter().all(Option::is_none) { Err(AnchorError::Empty) } else { Ok(()) }
 }
 
-/// Filter and smoother over all frames with given variances of the measurements.
+/// Filter and smoother over all frames, with given variances of the measurements.
 fn filtered(
     times_s: &[f64],
     measured: &[(f64, f64)],
@@ -144,7 +144,7 @@ fn filtered(
     };
     let dt_s: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     let first = measured[seen[0]].0;
-    // Nothing is known before: the range of distances is that of the scene.
+    // No prior: the range of distances is that of the scene.
     let mut state = ConstantVelocity::new(first, 0.0, first * first, options.velocity_sd_m_per_s.powi(2));
     let mut states = Vec::with_capacity(times_s.len());
     for i in 0..times_s.len() {
@@ -159,7 +159,7 @@ fn filtered(
     smooth_states(&states, &dt_s, &noise(0.0))
 }
 
-/// Correlation of the residuals of neighbouring frames, those beyond `most` cut to it.
+/// Correlation of the residuals of neighbouring frames, clipped to `most`.
 fn neighbour_correlation(seen: &[usize], residuals: &[f64], most: f64) -> f64 {
     let cut: Vec<f64> = residuals.iter().map(|r| r.clamp(-most, most)).collect();
     let square: f64 = cut.iter().map(|r| r * r).sum::<f64>() / cut.len() as f64;
@@ -181,7 +181,7 @@ mod tests {
         Anchor::single(DVec3::Z, distance_m, sd_m, 0.0, AnchorSource::Given)
     }
 
-    /// A walk away from the camera at uneven times, a third of the frames missing, two far off.
+    /// A walk away from the camera at unequal intervals; a third of the frames is missing, and two are outliers.
     #[test]
     fn a_planted_walk_is_followed() {
         let mut random = Random::new(2);
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!(track.distance_m, again.distance_m);
     }
 
-    /// Frames that agree far better than they state share an error: it stays.
+    /// Frames that agree much better than stated have a common error: it stays.
     #[test]
     fn a_common_error_does_not_average_out() {
         let times_s: Vec<f64> = (0..50).map(|i| f64::from(i) / 25.0).collect();
@@ -231,7 +231,7 @@ mod tests {
         assert!((alone.distance_m[0] - 4.0).abs() < 1e-9 && (alone.sd_m[0] - 0.1).abs() < 0.01);
     }
 
-    /// For normal scatter of 10 cm about a steady walk that deviation is found.
+    /// The deviation is recovered for normal scatter of 10 cm about a steady walk.
     #[test]
     fn the_scatter_is_a_standard_deviation() {
         let mut random = Random::new(7);
@@ -244,8 +244,8 @@ mod tests {
         assert!(track.correlation < 0.1, "{}", track.correlation);
     }
 
-    /// Errors that are alike in neighbouring frames are as many as they are different ones: the stated deviation
-    /// is that of the errors left.
+    /// If errors are equal in neighbouring frames, only different ones count: the stated deviation follows from
+    /// the number of independent errors.
     #[test]
     fn errors_alike_in_neighbouring_frames_average_out_less() {
         let mut ratios = Vec::new();
@@ -271,11 +271,11 @@ mod tests {
         assert!((0.4..1.4).contains(&ratios[10]), "{ratios:?}");
     }
 
-    /// Frames far from each other are no neighbours, however alike their errors are.
+    /// Frames that are far apart are not neighbours, even if their errors are similar.
     #[test]
     fn only_neighbouring_frames_are_compared() {
         let times_s: Vec<f64> = (0..300).map(|i| f64::from(i) / 25.0).collect();
-        // Every third frame is seen, its error that of a slow wave.
+        // Every third frame is seen; its error is a slow wave.
         let wave = |i: usize| 0.1 * (0.2 * i as f64).sin();
         let anchors: Vec<Option<Anchor>> =
             (0..300_usize).map(|i| i.is_multiple_of(3).then(|| anchor(5.0 + wave(i), 0.1))).collect();

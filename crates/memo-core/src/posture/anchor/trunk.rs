@@ -1,12 +1,12 @@
-//! The neck's distance from the trunk as a rigid body: neck, shoulders, pelvis and hips of known lengths.
+//! The anchor from the trunk as a rigid body: neck, shoulders, pelvis and hips of known lengths.
 //!
-//! Least squares over attitude and place by Levenberg-Marquardt on the distances of the points from their
-//! rays, from several starting attitudes. A nearly flat body seen from afar has mirror attitudes that fit
-//! almost equally; all are kept with their probabilities (their distances hardly differ). Without the vertical
-//! a leaning trunk and a more distant one look alike, and the standard deviation says so.
+//! Least squares over attitude and position by Levenberg-Marquardt on the distances of the points from their
+//! rays, from several starting attitudes. A nearly flat body seen from afar has mirror attitudes that fit almost
+//! equally; all are returned with their probabilities (their distances are nearly equal). Without the vertical, a
+//! leaning trunk and a more distant one look the same, and the standard deviation contains this.
 //!
-//! Shoulders and hips really turn against each other by up to 16 degrees in walking; that is part of the
-//! stated noise (`rigidity_sd_m`), not of the model.
+//! In walking, shoulders and hips rotate relative to each other by up to 16 degrees. This is part of the noise
+//! (`rigidity_sd_m`), not of the model.
 
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix6, Vector6};
@@ -18,30 +18,31 @@ use super::{
 use crate::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use crate::posture::lift::JointRays;
 
-/// One attitude of the trunk that explains the image.
+/// One attitude of the trunk that fits the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrunkAttitude {
     /// Columns: the trunk's axes in camera axes, x forward, y down, z from right to left.
     pub camera_from_trunk: DMat3,
     /// Distance of the neck along its ray, metres, and its standard deviation in this attitude.
     pub depth: DepthMode,
-    /// Sum of squared residuals over their standard deviations, prior included.
+    /// Sum of squared residuals divided by their variances, including the prior.
     pub chi_sq: f64,
 }
 
-/// The anchor with the attitudes it rests on.
+/// The anchor with all attitudes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrunkFit {
-    /// The neck over all attitudes.
+    /// The anchor over all attitudes.
     pub anchor: Anchor,
-    /// The attitudes, most probable first; the mirror pair among them.
+    /// The attitudes, most probable first, including the mirror pair.
     pub attitudes: Vec<TrunkAttitude>,
 }
 
-/// The trunk's joints in its own axes (x forward, y down, z left) from the neck, metres.
+/// The trunk's joints in its own axes (x forward, y down, z left), relative to the neck, metres.
 ///
-/// The shoulder line is behind the neck by what is left of neck-shoulder over half the width; the trunk's
-/// plane goes through shoulders and pelvis; the hips lie on its prolongation. Both sides have the mean length.
+/// The shoulder line is behind the neck by the remainder of the distance neck-shoulder after half the width. The
+/// trunk's plane contains shoulders and pelvis, and the hips are in its extension. Both sides have the mean
+/// length.
 pub fn rigid_trunk(lengths: &SegmentLengths) -> PerJoint<DVec3> {
     let [shoulders, right_pelvis, left_pelvis, hips] = lengths.rigid;
     let neck_shoulder = 0.5 * (lengths.to[Joint::RightShoulder] + lengths.to[Joint::LeftShoulder]);
@@ -50,7 +51,7 @@ pub fn rigid_trunk(lengths: &SegmentLengths) -> PerJoint<DVec3> {
     let behind = leg(neck_shoulder, 0.5 * shoulders);
     let below = leg(shoulder_pelvis, 0.5 * shoulders);
     let neck_pelvis = lengths.to[Joint::Pelvis];
-    // The triangle neck, middle of the shoulders, pelvis, with y from neck to pelvis.
+    // The triangle of neck, middle of the shoulders and pelvis, with y from neck to pelvis.
     let y = ((behind * behind - below * below) / neck_pelvis + neck_pelvis) / 2.0;
     let y = y.clamp(-behind, behind);
     let middle = DVec3::new(-leg(behind, y), y, 0.0);
@@ -69,7 +70,7 @@ pub fn rigid_trunk(lengths: &SegmentLengths) -> PerJoint<DVec3> {
     trunk
 }
 
-/// The joints of the trunk and how far each strays from the rigid body, over `rigidity_sd_m`.
+/// The joints of the trunk, each with its deviation from the rigid body divided by `rigidity_sd_m`.
 const TRUNK_JOINTS: [(Joint, f64); 6] = [
     (Joint::Neck, 0.5),
     (Joint::RightShoulder, 1.2),
@@ -79,18 +80,18 @@ const TRUNK_JOINTS: [(Joint, f64); 6] = [
     (Joint::LeftHip, 1.2),
 ];
 
-/// Starting attitudes: facings about the vertical.
+/// Number of starting attitudes about the vertical.
 const FACINGS: usize = 8;
 const ITERATIONS: usize = 40;
-/// Attitudes nearer than this to a better one are the same, radians.
+/// Attitudes closer than this to a better one are the same, radians.
 const SAME_RAD: f64 = 0.14;
-/// Attitudes whose χ² exceeds the least by more are left out.
+/// Attitudes are dropped if their χ² exceeds the smallest by more than this.
 const WORSE_CHI_SQ: f64 = 16.0;
 
-/// The neck from the rigid trunk.
+/// The anchor from the rigid trunk.
 ///
-/// `up` is the vertical in camera axes, if known: the trunk then stands upright within `lean_sd_rad`. Needs
-/// the neck, the pelvis or a hip, and four of the six joints.
+/// `up` is the vertical in camera axes, if known: then the trunk is upright within `lean_sd_rad`. The neck, the
+/// pelvis or a hip, and four of the six joints must be seen.
 pub fn from_trunk(
     rays: &JointRays,
     lengths: &SegmentLengths,
@@ -134,7 +135,7 @@ pub fn from_trunk(
     })
 }
 
-/// The attitudes to start from: y down, all facings; without the vertical also leaning towards and away.
+/// Starting attitudes: y down, all facing directions; without the vertical also leaning towards and away.
 fn starts(up: Option<DVec3>, neck: DVec3, low: DVec3, rough_m: f64) -> Vec<DMat3> {
     let down = up.map_or_else(|| ((low - neck) * rough_m).normalize_or(DVec3::Y), |up| -up);
     let across = down.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
@@ -174,7 +175,7 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Levenberg-Marquardt over a turn ω about the neck (R <- exp(ω) R) and its place t.
+    /// Levenberg-Marquardt over a rotation ω about the neck (R <- exp(ω) R) and its position t.
     fn refine(&self, mut rotation: DMat3, mut neck: DVec3) -> Option<Fit> {
         let (mut normal, mut gradient, mut chi_sq) = self.linearised(&rotation, neck);
         let mut damping = 1e-2;
@@ -246,14 +247,15 @@ impl Problem<'_> {
                 add(e.dot(down), down.cross(e), DVec3::ZERO);
             }
         } else {
-            // The trunk is seen from afar, not from below: a weak hold on the turn keeps the system definite.
+            // The trunk is seen from afar, not from below: a weak prior on the rotation keeps the system
+            // definite.
             (0..3).for_each(|i| normal[(i, i)] += 1e-3);
         }
         (normal, gradient, chi_sq)
     }
 }
 
-/// All attitudes as one anchor: probabilities exp(-χ²/2) times the volume of the covariance.
+/// All attitudes as one anchor; probabilities are exp(-χ²/2) times the volume of the covariance.
 fn summary(ray: DVec3, fits: &[Fit], scale_sd: f64) -> Option<TrunkFit> {
     let best = fits.first()?;
     let weights: Vec<f64> = fits
@@ -299,7 +301,7 @@ mod tests {
     use super::*;
     use crate::model::skeleton::{JOINT_COUNT, RigidDistance, Side, StickFigure};
 
-    /// All lengths of Table A.1 between the points of the rigid trunk; the neck in front of the shoulders.
+    /// All lengths of Table A.1 between the points of the rigid trunk; the neck is in front of the shoulders.
     #[test]
     fn the_rigid_trunk_has_the_paper_s_lengths() {
         let lengths = SegmentLengths::lee_chen();
@@ -328,17 +330,17 @@ mod tests {
         Fit { rotation: DMat3::IDENTITY, distance_m, variance, chi_sq, log_volume }
     }
 
-    /// Two attitudes: their odds are those of chi² and volume, the deviation that within and between them.
+    /// Two attitudes: their odds follow from χ² and volume, the deviation from within and between them.
     #[test]
     fn attitudes_are_put_together_by_their_probabilities() {
-        // χ² worse by 2 ln 2, a volume of a half as much again: odds of 4 to 3.
+        // χ² larger by 2 ln 2, a volume larger by half: odds of 4 to 3.
         let second = fit(4.4, 0.09, 1.0 + 2.0 * 2f64.ln(), 1.5f64.ln());
         let found = summary(DVec3::Z, &[fit(4.0, 0.04, 1.0, 0.0), second], 0.01).unwrap();
         let [p, q] = [4.0 / 7.0, 3.0 / 7.0];
         assert!((found.attitudes[0].depth.probability - p).abs() < 1e-12);
         let mean = 4.0 * p + 4.4 * q;
         assert!((found.anchor.distance_m - mean).abs() < 1e-12);
-        // With one percent of each distance for the scale of the lengths.
+        // With one per cent of each distance for the scale of the lengths.
         let within = p * (0.04 + 0.04f64.powi(2)) + q * (0.09 + 0.044f64.powi(2));
         let between = p * (4.0 - mean).powi(2) + q * (4.4 - mean).powi(2);
         assert!((found.anchor.sd_depth_m.powi(2) - within - between).abs() < 1e-12);
@@ -355,7 +357,7 @@ mod tests {
         Problem { rays, trunk, up, options, rough_m: 4.0 }
     }
 
-    /// A trunk that leans by 7 degrees is one standard deviation off, to whichever side.
+    /// A trunk that leans by 7 degrees to any side deviates by one standard deviation.
     #[test]
     fn a_leaning_trunk_costs_its_lean() {
         let options = AnchorOptions::default();
@@ -371,7 +373,7 @@ mod tests {
         assert!(upright.2 < 1e-12);
     }
 
-    /// The pelvis 2 cm beside its ray, of 0.7 times 1 cm of the body and of image noise at 4 m.
+    /// The pelvis is 2 cm from its ray; the deviations are 0.7 times 1 cm of the body, and image noise at 4 m.
     #[test]
     fn a_point_off_its_ray_costs_its_distance() {
         let options = AnchorOptions::default();

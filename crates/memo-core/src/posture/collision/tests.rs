@@ -10,12 +10,12 @@ fn point() -> impl Strategy<Value = DVec3> {
     (-1.0..1.0_f64, -1.0..1.0_f64, -1.0..1.0_f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
 }
 
-/// Least distance of points sampled on two sets of parameters, refined about the best.
+/// Smallest distance of points sampled over two sets of parameters, refined about the best.
 fn sampled(distance: impl Fn(&[f64]) -> f64, dimensions: usize) -> f64 {
     let mut best = vec![0.5; dimensions];
     let mut step = 0.5;
     let mut least = distance(&best);
-    // The distance is convex: random steps that shrink only when none of them helps.
+    // The distance is convex: random steps that get shorter only when none of them helps.
     let mut random = crate::synth::Random::new(1);
     while step > 1e-6 {
         let centre = best.clone();
@@ -43,8 +43,8 @@ fn faces(corners: &[DVec3]) -> impl Iterator<Item = Vec<DVec3>> + '_ {
         .map(|set| (0..corners.len()).filter(|i| set >> i & 1 == 1).map(|i| corners[i]).collect())
 }
 
-/// Distance of two simplices: least squares over the flats of every pair of faces, of which those count
-/// whose nearest points lie within the faces.
+/// Distance of two simplices: least squares over the flats of every pair of faces; pairs count if their nearest
+/// points are inside the faces.
 fn simplex_distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let mut least = f64::MAX;
     for (p, q) in faces(a).flat_map(|p| faces(b).map(move |q| (p.clone(), q))) {
@@ -112,13 +112,13 @@ fn a_forearm_through_the_torso_has_a_negative_clearance() {
     assert!((before - 0.05).abs() < 1e-12);
 }
 
-/// A figure whose joints lie anywhere in a room as small as the body, so that its parts often meet.
+/// A figure with joints anywhere in a room as small as the body, so that its parts often collide.
 fn anywhere(random: &mut Random) -> StickFigure {
     let mut draw = || random.uniform(-0.5, 0.5);
     PerJoint(Joint::ALL.map(|_| DVec3::new(draw(), draw(), draw())))
 }
 
-/// The segments that a name speaks of, by their ends: `right_arm`, `left_thigh`, `other_thigh` of a side.
+/// The segments of a name, by their ends: `right_arm`, `left_thigh`, `other_thigh` of a side.
 fn segments_called(part: &str, side: Side) -> Vec<[Joint; 2]> {
     let (side, part) = match part.split_once('_') {
         Some(("right", part)) => (Side::Right, part),
@@ -141,7 +141,7 @@ fn parts(constraint: Constraint, radii: &Collisions) -> Option<([Vec<[Joint; 2]>
     if second.contains("torso") {
         return None;
     }
-    // "thigh_in_thigh": of both sides.
+    // "thigh_in_thigh": both sides.
     let is_of_both = first == second;
     let side = if first.starts_with("left") { Side::Left } else { Side::Right };
     let second_side = if is_of_both { side.other() } else { side };
@@ -150,7 +150,7 @@ fn parts(constraint: Constraint, radii: &Collisions) -> Option<([Vec<[Joint; 2]>
     Some((both, radius(first) + radius(second)))
 }
 
-/// Every pair of limbs that meet is found, and no other, by the segments their names speak of.
+/// Exactly the pairs of limbs that collide are found; the segments are read from the names.
 #[test]
 fn limbs_collide_where_their_segments_come_nearer_than_their_radii() {
     let radii =
@@ -183,7 +183,7 @@ fn limbs_collide_where_their_segments_come_nearer_than_their_radii() {
     assert!(met > 1000 && met_torso > 200, "{met} {met_torso}");
 }
 
-/// Distance of the looked-at part of an upper arm or of a forearm from the two triangles of the torso.
+/// Distance of the evaluated part of an upper arm or of a forearm from the two triangles of the torso.
 fn torso_distance(constraint: Constraint, points: &StickFigure) -> f64 {
     use Joint::{LeftHip, LeftShoulder, RightHip, RightShoulder};
     let (start, end) = match constraint {
@@ -198,7 +198,7 @@ fn torso_distance(constraint: Constraint, points: &StickFigure) -> f64 {
     [[a, b, c], [a, c, d]].iter().map(|t| simplex_distance(t, &[start, end])).fold(f64::MAX, f64::min)
 }
 
-/// The upper arm begins at a corner of the torso: its first third may lie on it, the rest may not.
+/// The upper arm begins at a corner of the torso: its first third may touch it, the rest may not.
 #[test]
 fn the_shoulder_s_part_of_the_upper_arm_is_not_looked_at() {
     let near = Collisions { torso_m: 0.05, ..Collisions::paper() };
@@ -207,21 +207,23 @@ fn the_shoulder_s_part_of_the_upper_arm_is_not_looked_at() {
         near.check(constraint, &PlacedFigure::of(&placed))
     };
     let upper = Constraint::UpperArmTorso(Side::Left);
-    // Out to the side: the nearest point looked at is a third of 30 cm away, within 5 cm without the third.
+    // To the side: the nearest evaluated point is a third of 30 cm away; without the rule it would be within 5
+    // cm.
     assert_eq!(against(DVec3::Z, upper), None);
     assert_eq!(against(DVec3::X, upper), None);
-    // Across the chest, 0.2 of the arm's length ahead of it: 2 cm where the looked-at part begins.
+    // Across the chest, 0.2 of the arm's length in front of it: 2 cm at the beginning of the evaluated part.
     let across = DVec3::new(0.2, 0.6, -(1.0f64 - 0.2 * 0.2 - 0.6 * 0.6).sqrt());
     let found = against(across, upper).unwrap();
     assert!((found.value - 0.2 * ARM_M / 3.0).abs() < 1e-9, "{found:?}");
     assert_eq!(Collisions::measured().shoulder_part, 1.0 / 3.0);
 }
 
-/// Only a forearm that passes through the torso is cut; stick figures as printed, with room for noise else.
+/// Only a forearm that passes through the torso is cut: exactly for the paper's stick figures, otherwise with
+/// noise.
 #[test]
 fn a_forearm_may_touch_the_torso_and_not_pass_it() {
     let s = Side::Left;
-    // The upper arm forward, the forearm back to the chest's middle and some centimetres beyond.
+    // The upper arm forward, the forearm back to the middle of the chest and some centimetres beyond.
     let reaching = |beyond_m: f64| {
         let forward = turned(&standing(), s.elbow(), DVec3::new(0.2, 0.15, -0.1));
         let elbow = forward[s.elbow()];
@@ -237,7 +239,7 @@ fn a_forearm_may_touch_the_torso_and_not_pass_it() {
     let (mut passing, depth_m) = reaching(0.05);
     let found = Collisions::paper().check(constraint, &PlacedFigure::of(&passing)).unwrap();
     assert!((found.value + depth_m).abs() < 1e-9 && found.limit == 0.0, "{found:?} {depth_m}");
-    // 1.5 standard deviations of the forearm's place: 2 cm are no excuse, 4 cm are one.
+    // 1.5 standard deviations of the forearm's position: 2 cm do not explain it, 4 cm do.
     for (sd_m, is_cut) in [(0.02, true), (0.04, false)] {
         passing[s.wrist()].sd_m = sd_m;
         let found = Collisions::measured().check(constraint, &PlacedFigure::of(&passing));
@@ -246,7 +248,7 @@ fn a_forearm_may_touch_the_torso_and_not_pass_it() {
     }
 }
 
-/// The least clearance falls by the noise of both limbs' places, each cause of it, and of nothing else.
+/// The minimum clearance decreases by the noise of both limbs' positions, by each cause, and by nothing else.
 #[test]
 fn limbs_may_come_nearer_by_their_noise() {
     // Feet together and shanks crossed: all legs within 10 cm of each other.
@@ -293,8 +295,8 @@ fn span(ray: DVec3, near_m: f64, far_m: f64) -> Span {
     Span { ray: ray.normalize(), near_m, far_m }
 }
 
-/// Segments that the test on rays separates are apart wherever on their rays they end; and it separates most of
-/// those that are never near.
+/// Segments that the test on rays separates are apart wherever their ends are on their rays, and it separates
+/// most of those that are never near.
 #[test]
 fn what_is_out_of_reach_is_never_reached() {
     let mut random = Random::new(8);
@@ -326,12 +328,12 @@ fn what_is_out_of_reach_is_never_reached() {
     assert!(told > 500 && 2 * told > never, "{told} of {never}");
 }
 
-/// Without its first third a segment is farther from what lies beside its start.
+/// Without its first third a segment is farther from things beside its start.
 #[test]
 fn reach_leaves_the_shoulder_s_part_out() {
     let [start, end] = [span(DVec3::new(0.0, 0.0, 1.0), 2.0, 2.0), span(DVec3::new(0.3, 0.0, 1.0), 2.0, 2.0)];
     let other = [DVec3::new(0.0, 0.1, 1.0), DVec3::new(0.0, -0.1, 1.0)].map(|ray| span(ray, 1.9, 2.1));
-    // A third of the way the segment is 20 cm away from the plane through the others' rays.
+    // At a third of its length the segment is 20 cm from the plane through the rays of the others.
     assert!(!apart(&[start, end], 0.0, &other, 0.1));
     assert!(apart(&[start, end], 1.0 / 3.0, &other, 0.15));
     assert!(!apart(&[start, end], 1.0 / 3.0, &other, 0.25));

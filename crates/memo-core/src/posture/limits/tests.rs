@@ -6,7 +6,7 @@ use crate::posture::example::{
 use crate::posture::placed::{Bearings, PlacedFigure};
 use crate::posture::tree::{TreeOptions, explain};
 
-/// What a constraint has against a figure whose lengths are those of somebody standing.
+/// The violation of a constraint by a figure with the lengths of a standing person.
 fn against(
     limits: Limits,
     figure: &StickFigure,
@@ -24,14 +24,14 @@ fn against(
     found.into_iter().find(|violation| violation.constraint == constraint)
 }
 
-/// The same of noisy joints.
+/// The same for noisy joints.
 fn against_noisy(limits: &Limits, placed: &PerJoint<Placed>, constraint: Constraint) -> Option<Violation> {
     let figure = PlacedFigure::of(placed);
     let trunk = Trunk::of(&figure, &Bearings::default());
     limits.check(constraint, &figure, &trunk, &lengths_of(&standing()), None)
 }
 
-/// The hip part turned about an axis through the pelvis.
+/// The hip part rotated about an axis through the pelvis.
 fn with_hips(turn: DMat3) -> StickFigure {
     let mut figure = standing();
     for side in Side::BOTH {
@@ -40,12 +40,12 @@ fn with_hips(turn: DMat3) -> StickFigure {
     figure
 }
 
-/// A figure or head with one angle at a value, degrees, that only the named constraint bounds.
+/// A figure or head with one angle, degrees, that only the named constraint limits.
 type Posed = (StickFigure, Option<DMat3>);
-/// A constraint, its bound in degrees, and the posture at an angle.
+/// A constraint, its bound in degrees, and the posture for an angle.
 type Row = (Constraint, f64, Box<dyn Fn(f64) -> Posed>);
 
-/// Table 1 of Lee and Chen: every bound in degrees with a posture at an angle. The knee bends backwards.
+/// Table 1 of Lee and Chen: every bound in degrees with a posture for an angle. The knee bends backward.
 fn table_1() -> Vec<Row> {
     use Constraint as C;
     let mut rows: Vec<Row> = Vec::new();
@@ -79,7 +79,7 @@ fn table_1() -> Vec<Row> {
         add(C::KneeFlexion(s), 130.0, Box::new(move |a| limb(s.ankle(), forward_deg(-a))));
         add(C::KneeExtension(s), 0.0, Box::new(move |a| limb(s.ankle(), forward_deg(a))));
     }
-    // The hips' normal goes up where the torso bends forward, and the chin goes down with the head's.
+    // The hips' normal moves up if the torso bends forward, and the chin moves down with the head's.
     let about = |axis: DVec3, angle: f64| DMat3::from_axis_angle(axis, angle.to_radians());
     add(C::PelvisFlexion, 75.0, Box::new(move |a| (with_hips(about(DVec3::NEG_Z, a)), None)));
     add(C::PelvisExtension, 30.0, Box::new(move |a| (with_hips(about(DVec3::Z, a)), None)));
@@ -109,7 +109,7 @@ fn table_1_of_the_paper_holds_to_half_a_degree() {
     }
 }
 
-/// How far the measured limits are documented to be wider than Table 1, degrees.
+/// By how much the measured limits are wider than Table 1, as documented, degrees.
 fn widened_by_deg(constraint: Constraint) -> f64 {
     use Constraint as C;
     match constraint {
@@ -124,7 +124,7 @@ fn measured_limits_are_table_1_with_the_documented_margins() {
     let limits = Limits::measured();
     for (constraint, bound, pose) in table_1() {
         let bound = bound + widened_by_deg(constraint);
-        // Out of the sagittal plane an arm cannot be by more than 90 degrees, which no limit cuts.
+        // An arm cannot be more than 90 degrees out of the sagittal plane, which no limit cuts.
         if matches!(constraint, Constraint::ShoulderAbduction(_)) {
             continue;
         }
@@ -136,7 +136,8 @@ fn measured_limits_are_table_1_with_the_documented_margins() {
     }
 }
 
-/// Straight down, an arm held 90 degrees backwards is 40 beyond the extension and 90 short of the flexion.
+/// Straight down, an arm held 90 degrees backward is 40 beyond the extension limit and 90 before the flexion
+/// limit.
 #[test]
 fn the_nearer_of_two_bounds_counts() {
     let range = AngleRange::from_deg(-50.0, 180.0);
@@ -166,7 +167,7 @@ fn a_thigh_may_be_raised_higher_when_the_knee_is_bent() {
     }
 }
 
-/// A knee that noise could have straightened, or bent, is no straight knee for sure.
+/// If noise could have straightened or bent a knee, it is not certainly straight.
 #[test]
 fn noise_of_the_knee_lets_the_thigh_pass() {
     let s = Side::Left;
@@ -177,7 +178,7 @@ fn noise_of_the_knee_lets_the_thigh_pass() {
     let constraint = Constraint::HipFlexionStraight(s);
     let quiet = against_noisy(&limits, &placed, constraint).unwrap();
     assert!((quiet.limit.to_degrees() - 90.0).abs() < 1e-9);
-    // 1.5 standard deviations of 2 degrees each segment: 5 and 4.2 degrees are straight, with 4 degrees not.
+    // 1.5 standard deviations of 2 degrees per segment: 5 and 4.2 degrees are straight; with 4 degrees not.
     for (segment_sd_deg, is_cut) in [(2.0, true), (4.0, false)] {
         for joint in [s.knee(), s.ankle()] {
             placed[joint].lateral_m = LEG_M * f64::to_radians(segment_sd_deg);
@@ -187,7 +188,7 @@ fn noise_of_the_knee_lets_the_thigh_pass() {
     }
 }
 
-/// The least angle between a limb and a half-plane of limbs of one swing, by trying its directions.
+/// The smallest angle between a limb and a half-plane of limbs with the same swing, by trying its directions.
 fn least_turn(limb: DVec3, swing_rad: f64) -> f64 {
     let in_plane = DVec3::new(swing_rad.sin(), swing_rad.cos(), 0.0);
     (-9000..=9000)
@@ -198,7 +199,7 @@ fn least_turn(limb: DVec3, swing_rad: f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The turn back into the range is the least one, whatever the limb's angle out of the sagittal plane.
+/// The rotation back into the range is the smallest, for any angle of the limb out of the sagittal plane.
 #[test]
 fn a_turn_back_into_the_range_is_the_least_one() {
     let limits = Limits { noise_factor: 0.0, ..Limits::measured() };
@@ -212,7 +213,7 @@ fn a_turn_back_into_the_range_is_the_least_one() {
         for out in [0.0, 0.5, 2.0, 10.0] {
             let limb = (forward_deg(swing_deg) + out * DVec3::Z).normalize();
             let found = against(limits, &turned(&standing(), end, limb), None, constraint);
-            // Beyond a quarter turn the nearest limb of the bound is the one straight out.
+            // Beyond a quarter turn, the nearest limb on the bound is the one straight to the side.
             let expected = least_turn(limb, bound);
             let excess = found.map_or(0.0, |violation| violation.excess);
             assert!(
@@ -221,7 +222,7 @@ fn a_turn_back_into_the_range_is_the_least_one() {
             );
         }
     }
-    // Held out sideways, the arm has no flexion to speak of; read literally it is bent back by 90 degrees.
+    // Held out sideways, the arm has almost no flexion; read literally, it is bent back by 90 degrees.
     let aside = turned(&standing(), s.elbow(), DVec3::new(-0.02, 0.0, 1.0));
     assert_eq!(
         against(limits, &aside, None, Constraint::ShoulderExtension(s)).map(|v| v.excess < 0.02),
@@ -231,12 +232,12 @@ fn a_turn_back_into_the_range_is_the_least_one() {
     assert!((literal.excess.to_degrees() - 40.0).abs() < 1e-9);
 }
 
-/// A forearm that leaves the half-space of upper arm and z by little is bent the wrong way by little.
+/// A forearm slightly outside the half-space of upper arm and z is slightly bent the wrong way.
 #[test]
 fn a_hinge_bent_the_wrong_way_counts_out_of_its_half_space() {
     let limits = Limits { noise_factor: 0.0, ..Limits::measured() };
     for s in Side::BOTH {
-        // 70 degrees aside and 7 degrees backwards: sin 7 out of the half-space.
+        // 70 degrees to the side and 7 degrees backward: sin 7 out of the half-space.
         let aside = 70f64.to_radians();
         let forearm = DVec3::new(-7f64.to_radians().sin(), 0.0, 0.0)
             + 7f64.to_radians().cos() * DVec3::new(0.0, aside.cos(), aside.sin());
@@ -246,15 +247,15 @@ fn a_hinge_bent_the_wrong_way_counts_out_of_its_half_space() {
         assert_eq!(against(limits, &figure, None, Constraint::ElbowFlexion(s)), None);
         let literal = against(Limits::paper(), &figure, None, Constraint::ElbowExtension(s)).unwrap();
         assert!(literal.value.to_degrees() > 60.0, "{literal:?}");
-        // Folded back with w_z < 0 the paper counts an extension and no flexion; a turn counts both.
+        // Folded back with w_z < 0, the paper counts an extension and no flexion; a rotation counts both.
         let folded = turned(&standing(), s.wrist(), forward_deg(-170.0));
         assert_eq!(against(Limits::paper(), &folded, None, Constraint::ElbowFlexion(s)), None);
         assert!(against(limits, &folded, None, Constraint::ElbowFlexion(s)).is_some());
     }
 }
 
-/// Every limit grows by the noise of the limb and of the
-/// trunk's axes, `noise_factor` standard deviations of each direction's own displacement over its length.
+/// Every limit grows by the noise of the limb and of the trunk's axes: `noise_factor` standard deviations of the
+/// displacement in each direction divided by its length.
 #[test]
 fn limits_grow_by_the_noise_of_limb_and_trunk() {
     let (k, limb_m, trunk_m) = (1.5, 0.012, 0.02);
@@ -265,7 +266,7 @@ fn limits_grow_by_the_noise_of_limb_and_trunk() {
     let hinge = turned(&standing(), s.wrist(), forward_deg(-20.0));
     let folded = turned(&standing(), s.wrist(), forward_deg(175.0));
     let straight = turned(&turned(&standing(), s.knee(), forward_deg(110.0)), s.ankle(), forward_deg(110.0));
-    // The joints that move, by how much across the rays, and the noise of the angle that this is.
+    // The joints that move, their displacement across the rays, and the resulting noise of the angle.
     let cases = [
         (Constraint::ShoulderExtension(s), back, s.elbow(), limb_m / ARM_M, trunk_m / TRUNK_M),
         (Constraint::HipAbduction(s), across, s.knee(), limb_m / LEG_M, trunk_m / TRUNK_M),
@@ -284,19 +285,19 @@ fn limits_grow_by_the_noise_of_limb_and_trunk() {
         let expected = k * f64::hypot(of_limb, of_trunk);
         assert!((noisy.limit - quiet.limit - expected).abs() < 1e-3 * expected, "{constraint:?} {joint:?}");
         assert_eq!(noisy.value, quiet.value);
-        // The paper's limits do not know noise.
+        // The paper's limits contain no noise.
         let paper = Limits { noise_factor: 0.0, ..limits };
         assert_eq!(against_noisy(&paper, &placed, constraint), Some(quiet));
     }
 }
 
-/// The same of hips against torso: the hips' own displacement over their drop and width, with the torso's.
+/// The same for hips and torso: the displacement of the hips divided by their drop and width, with the torso's.
 #[test]
 fn limits_of_the_pelvis_grow_by_the_noise_of_hips_and_torso() {
     let (k, hip_m, torso_m) = (1.5, 0.003, 0.004);
     let limits = Limits { noise_factor: k, ..Limits::paper() };
     let about = |axis: DVec3, angle: f64| with_hips(DMat3::from_axis_angle(axis, f64::to_radians(angle)));
-    // A pair of points, each off by s in one direction, is off by √2 s in its difference and s/√2 in its mean.
+    // If two points are each off by s in one direction, their difference is off by √2 s and their mean by s/√2.
     let both = std::f64::consts::SQRT_2;
     let drop = hip_m / both / 0.1;
     let cases = [
@@ -319,7 +320,7 @@ fn limits_of_the_pelvis_grow_by_the_noise_of_hips_and_torso() {
     }
 }
 
-/// Shoulders whose distance is off by more than the tolerance, or than noise along and across it explains.
+/// Shoulders whose distance is wrong by more than the tolerance, or than noise along and across it explains.
 #[test]
 fn rigid_distances_hold_to_their_tolerance_and_noise() {
     let distance = RigidDistance::Shoulders;
@@ -346,10 +347,10 @@ fn rigid_distances_hold_to_their_tolerance_and_noise() {
         against_noisy(&limits, &placed, constraint).unwrap().limit - 0.02
     };
     let both = std::f64::consts::SQRT_2;
-    // Along the line of the shoulders both joints' noise adds to their distance.
+    // Along the shoulder line, the noise of both joints adds to their distance.
     assert!((limit(DVec3::Z, 0.01, 0.0) - k * both * 0.01).abs() < 1e-12);
     assert!((limit(DVec3::X, 0.0, 0.01) - k * both * 0.01).abs() < 1e-12);
-    // Across it, the distance of two points w apart that are k standard deviations out of line is longer.
+    // Across it, the distance of two points w apart is longer if they are k standard deviations out of line.
     let out_of_line = k * both * 0.05;
     let longer = WIDTH_M.hypot(out_of_line) - WIDTH_M;
     assert!((limit(DVec3::X, 0.05, 0.0) - longer).abs() < 0.02 * longer);

@@ -1,29 +1,29 @@
-//! Stretches of a linked path that could be read the other way round.
+//! Mirrored stretches of a linked path.
 //!
-//! Between two moments in which a segment stands perpendicular to its ray, all its roots may be mirrored
-//! together: an excursion. The dynamic program remembers two frames; whether a limb crossed or bounced is
-//! decided better by its whole motion before and after. So every excursion of a path is mirrored on trial and
-//! costed by a Kalman filter run over it, and the mirrored one kept where it costs less. What the others
-//! would cost is the margin of the choice.
+//! An excursion is the interval between two times at which a segment is perpendicular to its ray. All its roots
+//! may be mirrored together. The dynamic program uses two previous frames; whether a limb crossed or bounced is
+//! decided better by its whole motion before and after. So every excursion of a path is mirrored on trial, with a
+//! cost from a Kalman filter run over it, and stays mirrored if that costs less. The extra cost of the other
+//! choice is the margin.
 
 use rayon::prelude::*;
 
 use super::super::prior::capped;
 use crate::estimate::smooth::{Innovation, Measured, filter_step};
 
-/// Time before and after a stretch over which it is judged, seconds.
+/// Time before and after a stretch that is included in its cost, seconds.
 const AROUND_S: f64 = 0.5;
 
-/// Longest stretch, in excursions. A stride holds about four.
+/// Longest stretch, in excursions. A stride has about four.
 const LONGEST: usize = 4;
 
-/// Rounds of mirroring; each takes every mirroring that helps and does not touch a better one.
+/// Rounds of mirroring. Each round applies all mirrorings that reduce the cost and do not overlap a better one.
 const ROUNDS: usize = 8;
 
-/// Innovations whose variances are multiplied before a logarithm is taken: far from where floats end.
+/// Number of innovations whose variances are multiplied before a logarithm is taken: far from overflow.
 const LOG_EVERY: usize = 8;
 
-/// Something that is read in one of several states a frame; each bit of a state is the root of a segment.
+/// A chain with one of several states per frame; each bit of a state is the root of a segment.
 pub(super) struct Chain<'a> {
     /// Times of the frames, seconds.
     pub times_s: &'a [f64],
@@ -31,15 +31,15 @@ pub(super) struct Chain<'a> {
     pub acceleration_mps2: &'a [f64],
     /// Sets of bits that may be mirrored together.
     pub masks: &'a [usize],
-    /// The bits whose extents change with those of a mask.
+    /// The bits whose extents change if those of a mask change.
     pub affected: fn(usize) -> usize,
     /// `(bit, frame, state)`: signed extent of the bit's segment along the ray.
     pub extent: &'a (dyn Fn(usize, usize, usize) -> Measured + Sync),
-    /// `(frame, state)`: cost of a state by itself, nats.
+    /// `(frame, state)`: cost of a state alone, nats.
     pub cost: &'a (dyn Fn(usize, usize) -> f64 + Sync),
 }
 
-/// One stretch mirrored.
+/// A mirrored stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Flip {
     /// The bits that change.
@@ -48,12 +48,12 @@ pub(super) struct Flip {
     pub from: usize,
     /// One past the last frame.
     pub to: usize,
-    /// What it costs more, nats.
+    /// Extra cost, nats.
     pub delta: f64,
 }
 
 impl Chain<'_> {
-    /// Mirrors what is better mirrored.
+    /// Applies the mirrorings that reduce the cost.
     pub fn refine(&self, states: &mut [usize]) {
         let everywhere = vec![[0, states.len()]];
         let mut changed = everywhere;
@@ -73,12 +73,12 @@ impl Chain<'_> {
         }
     }
 
-    /// All mirrorings of a path, cheapest first; of equal ones the earlier.
+    /// All mirrorings of a path, cheapest first; among equal ones the earlier first.
     pub fn flips(&self, states: &[usize]) -> Vec<Flip> {
         self.flips_near(states, &[[0, states.len()]])
     }
 
-    /// The mirrorings whose cost depends on any of some stretches, cheapest first.
+    /// The mirrorings whose cost depends on any of the given stretches, cheapest first.
     fn flips_near(&self, states: &[usize], stretches: &[[usize; 2]]) -> Vec<Flip> {
         let mut spans: Vec<[usize; 3]> = Vec::new();
         for &mask in self.masks {
@@ -100,7 +100,7 @@ impl Chain<'_> {
         flips
     }
 
-    /// Frames in which a bit's segment may pass perpendicular to its ray, with the first frame and the end.
+    /// Frames at which a bit's segment may be perpendicular to its ray, with the first frame and the end.
     fn bounds(&self, states: &[usize], bit: usize) -> Vec<usize> {
         let extents: Vec<Measured> =
             states.iter().enumerate().map(|(t, &state)| (self.extent)(bit, t, state)).collect();
@@ -125,7 +125,7 @@ impl Chain<'_> {
         [first, times.partition_point(|&time| time <= times[to - 1] + AROUND_S)]
     }
 
-    /// Cost of mirroring a stretch.
+    /// Extra cost of mirroring a stretch.
     pub fn delta(&self, states: &[usize], mask: usize, from: usize, to: usize) -> f64 {
         let reach = self.around(from, to);
         let mirrored = |t: usize| if (from..to).contains(&t) { states[t] ^ mask } else { states[t] };
@@ -134,14 +134,14 @@ impl Chain<'_> {
         own + self.motion(affected, reach, mirrored) - self.motion(affected, reach, |t| states[t])
     }
 
-    /// Cost of a path: its states' and its motion's.
+    /// Cost of a path: of its states and of its motion.
     pub fn total(&self, states: &[usize]) -> f64 {
         let own: f64 = states.iter().enumerate().map(|(t, &state)| (self.cost)(t, state)).sum();
         let all = (1 << self.acceleration_mps2.len()) - 1;
         own + self.motion(all, [0, states.len()], |t| states[t])
     }
 
-    /// Negative log likelihood of some segments' motion over a stretch.
+    /// Negative log likelihood of the motion of some segments over a stretch.
     fn motion(&self, bits: usize, [from, to]: [usize; 2], state: impl Fn(usize) -> usize) -> f64 {
         let moving = self.acceleration_mps2.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 == 1);
         moving
@@ -157,11 +157,11 @@ fn overlaps(stretches: &[[usize; 2]], [from, to]: [usize; 2]) -> bool {
     stretches.iter().any(|stretch| stretch[0] < to && from < stretch[1])
 }
 
-/// Negative log likelihood of a track, (time in seconds, measurement) after the other, under a motion of that
-/// acceleration: Σ ½ min(ν²/S, cap) + ½ ln S over innovations ν of variance S.
+/// Negative log likelihood of a track of (time in seconds, measurement), for a motion with that acceleration: Σ ½
+/// min(ν²/S, cap) + ½ ln S over innovations ν of variance S.
 fn motion_cost(track: impl Iterator<Item = (f64, Measured)>, acceleration_sd: f64) -> f64 {
     let mut cost = 0.0;
-    // Logarithms of products: one for several frames.
+    // Logarithms of products: one logarithm for several frames.
     let (mut variances, mut factors) = (1.0, 0);
     let mut filter = None;
     let mut before_s = None;
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
     use crate::synth::Random;
 
-    /// A track of noisy places, one of them far off.
+    /// A track of noisy positions, one of them an outlier.
     fn track(frames: usize) -> Vec<(f64, Measured)> {
         let mut random = Random::new(2);
         (0..frames)
@@ -202,7 +202,7 @@ mod tests {
             .collect()
     }
 
-    /// The likelihood of normal innovations, frame by frame, those far off cut at 25.
+    /// The likelihood of normal innovations, frame by frame, with outliers capped at 25.
     #[test]
     fn the_cost_of_a_motion_is_its_likelihood() {
         for frames in [1, 2, 7, 8, 9, 10, 30] {
@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Two segments that hang on each other, of four states a frame; bit 0 also turns the extent of bit 1.
+    /// Two connected segments with four states per frame; bit 0 also changes the extent of bit 1.
     fn extent(bit: usize, t: usize, state: usize) -> Measured {
         let size = if bit == 0 { (0.25 * t as f64 - 2.0).sin() } else { 0.3 + 0.02 * t as f64 };
         let is_far = |bit: usize| state >> bit & 1 == 1;
@@ -248,7 +248,8 @@ mod tests {
         Chain { times_s, acceleration_mps2: &[4.0, 6.0], masks: &[1, 2, 3], affected, extent, cost }
     }
 
-    /// Over a stretch so short that all of it is judged, what mirroring costs is the difference of the totals.
+    /// If the whole path is within the cost of the stretch, the extra cost of mirroring is the difference of the
+    /// totals.
     #[test]
     fn mirroring_costs_the_difference_of_the_paths() {
         let times_s: Vec<f64> = (0..10).map(|t| 0.04 * t as f64).collect();
@@ -265,7 +266,7 @@ mod tests {
         }
     }
 
-    /// Stretches are judged by half a second before and after them.
+    /// The cost of a stretch includes half a second before and after it.
     #[test]
     fn a_stretch_is_judged_by_what_is_around_it() {
         let times_s: Vec<f64> = (0..100).map(|t| 0.04 * t as f64).collect();
@@ -275,7 +276,8 @@ mod tests {
         assert_eq!(chain.around(3, 98), [0, 100]);
     }
 
-    /// Where an extent crosses zero, where it is least and not surely different from it, where it is not seen.
+    /// Where an extent crosses zero, where it is smallest and not clearly different from zero, where it is not
+    /// seen.
     #[test]
     fn stretches_begin_where_a_segment_may_stand_across_its_ray() {
         let times_s: Vec<f64> = (0..12).map(|t| 0.04 * t as f64).collect();
@@ -297,7 +299,7 @@ mod tests {
         assert_eq!(bounds(unseen, 0.01), [0, 3, 5, 12]);
     }
 
-    /// A path read the wrong way round in a stretch is put right, however long the stretch is in excursions.
+    /// A path mirrored over a stretch is corrected, for any number of excursions in the stretch.
     #[test]
     fn what_is_better_mirrored_is_mirrored() {
         let times_s: Vec<f64> = (0..120).map(|t| 0.04 * t as f64).collect();
@@ -315,13 +317,13 @@ mod tests {
             extent: &swing,
             cost: &none,
         };
-        // Truth: the same state throughout. Wrong between two passings of zero, 12 or 13 frames apart: one
+        // Truth: the same state throughout. Wrong between two zero crossings, 12 or 13 frames apart: one
         // excursion, and three together.
         for (from, to) in [(13, 26), (26, 63)] {
             let mut states = vec![0; 120];
             states[from..to].fill(1);
             chain.refine(&mut states);
-            // Within the noise of zero nobody can tell.
+            // Within the noise of zero the state cannot be determined.
             let is_clear = |t: usize| swing(0, t, 0).value.abs() > 0.03;
             let clear: Vec<usize> = (0..120).filter(|&t| is_clear(t)).map(|t| states[t]).collect();
             assert!(clear.iter().all(|state| *state == clear[0]), "{states:?}");

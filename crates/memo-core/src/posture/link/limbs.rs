@@ -1,4 +1,4 @@
-//! Arms and legs of a sequence, given the trunk.
+//! Links arms and legs of a sequence, given the trunk.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use crate::estimate::viterbi::least_path;
 use crate::model::angles::{elbow_rad, knee_rad, swing_rad};
 use crate::model::skeleton::{Joint, PerJoint, Side, StickFigure};
 
-/// Both limbs of a pair, right and left: where the limb hangs, its middle joint, its end. Pair 0 the arms.
+/// Both limbs of a pair, right and left: the joint of the trunk, the middle joint, the end. Pair 0 is the arms.
 const PAIRS: [[[Joint; 3]; 2]; 2] = [
     [
         [Joint::RightShoulder, Joint::RightElbow, Joint::RightWrist],
@@ -23,16 +23,16 @@ const PAIRS: [[[Joint; 3]; 2]; 2] = [
     ],
 ];
 
-/// Bits of a pair's reading: inner and outer segment of the right limb, then of the left; 1 the farther root.
+/// Bits of a pair's reading: inner and outer segment of the right limb, then of the left; 1 is the far root.
 const SEGMENTS: usize = 4;
 
 /// Number of readings of a pair.
 const READINGS: usize = 1 << SEGMENTS;
 
-/// What may be mirrored together: one segment, a whole limb, both inner segments, all.
+/// Sets of segments that may be mirrored together: one segment, a whole limb, both inner segments, all.
 const MASKS: [usize; 8] = [1, 2, 4, 8, 3, 12, 5, 15];
 
-/// Times arms and legs are linked anew given the other.
+/// Number of times arms and legs are linked again, given the other pair.
 const ROUNDS: usize = 4;
 
 /// One limb's four readings in a frame.
@@ -42,13 +42,13 @@ struct LimbFrame {
     extents: [[Measured; 2]; 4],
     /// Cost of the limb's attitude.
     cost: [f64; 4],
-    /// Swing of the inner segment with its noise, radians.
+    /// Swing of the inner segment with its standard deviation, radians.
     swing: [Measured; 4],
-    /// Height of the end above that of a standing foot, metres; NaN for arms and where it is not known.
+    /// Height of the end above that of a supporting foot, metres; NaN for arms and if it is not known.
     lift_m: [f64; 4],
 }
 
-/// A reading of one limb of a pair's reading.
+/// The reading of one limb in a pair's reading.
 fn limb_bits(state: usize, side: usize) -> usize {
     state >> (2 * side) & 3
 }
@@ -66,9 +66,9 @@ struct Pair {
 pub(super) struct Limbs {
     /// Figures of every frame, trunk and limbs, smoothed.
     pub smoothed: Vec<StickFigure>,
-    /// Standard deviation of each joint along its ray against its starting joint, metres.
+    /// Standard deviation of each joint along its ray, relative to its starting joint, metres.
     pub sd_m: Vec<PerJoint<f64>>,
-    /// What the paths cost, nats.
+    /// Cost of the paths, nats.
     pub cost: f64,
     flips: [Vec<Flip>; 2],
 }
@@ -77,7 +77,7 @@ impl Limbs {
     pub fn link(problem: &Problem, trunk: &Trunk) -> Self {
         let pairs = [0, 1].map(|pair| Pair::new(problem, trunk, pair));
         let mut states: [Option<Vec<usize>>; 2] = [None, None];
-        // The legs first: knees bend one way only, which tells more.
+        // The legs first: knees bend in one direction only, which is more informative.
         for _ in 0..ROUNDS {
             let before = states.clone();
             for pair in [1, 0] {
@@ -108,7 +108,7 @@ impl Limbs {
         limbs
     }
 
-    /// Other readings: what is mirrored, and the joints concerned.
+    /// Other readings: the stretch that is mirrored, and its joints.
     pub fn readings(&self) -> impl Iterator<Item = (Flip, Vec<Joint>)> + '_ {
         self.flips.iter().enumerate().flat_map(|(pair, flips)| {
             flips.iter().map(move |&flip| {
@@ -153,7 +153,7 @@ impl Pair {
         self.frames[side][t].extents[limb_bits(state, side)][bit % 2]
     }
 
-    /// The pair's least-cost path.
+    /// The pair's path of the smallest cost.
     fn path(&self, cost: &[[f64; READINGS]]) -> Vec<usize> {
         let step = |side: usize, t: usize, [k, i, j]: [usize; 3]| {
             let [k, i, j] = [k, i, j].map(|state| limb_bits(state, side));
@@ -166,8 +166,8 @@ impl Pair {
         )
     }
 
-    /// Mirrors what is better mirrored of a path; returns, if asked, what the rest would cost and what the
-    /// path costs.
+    /// Applies the mirrorings of a path that reduce the cost. Returns the other mirrorings, if requested, and the
+    /// cost of the path.
     fn refine(
         &self,
         times_s: &[f64],
@@ -188,7 +188,7 @@ impl Pair {
     }
 }
 
-/// Costs of the readings of a pair in every frame, given the other pair's states if there are some.
+/// Costs of the readings of a pair in every frame, given the other pair's states if they are known.
 fn pair_costs(
     problem: &Problem,
     pairs: &[Pair; 2],
@@ -255,7 +255,7 @@ impl Problem<'_> {
         limb
     }
 
-    /// Inner and outer segment of a reading: signed extent along the ray of its end, and its vector.
+    /// Inner and outer segment of a reading: signed extent along the ray of its end, and the vector.
     fn limb_extents(
         &self,
         t: usize,
@@ -281,7 +281,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Twice the cost of a limb's attitude: what is usual, and what its middle joint allows.
+    /// Twice the cost of a limb's attitude: the prior, and the limits of its middle joint.
     fn limb_cost(
         &self,
         t: usize,
@@ -341,7 +341,7 @@ mod tests {
     use crate::posture::prior::MotionPrior;
     use crate::reproduce::stick_walker::StickWalker;
 
-    /// A walk of the paper's walker 4 m away, facing right, ten frames in 0.36 s.
+    /// A walk of the paper's walker 4 m away, facing right: ten frames in 0.36 s.
     fn frames() -> (Vec<LinkFrame>, SegmentLengths, LinkOptions) {
         let walker = StickWalker::lee_chen();
         let camera_from_walker = |v: DVec3| DVec3::new(v.x, -v.y, v.z);
@@ -357,7 +357,7 @@ mod tests {
         (frames.collect(), *walker.lengths(), options)
     }
 
-    /// An inner segment's root moves the outer segment's extent: what mirroring costs has both in it.
+    /// An inner segment's root changes the outer segment's extent: the extra cost of mirroring contains both.
     #[test]
     fn mirroring_a_segment_moves_what_hangs_on_it() {
         let (frames, lengths, options) = frames();
@@ -380,7 +380,7 @@ mod tests {
                     extent: &|bit, t, state| readings.extent(bit, t, state),
                     cost: &|_, _| 0.0,
                 };
-                // All ten frames are within what a stretch is judged by.
+                // All ten frames are within the cost of a stretch.
                 let difference = chain.total(&mirrored) - total;
                 assert!((flip.delta - difference).abs() < 1e-9, "{flip:?} {difference}");
                 inner += usize::from(flip.mask & 0b0101 != 0);
@@ -389,7 +389,7 @@ mod tests {
         }
     }
 
-    /// An elbow bent the wrong way costs the square of the angle in the deviations of its limit, a knee too.
+    /// An elbow or a knee bent the wrong way costs the square of the angle in standard deviations of its limit.
     #[test]
     fn bending_the_wrong_way_costs() {
         let (frames, lengths, options) = frames();
@@ -399,12 +399,12 @@ mod tests {
         let shank = |deg: f64| DVec3::new(deg.to_radians().sin(), deg.to_radians().cos(), 0.0);
         for (pair, wrong_deg, limit) in [(0, -20.0, 20.0 / 15.0), (1, 20.0, 20.0 / 10.0f64)] {
             let cost = |deg: f64| problem.limb_cost(0, &axes, [DVec3::Y, shank(deg)], [0.0; 2], pair, 0);
-            // Anybody's forearm and shank may swing as they like; only the bend differs.
+            // In the prior of any motion forearm and shank may swing freely; only the bend differs.
             assert!((cost(wrong_deg) - cost(-wrong_deg) - limit * limit).abs() < 1e-9, "{pair}");
         }
     }
 
-    /// The outer segment starts where the inner one ends, as unsure along its ray.
+    /// The outer segment starts where the inner one ends, with the same standard deviation along its ray.
     #[test]
     fn an_outer_segment_is_as_unsure_as_its_start() {
         let (frames, lengths, options) = frames();

@@ -1,15 +1,14 @@
-//! One posture a frame: the roots of a sequence linked over time (the work that Lee and Chen 1985 announce in
-//! their summary).
+//! One posture per frame: the roots of a sequence are linked over time (Lee and Chen 1985 announce this as future
+//! work in their summary).
 //!
-//! A limb that passes parallel to the image meets its mirror there: to first order in time "it crossed" and
-//! "it bounced" cost the same, so the cost takes three frames, a change of velocity. The trunk is linked
-//! first, then both arms and both legs, each pair jointly, given the trunk and the other pair. Costs are
-//! negative log likelihoods, in nats. What a person can do, and does when walking, enters softly
-//! ([`MotionPrior`]).
+//! When a limb becomes parallel to the image plane, it meets its mirror image. To first order in time "it
+//! crossed" and "it bounced" have the same cost, so the cost uses three frames: a change of velocity. The trunk
+//! is linked first, then both arms and both legs, each pair jointly, given the trunk and the other pair. Costs
+//! are negative log likelihoods, in nats. Limits of the body and habits of walking are soft ([`MotionPrior`]).
 //!
-//! The candidates are all roots, not only the survivors of the tree: a hard limit missed by a degree of noise
-//! would break the chain. Short gaps of a joint's track are bridged for the decision only; the figures hold
-//! what was seen.
+//! Candidates are all roots, not only the survivors of the tree: a hard limit exceeded by one degree of noise
+//! would break the chain. Short gaps in a joint's track are interpolated for the decision only; the figures
+//! contain only what was seen.
 
 mod flip;
 mod limbs;
@@ -33,7 +32,7 @@ use trunk::{Trunk, joints_of};
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// A time does not follow the one before.
+    /// The times do not increase.
     #[error("times must increase: frame {frame} is at {time_s} s, the one before at {before_s} s")]
     Times {
         /// The frame.
@@ -43,7 +42,7 @@ pub enum LinkError {
         /// The time of the frame before, seconds.
         before_s: f64,
     },
-    /// A neck is at infinity or not before the camera.
+    /// A neck is not finite or not in front of the camera.
     #[error("the neck of frame {frame} must be before the camera or unknown (NaN), got {neck} m")]
     Neck {
         /// The frame.
@@ -51,47 +50,48 @@ pub enum LinkError {
         /// The neck given, metres.
         neck: DVec3,
     },
-    /// A direction has no length or is not finite.
+    /// A direction is zero or not finite.
     #[error("{parameter} must be a finite direction, got {value}")]
     Direction {
-        /// Which one.
+        /// Name of the direction.
         parameter: &'static str,
-        /// What was given.
+        /// The direction given.
         value: DVec3,
     },
-    /// A segment length is wrong.
+    /// The segment lengths are not valid.
     #[error(transparent)]
     Lengths(#[from] LengthError),
-    /// Somebody wished it to end.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
-/// What one frame shows.
+/// Input of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkFrame {
     /// Time, seconds.
     pub time_s: f64,
     /// Rays to the joints, camera axes.
     pub rays: JointRays,
-    /// The neck, camera axes, metres; NaN where it is not known, and then nothing of the frame is.
+    /// The neck, camera axes, metres; NaN if it is not known, and then the frame is not used.
     pub neck: DVec3,
 }
 
-/// How to link.
+/// Options of [`link`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkOptions {
-    /// What the person is expected to do.
+    /// Prior of the motion.
     pub prior: MotionPrior,
-    /// The world's upward direction in camera axes; without it the trunk's own axis stands for it.
+    /// The world's upward direction in camera axes; `None` uses the trunk's own axis.
     pub up: Option<DVec3>,
-    /// The ground the person stands on; without it feet may be at any height.
+    /// The ground the person is on; with `None` feet may be at any height.
     pub ground: Option<Ground>,
-    /// The moving direction in camera axes; without it the trunk's forward axis stands for it.
+    /// The moving direction in camera axes; `None` uses the trunk's forward axis.
     pub moving_direction: Option<DVec3>,
-    /// Gaps of a joint's track up to this long are bridged for the decision, seconds: a quarter of a step.
+    /// Gaps of a joint's track up to this duration are interpolated for the decision, seconds: a quarter of a
+    /// step.
     pub bridge_s: f64,
-    /// Two readings are different where a joint lies farther apart than this, metres.
+    /// Two readings differ if they place a joint farther apart than this, metres.
     pub distinct_m: f64,
 }
 
@@ -108,7 +108,7 @@ impl Default for LinkOptions {
     }
 }
 
-/// A second way to read a sequence: some segments mirrored over some frames.
+/// Another reading of a sequence: some segments are mirrored over some frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
     /// The joints at the ends of the mirrored segments.
@@ -119,12 +119,13 @@ pub struct Alternative {
     pub to: usize,
     /// The postures of these frames, camera axes, metres.
     pub figures: Vec<StickFigure>,
-    /// By how much it costs more than the best, nats, over the prior's overconfidence: exp(-margin) is its odds.
+    /// Cost above that of the best reading, nats, divided by the prior's overconfidence: exp(-margin) is its
+    /// odds.
     pub margin: f64,
 }
 
 impl Alternative {
-    /// Its probability where it and the best are all there is, 0 to 0.5.
+    /// Its probability if it and the best reading are the only ones, 0 to 0.5.
     pub fn probability(&self) -> f64 {
         1.0 / (1.0 + self.margin.exp())
     }
@@ -133,30 +134,30 @@ impl Alternative {
 /// A linked sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkedPath {
-    /// The posture of every frame, camera axes, metres: at every joint one of its roots; NaN where the joint,
-    /// or one it hangs on, was not seen.
+    /// The posture of every frame, camera axes, metres. Every joint is at one of its roots; NaN if the joint, or
+    /// a joint between it and the neck, was not seen.
     pub figures: Vec<StickFigure>,
-    /// The same smoothed over time: joints stay on their rays, depths are those of a steady motion.
+    /// The postures smoothed over time: joints stay on their rays, depths follow a steady motion.
     pub smoothed: Vec<StickFigure>,
-    /// Standard deviation of each smoothed joint along its ray against its starting joint, metres.
+    /// Standard deviation of each smoothed joint along its ray, relative to its starting joint, metres.
     pub sd_m: Vec<PerJoint<f64>>,
-    /// By how much each joint of `figures` is farther from its starting joint than its segment is long,
-    /// metres: more than 0 where no real root was.
+    /// Distance of each joint of `figures` from its starting joint, less the length of its segment, metres: more
+    /// than 0 if there was no real root.
     pub gap_m: Vec<PerJoint<f64>>,
-    /// The cheapest reading that puts a joint elsewhere; none where there is none.
+    /// The cheapest reading that places a joint elsewhere; `None` if there is none.
     pub second: Option<Alternative>,
-    /// For each segment, by the joint at its end, the least margin of a reading that mirrors it, alone or with
-    /// others, over some frames; infinite where there is none. What hangs on a mirrored trunk is not linked
-    /// anew for this.
+    /// For each segment, by the joint at its end, the smallest margin of a reading that mirrors it, alone or with
+    /// others, over some frames; infinite if there is none. When a trunk is mirrored for this, the limbs are not
+    /// linked again.
     pub mirror_margin: Vec<PerJoint<f64>>,
-    /// For each frame, what it would cost at least to put one of its joints elsewhere, nats; infinite where
-    /// no joint could be.
+    /// For each frame, the smallest cost of placing one of its joints elsewhere, nats; infinite if none can be
+    /// elsewhere.
     pub margin: Vec<f64>,
 }
 
 impl LinkedPath {
-    /// Probability that the segment which ends at a joint is mirrored in depth in a frame, 0 to 0.5; NaN where
-    /// the joint is not known.
+    /// Probability that the segment that ends at a joint is mirrored in depth in a frame, 0 to 0.5; NaN if the
+    /// joint is not known.
     pub fn probability_mirrored(&self, t: usize, joint: Joint) -> f64 {
         if self.figures[t][joint].is_nan() {
             return f64::NAN;
@@ -177,7 +178,7 @@ pub fn link(
     link_with_progress(frames, lengths, options, &Progress::new())
 }
 
-/// [`link`], each frame counting as one unit of the caller's `progress`.
+/// [`link`] with progress and cancellation; each frame is one unit of `progress`.
 ///
 /// # Errors
 /// Those of [`link`], and [`LinkError::Stopped`].
@@ -191,11 +192,11 @@ pub(super) fn link_with_progress(
     check(frames, options)?;
     let known: Vec<usize> = (0..frames.len()).filter(|&t| !frames[t].neck.is_nan()).collect();
     let seen: Vec<LinkFrame> = known.iter().map(|&t| frames[t]).collect();
-    // 1. Bridge short gaps for the decision.
+    // 1. Interpolate short gaps for the decision.
     let bridged = bridge(&seen, options.bridge_s);
     let problem = Problem { frames: &bridged, lengths, options };
-    // 2. The trunk, then arms and legs in turn, each given the other.
-    //    Which way a trunk faces its limbs may tell better: it is tried turned round as well.
+    // 2. The trunk, then arms and legs in turn, each given the other. The limbs may show better which way the
+    //    trunk faces, so the flipped trunk is tried as well.
     let trunks = Trunk::link(&problem);
     let share = frames.len() / trunks.len();
     let mut bodies = Vec::with_capacity(trunks.len());
@@ -215,7 +216,7 @@ pub(super) fn link_with_progress(
             delta: cost - best,
         })
         .collect();
-    // 3. Leaves of the tree, second-best reading and margins.
+    // 3. Leaves of the tree, the second-best reading and margins.
     let path = problem.path(&seen, trunk, limbs, &turned);
     Ok(path.spread(&known, frames.len()))
 }
@@ -260,7 +261,7 @@ fn bridge(frames: &[LinkFrame], bridge_s: f64) -> Vec<LinkFrame> {
     bridged
 }
 
-/// The sequence with what is known of it.
+/// The sequence with the options and priors of linking.
 #[derive(Clone, Copy)]
 struct Problem<'a> {
     frames: &'a [LinkFrame],
@@ -279,8 +280,9 @@ impl Problem<'_> {
 
     /// The roots of a segment whose starting joint is known along its ray to `start_sd_m`.
     ///
-    /// The distance d of start and ray is uncertain by the noise of the image, by how steady the segment's
-    /// length is, and by the starting joint's own place: moved along its ray, it comes nearer to the end's.
+    /// The distance d of start and ray is uncertain because of the noise of the image, the variation of the
+    /// segment's length, and the starting joint's own position: if it moves along its ray, it comes nearer to the
+    /// ray of the end.
     fn roots(&self, t: usize, start: DVec3, start_sd_m: f64, end: Joint) -> Roots {
         let rays = &self.frames[t].rays;
         let length = self.lengths.to[end];
@@ -295,7 +297,7 @@ impl Problem<'_> {
         found
     }
 
-    /// Axes forward, down, left to which swings are measured.
+    /// Axes forward, down, left, relative to which swings are measured.
     fn reference(&self, trunk: &StickFigure) -> Option<DMat3> {
         let own = trunk_axes(trunk);
         let down = self.options.up.map(|up| -up.normalize()).or(own.map(|axes| axes.y_axis))?;
@@ -304,7 +306,7 @@ impl Problem<'_> {
         Some(DMat3::from_cols(forward, down, forward.cross(down)))
     }
 
-    /// Share of a frame in the evidence of the priors: neighbouring frames say the same.
+    /// Weight of a frame in the evidence of the priors: neighbouring frames are not independent.
     fn weight(&self, t: usize) -> f64 {
         let last = self.frames.len() - 1;
         let [before, after] = [t.saturating_sub(1), (t + 1).min(last)];
@@ -315,21 +317,21 @@ impl Problem<'_> {
         (dt / self.options.prior.independence_s).min(1.0)
     }
 
-    /// Height of an ankle above that of a foot on the ground, metres; NaN without a ground.
+    /// Height of an ankle above the ankle of a foot on the ground, metres; NaN without a ground.
     fn lift_m(&self, ankle: Joint, point: DVec3) -> f64 {
         let standing = AnchorOptions::default().ankle_height_over_shank * self.lengths.to[ankle];
         self.options.ground.map_or(f64::NAN, |ground| ground.height_m(point) - standing)
     }
 
-    /// Twice the cost of the ankles' heights: one of both stands. Where one is not known, the other may be in
-    /// the air, but not below the ground.
+    /// Twice the cost of the ankles' heights: at least one foot is on the ground. If the height of one is not
+    /// known, the other may be in the air, but not below the ground.
     fn support_cost(&self, lift_m: [f64; 2]) -> f64 {
         let lower = lift_m[0].min(lift_m[1]);
         let both = !lift_m[0].is_nan() && !lift_m[1].is_nan();
         chi_sq(if both { lower } else { lower.min(0.0) } / self.options.prior.support_sd_m)
     }
 
-    /// Half the square of a change of velocity in its standard deviations; 0 where an extent is not known.
+    /// Half the squared change of velocity in units of its standard deviation; 0 if an extent is not known.
     fn acceleration_cost(&self, t: usize, extents: [Measured; 3], sd_mps2: f64) -> f64 {
         let before_s = self.frames[t - 1].time_s - self.frames[t - 2].time_s;
         let after_s = self.frames[t].time_s - self.frames[t - 1].time_s;
@@ -397,8 +399,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The leaf of the tree whose segments point to the same side along their rays as the figure's, some
-    /// mirrored.
+    /// The leaf of the tree whose segments point to the same side along their rays as the figure's, except those
+    /// in `mirrored`.
     fn leaf(&self, frame: &LinkFrame, like: &StickFigure, mirrored: &[Joint]) -> Leaf {
         let mut leaf = Leaf {
             figure: StickFigure::UNKNOWN,
@@ -436,7 +438,7 @@ fn place(figure: &mut StickFigure, joint: Joint, ray: DVec3, extent_m: f64) {
 }
 
 impl LinkedPath {
-    /// The path with its frames at their places in the whole sequence, nothing known in between.
+    /// The path with its frames at their indices in the whole sequence; frames in between are unknown.
     fn spread(self, known: &[usize], frames: usize) -> Self {
         if known.len() == frames {
             return self;

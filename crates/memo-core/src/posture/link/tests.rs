@@ -4,7 +4,7 @@ use glam::DQuat;
 
 const FRAMES: usize = 60;
 
-/// The truth in camera axes, 4 m away, and what a sequence at 25 frames a second shows of it.
+/// The truth in camera axes, 4 m away, and its sequence at 25 frames per second.
 fn sequence(yaw_rad: f64) -> (Vec<StickFigure>, Vec<LinkFrame>, SegmentLengths, LinkOptions) {
     let walker = StickWalker::lee_chen();
     let turn = DQuat::from_rotation_y(yaw_rad);
@@ -141,7 +141,7 @@ fn wrong_input_is_named() {
     assert!(matches!(link(&frames, &short, &options), Err(LinkError::Lengths(_))));
 }
 
-/// Nothing expected of the motion: seen from above, many mirrored legs would leave the ground.
+/// No prior of the motion: seen from above, many mirrored legs would leave the ground.
 #[test]
 fn somebody_stands_on_the_ground() {
     let mut shares = [0.0; 2];
@@ -181,7 +181,7 @@ fn timed(times_s: &[f64]) -> Vec<LinkFrame> {
     times_s.iter().map(|&time_s| LinkFrame { time_s, rays, neck: DVec3::new(0.0, 0.0, 4.0) }).collect()
 }
 
-/// A ray that is missing for a moment goes on evenly with time; one that is missing for longer stays missing.
+/// A ray missing for a short time is interpolated linearly in time; one missing for longer stays missing.
 #[test]
 fn short_gaps_are_bridged_evenly_in_time() {
     let mut frames = timed(&[0.0, 0.02, 0.10, 0.14, 0.25, 0.29]);
@@ -190,7 +190,7 @@ fn short_gaps_are_bridged_evenly_in_time() {
         frames[t].rays.ray[Joint::LeftKnee] = along(x);
     }
     let bridged = bridge(&frames, 0.12);
-    // A fifth of the time between frames 0 and 2; 0.19 s up to frame 5 are too long.
+    // A fifth of the time between frames 0 and 2; the 0.19 s up to frame 5 are too long.
     assert!((bridged[1].rays.ray[Joint::LeftKnee] - along(0.002)).length() < 1e-6);
     assert!(bridged[3].rays.ray[Joint::LeftKnee].is_nan() && bridged[4].rays.ray[Joint::LeftKnee].is_nan());
     let longer = bridge(&frames, 0.2);
@@ -206,8 +206,8 @@ fn problem_of<'a>(
     Problem { frames, lengths, options }
 }
 
-/// The deviation of an extent is made of the image noise, of the length's and of the starting joint's place,
-/// as far as that lies across the ray.
+/// The deviation of an extent consists of the image noise, the length's deviation, and the starting joint's
+/// position as far as that is across the ray.
 #[test]
 fn extents_are_as_unsure_as_image_length_and_start() {
     let lengths = SegmentLengths::lee_chen();
@@ -233,7 +233,7 @@ fn extents_are_as_unsure_as_image_length_and_start() {
     assert!((sd(&frames, &options, 0.2) - extent_sd(half, across, all_m)).abs() < 1e-12);
 }
 
-/// Extents that accelerate evenly, at uneven times: half the square of the acceleration in its deviations.
+/// Extents of constant acceleration at unequal intervals cost half the squared acceleration in its deviations.
 #[test]
 fn a_change_of_velocity_costs_the_square_of_its_acceleration() {
     let lengths = SegmentLengths::lee_chen();
@@ -263,7 +263,7 @@ fn a_change_of_velocity_costs_the_square_of_its_acceleration() {
     assert_eq!(problem.acceleration_cost(2, [Measured::NOTHING; 3], 2.0), 0.0);
 }
 
-/// Frames count in full 80 ms apart, less where they follow faster; the first and last by their one neighbour.
+/// Frames 80 ms apart have full weight, closer ones less; the first and the last by their one neighbour.
 #[test]
 fn frames_count_by_the_time_between_them() {
     let (lengths, options) = (SegmentLengths::lee_chen(), LinkOptions::default());
@@ -276,7 +276,7 @@ fn frames_count_by_the_time_between_them() {
     assert_eq!(problem_of(&frames[..1], &lengths, &options).weight(0), 1.0);
 }
 
-/// One of both ankles stands on the ground; an ankle known alone may be above it, and not below.
+/// At least one ankle is at ground level; a single known ankle may be above it, and not below.
 #[test]
 fn the_lower_ankle_stands_on_the_ground() {
     let (lengths, frames) = (SegmentLengths::lee_chen(), timed(&[0.0]));
@@ -289,7 +289,7 @@ fn the_lower_ankle_stands_on_the_ground() {
     assert_eq!(problem.support_cost([f64::NAN, 2.0 * sd]), 0.0);
     assert!((problem.support_cost([-2.0 * sd, f64::NAN]) - 4.0).abs() < 1e-12);
     assert_eq!(problem.support_cost([f64::NAN; 2]), 0.0);
-    // An ankle of a standing foot is 0.17 of the shank above the ground.
+    // The ankle of a supporting foot is 0.17 of the shank above the ground.
     let standing = 0.17 * lengths.to[Joint::LeftAnkle];
     let point = DVec3::new(0.5, 1.2 - standing - 0.25, 3.0);
     assert!((problem.lift_m(Joint::LeftAnkle, point) - 0.25).abs() < 1e-12);
@@ -297,7 +297,7 @@ fn the_lower_ankle_stands_on_the_ground() {
     assert!(problem_of(&frames, &lengths, &nowhere).lift_m(Joint::LeftAnkle, point).is_nan());
 }
 
-/// A mirrored reading costs what its odds say: the margin over the overconfidence of the prior.
+/// Probability of a mirrored reading from its odds: the margin divided by the overconfidence of the prior.
 #[test]
 fn probabilities_are_those_of_the_margins() {
     let alternative = |margin: f64| Alternative { joints: vec![], from: 0, to: 0, figures: vec![], margin };
@@ -315,7 +315,7 @@ fn probabilities_are_those_of_the_margins() {
     assert!((2.0 * path.second.unwrap().margin - surer.second.unwrap().margin).abs() < 1e-9);
 }
 
-/// Seen from any side, also without a direction, the cheaper of a trunk and the turned one is chosen.
+/// From any view, also without a direction, the cheaper of a trunk and its flipped trunk is chosen.
 #[test]
 fn the_cheaper_body_is_chosen_limbs_and_all() {
     for yaw_deg in [0.0, 20.0, 160.0, 180.0_f64] {

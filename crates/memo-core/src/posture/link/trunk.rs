@@ -1,4 +1,4 @@
-//! The trunk of a sequence: shoulders, pelvis and hips.
+//! Links the trunk of a sequence: shoulders, pelvis and hips.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,38 +11,38 @@ use crate::estimate::viterbi::least_path;
 use crate::model::angles::{hip_axes, swing_rad, trunk_axes};
 use crate::model::skeleton::{Joint, PerJoint, RigidDistance, StickFigure};
 
-/// Joints of the trunk in the order of their levels; bit i of a reading is the root of joint i, 1 the farther.
+/// Joints of the trunk in the order of their levels. Bit i of a reading is the root of joint i, 1 the far one.
 const JOINTS: [Joint; 5] =
     [Joint::RightShoulder, Joint::LeftShoulder, Joint::Pelvis, Joint::RightHip, Joint::LeftHip];
 
 /// Number of readings.
 const READINGS: usize = 1 << JOINTS.len();
 
-/// Readings of a frame among which the dynamic program chooses, the least costly ones.
+/// Number of readings of a frame in the dynamic program: those of the smallest cost.
 const KEPT: usize = 8;
 
 /// Share of a usual spread that is constant over a sequence.
 const STEADY_SHARE: f64 = 0.7;
 
-/// What may be mirrored together: one segment, both shoulders, both hips.
+/// Sets of segments that may be mirrored together: one segment, both shoulders, both hips.
 const MASKS: [usize; 7] = [1, 2, 4, 8, 16, 3, 24];
 
-/// What turns a trunk round: shoulders and hips.
+/// The set that flips a trunk: shoulders and hips.
 const TURN: usize = 27;
 
-/// A turned trunk that costs more than so many nats more a second (of at least one) is not tried. On walks
-/// limbs made up for up to 9 nats a second.
+/// Skip flipped trunks that cost more than 20 nats per second (of at least one second) above the best trunk. On
+/// walks the limbs compensated for up to 9 nats per second.
 const WORTH_TRYING_PER_S: f64 = 20.0;
 
 /// The trunk's path.
 pub(super) struct Trunk {
-    /// By how much it costs more than the least costly trunk, nats, limbs apart.
+    /// Cost above that of the best trunk, nats, without limbs.
     pub delta: f64,
-    /// What is turned round against the least costly trunk.
+    /// The set flipped relative to the best trunk.
     pub turn: usize,
     /// Neck and trunk of every frame, smoothed.
     pub smoothed: Vec<StickFigure>,
-    /// Standard deviation of each joint along its ray against its starting joint, metres.
+    /// Standard deviation of each joint along its ray, relative to its starting joint, metres.
     pub sd_m: Vec<PerJoint<f64>>,
     flips: Vec<Flip>,
 }
@@ -55,7 +55,7 @@ struct Reading {
 }
 
 impl Trunk {
-    /// The least costly trunk, and that trunk turned round where limbs may make up for it.
+    /// The trunk of the smallest cost, and the flipped trunk if the limbs may compensate for its cost.
     pub fn link(problem: &Problem) -> Vec<Self> {
         let readings: Vec<[Reading; READINGS]> = (0..problem.frames.len())
             .into_par_iter()
@@ -105,7 +105,7 @@ impl Trunk {
             .collect()
     }
 
-    /// Other readings: what is mirrored, and the joints concerned.
+    /// Other readings: the stretch that is mirrored, and its joints.
     pub fn readings(&self) -> impl Iterator<Item = (Flip, Vec<Joint>)> + '_ {
         self.flips.iter().map(|&flip| (flip, joints_of(flip.mask)))
     }
@@ -117,7 +117,7 @@ pub(super) fn joints_of(mask: usize) -> Vec<Joint> {
     bits.map(|(_, joint)| joint).collect()
 }
 
-/// The readings that cost least, of equal ones the lower.
+/// The readings of the smallest cost; among equal ones, those of lower number.
 fn cheapest(readings: &[Reading; READINGS]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..READINGS).collect();
     order.sort_by(|&a, &b| readings[a].cost.total_cmp(&readings[b].cost));
@@ -166,7 +166,7 @@ impl Problem<'_> {
             .sum()
     }
 
-    /// Twice the cost of how the trunk stands and turns.
+    /// Twice the cost of the trunk's inclination and rotation.
     fn attitude_cost(&self, t: usize, figure: &StickFigure, sd_m: &PerJoint<f64>) -> f64 {
         let Some(axes) = self.reference(figure) else { return 0.0 };
         let prior = &self.options.prior;
@@ -198,7 +198,7 @@ impl Problem<'_> {
         cost
     }
 
-    /// The trunk smoothed over time, with what is usual of it as a further measurement.
+    /// The trunk smoothed over time, with the prior as a further measurement.
     fn smooth_trunk(&self, extents: &[[Measured; 5]]) -> (Vec<StickFigure>, Vec<PerJoint<f64>>) {
         let times_s = self.times_s();
         let mut figures: Vec<StickFigure> = self
@@ -222,7 +222,7 @@ impl Problem<'_> {
             let smoothed = smooth_track(&times_s, &measured, self.options.prior.trunk_acceleration_mps2);
             for (t, figure) in figures.iter_mut().enumerate() {
                 place(figure, joint, self.ray(t, joint), smoothed[t].value);
-                // What is wrong with a whole sequence, such as an unusual lean, smoothing does not lessen.
+                // Smoothing does not reduce deviations that last for the whole sequence, such as an unusual lean.
                 let steady =
                     self.usual_extent(t, joint).map_or(0.0, |usual| usual.sd * self.weight(t).sqrt());
                 sd_m[t][joint] = smoothed[t].sd.max(STEADY_SHARE * steady);
@@ -231,7 +231,7 @@ impl Problem<'_> {
         (figures, sd_m)
     }
 
-    /// How far the neck lies before the line of the shoulders, by the lengths of the rigid torso.
+    /// Distance of the neck in front of the shoulder line, by the lengths of the rigid torso.
     fn neck_forward_m(&self) -> f64 {
         let half = 0.5 * self.lengths.rigid[RigidDistance::Shoulders as usize];
         let to_shoulder =
@@ -239,7 +239,7 @@ impl Problem<'_> {
         (to_shoulder * to_shoulder - half * half).max(0.0).sqrt()
     }
 
-    /// Where a joint of the trunk is expected along its ray from its starting joint, if up and the moving
+    /// Expected position of a joint of the trunk along its ray from its starting joint, if up and the moving
     /// direction are given.
     fn usual_extent(&self, t: usize, joint: Joint) -> Option<Measured> {
         self.options.up.and(self.options.moving_direction)?;
@@ -282,7 +282,7 @@ mod tests {
     use crate::posture::prior::MotionPrior;
     use crate::reproduce::stick_walker::StickWalker;
 
-    /// Somebody upright facing the camera, 4 m away; the trunk of Table A.1, its shoulders behind the neck.
+    /// A person upright facing the camera, 4 m away; the trunk of Table A.1, its shoulders behind the neck.
     fn facing() -> (Vec<LinkFrame>, StickFigure, SegmentLengths, LinkOptions) {
         let walker = StickWalker::lee_chen();
         let figure = walker.posed(0.25, DVec3::ZERO);
@@ -297,7 +297,7 @@ mod tests {
         (frames.collect(), figure, *walker.lengths(), options)
     }
 
-    /// Twice what an attitude costs, without noise.
+    /// Twice the cost of an attitude, without noise.
     fn cost(options: &LinkOptions, figure: &StickFigure) -> f64 {
         let (frames, _, lengths, _) = facing();
         let problem = Problem { frames: &frames, lengths: &lengths, options };
@@ -326,7 +326,7 @@ mod tests {
         assert!((problem.neck_forward_m() - behind_m).abs() < 1e-4);
     }
 
-    /// Hips that face against the torso cost 25 beside what their turn costs.
+    /// Hips that face opposite to the torso cost 25 in addition to their rotation.
     #[test]
     fn hips_that_face_against_the_torso_cost() {
         let (_, figure, _, options) = facing();
@@ -339,14 +339,14 @@ mod tests {
             }
             turned
         };
-        // Both turns are beyond the cap of a turn; the second one is more than a quarter.
+        // Both rotations are beyond the cap; the second one is more than a quarter turn.
         let difference = cost(&options, &turned(175.0)) - cost(&options, &turned(-89.0));
-        // 89 degrees are 4.45 deviations of 20.
+        // 89 degrees are 4.45 standard deviations of 20.
         assert!((difference - 25.0 - (25.0 - 4.45f64.powi(2))).abs() < 1.5, "{difference}");
     }
 
-    /// The usual places of trunk and hips of somebody who faces the camera, along the rays: the pelvis level
-    /// with the neck, shoulders 3.77 cm farther, right and left alike.
+    /// Expected positions of trunk and hips along the rays, for a person who faces the camera: the pelvis level
+    /// with the neck, shoulders 3.77 cm farther, right and left the same.
     #[test]
     fn usual_extents_are_those_of_an_upright_trunk() {
         let (frames, _, lengths, options) = facing();
@@ -356,7 +356,7 @@ mod tests {
         let half = 0.5 * lengths.rigid[RigidDistance::Shoulders as usize];
         let hip = 0.5 * lengths.rigid[RigidDistance::Hips as usize];
         let drop = (lengths.to[Joint::LeftHip].powi(2) - hip * hip).sqrt();
-        // Facing the camera, the person's left is at its right.
+        // Facing the camera, the person's left is on its right.
         for (joint, vector) in [
             (Joint::LeftShoulder, DVec3::new(half, 0.0, 0.0377)),
             (Joint::RightShoulder, DVec3::new(-half, 0.0, 0.0377)),
@@ -366,7 +366,7 @@ mod tests {
         ] {
             assert!(off(joint, vector).abs() < 1e-4, "{joint:?} {}", off(joint, vector));
         }
-        // Frames 40 ms apart count half: spreads grow by the root of two.
+        // Frames 40 ms apart have half the weight: spreads grow by the square root of two.
         let lean = 8f64.to_radians() * lengths.to[Joint::Pelvis];
         assert!((usual(Joint::Pelvis).sd - 2f64.sqrt() * lean).abs() < 1e-9);
         let turn = (8f64.to_radians() * half).hypot(0.02);
@@ -376,7 +376,7 @@ mod tests {
         assert_eq!(problem.usual_extent(0, Joint::Pelvis), None);
     }
 
-    /// What is steady in how a person holds the trunk does not average out over fifty frames.
+    /// Deviations of a person's usual posture do not average out over fifty frames.
     #[test]
     fn a_trunk_stays_as_unsure_as_people_hold_it() {
         let (frames, _, lengths, options) = facing();

@@ -4,7 +4,7 @@ use crate::posture::example::{LEG_M, TRUNK_M, WIDTH_M, seen_along, standing, tur
 use crate::posture::lift::roots;
 use crate::synth::Random;
 
-/// A segment seen aslant, its end noisy.
+/// An oblique segment with a noisy end.
 fn noisy() -> Placed {
     let mut placed = seen_along(&standing(), DVec3::new(0.3, 0.8, 0.5))[Joint::LeftKnee];
     (placed.sd_m, placed.lateral_m) = (0.03, 0.012);
@@ -33,7 +33,7 @@ fn the_noise_of_a_direction_is_the_spread_of_drawn_ends() {
         assert!((placed.direction_sd(towards) - spread).abs() < 0.02 * spread, "{towards} {spread}");
         assert!(placed.direction_sd(towards) <= placed.worst_direction_sd());
     }
-    // The largest of all directions across the segment.
+    // The largest over all directions across the segment.
     let largest = (0..360)
         .map(|deg| DVec3::new(f64::to_radians(deg.into()).cos(), 0.0, f64::to_radians(deg.into()).sin()))
         .map(|towards| placed.direction_sd(towards))
@@ -41,7 +41,7 @@ fn the_noise_of_a_direction_is_the_spread_of_drawn_ends() {
     assert!((placed.worst_direction_sd() - largest).abs() < 1e-4 * largest);
 }
 
-/// Two image points, each off by the noise across the ray, put a segment's ends off by √2 of it.
+/// Two image points with noise across the ray give √2 of it for the ends of a segment.
 #[test]
 fn a_joint_at_a_root_has_the_noise_of_two_image_points() {
     let (start, ray) = (DVec3::new(0.2, -0.1, 4.0), DVec3::new(0.1, 0.05, 1.0).normalize());
@@ -54,7 +54,7 @@ fn a_joint_at_a_root_has_the_noise_of_two_image_points() {
     assert_eq!(placed.sd_m, found.sd_m);
 }
 
-/// What a small displacement of one joint turns the axes of the trunk or of the hips by, radians about x, y, z.
+/// Rotation of the axes of trunk or hips by a small displacement of one joint, radians about x, y, z.
 fn turn_of(displaced: Joint, by: DVec3, axes: fn(&StickFigure) -> Option<DMat3>) -> DVec3 {
     let mut figure = standing();
     let before = axes(&figure).unwrap();
@@ -63,7 +63,7 @@ fn turn_of(displaced: Joint, by: DVec3, axes: fn(&StickFigure) -> Option<DMat3>)
     turn / by.length()
 }
 
-/// The noise of the axes, each displacement on its own, against the turns that the axes themselves make.
+/// The noise of the axes, for each displacement alone, against the rotations of the axes themselves.
 #[test]
 fn the_axes_are_as_noisy_as_their_joints_turn_them() {
     let noise_m = 0.01;
@@ -81,7 +81,7 @@ fn the_axes_are_as_noisy_as_their_joints_turn_them() {
             let sum: DVec3 = turns.map(|turn| turn * turn).sum();
             noise_m * DVec3::new(sum.x.sqrt(), sum.y.sqrt(), sum.z.sqrt())
         };
-        // The pelvis, which turns the trunk's y, and the shoulders, which turn it about y.
+        // The pelvis, which rotates the trunk's y, and the shoulders, which rotate the trunk about y.
         let torso = squares(&[Joint::Pelvis, Joint::RightShoulder, Joint::LeftShoulder], trunk_axes);
         assert!((trunk.torso_sd - torso).abs().max_element() < 1e-6, "{} {torso}", trunk.torso_sd);
         let hips = squares(&[Joint::RightHip, Joint::LeftHip], hip_axes);
@@ -98,7 +98,7 @@ fn trunk_of_quiet() -> Trunk {
     Trunk::of(&PlacedFigure::of(&seen_along(&standing(), DVec3::Z)), &Bearings::default())
 }
 
-/// A direction that was given goes before the face's, and that before the trunk's.
+/// A given direction is used before the face's, and that before the trunk's.
 #[test]
 fn the_moving_direction_is_the_given_one_else_the_faces_else_the_trunks() {
     let placed = seen_along(&standing(), DVec3::Z);
@@ -121,7 +121,7 @@ fn the_moving_direction_is_the_given_one_else_the_faces_else_the_trunks() {
     }
 }
 
-/// Leaning forward, the trunk's own direction upwards is not that of gravity.
+/// If the trunk leans forward, its own upward direction is not that of gravity.
 #[test]
 fn the_vertical_is_the_given_one_else_the_trunks() {
     let leaning = turned(&standing(), Joint::Pelvis, DVec3::new(-0.5, 1.0, 0.0));
@@ -131,7 +131,7 @@ fn the_vertical_is_the_given_one_else_the_trunks() {
     assert!((own.up - DVec3::new(0.5, -1.0, 0.0).normalize()).length() < 1e-12);
     let given = Bearings { up: Some(DVec3::new(0.0, -3.0, 0.0)), ..Bearings::default() };
     assert!((Trunk::of(&figure, &given).up - DVec3::NEG_Y).length() < 1e-12);
-    // The body's plane is that of the trunk: its normal is perpendicular to the spine, not level.
+    // The body's plane is that of the trunk: its normal is perpendicular to the spine, not horizontal.
     let heading = Bearings { heading: Some(DVec3::X), ..given };
     let trunk = Trunk::of(&figure, &heading);
     assert!(trunk.body_normal.dot(DVec3::new(-0.5, 1.0, 0.0)).abs() < 1e-12 && trunk.body_normal.x > 0.8);

@@ -9,7 +9,7 @@ use crate::posture::example::{
 use crate::posture::placed::Bearings;
 use crate::posture::tree::{TreeOptions, explain};
 
-/// The rules that a figure breaks, moving forward, and by what.
+/// The rules that a figure breaks when it moves forward, with the violations.
 fn broken(model: &MotionModel, figure: &StickFigure) -> Vec<Violation> {
     let bearings = Bearings { heading: Some(DVec3::X), ..Bearings::default() };
     let options = TreeOptions {
@@ -29,24 +29,25 @@ fn rules(model: &MotionModel, figure: &StickFigure) -> Vec<Rule> {
     rules.into_iter().map(|rule| Rule::ALL[rule]).collect()
 }
 
-/// A figure whose segments swing forward by so many degrees, by ending joint; the others hang down.
+/// A figure whose segments swing forward by these degrees, by ending joint; the others hang down.
 fn swung(swings_deg: &[(Joint, f64)]) -> StickFigure {
     swings_deg.iter().fold(standing(), |figure, &(end, angle)| turned(&figure, end, forward_deg(angle)))
 }
 
-/// Somebody with the right one of two joints before the body's plane and the left one behind it, by so much.
+/// A person with the right one of two joints in front of the body's plane and the left one behind it, by this
+/// much.
 fn ahead(right: Joint, by_m: f64, swings_deg: &[(Joint, f64)]) -> StickFigure {
     let figure = shifted(&standing(), right, by_m * DVec3::X);
     let figure = shifted(&figure, right.mirrored(), -by_m * DVec3::X);
     swings_deg.iter().fold(figure, |figure, &(end, angle)| turned(&figure, end, forward_deg(angle)))
 }
 
-/// The hips so.
+/// The same for the hips.
 fn hips_ahead(by_m: f64, swings_deg: &[(Joint, f64)]) -> StickFigure {
     ahead(Joint::RightHip, by_m, swings_deg)
 }
 
-/// The shoulders so.
+/// The same for the shoulders.
 fn shoulders_ahead(by_m: f64, swings_deg: &[(Joint, f64)]) -> StickFigure {
     ahead(Joint::RightShoulder, by_m, swings_deg)
 }
@@ -69,10 +70,10 @@ fn one_knee(flexed_deg: f64, lean_deg: f64) -> StickFigure {
     swung(&[(Joint::RightAnkle, -flexed_deg), (Joint::LeftKnee, lean_deg), (Joint::LeftAnkle, lean_deg)])
 }
 
-/// A rule, its tolerance in degrees, and postures that pass the tolerance by some degrees.
+/// A rule, its tolerance in degrees, and postures that exceed the tolerance by some degrees.
 type Row = (Rule, f64, Box<dyn Fn(f64) -> StickFigure>);
 
-/// Of every rule postures on both sides of the body that break it and no other one.
+/// For every rule, postures on both sides of the body that break it and no other rule.
 fn rows(model: &MotionModel) -> Vec<Row> {
     use Joint::{LeftAnkle, LeftElbow, LeftKnee, LeftWrist, RightAnkle, RightElbow, RightKnee, RightWrist};
     let mut rows: Vec<Row> = Vec::new();
@@ -88,7 +89,8 @@ fn rows(model: &MotionModel) -> Vec<Row> {
         add(Rule::ArmsOpposed, Box::new(move |a| both(RightElbow, LeftElbow, a)));
         add(Rule::ArmOpposesLeg, Box::new(move |a| both(RightElbow, RightKnee, a)));
         add(Rule::ArmOpposesLeg, Box::new(move |a| both(LeftKnee, LeftElbow, a)));
-        // Swung back, a thigh with its shank straight down would be a knee bent the wrong way, which no rule forbids.
+        // If the thigh swings back and its shank is straight down, the knee is bent the wrong way, which no rule
+        // forbids.
         add(Rule::LegsOpposed, Box::new(move |a| both(RightKnee, LeftKnee, a)));
     }
     for (end, beyond) in [(RightElbow, RightWrist), (LeftElbow, LeftWrist)] {
@@ -119,7 +121,7 @@ fn rows(model: &MotionModel) -> Vec<Row> {
     for side in Side::BOTH {
         let lean = move |a: f64| swung(&[(side.knee(), a), (side.ankle(), a)]);
         add(Rule::LegsUpright, Box::new(lean));
-        // A thigh forward and a shank back keep the ankle below the hip.
+        // A thigh forward and a shank backward keep the ankle below the hip.
         add(
             Rule::KneesStraight,
             Box::new(move |a| swung(&[(side.knee(), a / 2.0), (side.ankle(), -a / 2.0)])),
@@ -128,14 +130,14 @@ fn rows(model: &MotionModel) -> Vec<Row> {
     rows
 }
 
-/// Right for left.
+/// Right and left exchanged.
 fn mirrored(figure: &StickFigure) -> StickFigure {
     let reflect = |p: DVec3| DVec3::new(p.x, p.y, -p.z);
     PerJoint(Joint::ALL.map(|joint| reflect(figure[joint.mirrored()])))
 }
 
-/// Each rule cuts a posture that no other rule of the model cuts as soon as it passes the tolerance, and no
-/// rule cuts it within.
+/// Each rule cuts a posture that no other rule of the model cuts if it exceeds the tolerance, and no rule cuts it
+/// within the tolerance.
 fn cuts_alone(model: &MotionModel, tolerances_deg: &[(Rule, f64)]) {
     let applying: Vec<Rule> = Rule::ALL.into_iter().filter(|&rule| model.tolerance(rule).is_some()).collect();
     let rows = rows(model);
@@ -191,7 +193,7 @@ fn each_rule_of_other_motions_cuts_what_no_other_rule_cuts() {
     );
 }
 
-/// Rules of the paper alone, since one as tight as printed mostly breaks another one too.
+/// Only rules of the paper, because one as tight as printed mostly breaks another one too.
 #[test]
 fn each_rule_of_the_paper_cuts_beyond_its_tolerance() {
     let paper = MotionModel::walking_paper();
@@ -223,12 +225,12 @@ fn each_rule_of_the_paper_cuts_beyond_its_tolerance() {
     }
 }
 
-/// Rules 1 to 3 forbid a common or an opposite swing, and nothing where the sides are the other way round.
+/// Rules 1 to 3 forbid a common or an opposite swing; the other way round is allowed.
 #[test]
 fn swings_that_a_walker_makes_pass() {
     use Joint::{LeftAnkle, LeftElbow, LeftKnee, LeftWrist, RightAnkle, RightElbow, RightKnee, RightWrist};
     let walking = MotionModel::walking();
-    // Right arm and left leg ahead, by as much as one likes.
+    // Right arm and left leg forward, by any angle.
     let stride = swung(&[
         (RightElbow, 35.0),
         (RightWrist, 50.0),
@@ -240,34 +242,34 @@ fn swings_that_a_walker_makes_pass() {
         (LeftAnkle, 35.0),
     ]);
     assert_eq!(rules(&walking, &stride), []);
-    // Thigh and hip on one side of the body's plane, thigh ahead and shank back.
+    // Thigh and hip on one side of the body's plane, thigh forward and shank backward.
     let hips = hips_ahead(0.05, &[(RightKnee, 25.0), (LeftKnee, -25.0), (LeftAnkle, -60.0)]);
     assert_eq!(rules(&walking, &hips), []);
-    // Hips within the distance may swing against their thighs.
+    // Hips within the distance may swing opposite to their thighs.
     let near = hips_ahead(0.029, &[(RightKnee, -19.0), (RightAnkle, -19.0)]);
     assert_eq!(rules(&walking, &near), []);
     assert_eq!(
         rules(&walking, &hips_ahead(0.031, &[(RightKnee, -19.0), (RightAnkle, -19.0)])),
         [Rule::HipKnee]
     );
-    // One flexed knee beside an upright leg; two little flexed ones beside leaning legs.
+    // One flexed knee with an upright leg; two slightly flexed knees with leaning legs.
     assert_eq!(rules(&walking, &one_knee(60.0, 19.0)), []);
     assert_eq!(rules(&walking, &one_knee(39.0, 25.0)), []);
-    // From 40 degrees on a knee is flexed: with the other leg leaning, at 45 that is not walking.
+    // A knee counts as flexed from 40 degrees: at 45, with the other leg leaning, the posture is not walking.
     assert_eq!(rules(&walking, &one_knee(45.0, 25.0)), [Rule::OtherLegUpright]);
     assert_eq!(rules(&walking, &mirrored(&one_knee(45.0, 25.0))), [Rule::OtherLegUpright]);
     assert_eq!(rules(&walking, &knees(45.0, 45.0)), [Rule::OneKneeFlexed]);
 }
 
-/// What a constraint has against a figure of noisy joints that moves forward.
+/// The violation of a constraint by a figure of noisy joints that moves forward.
 fn against(model: &MotionModel, placed: &PerJoint<Placed>, constraint: Constraint) -> Option<Violation> {
     let figure = PlacedFigure::of(placed);
     let bearings = Bearings { heading: Some(DVec3::X), ..Bearings::default() };
     model.check(constraint, &figure, &Trunk::of(&figure, &bearings))
 }
 
-/// A value is drawn towards 0 by as many standard deviations of its noise as the factor says: displacements
-/// across the rays over the lengths of limb and trunk.
+/// A value is moved towards 0 by `noise_factor` standard deviations of its noise: displacements across the rays
+/// divided by the lengths of limb and trunk.
 #[test]
 fn values_are_drawn_in_by_the_noise_of_limb_and_trunk() {
     use Constraint as C;
@@ -330,7 +332,7 @@ fn values_are_drawn_in_by_the_noise_of_limb_and_trunk() {
             );
             assert_eq!(quiet.limit, noisy.limit);
         }
-        // A leg's line is as long as the leg, and depth alone moves its ends.
+        // The line of a leg is as long as the leg, and its ends move only in depth.
         let leaning = seen_along(&swung(&[(Joint::LeftKnee, 40.0), (Joint::LeftAnkle, 40.0)]), DVec3::X);
         let mut placed = leaning;
         let quiet = against(&model, &placed, C::LegUpright(L)).unwrap();
@@ -340,7 +342,7 @@ fn values_are_drawn_in_by_the_noise_of_limb_and_trunk() {
     }
 }
 
-/// A hip before the body's plane by less than its noise breaks no rule.
+/// A hip in front of the body's plane by less than its noise breaks no rule.
 #[test]
 fn noise_of_the_hip_lets_rule_3_pass() {
     let figure = hips_ahead(0.05, &[(Joint::RightKnee, -30.0), (Joint::RightAnkle, -30.0)]);
@@ -352,8 +354,8 @@ fn noise_of_the_hip_lets_rule_3_pass() {
     }
 }
 
-/// Where the trunk alone tells the moving direction, its noise is in rule 4: shoulders each off by s turn the
-/// line between them by √2 s over its length.
+/// If the moving direction comes from the trunk alone, its noise is in rule 4: if both shoulders are off by s,
+/// the line between them turns by √2 s divided by its length.
 #[test]
 fn a_direction_taken_from_the_trunk_is_as_noisy_as_the_shoulders() {
     let shoulder_m = 0.02;

@@ -17,7 +17,7 @@ pub(super) struct Walk {
     pub times_s: Vec<f64>,
     pub points_px: Vec<PerJoint<DVec2>>,
     pub weights: Vec<PerJoint<f64>>,
-    /// Head points, once drawn.
+    /// Head points, if they were drawn.
     pub head_points_px: Option<Vec<[DVec2; 6]>>,
     pub truth: Vec<StickFigure>,
     /// The direction of the walk in the world.
@@ -30,7 +30,7 @@ impl Walk {
         KeypointSequence { times_s, points_px, weights, head_points_px: self.head_points_px.as_deref() }
     }
 
-    /// The head of a frame as the camera would see it without noise: Table A.2, facing the way.
+    /// The head of a frame as the camera would see it without noise: Table A.2, facing the walking direction.
     pub fn head_px(&self, t: usize) -> [DVec2; 6] {
         let points = HeadModel::lee_chen().points_m;
         let right = self.forward.cross(DVec3::Z);
@@ -46,7 +46,7 @@ impl Walk {
     }
 }
 
-/// The walker of the paper at 1.2 m/s past a level camera, `azimuth_deg` off the direction towards it.
+/// The paper's walker at 1.2 m/s past a level camera, at `azimuth_deg` from the direction towards it.
 pub(super) fn walk(azimuth_deg: f64, frames: usize, noise_px: f64) -> Walk {
     let camera = Camera::level([1920, 1920], 0.9273, 1.2, 5.0).unwrap();
     let walker = StickWalker::lee_chen();

@@ -1,4 +1,4 @@
-//! What one frame allows: its tree, and its surviving postures in groups.
+//! One frame: its tree, and its surviving postures in groups.
 
 use glam::DVec3;
 use thiserror::Error;
@@ -10,17 +10,17 @@ use crate::posture::constraint::Constraint;
 use crate::posture::group::group;
 use crate::posture::tree::{Interpretations, TreeError, TreeOptions, View};
 
-/// Why a frame says nothing.
+/// Why a frame is not used.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FrameProblem {
-    /// Everything hangs on the neck.
+    /// The neck is not seen, and all joints depend on it.
     #[error("the neck is not seen")]
     NeckNotSeen,
-    /// Nor is there a posture without its distance.
+    /// The neck's distance is not known, so there is no posture.
     #[error("the distance of the neck is not known")]
     NoDistance,
-    /// The distance found is less than its standard deviation.
+    /// The distance is smaller than its standard deviation.
     #[error("the distance of the neck is not known: {distance_m:.2} ± {sd_m:.2} m says nothing")]
     VagueDistance {
         /// The distance, metres.
@@ -28,18 +28,18 @@ pub enum FrameProblem {
         /// Its standard deviation, metres.
         sd_m: f64,
     },
-    /// No joint that begins at the neck is seen, so that there is no figure.
+    /// No joint adjacent to the neck is seen, so there is no figure.
     #[error("nothing that hangs on the neck is seen")]
     NeckAlone,
-    /// The tree refuses the view.
+    /// The tree cannot be grown from the view.
     #[error(transparent)]
     Tree(TreeError),
 }
 
-/// Postures that look alike.
+/// A group of similar postures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepresentedGroup {
-    /// The member in their middle, world axes, metres.
+    /// The representative member, world axes, metres.
     pub figure: StickFigure,
     /// Number of members.
     pub size: usize,
@@ -47,16 +47,16 @@ pub struct RepresentedGroup {
     pub diameter_m: f64,
 }
 
-/// What a frame allows.
+/// The postures that a frame allows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameReading {
-    /// The tree: counts of the levels, reasons of the cuts, ways to all survivors and, where there are none,
-    /// the posture nearest to surviving. Its figures are in camera axes.
+    /// The tree: counts per level, reasons for cuts, paths to all survivors and, if there are none, the least
+    /// violating posture. Its figures are in camera axes.
     pub tree: Interpretations,
-    /// Survivors that look alike, largest groups first, at most [`super::SequenceOptions::max_groups`].
+    /// Groups of similar survivors, largest first, at most [`super::SequenceOptions::max_groups`].
     pub groups: Vec<RepresentedGroup>,
-    /// Number of all groups; none where more than [`MOST_GROUPED`] postures survive and the groups are of
-    /// so many of them, evenly spaced.
+    /// Number of all groups; `None` if more than [`MOST_GROUPED`] postures survive. Then the groups are those of
+    /// [`MOST_GROUPED`] evenly spaced survivors.
     pub group_count: Option<usize>,
 }
 
@@ -66,14 +66,14 @@ impl FrameReading {
         self.tree.survivors.len()
     }
 
-    /// Where nothing survives, what the posture nearest to surviving breaks, a sentence each.
+    /// If nothing survives, the violations of the least violating posture, one sentence each.
     pub fn cut_all(&self) -> Option<Vec<String>> {
         let least = self.tree.least_violating.as_ref()?;
         Some(least.violations.iter().map(ToString::to_string).collect())
     }
 }
 
-/// Postures that are grouped; comparing them costs the square of their number.
+/// Maximum number of postures that are grouped; the cost grows with the square of their number.
 pub const MOST_GROUPED: usize = 1024;
 
 /// The tree of a frame and its groups.
@@ -114,7 +114,7 @@ fn groups(scene: &Scene, tree: &Interpretations) -> (Vec<RepresentedGroup>, Opti
         tree.survivors.iter().step_by(step).map(|&path| tree.view.interpretation(path).figure).collect();
     let mut found = group(&figures, scene.options.group_m);
     let count = (step == 1).then_some(found.len());
-    // Stable: groups of one size stay in the order of the walk.
+    // Stable sort: groups of the same size stay in the order of the walk.
     found.sort_by_key(|group| std::cmp::Reverse(group.members.len()));
     let represented = found.iter().take(scene.options.max_groups).map(|group| RepresentedGroup {
         figure: figure_in_world(&figures[group.representative], scene.camera),
@@ -124,20 +124,20 @@ fn groups(scene: &Scene, tree: &Interpretations) -> (Vec<RepresentedGroup>, Opti
     (represented.collect(), count)
 }
 
-/// What one constraint did over the whole sequence.
+/// Number of cuts of one constraint over the whole sequence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReasonTotal {
     /// The constraint; [`Constraint::description`] says what it is.
     pub constraint: Constraint,
     /// The level at which it cuts.
     pub joint: Joint,
-    /// Branches it cut in all frames.
+    /// Number of branches it cut in all frames.
     pub branches: u64,
-    /// Frames in which it cut any.
+    /// Number of frames in which it cut any.
     pub frames: usize,
 }
 
-/// Sums the reasons of all frames, most branches first.
+/// Sums the reasons of all frames, largest number of branches first.
 pub fn reason_totals(frames: &[Result<FrameReading, FrameProblem>]) -> Vec<ReasonTotal> {
     let mut totals: Vec<ReasonTotal> = Constraint::ALL
         .into_iter()
@@ -161,7 +161,7 @@ mod tests {
     use crate::posture::sequence::example::{walk, with_lengths};
     use crate::posture::sequence::{Motion, SequenceOptions};
 
-    /// Seen from the front with much noise thousands of postures are possible, too many to compare all.
+    /// Seen from the front with much noise, thousands of postures are possible, too many to compare all.
     #[test]
     fn the_number_of_groups_is_known_of_few_postures_alone() {
         let walk = walk(0.0, 6, 0.5);
@@ -179,7 +179,7 @@ mod tests {
         assert!(counts.contains(&true) && counts.contains(&false), "{counts:?}");
     }
 
-    /// The tree of a frame has the neck's deviation and that of the lengths about their scale.
+    /// The tree of a frame uses the deviations of the neck and of the lengths for a known scale.
     #[test]
     fn a_frame_knows_how_sure_neck_and_lengths_are() {
         let walk = walk(60.0, 12, 0.5);
@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Reasons of all frames, by a count of our own.
+    /// Reasons of all frames, compared with an independent count.
     #[test]
     fn reasons_add_up_with_the_strongest_first() {
         let walk = walk(60.0, 6, 0.5);

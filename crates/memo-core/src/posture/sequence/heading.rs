@@ -5,21 +5,21 @@ use glam::{DVec2, DVec3};
 use super::Warning;
 use super::neck::{Head, NeckTrack, Scene};
 
-/// From where the moving direction was taken.
+/// Source of the moving direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum HeadingFrom {
-    /// It was given.
+    /// Given by the caller.
     Given,
-    /// The way of the neck over the ground.
+    /// The displacement of the neck on the ground.
     Travel,
-    /// The way the face looks, in each frame.
+    /// The direction the face looks, in each frame.
     Head,
     /// The trunk's forward axis, in each branch of the tree.
     Trunk,
 }
 
 impl HeadingFrom {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Given => "given",
@@ -33,20 +33,20 @@ impl HeadingFrom {
 /// The moving direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
-    /// Level unit vector in the world, one for all frames; none where each frame or branch has its own.
+    /// Horizontal unit vector in world axes, one for all frames; `None` if each frame or branch has its own.
     pub direction: Option<DVec3>,
-    /// From where it was taken.
+    /// Source of the direction.
     pub from: HeadingFrom,
-    /// Distance over the ground from the beginning to the end of the sequence, metres; NaN if not known.
+    /// Displacement on the ground from the beginning to the end of the sequence, metres; NaN if not known.
     pub travelled_m: f64,
 }
 
-/// Standard deviations of the way that are needed before its direction is believed.
+/// The displacement is used if it exceeds this many of its standard deviations.
 const TRAVEL_SIGMAS: f64 = 4.0;
-/// A way that turns by more than this is not straight, degrees.
+/// A path that turns by more than this is not straight, degrees.
 const STRAIGHT_DEG: f64 = 30.0;
 
-/// The direction given, else of the way, else of the faces, else that of the trunk.
+/// The given direction, otherwise that of the displacement, the faces or the trunk, in this order.
 pub(super) fn find(
     scene: &Scene,
     necks: &[DVec3],
@@ -85,7 +85,8 @@ pub(super) fn find(
     Heading { direction: None, from, travelled_m }
 }
 
-/// From the mean place of the first fifth to that of the last, and the standard deviation of its length.
+/// Displacement from the mean position of the first fifth to that of the last, and the standard deviation of its
+/// length.
 fn way(places: &[(DVec2, f64)]) -> Option<(DVec2, f64)> {
     if places.len() < 2 {
         return None;
@@ -97,7 +98,7 @@ fn way(places: &[(DVec2, f64)]) -> Option<(DVec2, f64)> {
     Some((way, sd_m))
 }
 
-/// Whether the second half of the way leads elsewhere than the first.
+/// A warning if the second half of the path has another direction than the first.
 fn turn(places: &[(DVec2, f64)], min_travel_m: f64) -> Option<Warning> {
     let (first, second) = places.split_at(places.len() / 2);
     let [first, second] = [way(first)?.0, way(second)?.0];
@@ -112,7 +113,7 @@ mod tests {
     use crate::posture::sequence::example::{Walk, walk, with_lengths};
     use crate::posture::sequence::{AnchorChoice, SequenceOptions};
 
-    /// Places along straight lines, 10 cm apart: so many in each direction.
+    /// Positions along straight lines, 10 cm apart: this many in each direction.
     fn places(legs: &[(usize, DVec2)]) -> Vec<(DVec2, f64)> {
         let mut at = DVec2::ZERO;
         let steps = legs.iter().flat_map(|&(count, direction)| std::iter::repeat_n(direction, count));
@@ -146,7 +147,7 @@ mod tests {
             if let Some(Warning::Turns { turn_deg: told }) = told {
                 assert!((told - f64::abs(turn_deg)).abs() < 1e-9);
             }
-            // Halves too short to have a direction.
+            // The halves are too short to have a direction.
             assert_eq!(turn(&places, 5.0), None);
         }
     }
@@ -159,7 +160,7 @@ mod tests {
         (found.heading, is_told)
     }
 
-    /// Given before the way, that before the face, that before the trunk.
+    /// The given direction is used first, then displacement, face and trunk.
     #[test]
     fn the_direction_is_taken_from_the_best_source() {
         let mut walk = walk(60.0, 20, 0.2);
@@ -169,16 +170,16 @@ mod tests {
         assert_eq!((found.from, is_told), (HeadingFrom::Travel, false));
         let direction = found.direction.unwrap();
         assert!(direction.dot(walk.forward) > 0.98 && direction.z == 0.0, "{direction}");
-        // 19 frames of 4.8 cm, between the means of four frames at either end.
+        // 19 intervals of 4.8 cm, between the means of four frames at either end.
         assert!((found.travelled_m - 16.0 * 0.048).abs() < 0.15, "{}", found.travelled_m);
-        // Too short a way, or as long as its noise alone makes it.
+        // The displacement is too small, or no larger than its noise.
         for change in
             [|o: &mut SequenceOptions| o.min_travel_m = 3.0, |o: &mut SequenceOptions| o.noise_px = 300.0]
         {
             let (found, is_told) = heading(&walk, change);
             assert_eq!((found.direction, found.from, is_told), (None, HeadingFrom::Trunk, true));
         }
-        // A face in most frames goes before the trunk.
+        // If most frames show a face, it is used before the trunk.
         for (seen, from) in [(12, HeadingFrom::Head), (8, HeadingFrom::Trunk)] {
             let face = |t: usize| if t < seen { walk.head_px(t) } else { [DVec2::NAN; 6] };
             walk.head_points_px = Some((0..20).map(face).collect());
@@ -187,7 +188,7 @@ mod tests {
         }
     }
 
-    /// A distance that is wrong alike in all frames shifts the way and does not bend it.
+    /// An error of the distance that is the same in all frames shifts the path and does not bend it.
     #[test]
     fn an_error_common_to_all_frames_does_not_hide_the_way() {
         let walk = walk(60.0, 20, 0.2);

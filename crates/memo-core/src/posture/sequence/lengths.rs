@@ -1,4 +1,4 @@
-//! Lengths of a sequence: given, or by height and proportions refined by what is seen.
+//! Segment lengths of a sequence: given, or estimated from height and proportions and refined by the images.
 
 use super::{AnchorChoice, SequenceError, SequenceOptions, Warning};
 use crate::model::skeleton::{Joint, SegmentLengths, segment_name};
@@ -10,17 +10,17 @@ use crate::posture::lift::JointRays;
 use crate::posture::sequence::NeckTrack;
 use crate::posture::tree::DEFAULT_LENGTH_SD_M;
 
-/// What a length rests on.
+/// Source of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LengthOrigin {
-    /// It was given.
+    /// Given by the caller.
     Given,
-    /// It was estimated.
+    /// Estimated, with its basis.
     Estimated(LengthBasis),
 }
 
 impl LengthOrigin {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Given => "given",
@@ -31,7 +31,7 @@ impl LengthOrigin {
     }
 }
 
-/// The lengths that were used.
+/// The segment lengths in use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SequenceLengths {
     /// The lengths.
@@ -39,18 +39,18 @@ pub struct SequenceLengths {
     /// Standard deviation of each, the common scale included, metres, in the order of
     /// [`SegmentLengths::named`].
     pub sd_m: Vec<f64>,
-    /// What each rests on, in that order.
+    /// Source of each length, in that order.
     pub origin: Vec<LengthOrigin>,
-    /// Where their scale comes from; none where they were given.
+    /// Source of their scale; `None` if the lengths were given.
     pub scale_from: Option<ScaleFrom>,
     /// Relative standard deviation of the scale.
     pub scale_sd: f64,
-    /// Standard deviation of a segment's length about the scale, median of the 13 segments, metres.
+    /// Standard deviation of a segment's length for a known scale, median of the 13 segments, metres.
     pub own_sd_m: f64,
 }
 
 impl SequenceLengths {
-    /// Where the scale comes from, in a word.
+    /// Source of the scale, as a word for tables.
     pub fn scale_name(&self) -> &'static str {
         match self.scale_from {
             None => "lengths",
@@ -61,7 +61,7 @@ impl SequenceLengths {
         }
     }
 
-    /// What the sources of the neck's distance have to know of these lengths.
+    /// The anchor options for these lengths.
     pub(super) fn anchor_options(&self, options: &AnchorOptions) -> AnchorOptions {
         if self.scale_from.is_none() {
             return *options;
@@ -94,7 +94,7 @@ impl SequenceLengths {
         }
     }
 
-    /// Proportions alone. Limbs of people of one height differ by some 8 %.
+    /// From proportions alone. Limbs of people of the same height differ by some 8 %.
     fn of_prior(prior: &LengthPrior) -> Self {
         const SPREAD: f64 = crate::posture::length::SPREAD[0];
         let relative = SPREAD.hypot(prior.scale_sd);
@@ -112,10 +112,10 @@ impl SequenceLengths {
     }
 }
 
-/// Lengths given; or from the height, or an assumed one, refined by the sequence.
+/// The given lengths; or lengths from the given or assumed height, refined by the sequence.
 ///
-/// Given distances tell the scale of unknown lengths, and so does the ground, unless the neck is to be found
-/// from trunk or head alone: who asks for these does not trust the ground.
+/// The scale of unknown lengths comes from given distances or from the ground. The ground is not used if the
+/// caller chose trunk or head as the only source of the neck's distance, because then the ground is not trusted.
 pub(super) fn find(
     rays: &[JointRays],
     ground: Option<&Ground>,
@@ -153,11 +153,11 @@ pub(super) fn find(
     }
 }
 
-/// Reports segments that look longer than they are wherever the person stands.
+/// Warns of segments that look longer than they can be at any position of the person.
 ///
-/// A starting joint is at least as far from the camera as the neck less the segments between them, so with
-/// the neck three standard deviations nearer and three of noise the segment's ray passes it at the least
-/// distance that can be; where that exceeds the length, no depth has a posture.
+/// A starting joint is at least as far from the camera as the neck less the segments between them. With the neck
+/// three standard deviations nearer, and three standard deviations of noise, the segment's ray passes it at the
+/// smallest possible distance. If this distance exceeds the length, no depth gives a posture.
 pub(super) fn impossible(
     rays: &[JointRays],
     neck: &NeckTrack,
@@ -211,7 +211,7 @@ mod tests {
     use crate::posture::sequence::NeckFrom;
     use crate::posture::sequence::example::{walk, with_lengths};
 
-    /// A fit whose segments have a scale known to 5 % and 2 cm of their own.
+    /// A fit of segments with a scale known to 5 % and a standard deviation of 2 cm each.
     fn fit() -> LengthFit {
         let lengths = SegmentLengths::lee_chen();
         let estimate = |(segment, length_m): (String, f64)| LengthEstimate {
@@ -235,7 +235,7 @@ mod tests {
     fn the_scale_is_apart_from_what_each_length_has_of_its_own() {
         let fitted = SequenceLengths::fitted(&fit());
         assert!((fitted.own_sd_m - 0.02).abs() < 1e-12, "{}", fitted.own_sd_m);
-        // The sources of the neck's distance get the scale of the lengths, and their own deviation.
+        // The anchor options get the standard deviations of the scale and of single lengths.
         let options = AnchorOptions { scale_sd: 0.01, length_sd: 0.001, ..AnchorOptions::default() };
         let told = fitted.anchor_options(&options);
         assert_eq!(told.scale_sd, 0.05);
@@ -251,7 +251,7 @@ mod tests {
         assert_eq!(given.own_sd_m, 0.005);
     }
 
-    /// Of an adult of assumed height: 6 % of scale and 8 % of each limb.
+    /// For an adult of assumed height: 6 % for the scale and 8 % for each limb.
     #[test]
     fn proportions_alone_are_as_unsure_as_people_differ() {
         let prior = LengthPrior::from_height(None).unwrap();
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!((names, LengthOrigin::Given.name()), (["measured", "other_side", "proportions"], "given"));
     }
 
-    /// Where no frame shows the legs the ground tells no distance, but the trunk does.
+    /// If no frame shows the legs, the ground gives no distance, but the trunk does.
     #[test]
     fn without_feet_on_the_ground_the_trunk_tells_the_lengths() {
         let mut walk = walk(45.0, 30, 0.5);
@@ -298,7 +298,7 @@ mod tests {
         assert!(!is_told, "{:?}", found.warnings);
         assert_eq!(found.lengths.scale_name(), "height");
         assert!(found.lengths.origin.contains(&LengthOrigin::Estimated(LengthBasis::Measured)));
-        // Asked for the trunk or the head, nobody trusts the ground, even with feet on it.
+        // With trunk or head as the only source the ground is not used, even if feet are on it.
         let walk = walk_with_feet();
         for source in [AnchorSource::Trunk, AnchorSource::Head] {
             let anchor = AnchorChoice::Source(source);
@@ -316,8 +316,8 @@ mod tests {
         walk
     }
 
-    /// A forearm seen at the angle that its length makes at the least distance it can be at: one shoulder and
-    /// one upper arm before the neck, that three standard deviations nearer than found.
+    /// A forearm seen at the angle that its length has at the smallest possible distance: one shoulder and one
+    /// upper arm in front of the neck, which is three standard deviations nearer than found.
     #[test]
     fn a_segment_is_too_short_only_at_the_nearest_it_can_be() {
         let lengths = SequenceLengths::given(SegmentLengths::lee_chen(), 0.0);

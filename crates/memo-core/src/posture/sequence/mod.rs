@@ -1,13 +1,13 @@
-//! Postures of a sequence of keypoints, from pixels to the world: the stages of [`super`] in order.
+//! Postures of a sequence of keypoints, from pixels to world coordinates: the stages of [`super`] in order.
 //!
-//! [`postures`] reads as numbered steps; each stage is a module of its own and can be called without this one.
-//! The interpretation tree of every frame is grown and pruned (Lee and Chen 1985, sections 2.2-3.4), and one
-//! posture a frame is chosen by linking over time.
+//! [`postures`] reads as numbered steps. Each stage is a module that can be called alone. The interpretation tree
+//! of every frame is grown and pruned (Lee and Chen 1985, sections 2.2-3.4), and one posture per frame is chosen
+//! by linking over time.
 //!
-//! The limits: one person; left and right as given (repair them before, [`crate::keypoints::unswap`]); a
-//! camera that stands still, calibrated against the vertical. Rules and the prior of walking are of
-//! straight-line walking forwards. Weights say which joints count as seen; all that are seen get the same
-//! noise, for scores of detectors are no standard deviations.
+//! Limits: one person; left and right as given (correct swapped labels first with [`crate::keypoints::unswap`]);
+//! a camera that does not move and is calibrated against the vertical. The rules and the prior of walking are for
+//! forward walking on a straight line. Weights decide which joints count as seen. All seen joints get the same
+//! noise, because scores of detectors are not standard deviations.
 
 #[cfg(test)]
 mod example;
@@ -45,73 +45,74 @@ pub use warning::Warning;
 pub struct KeypointSequence<'a> {
     /// Times of the frames, seconds, increasing.
     pub times_s: &'a [f64],
-    /// Joints of each frame, pixels as the lens shows them; NaN: missing.
+    /// Joints of each frame, distorted pixels as in the image; NaN: missing.
     pub points_px: &'a [PerJoint<DVec2>],
     /// Weight of each joint, 0 to 1.
     pub weights: &'a [PerJoint<f64>],
-    /// The six points of the head in the order of [`crate::posture::head::HeadPoint::ALL`], pixels; NaN: missing.
+    /// The six points of the head in the order of [`crate::posture::head::HeadPoint::ALL`], distorted pixels;
+    /// NaN: missing.
     pub head_points_px: Option<&'a [[DVec2; 6]]>,
 }
 
-/// Why there are no postures.
+/// Why no postures were found.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SequenceError {
-    /// No frames.
+    /// There are no frames.
     #[error("there are no frames")]
     Empty,
-    /// Lists do not go together.
+    /// Two lists have different lengths.
     #[error("as many {what} as times ({frames}) are needed, got {got}")]
     Counts {
         /// Number of times.
         frames: usize,
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Its length.
         got: usize,
     },
-    /// A time does not follow the one before.
+    /// The times do not increase.
     #[error(
         "times must be finite and increase: frame {frame} is at {time_s} s, the one before at {before_s} s"
     )]
     Times {
-        /// The frame.
+        /// Number of the frame.
         frame: usize,
-        /// Its time.
+        /// Its time, seconds.
         time_s: f64,
-        /// The time before.
+        /// Time of the frame before, seconds.
         before_s: f64,
     },
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// The moving direction has no level part.
+    /// The moving direction has no horizontal component.
     #[error("moving_direction must be finite and not vertical, got {value}")]
     Direction {
-        /// The vector.
+        /// The direction given.
         value: DVec3,
     },
-    /// The head was asked for and there are no head points.
+    /// The head is the source of the neck's distance, and there are no head points.
     #[error("the neck's distance from the head needs its six points (neck, nose, eyes, ears)")]
     NoHeadPoints,
-    /// No frame gives the neck's place.
+    /// No frame gives the neck's position.
     #[error("no frame gives the neck's distance: {}{}", listed(reasons), also(warnings))]
     NoNeck {
-        /// Why not, each source for itself.
+        /// The error of each source.
         reasons: Vec<AnchorError>,
-        /// What had been noticed before.
+        /// Warnings up to that point.
         warnings: Vec<Warning>,
     },
-    /// The camera is not usable.
+    /// The camera is not valid.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// Lengths or height are not usable.
+    /// Lengths or height are not valid.
     #[error(transparent)]
     Length(#[from] LengthError),
     /// The frames cannot be linked.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// Somebody wished it to end.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -124,39 +125,40 @@ fn also(warnings: &[Warning]) -> String {
     if warnings.is_empty() { String::new() } else { format!("; noticed before: {}", listed(warnings)) }
 }
 
-/// What was found in a sequence. Figures are in world axes, metres, Z up.
+/// Postures of a sequence. Figures are in world axes, metres, Z up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PostureSequence {
-    /// Lengths of the segments and what they rest on.
+    /// Segment lengths and their sources.
     pub lengths: SequenceLengths,
     /// Distance of the neck in each frame.
     pub neck: NeckTrack,
     /// The moving direction.
     pub heading: Heading,
-    /// What each frame alone allows, or why it says nothing.
+    /// The postures that each frame alone allows, or why the frame cannot be used.
     pub frames: Vec<Result<FrameReading, FrameProblem>>,
-    /// One posture a frame, its figures in world axes; its `sd_m` is along the camera's rays and against the
+    /// One posture per frame, its figures in world axes. Its `sd_m` is along the camera's rays, relative to the
     /// starting joint.
     pub linked: LinkedPath,
-    /// Constraints that the linked posture of each frame breaks. Linking takes both roots of every segment
-    /// with limits that may be passed at a price, not the survivors of a frame alone.
+    /// Constraints that the linked posture of each frame breaks. Linking considers both roots of every segment,
+    /// with soft limits, and not only the postures that survive the tree of a frame.
     pub linked_breaks: Vec<Vec<Constraint>>,
-    /// Standard deviation of each joint's place in `linked.figures`, metres: noise, lengths and the neck's
-    /// distance. That a root is the wrong one is not in it. NaN where the joint is unknown.
+    /// Standard deviation of each joint's position in `linked.figures`, metres: from noise, lengths and the
+    /// neck's distance. It does not contain the error of choosing the wrong root. NaN if the joint is unknown.
     pub sd_m: Vec<PerJoint<f64>>,
-    /// What a reader should know before trusting the rest.
+    /// Reasons to doubt the results.
     pub warnings: Vec<Warning>,
 }
 
 /// Finds the postures of a sequence.
 ///
-/// A frame without a neck says nothing and takes nothing from the others ([`FrameProblem`]); a missing joint
-/// leaves what hangs on it unknown. The number of threads changes nothing.
+/// A frame without a neck position is not used and does not affect the others ([`FrameProblem`]). If a joint is
+/// missing, the joints beyond it on the limb are unknown too. The result does not depend on the number of
+/// threads.
 ///
 /// # Errors
 ///
-/// Lists of different lengths, times that do not increase, options out of range, and a sequence in which no
-/// frame gives the neck's distance.
+/// An error for lists of different lengths, times that do not increase, options out of range, and a sequence in
+/// which no frame gives the neck's distance.
 pub fn postures(
     sequence: &KeypointSequence,
     camera: &Camera,
@@ -165,18 +167,19 @@ pub fn postures(
     postures_with_progress(sequence, camera, options, &Progress::new())
 }
 
-/// [`postures`], counting frames in `progress`: once for the neck, once for the tree, once for the link.
+/// [`postures`] with progress and cancellation. Every frame is counted three times: for the neck, the tree and
+/// the link.
 ///
 /// # Errors
 ///
-/// Those of [`postures`], and [`SequenceError::Stopped`].
+/// Those of [`postures`], and [`SequenceError::Stopped`] if the call is cancelled.
 pub fn postures_with_progress(
     sequence: &KeypointSequence,
     camera: &Camera,
     options: &SequenceOptions,
     progress: &Progress,
 ) -> Result<PostureSequence, SequenceError> {
-    // 1. Check what came; rays through the lens.
+    // 1. Check the input; rays through the lens.
     check(sequence, options)?;
     progress.expect(3 * sequence.times_s.len());
     let camera = camera.clone().validated()?;
@@ -194,7 +197,7 @@ pub fn postures_with_progress(
     lengths::impossible(&rays, &neck, &lengths, &mut warnings);
     // 4. The moving direction.
     let heading = heading::find(&scene, &necks, &neck, &heads, &mut warnings);
-    // 5. What every frame allows.
+    // 5. The postures that every frame allows.
     let tree = options.motion.tree(options.strength);
     let trees: Vec<TreeOptions> = heads
         .iter()
@@ -205,10 +208,10 @@ pub fn postures_with_progress(
         Ok(frame::read(&scene, &trees[t], &neck, necks[t], t))
     };
     let frames = (0..rays.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
-    // 6. One of them a frame.
+    // 6. One posture per frame.
     let linked = link_frames(&scene, &heading, &necks, &frames, progress)?;
     let sd_m = uncertainty(&scene, &neck, &linked);
-    // 7. What casts doubt on it.
+    // 7. Reasons to doubt the results.
     let linked_breaks = broken(&trees, &frames, &linked);
     let found = warning::Found {
         trees: &trees,
@@ -223,7 +226,7 @@ pub fn postures_with_progress(
     Ok(PostureSequence { lengths, neck, heading, frames, linked, linked_breaks, sd_m, warnings })
 }
 
-/// What the linked posture of each frame breaks; figures in camera axes.
+/// Constraints that the linked posture of each frame breaks; figures in camera axes.
 fn broken(
     trees: &[TreeOptions],
     frames: &[Result<FrameReading, FrameProblem>],
@@ -272,13 +275,13 @@ fn check(sequence: &KeypointSequence, options: &SequenceOptions) -> Result<(), S
     Ok(())
 }
 
-/// Noise moves a point at the picture's edge so many of its standard deviations beyond.
+/// Points may leave the image by this many standard deviations of the noise.
 const BEYOND_SIGMAS: f64 = 3.0;
-/// Share of points outside the picture that is worth a warning: some detectors guess joints that the edge cuts off.
+/// Share of points outside the image that gives a warning: some detectors guess joints outside the image.
 const CONSIDERABLE_BEYOND: f64 = 0.05;
 
-/// Rays of all frames. Joints of little or no weight, at infinity or where no lens images anything are
-/// missing.
+/// Rays of all frames. Joints are missing if their weight is below the minimum or unknown, if they are not
+/// finite, or if the lens maps nothing to that point.
 fn rays(
     sequence: &KeypointSequence,
     camera: &Camera,
@@ -299,7 +302,7 @@ fn rays(
             }
             given += 1;
             beyond += usize::from(pixel.cmplt(lowest_px).any() || pixel.cmpgt(highest_px).any());
-            // Not `weight < min_weight`: an unknown weight (NaN) is none.
+            // Not `weight < min_weight`: an unknown weight (NaN) counts as too small.
             if weight.is_nan() || weight < options.min_weight {
                 light += 1;
             } else if let Some(ideal_px) =
@@ -346,7 +349,7 @@ fn link_frames(
         prior: scene.options.motion.prior(),
         up: Some(scene.up()),
         ground: scene.ground,
-        // Anybody may move sideways: the prior of any motion is against the trunk's own direction.
+        // Without a motion, people may move sideways: the prior is relative to the trunk's own direction.
         moving_direction: heading
             .direction
             .filter(|_| scene.options.motion.needs_heading())
@@ -356,7 +359,7 @@ fn link_frames(
     link_with_progress(&link_frames, &scene.lengths.lengths, &options, progress)
 }
 
-/// Standard deviations of the joints of the smoothed figures, as if each frame stood alone.
+/// Standard deviations of the joints of the smoothed figures, with each frame on its own.
 fn uncertainty(scene: &neck::Scene, neck: &NeckTrack, linked: &LinkedPath) -> Vec<PerJoint<f64>> {
     let lengths = scene.lengths;
     let own_sd_m = |sd_m: f64, length_m: f64| {
@@ -380,13 +383,13 @@ fn uncertainty(scene: &neck::Scene, neck: &NeckTrack, linked: &LinkedPath) -> Ve
     (0..linked.smoothed.len()).into_par_iter().map(of_frame).collect()
 }
 
-/// A figure of camera axes (x right, y down, z forward) in those of the world (z up), metres.
+/// A figure of camera axes (x right, y down, z forward) in world axes (z up), metres.
 pub fn figure_in_world(figure_in_camera: &StickFigure, camera: &Camera) -> StickFigure {
     let world_from_camera = camera.rotation.transpose();
     PerJoint(figure_in_camera.0.map(|point| world_from_camera * (point - camera.translation)))
 }
 
-/// A figure of world axes (z up) in those of the camera (x right, y down, z forward), metres.
+/// A figure of world axes (z up) in camera axes (x right, y down, z forward), metres.
 pub fn figure_in_camera(figure_in_world: &StickFigure, camera: &Camera) -> StickFigure {
     PerJoint(figure_in_world.0.map(|point| camera.camera_from_world(point)))
 }

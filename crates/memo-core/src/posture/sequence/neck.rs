@@ -1,4 +1,4 @@
-//! Distance of the neck in every frame, from the sources that were asked for, followed over time.
+//! Distance of the neck in every frame, from the chosen sources, filtered over time.
 
 use crate::wording::counted;
 use std::collections::BTreeMap;
@@ -22,11 +22,11 @@ use crate::posture::lift::JointRays;
 use crate::posture::placed::Bearings;
 use crate::progress::{Progress, Stopped};
 
-/// What all stages look at.
+/// Input of all stages.
 pub(super) struct Scene<'a> {
     pub sequence: &'a KeypointSequence<'a>,
     pub camera: &'a Camera,
-    /// None where the camera is not above the ground.
+    /// `None` if the camera is not above the ground.
     pub ground: Option<Ground>,
     pub rays: &'a [JointRays],
     pub lengths: &'a SequenceLengths,
@@ -39,7 +39,7 @@ impl Scene<'_> {
         self.camera.rotation.z_axis
     }
 
-    /// Vertical, moving direction (given in the world) and head of a frame, camera axes.
+    /// Vertical, moving direction (given in world axes) and head of a frame, in camera axes.
     pub fn bearings(&self, moving_direction: Option<DVec3>, head: Option<&Head>) -> Bearings {
         Bearings {
             up: Some(self.up()),
@@ -49,19 +49,20 @@ impl Scene<'_> {
     }
 }
 
-/// From where the distance of a frame was taken.
+/// Source of the distance of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum NeckFrom {
-    /// Its own image, by this source, and its neighbours.
+    /// The frame's own image, by this source, and the neighbouring frames.
     Source(AnchorSource),
-    /// Its neighbours alone: it gives none, or was not asked, as most frames of long sequences.
+    /// Only the neighbouring frames: the image gives none, or was not evaluated, as in most frames of long
+    /// sequences.
     Neighbours,
-    /// There is none.
+    /// No distance.
     Nothing,
 }
 
 impl NeckFrom {
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Source(source) => source.name(),
@@ -71,18 +72,18 @@ impl NeckFrom {
     }
 }
 
-/// Two sources that contradict each other in some frames.
+/// Two sources that disagree in some frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SourceConflict {
     /// The sources.
     pub sources: [AnchorSource; 2],
-    /// Frames in which they contradict each other.
+    /// Number of frames in which they disagree.
     pub frames: usize,
-    /// Frames with several sources.
+    /// Number of frames with several sources.
     pub of: usize,
     /// Medians of their distances in these frames, metres.
     pub distances_m: [f64; 2],
-    /// Median of the difference over its standard deviation.
+    /// Median of the difference divided by its standard deviation.
     pub sigmas: f64,
 }
 
@@ -100,27 +101,29 @@ impl fmt::Display for SourceConflict {
     }
 }
 
-/// The neck over the sequence.
+/// The neck's distance over the sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeckTrack {
-    /// Distance along the neck's ray, metres; NaN where it is not known.
+    /// Distance along the neck's ray, metres; NaN if it is not known.
     pub distance_m: Vec<f64>,
     /// Its standard deviation, metres.
     pub sd_m: Vec<f64>,
-    /// What it rests on.
+    /// Source of each distance.
     pub from: Vec<NeckFrom>,
-    /// Distance and standard deviation, metres, that were found and are not used: the second exceeds the first.
+    /// Distances that are too uncertain to use, with standard deviation, metres: the deviation exceeds the
+    /// distance.
     pub vague: Vec<Option<[f64; 2]>>,
-    /// Sources that contradict each other.
+    /// Sources that disagree.
     pub conflicts: Vec<SourceConflict>,
-    /// The part of `sd_m` that all frames share, metres.
+    /// The part of `sd_m` common to all frames, metres.
     pub common_sd_m: f64,
     /// The part of `sd_m` that is due to the scale of the lengths, relative to the distance.
     pub scale_sd: f64,
 }
 
 impl NeckTrack {
-    /// The neck of each frame, camera axes, metres; NaN where it is not seen or its distance is not known.
+    /// Position of the neck in each frame, camera axes, metres; NaN if it is not seen or its distance is not
+    /// known.
     pub fn places(&self, rays: &[JointRays]) -> Vec<DVec3> {
         let place = |(rays, &distance_m): (&JointRays, &f64)| match distance_m > 0.0 {
             true => rays.ray[Joint::Neck] * distance_m,
@@ -129,7 +132,7 @@ impl NeckTrack {
         rays.iter().zip(&self.distance_m).map(place).collect()
     }
 
-    /// A distance smaller than its standard deviation is none.
+    /// Removes distances that are smaller than their standard deviation.
     fn without_vague(mut self) -> Self {
         for t in 0..self.distance_m.len() {
             let found = [self.distance_m[t], self.sd_m[t]];
@@ -149,17 +152,17 @@ pub(super) struct Head {
     /// The neck's distance, metres, and its standard deviation.
     distance_m: f64,
     sd_m: f64,
-    /// Axes x forward, y down, z left in camera axes, where the facing is known well.
+    /// Axes x forward, y down, z left in camera axes, if the facing direction is certain enough.
     pub axes: Option<DMat3>,
 }
 
-/// Relative standard deviation of the size of heads of people of one height, and of where a detector puts
-/// nose, eyes and ears on them.
+/// Relative standard deviation of the size of the head between people of the same height, including where a
+/// detector puts nose, eyes and ears.
 const HEAD_SIZE_SD: f64 = 0.05;
-/// A facing less certain than this decides nothing, radians: 10 degrees, of limits of 40 to 70.
+/// A facing direction with a larger standard deviation is not used, radians: 10 degrees, with limits of 40 to 70.
 const FACING_SD_RAD: f64 = 0.175;
 
-/// The heads of all frames that show one.
+/// The heads of the frames that show one.
 pub(super) fn heads(scene: &Scene) -> Vec<Option<Head>> {
     let frames = scene.sequence.times_s.len();
     let Some(points_px) = scene.sequence.head_points_px else { return vec![None; frames] };
@@ -178,13 +181,13 @@ pub(super) fn heads(scene: &Scene) -> Vec<Option<Head>> {
     points_px.par_iter().map(head).collect()
 }
 
-/// The body height that goes with segment lengths by the proportions of Table A.1.
+/// The body height that has these segment lengths by the proportions of Table A.1.
 fn height_m(lengths: &SegmentLengths) -> f64 {
     let legs = |l: &SegmentLengths| l.to[Joint::RightKnee] + l.to[Joint::RightAnkle];
     LEE_CHEN_BODY_HEIGHT_M * legs(lengths) / legs(&SegmentLengths::lee_chen())
 }
 
-/// The neck over all poses by their probabilities, the facing of the only one.
+/// The neck over all poses, weighted by their probabilities; the facing direction only if there is one pose.
 fn head_of(found: &Resection, model: &HeadModel) -> Head {
     let mut total = 0.0;
     let mut sums = [0.0; 2];
@@ -205,16 +208,16 @@ fn head_of(found: &Resection, model: &HeadModel) -> Head {
     Head { distance_m, sd_m, axes: is_certain.then(|| DMat3::from_cols(x, y, z)) }
 }
 
-/// What one frame says about the neck's distance.
+/// The neck's distance from one frame.
 struct FrameAnchor {
-    /// Or why each source that was asked gives none.
+    /// The anchor, or the error of each source that was evaluated.
     anchor: Result<Anchor, Vec<AnchorError>>,
     conflicts: Vec<Conflict>,
-    /// Whether several sources were there.
+    /// True if several sources were combined.
     is_combined: bool,
 }
 
-/// The neck's distance over the sequence. `warnings` go with the reasons if no frame gives it.
+/// The neck's distance over the sequence. If no frame gives it, the error contains the reasons and `warnings`.
 pub(super) fn track(
     scene: &Scene,
     heads: &[Option<Head>],
@@ -236,7 +239,7 @@ pub(super) fn track(
     found.map_err(no_neck).map(NeckTrack::without_vague)
 }
 
-/// From the images, each frame alone.
+/// Anchors from the images, each frame alone.
 fn anchors(
     scene: &Scene,
     heads: &[Option<Head>],
@@ -252,7 +255,7 @@ fn anchors(
     asked.par_iter().enumerate().map(anchor).collect()
 }
 
-/// All frames together.
+/// Filters all frames together.
 fn over_time(scene: &Scene, asked: &[usize], found: Vec<FrameAnchor>) -> Result<NeckTrack, Vec<AnchorError>> {
     let times_s = scene.sequence.times_s;
     let conflicts = conflicts(&found);
@@ -283,12 +286,12 @@ fn over_time(scene: &Scene, asked: &[usize], found: Vec<FrameAnchor>) -> Result<
     })
 }
 
-/// Up to so many frames each one is asked; of longer sequences one each [`ANCHOR_INTERVAL_S`].
+/// Every frame is evaluated up to this number; longer sequences have one evaluation per [`ANCHOR_INTERVAL_S`].
 const ALL_ASKED: usize = 500;
-/// Postures, and with them the errors of the sources, are alike within a fraction of a step, seconds.
+/// Postures, and with them the errors of the sources, are similar within a fraction of a step, seconds.
 const ANCHOR_INTERVAL_S: f64 = 0.2;
 
-/// Frames whose images are asked for the neck's distance, ascending, the first and the last among them.
+/// Frames whose images are evaluated for the neck's distance, ascending, including the first and the last.
 fn asked(times_s: &[f64]) -> Vec<usize> {
     if times_s.len() <= ALL_ASKED {
         return (0..times_s.len()).collect();
@@ -304,7 +307,7 @@ fn asked(times_s: &[f64]) -> Vec<usize> {
     asked
 }
 
-/// Values at all times from those at some, ascending, the first and the last among them; linear between.
+/// Linear interpolation from some times to all. Times ascend; the first and the last are known.
 fn interpolated(times_s: &[f64], known_s: &[f64], known: &[f64]) -> Vec<f64> {
     let at = |&time_s: &f64| {
         let after = known_s.partition_point(|&s| s < time_s).min(known_s.len() - 1);
@@ -316,7 +319,7 @@ fn interpolated(times_s: &[f64], known_s: &[f64], known: &[f64]) -> Vec<f64> {
     times_s.iter().map(at).collect()
 }
 
-/// What frames say alike, once, in the order in which they came.
+/// Each distinct error once, in order of first occurrence.
 fn told_once(errors: Vec<AnchorError>) -> Vec<AnchorError> {
     let mut once: Vec<AnchorError> = Vec::new();
     for error in errors {
@@ -333,7 +336,7 @@ fn told_once(errors: Vec<AnchorError>) -> Vec<AnchorError> {
     once
 }
 
-/// Known distances are taken as they are.
+/// Given distances are used unchanged.
 fn given(rays: &[JointRays], distance_m: &[f64], sd_m: f64) -> Result<NeckTrack, Vec<AnchorError>> {
     let distance = |t: usize| distance_m[t.min(distance_m.len() - 1)];
     let mut errors = Vec::new();
@@ -358,7 +361,7 @@ fn given(rays: &[JointRays], distance_m: &[f64], sd_m: f64) -> Result<NeckTrack,
     })
 }
 
-/// One frame: the source that was asked for, or those that the frame gives together.
+/// The anchor of one frame: from the chosen source, or combined from the sources that the frame allows.
 fn frame_anchor(
     scene: &Scene,
     options: &AnchorOptions,
@@ -424,7 +427,7 @@ fn from_head(rays: &JointRays, head: Option<&Head>) -> Result<Anchor, AnchorErro
     })
 }
 
-/// Conflicts of all frames by the pairs of their sources.
+/// Conflicts of all frames, by pairs of sources.
 fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
     let of = found.iter().filter(|frame| frame.is_combined).count();
     let mut pairs: BTreeMap<[AnchorSource; 2], Vec<&Conflict>> = BTreeMap::new();
@@ -461,7 +464,7 @@ mod tests {
         assert_eq!(super::asked(&times_s[..500]).len(), 500);
     }
 
-    /// The height that goes with lengths a tenth longer than the paper's is a tenth more.
+    /// If lengths are a tenth longer than the paper's, the height is a tenth larger.
     #[test]
     fn taller_legs_are_of_taller_people() {
         let mut lengths = SegmentLengths::lee_chen();
@@ -469,7 +472,7 @@ mod tests {
         assert!((height_m(&lengths) - 1.1 * 1.608).abs() < 1e-12);
     }
 
-    /// A head seen without noise: where its neck is and which way it faces, and that it says so.
+    /// A head seen without noise: position of the neck and facing direction, both certain.
     #[test]
     fn a_head_has_the_neck_and_the_facing_that_it_was_drawn_with() {
         let mut walk = walk(60.0, 3, 0.0);
@@ -492,14 +495,14 @@ mod tests {
             let head = head.unwrap();
             let truth_m = walk.camera.camera_from_world(walk.truth[t][Joint::Neck]).length();
             assert!((head.distance_m - truth_m).abs() < 1e-6, "{} {truth_m}", head.distance_m);
-            // A head of 20 cm at 5 m: some centimetres for a pixel.
+            // A head of 20 cm at 5 m: some centimetres per pixel.
             assert!((0.01..0.5).contains(&head.sd_m), "{}", head.sd_m);
             let axes = head.axes.unwrap();
             let expected = [walk.forward, DVec3::NEG_Z, DVec3::Z.cross(walk.forward)];
             for (axis, expected) in [axes.x_axis, axes.y_axis, axes.z_axis].into_iter().zip(expected) {
                 assert!((axis - walk.camera.rotation * expected).length() < 1e-6, "{axis} {expected}");
             }
-            // What the rules are told: the vertical, the direction and the face.
+            // Bearings for the rules: the vertical, the direction and the face.
             let bearings = scene.bearings(Some(walk.forward), Some(&head));
             assert_eq!(bearings.up, Some(walk.camera.rotation * DVec3::Z));
             assert_eq!(bearings.heading, Some(walk.camera.rotation * walk.forward));
@@ -507,7 +510,7 @@ mod tests {
         }
     }
 
-    /// Two poses of a head 4 and 5 m away, one three times as probable: mean, and spread between and within.
+    /// Two poses of a head 4 and 5 m away, one three times as probable: mean, and variance between and within.
     #[test]
     fn several_poses_of_a_head_are_one_distance_with_their_spread() {
         let camera = Camera::level([1280, 720], 1.0, 1.2, 4.0).unwrap();
@@ -532,12 +535,12 @@ mod tests {
         far.translation.z += 1.0;
         let two = head_of(&Resection { poses: vec![near, far], minima: 2 }, &model);
         assert!((two.distance_m - 4.25).abs() < 1e-6);
-        // Of a distance of two values with odds of three to one, 1 m apart: variance 3/16.
+        // A distance with two values 1 m apart and odds of three to one: variance 3/16.
         assert!((two.sd_m.powi(2) - variance - 3.0 / 16.0).abs() < 1e-6, "{}", two.sd_m);
         assert!(two.axes.is_none(), "an ambiguous face decides nothing");
     }
 
-    /// A facing that noise leaves unsure by more than 10 degrees decides nothing either.
+    /// A facing direction whose noise exceeds 10 degrees is not used either.
     #[test]
     fn a_face_seen_badly_decides_nothing() {
         let mut walk = walk(60.0, 2, 0.0);
@@ -562,7 +565,8 @@ mod tests {
         assert!(matches!(from_head(&rays, None), Err(AnchorError::NotSeen { .. })));
     }
 
-    /// Ground, trunk and extent together where they are seen; the head alone where it was not ruled out.
+    /// Ground, trunk and extent are combined as far as they are seen; the head alone is used if it was not
+    /// excluded.
     #[test]
     fn sources_are_asked_as_chosen() {
         let walk = walk(60.0, 1, 0.5);
@@ -599,7 +603,7 @@ mod tests {
             let found = ask(AnchorChoice::Source(single.source), &rays);
             assert!(!found.is_combined && found.anchor == Ok(single));
         }
-        // The neck alone: no source but the head.
+        // Only the neck is seen: the head is the only source.
         let mut neck_alone = JointRays::from_points(&crate::model::skeleton::StickFigure::UNKNOWN);
         neck_alone.ray[Joint::Neck] = rays[0].ray[Joint::Neck];
         let auto = ask(AnchorChoice::Auto, &[neck_alone]).anchor.unwrap();
@@ -608,7 +612,7 @@ mod tests {
         assert_eq!(combined.unwrap_err().len(), 3);
     }
 
-    /// Conflicts are counted among the frames that had several sources, with the medians of what they say.
+    /// Conflicts are counted among the frames with several sources, with the medians of their distances.
     #[test]
     fn conflicts_are_counted_by_pairs_of_sources() {
         let conflict = |a_m: f64, b_m: f64, sigmas: f64| Conflict {
@@ -638,7 +642,7 @@ mod tests {
         assert_eq!(conflicts(&frames), [expected]);
     }
 
-    /// What the sources have wrong together stays with the track: here at least the scale of the lengths.
+    /// An error common to all sources stays in the track: here at least the scale of the lengths.
     #[test]
     fn what_all_frames_share_does_not_average_out() {
         let walk = walk(60.0, 30, 0.3);
@@ -646,7 +650,7 @@ mod tests {
         let mean_m = found.neck.distance_m.iter().sum::<f64>() / 30.0;
         assert!(found.neck.common_sd_m > 0.5 * found.neck.scale_sd * mean_m, "{:?}", found.neck.common_sd_m);
         assert!(found.neck.sd_m.iter().all(|sd| *sd >= found.neck.common_sd_m));
-        // A distance less sure than it is long is none.
+        // A distance smaller than its standard deviation is not used.
         let vague = NeckTrack { sd_m: vec![9.0; 30], ..found.neck.clone() }.without_vague();
         assert!(vague.distance_m.iter().all(|d| d.is_nan()) && vague.vague.iter().all(Option::is_some));
     }

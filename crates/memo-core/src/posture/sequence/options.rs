@@ -1,5 +1,5 @@
-//! How postures of a sequence are found: the motion, the strength of its limits, where the neck's distance comes
-//! from, and what of it is refused.
+//! Options of [`super::postures`]: the motion, the strength of its limits, the source of the neck's distance, and
+//! their ranges.
 
 use crate::option_error::OptionError;
 use glam::DVec3;
@@ -12,23 +12,23 @@ use crate::posture::prior::MotionPrior;
 use crate::posture::rules::MotionModel;
 use crate::posture::tree::TreeOptions;
 
-/// Rules of motion beyond what a body can do.
+/// Motion model: rules beyond the limits of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Motion {
-    /// None: anybody doing anything.
+    /// No rules: any person, any motion.
     Physical,
-    /// Rules 1 to 5: walking straight on.
+    /// Rules 1 to 5: forward walking on a straight line.
     Walking,
-    /// Rules 1 and 2 alone: arms and legs swing in opposition.
+    /// Only rules 1 and 2: arms and legs swing in opposition.
     WalkingGeneral,
-    /// An example, not measured.
+    /// An example, not validated on data.
     Running,
-    /// An example, not measured.
+    /// An example, not validated on data.
     Standing,
 }
 
 impl Motion {
-    /// All of them.
+    /// All motions.
     pub const ALL: [Self; 5] =
         [Self::Physical, Self::Walking, Self::WalkingGeneral, Self::Running, Self::Standing];
 
@@ -48,7 +48,7 @@ impl Motion {
         Self::ALL.into_iter().find(|motion| motion.name() == name)
     }
 
-    /// What cuts.
+    /// The constraints of the tree.
     pub fn tree(self, strength: Strength) -> TreeOptions {
         let is_paper = strength == Strength::Paper;
         let options = if is_paper { TreeOptions::physical_paper() } else { TreeOptions::physical() };
@@ -63,12 +63,12 @@ impl Motion {
         }
     }
 
-    /// Whether its rules or what is usual are measured against the moving direction.
+    /// True if its rules or its prior are relative to the moving direction.
     pub(super) fn needs_heading(self) -> bool {
         matches!(self, Self::Walking | Self::WalkingGeneral | Self::Running)
     }
 
-    /// What a person does.
+    /// Word for a person in this motion.
     pub(super) fn noun(self) -> &'static str {
         match self {
             Self::Physical => "a person",
@@ -78,7 +78,7 @@ impl Motion {
         }
     }
 
-    /// What is usual.
+    /// The prior of the motion.
     pub(super) fn prior(self) -> MotionPrior {
         match self {
             Self::Walking | Self::WalkingGeneral => MotionPrior::walking(),
@@ -87,12 +87,12 @@ impl Motion {
     }
 }
 
-/// How hard the limits are.
+/// Strength of the limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Strength {
-    /// As real people and noise need it.
+    /// Limits that real people keep in noisy data.
     Measured,
-    /// As Lee and Chen print them.
+    /// Limits as printed by Lee and Chen.
     Paper,
 }
 
@@ -111,14 +111,14 @@ impl Strength {
     }
 }
 
-/// From where the neck's distance is taken.
+/// Source of the neck's distance.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnchorChoice {
-    /// Ground, trunk and extent together, those of them that a frame gives; the head where none does.
+    /// Ground, trunk and extent combined, as far as a frame allows each; the head if it allows none.
     Auto,
-    /// One source alone: ground, trunk, extent or head. `Combined` is `Auto` without the head.
+    /// One source: ground, trunk, extent or head. `Combined` is `Auto` without the head.
     Source(AnchorSource),
-    /// Known distances along the neck's ray: one for all frames or one each (NaN: unknown).
+    /// Known distances along the neck's ray: one for all frames or one per frame (NaN: unknown).
     Given {
         /// Distances, metres.
         distance_m: Vec<f64>,
@@ -127,43 +127,43 @@ pub enum AnchorChoice {
     },
 }
 
-/// Standard deviation of a given distance where none is stated, metres: a tape measure to where somebody
-/// stands.
+/// Default standard deviation of a given distance, metres: a tape measure to where the person stands.
 pub const DEFAULT_DISTANCE_SD_M: f64 = 0.05;
 
-/// Distances that are taken, metres: nearer the lens touches the person, farther nobody is resolved.
+/// Accepted distances, metres: nearer, the lens touches the person; farther, a person is not resolved.
 const DISTANCES_M: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
-/// How postures are found.
+/// Options of [`super::postures`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SequenceOptions {
-    /// Segment lengths, if measured; else from `height_m` and the sequence.
+    /// Segment lengths, if measured; otherwise they are estimated from `height_m` and the sequence.
     pub lengths: Option<SegmentLengths>,
-    /// Body height, if known, metres; without lengths and height the scale comes from the ground.
+    /// Body height, metres, if known. Without lengths and height the scale comes from the ground.
     pub height_m: Option<f64>,
-    /// Standard deviation of a pixel coordinate. 2: good detections of a person some 500 px high; detectors
-    /// that disagree with the joints by 8 px want 8.
+    /// Standard deviation of a pixel coordinate. Default 2: good detections of a person some 500 px tall. If a
+    /// detector differs from the joints by 8 px, use 8.
     pub noise_px: f64,
-    /// Rules. Walking: what the rules of the paper are of.
+    /// Motion model. Default: walking, for which the paper gives its rules.
     pub motion: Motion,
-    /// Their strength. Measured: limits as printed reject most true frames of walking.
+    /// Strength of the limits. Default: measured, because the printed limits reject most true frames of walking.
     pub strength: Strength,
     /// Source of the neck's distance.
     pub anchor: AnchorChoice,
-    /// The moving direction in the world, if known; its vertical part is not used.
+    /// The moving direction in world axes, if known; its vertical component is not used.
     pub moving_direction: Option<DVec3>,
-    /// Joints of less weight count as missing. 0.2: what detectors score below is guessed more than seen.
+    /// Joints with a lower weight count as missing. Default 0.2: detections with a lower score are mostly
+    /// guesses.
     pub min_weight: f64,
-    /// The way on the ground from which the moving direction is taken, metres. 0.5: a step is longer, and
-    /// swaying on the spot shorter.
+    /// Minimum displacement on the ground from which the moving direction is taken, metres. Default 0.5: a step
+    /// is longer, and swaying on the spot is shorter.
     pub min_travel_m: f64,
-    /// Surviving postures within this distance in every joint are one group, metres.
+    /// Surviving postures whose joints all agree within this distance are one group, metres.
     pub group_m: f64,
-    /// Most groups of a frame that are returned, largest first. 64: more than that are not told apart by eye.
+    /// Maximum number of groups per frame, largest first. Default 64: more cannot be distinguished by eye.
     pub max_groups: usize,
-    /// Assumptions of the sources of the neck's distance.
+    /// Assumptions of the sources of the neck's distance, see [`AnchorOptions`].
     pub anchor_options: AnchorOptions,
-    /// How distances are smoothed.
+    /// Options of smoothing the distances.
     pub smooth_options: SmoothOptions,
 }
 
@@ -187,7 +187,7 @@ impl Default for SequenceOptions {
     }
 }
 
-/// What is out of range.
+/// An error for the first option that is out of range.
 pub(super) fn check_options(options: &SequenceOptions) -> Result<(), SequenceError> {
     let at_least_0 = [
         ("noise_px", options.noise_px),
@@ -252,7 +252,7 @@ mod tests {
         }
     }
 
-    /// Who stands or does anything has no direction to keep to; a walker's habits are a walker's alone.
+    /// Standing and arbitrary motion have no direction; only walking has a prior.
     #[test]
     fn walking_and_running_have_a_direction_and_walking_its_habits() {
         let with_direction = Motion::ALL.into_iter().filter(|motion| motion.needs_heading());

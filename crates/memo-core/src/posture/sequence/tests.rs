@@ -4,7 +4,7 @@ use crate::model::skeleton::SegmentLengths;
 use crate::posture::constraint::ConstraintKind;
 use proptest::prelude::*;
 
-/// Median and 90 % quantile of the distances from the truth, necks on each other, cm.
+/// Median and 90 % quantile of the distances from the truth, with necks aligned, cm.
 fn errors_cm(found: &[StickFigure], truth: &[StickFigure]) -> [f64; 2] {
     let mut errors: Vec<f64> = found
         .iter()
@@ -41,7 +41,7 @@ fn a_walk_is_recovered_in_the_world() {
     }
 }
 
-/// Survivors by count, reasons by the constraint's kind: rules cut only where they are asked for.
+/// Survivors by count, reasons by the constraint's kind: rules cut only if requested.
 #[test]
 fn rules_cut_what_bodies_allow() {
     let walk = walk(45.0, 10, 1.0);
@@ -216,7 +216,7 @@ fn a_segment_longer_than_can_be_is_reported() {
     assert!(found.warnings.iter().any(is_short), "{:?}", found.warnings);
     let gaps: Vec<f64> = found.linked.gap_m.iter().map(|gap| gap[Joint::RightAnkle]).collect();
     assert!(gaps.iter().all(|gap| *gap > 0.05), "{gaps:?}");
-    // Without a distance the ground takes the short leg for a nearer one, against the trunk.
+    // Without a distance the ground takes the short leg for a nearer one, unlike the trunk.
     let found = walk.postures(&options).unwrap();
     let is_conflict = |c: &SourceConflict| c.sources == [AnchorSource::Ground, AnchorSource::Trunk];
     assert!(found.neck.conflicts.iter().any(is_conflict), "{:?}", found.neck.conflicts);
@@ -253,7 +253,7 @@ fn any_pixel() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever the points: an answer of the right size, or an error.
+    /// For any points: a result of the right size, or an error.
     #[test]
     fn no_points_break_it(
         pixels in prop::collection::vec((any_pixel(), any_pixel()), 3 * JOINT_COUNT),
@@ -277,7 +277,8 @@ proptest! {
     }
 }
 
-/// Rays and their noise: no weight is no point, and a pixel over the mean focal length is an angle.
+/// Rays and their noise: without weight there is no point, and a pixel divided by the mean focal length is an
+/// angle.
 #[test]
 fn points_of_unknown_weight_are_missing() {
     let mut walk = walk(45.0, 8, 0.5);
@@ -290,7 +291,7 @@ fn points_of_unknown_weight_are_missing() {
     assert!((rays.noise_rad - 2.0 / walk.camera.focal_px.x).abs() < 1e-12, "{}", rays.noise_rad);
 }
 
-/// A frame that says nothing is not linked, though its neck is known.
+/// A frame that cannot be used is not linked, though its neck is known.
 #[test]
 fn the_neck_alone_is_no_posture() {
     let mut walk = walk(45.0, 8, 0.5);
@@ -337,7 +338,8 @@ fn frames_are_linked_on_the_ground_and_in_the_moving_direction() {
                 );
             }
         }
-        // The other reading is in the world too: it differs in its mirrored joints and what is beyond them.
+        // The other reading is in world axes too: it differs in its mirrored joints and in the joints beyond
+        // them.
         let second = found.linked.second.unwrap();
         let hangs = |joint: Joint| {
             std::iter::successors(Some(joint), |joint| joint.start())
@@ -351,8 +353,8 @@ fn frames_are_linked_on_the_ground_and_in_the_moving_direction() {
     }
 }
 
-/// The stated deviations are those of noise, 5 mm a segment and the scale of the lengths that went into the
-/// neck's distance, carried down the limbs.
+/// The stated deviations are those of noise, 5 mm per segment and the scale of the lengths that is in the neck's
+/// distance, propagated down the limbs.
 #[test]
 fn deviations_are_those_of_their_causes() {
     let walk = walk(60.0, 10, 1.0);

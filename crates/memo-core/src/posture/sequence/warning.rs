@@ -1,4 +1,4 @@
-//! What a reader should know before trusting the postures of a sequence.
+//! Warnings about the postures of a sequence.
 
 use crate::wording::counted;
 use std::fmt;
@@ -16,34 +16,34 @@ use crate::posture::constraint::{Constraint, ConstraintKind};
 use crate::posture::link::LinkedPath;
 use crate::posture::tree::TreeOptions;
 
-/// Something that casts doubt on a result, as a sentence with its numbers.
+/// A reason to doubt a result. Its text is a sentence with the numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// Joints were left out for their weight.
+    /// Joints were ignored because of their weights.
     LightJoints {
-        /// How many.
+        /// Number of joints ignored.
         light: usize,
-        /// Of how many points.
+        /// Number of all points.
         all: usize,
-        /// The least weight asked for.
+        /// Minimum weight.
         min_weight: f64,
     },
-    /// Joints lie where the lens shows nothing.
+    /// Joints are where the lens shows nothing.
     OutsideLens {
-        /// How many.
+        /// Number of such joints.
         outside: usize,
-        /// Of how many points.
+        /// Number of all points.
         all: usize,
     },
-    /// Joints lie outside the picture that the camera is calibrated for.
+    /// Joints are outside the image for which the camera is calibrated.
     OutsidePicture {
-        /// How many.
+        /// Number of such joints.
         beyond: usize,
-        /// Of how many points.
+        /// Number of all points.
         all: usize,
-        /// Width and height of the picture, pixels.
+        /// Width and height of the image, pixels.
         size: [u32; 2],
-        /// The largest coordinates that are seen, pixels.
+        /// Largest coordinates found, pixels.
         farthest_px: DVec2,
     },
     /// The camera is not above the ground.
@@ -51,98 +51,98 @@ pub enum Warning {
         /// Its height, metres.
         camera_height_m: f64,
     },
-    /// Lengths are those of the proportions alone.
+    /// The lengths come from proportions alone.
     LengthsNotSeen {
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// Lengths have the scale of an adult of assumed height.
+    /// The scale of the lengths is that of an adult of assumed height.
     ScaleAssumed {
         /// Relative standard deviation of the scale.
         scale_sd: f64,
     },
-    /// A segment is seen longer than it can be.
+    /// A segment looks longer than it can be.
     SegmentTooShort {
         /// Its name.
         segment: String,
         /// Its length, metres.
         length_m: f64,
-        /// The least length that explains it, median, metres.
+        /// The smallest length that fits the image, median, metres.
         seen_m: f64,
-        /// Frames in which it is.
+        /// Number of such frames.
         frames: usize,
-        /// Frames in which it is seen.
+        /// Number of frames in which it is seen.
         of: usize,
     },
     /// Sources of the neck's distance contradict each other in many frames.
     Conflict(SourceConflict),
-    /// There is no moving direction to which the rules of a motion could be held.
+    /// There is no moving direction for the rules of the motion.
     NoTravel {
-        /// Way over the ground, metres; NaN if not known.
+        /// Displacement on the ground, metres; NaN if not known.
         travelled_m: f64,
-        /// What stands for it.
+        /// The direction used instead.
         from: HeadingFrom,
     },
     /// The person turns.
     Turns {
-        /// Between the first and the second half of the way, degrees.
+        /// Angle between the first and the second half of the path, degrees.
         turn_deg: f64,
     },
-    /// The person goes backwards, or right and left are exchanged throughout.
+    /// The person walks backward, or right and left are swapped in the whole sequence.
     Backwards {
         /// Frames in which the trunk of the linked posture faces against the moving direction.
         frames: usize,
-        /// Of how many.
+        /// Number of frames compared.
         of: usize,
     },
-    /// Frames say nothing.
+    /// Frames are not used.
     SilentFrames {
-        /// How many.
+        /// Number of such frames.
         silent: usize,
-        /// Of how many.
+        /// Number of all frames.
         of: usize,
-        /// Why the first one says nothing.
+        /// Why the first of them is not used.
         reason: FrameProblem,
     },
-    /// Many segments are seen longer than they are.
+    /// Many segments look longer than they are.
     WithoutRoot {
         /// Their share.
         share: f64,
-        /// The share explained by the noise that was stated, at most.
+        /// The largest share explained by the given noise.
         usual: f64,
     },
-    /// Points jump more than the noise that was stated.
+    /// The points are noisier than stated.
     Noisy {
-        /// Standard deviation of a coordinate by the points' own jumps, pixels.
+        /// Standard deviation of a coordinate, estimated from the jumps of the points, pixels.
         seen_px: f64,
-        /// What was stated, pixels.
+        /// Standard deviation given, pixels.
         stated_px: f64,
     },
-    /// In most frames no posture survives the limits of bodies.
+    /// In most frames no posture survives the physical limits.
     NothingPossible {
-        /// How many frames.
+        /// Number of such frames.
         frames: usize,
-        /// Of how many.
+        /// Number of all frames.
         of: usize,
     },
-    /// In most frames the linked posture does what a body cannot.
+    /// In most frames the linked posture breaks physical limits.
     LinkedBreaks {
-        /// How many frames.
+        /// Number of such frames.
         frames: usize,
-        /// Of how many.
+        /// Number of all frames.
         of: usize,
     },
-    /// The rules of the motion leave no posture, in frames in which a body could have one.
+    /// The rules of the motion leave no posture in frames in which the physical limits do.
     AgainstRules {
         /// The motion.
         motion: Motion,
         /// Their strength.
         strength: Strength,
-        /// Frames in which the rules leave nothing.
+        /// Number of frames in which the rules leave no posture.
         frames: usize,
-        /// Frames in which bodies can be.
+        /// Number of frames in which the physical limits leave a posture.
         of: usize,
-        /// Linked postures that break a rule, share.
+        /// Share of linked postures that break a rule.
         linked: f64,
     },
 }
@@ -250,24 +250,24 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Share of segments without real root that noise explains at the most: 36 % at 8 px, measured on walks.
+/// Largest share of segments without real root that noise explains: 36 % at 8 px, measured on walks.
 const USUAL_WITHOUT_ROOT: f64 = 0.36;
-/// A conflict in more frames than this share is worth a warning.
+/// Sources that conflict in a larger share of frames give a warning.
 const MANY_CONFLICTS: f64 = 0.1;
 
-/// All results, figures in camera axes.
+/// All results, with figures in camera axes.
 pub(super) struct Found<'a> {
-    /// What cut, frame by frame.
+    /// The constraints used, per frame.
     pub trees: &'a [TreeOptions],
     pub frames: &'a [Result<FrameReading, FrameProblem>],
     pub linked: &'a LinkedPath,
-    /// What the linked postures break.
+    /// Constraints that the linked postures break.
     pub linked_breaks: &'a [Vec<Constraint>],
     pub neck: &'a NeckTrack,
     pub heading: &'a Heading,
 }
 
-/// Looks at all results.
+/// Adds the warnings about all results.
 pub(super) fn judge(scene: &Scene, found: &Found, warnings: &mut Vec<Warning>) {
     let Found { frames, linked, neck, .. } = found;
     let many = |conflict: &&SourceConflict| conflict.frames as f64 > MANY_CONFLICTS * conflict.of as f64;
@@ -282,7 +282,8 @@ pub(super) fn judge(scene: &Scene, found: &Found, warnings: &mut Vec<Warning>) {
     warnings.extend(rejected(scene, found));
 }
 
-/// Whether the linked trunk faces against the way in most frames, where rules or prior are of going forwards.
+/// Warns if the linked trunk faces against the displacement in most frames, and rules or prior are for forward
+/// motion.
 fn backwards(scene: &Scene, found: &Found) -> Option<Warning> {
     let heading = found.heading.direction.filter(|_| scene.options.motion.needs_heading())?;
     let in_camera = scene.camera.rotation * heading;
@@ -299,8 +300,8 @@ fn without_root(gap_m: &[PerJoint<f64>]) -> Option<Warning> {
     (share > USUAL_WITHOUT_ROOT).then_some(Warning::WithoutRoot { share, usual: USUAL_WITHOUT_ROOT })
 }
 
-/// A coordinate over three frames at even times: its second difference has √6 of its noise. Medians, for the
-/// limbs that move fast and the joints that jump to the other side are few.
+/// For three frames at equal intervals the second difference of a coordinate has √6 times its noise. Medians are
+/// used, because limbs that move fast and joints that jump to the other side are few.
 fn noisy(scene: &Scene) -> Option<Warning> {
     let (points_px, times_s) = (scene.sequence.points_px, scene.sequence.times_s);
     let mut jumps_px = Vec::new();
@@ -325,7 +326,7 @@ fn noisy(scene: &Scene) -> Option<Warning> {
     (seen_px > 2.0 * stated_px + 0.5).then_some(Warning::Noisy { seen_px, stated_px })
 }
 
-/// Whether limits or rules reject most frames.
+/// Warns if limits or rules reject most frames.
 fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
     let frames: Vec<(usize, &FrameReading)> =
         found.frames.iter().enumerate().filter_map(|(t, frame)| Some((t, frame.as_ref().ok()?))).collect();
@@ -361,7 +362,7 @@ fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
     warnings
 }
 
-/// What is known before anything is looked at.
+/// Warnings about scale and lengths, before any frame is processed.
 pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let camera_height_m = scene.camera.position().z;
@@ -388,7 +389,7 @@ mod tests {
     #[test]
     fn many_segments_too_long_are_told_from_the_share_that_noise_explains() {
         for (long, is_told) in [(30, false), (40, true)] {
-            // Of 100 segments that are known so many look too long; those that are unknown do not count.
+            // Exactly this share of 100 known segments looks too long; unknown segments do not count.
             let gaps: Vec<f64> = (0..104)
                 .map(|i| {
                     if i >= 100 {
@@ -422,7 +423,7 @@ mod tests {
         walk.postures(&options).unwrap().warnings
     }
 
-    /// The noise of a walk's points is read off their jumps, at uneven times too.
+    /// The noise of a walk's points is estimated from their jumps, also for unequal intervals.
     #[test]
     fn points_noisier_than_stated_are_told_by_how_much() {
         let mut walk = walk(60.0, 60, 5.0);
@@ -436,12 +437,12 @@ mod tests {
             Warning::Noisy { seen_px, stated_px: 1.0 } => Some(*seen_px),
             _ => None,
         });
-        // The walk's own acceleration between frames adds to it.
+        // The walk's own acceleration between frames adds to the estimate.
         assert!(seen.is_some_and(|seen_px| (4.5..6.5).contains(&seen_px)), "{seen:?}");
         assert!(!warnings(&walk, |o| o.noise_px = 4.0).iter().any(|w| matches!(w, Warning::Noisy { .. })));
     }
 
-    /// Left for right, or backwards: seen from the front that is one who faces away.
+    /// Left and right swapped, or backward walking: seen from the front, a person who faces away.
     #[test]
     fn a_trunk_against_the_way_is_told() {
         let mut walk = walk(15.0, 20, 0.5);
@@ -454,7 +455,8 @@ mod tests {
         assert!(is_told(&told), "{told:?}");
     }
 
-    /// A judged sequence of which so many frames have no survivors, and linked postures break so much.
+    /// The warnings for a sequence in which this many frames have no survivors and linked postures break these
+    /// limits.
     fn judged(
         found: &PostureSequence,
         walk: &Walk,
@@ -499,25 +501,25 @@ mod tests {
         let found = walk.postures(&with_lengths()).unwrap();
         let judge = |motion, empty, breaks: &[Constraint]| judged(&found, &walk, motion, empty, breaks);
         assert_eq!(judge(Motion::Walking, 5, &[]), []);
-        // Bodies could do it, so the rules are against it.
+        // The physical limits leave postures, so the warning is about the rules.
         let against = judge(Motion::Walking, 6, &[]);
         assert!(
             matches!(against[..], [Warning::AgainstRules { frames: 6, of: 10, linked: 0.0, .. }]),
             "{against:?}"
         );
-        // Without rules the bodies are.
+        // Without rules, the warning is about the physical limits.
         assert_eq!(judge(Motion::Physical, 5, &[]), []);
         assert_eq!(judge(Motion::Physical, 6, &[]), [Warning::NothingPossible { frames: 6, of: 10 }]);
-        // What the linked postures break.
+        // Constraints that the linked postures break.
         let linked = judge(Motion::Walking, 0, &[Constraint::ArmsOpposed]);
         assert!(matches!(linked[..], [Warning::AgainstRules { frames: 0, linked: 0.6, .. }]), "{linked:?}");
         let limits = [Constraint::NeckFlexion];
         assert_eq!(judge(Motion::Walking, 0, &limits), [Warning::LinkedBreaks { frames: 6, of: 10 }]);
-        // Where nothing is possible, that linked postures break limits is no news.
+        // If no posture is possible, there is no second warning about linked postures.
         assert_eq!(judge(Motion::Physical, 6, &limits), [Warning::NothingPossible { frames: 6, of: 10 }]);
     }
 
-    /// Frames in which bodies cannot be either do not count against the rules.
+    /// Frames in which no body posture is possible do not count against the rules.
     #[test]
     fn impossible_frames_are_not_held_against_the_rules() {
         let walk = walk(60.0, 10, 0.5);
@@ -548,7 +550,7 @@ mod tests {
             heading: &found.heading,
         };
         assert_eq!(rejected(&scene, &of), [Warning::NothingPossible { frames: 10, of: 10 }]);
-        // Conflicts of sources are told from one frame in ten on.
+        // Conflicts give a warning if they occur in more than one frame in ten.
         let conflict = |frames| SourceConflict {
             sources: [AnchorSource::Ground, AnchorSource::Trunk],
             frames,

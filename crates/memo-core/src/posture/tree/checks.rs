@@ -1,4 +1,4 @@
-//! A view whose joints are placed, and what is asked of them.
+//! A view with placed joints, and the constraints to evaluate on it.
 
 use super::nodes::all_choices;
 use super::places::{CHAINS, Places};
@@ -8,22 +8,22 @@ use crate::posture::collision::Collisions;
 use crate::posture::constraint::{CONSTRAINT_COUNT, Constraint, JointSet, Violation};
 use crate::posture::placed::{PlacedFigure, Trunk};
 
-/// A constraint and what it looks at.
+/// A constraint with the joints and choices it depends on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
     pub constraint: Constraint,
-    /// Its place in [`Constraint::ALL`].
+    /// Its index in [`Constraint::ALL`].
     pub index: usize,
     pub level: Joint,
-    /// Joints it cannot be asked without.
+    /// Joints without which it cannot be evaluated.
     joints: JointSet,
-    /// The choices it depends on.
+    /// The choices of roots it depends on.
     pub scope: usize,
 }
 
 thread_local! {
-    /// All constraints by level, those of a level in the order of [`Constraint::ALL`]. Of each thread, because one
-    /// of all threads could be half made in a process that is forked meanwhile.
+    /// All constraints by level, those of one level in the order of [`Constraint::ALL`]. It is thread-local,
+    /// because a value shared by all threads could be half initialised in a process forked at that moment.
     static BY_LEVEL: [Asked; CONSTRAINT_COUNT] = {
         let mut index = 0..CONSTRAINT_COUNT;
         let mut all = Constraint::ALL.map(|constraint| {
@@ -40,16 +40,16 @@ const TORSO: usize = CHAINS[Joint::RightShoulder as usize]
     | CHAINS[Joint::LeftShoulder as usize]
     | CHAINS[Joint::Pelvis as usize];
 
-/// A view whose joints are placed, and what is asked of them.
+/// A view with placed joints, and the constraints to evaluate on it.
 pub(super) struct Tree<'a> {
     pub view: &'a View,
     pub options: &'a TreeOptions,
     pub places: Places,
-    /// Of every choice of the roots of shoulders and pelvis.
+    /// The trunk for every choice of the roots of shoulders and pelvis.
     torsos: [Trunk; TORSO + 1],
-    /// Constraints asked for that can be tried, by level.
+    /// Requested constraints that can be evaluated, by level.
     pub asked: Vec<Asked>,
-    /// Constraints asked for that cannot be tried.
+    /// Requested constraints that cannot be evaluated.
     pub open: Vec<Constraint>,
 }
 
@@ -82,22 +82,22 @@ impl<'a> Tree<'a> {
         tree
     }
 
-    /// The constraints of a level, those of one scope that follow each other together.
+    /// The constraints of a level; consecutive constraints with the same scope form one group.
     pub fn groups(&self, level: Joint) -> impl Iterator<Item = &[Asked]> {
         let start = self.asked.partition_point(|asked| asked.level < level);
         let end = self.asked.partition_point(|asked| asked.level <= level);
         self.asked[start..end].chunk_by(|a, b| a.scope == b.scope)
     }
 
-    /// A figure to place joints in.
+    /// An empty figure in which to place joints.
     pub fn figure(&self) -> PlacedFigure<'_> {
         let mut figure = PlacedFigure::UNKNOWN_PLACES;
         figure[Joint::Neck] = self.places.at(Joint::Neck, 0);
         figure
     }
 
-    /// Places the joints of a scope at the roots of a node; those that hang on none of the changed choices
-    /// stand there already.
+    /// Places the joints of a scope at the roots of a node. Joints that depend on none of the changed choices are
+    /// already in place.
     pub fn place<'b>(&'b self, figure: &mut PlacedFigure<'b>, scope: usize, node: usize, changed: usize) {
         let mut left = scope;
         while left != 0 {
@@ -109,7 +109,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// The trunk of a node whose joints are placed, with its hips where a level asks for them.
+    /// The trunk of a node whose joints are placed, with its hips if the level needs them.
     pub fn trunk<'b>(
         &'b self,
         level: Joint,
@@ -125,7 +125,7 @@ impl<'a> Tree<'a> {
         self.options.check(asked.constraint, figure, trunk, &self.view.lengths)
     }
 
-    /// What a group of constraints has against a node.
+    /// The violations of a group of constraints at a node.
     pub fn violations(&self, group: &[Asked], node: usize) -> impl Iterator<Item = Violation> {
         let mut violations = Vec::new();
         if let Some(&Asked { scope, level, .. }) = group.first() {

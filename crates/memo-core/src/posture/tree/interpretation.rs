@@ -1,4 +1,4 @@
-//! What is left of a tree, and what was cut.
+//! Result of the interpretation tree: surviving postures and the reasons for cuts.
 
 use super::View;
 use crate::model::skeleton::{Joint, PerJoint, StickFigure};
@@ -6,15 +6,15 @@ use crate::posture::constraint::{Constraint, Violation};
 use crate::posture::lift::RootKind;
 use crate::posture::placed::{HeadingSource, PlacedFigure};
 
-/// A way down the tree: for each joint near or far.
+/// A path down the tree: near or far root for each joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Path(
-    /// Bit n is set where the joint of level n is at the far root.
+    /// Bit n is set if the joint of level n is at the far root.
     pub u16,
 );
 
 impl Path {
-    /// Whether a joint is at the far root; false where it has but one.
+    /// True if a joint is at the far root; false if it has only one root.
     pub fn is_far(self, joint: Joint) -> bool {
         self.0 >> joint as u16 & 1 == 1
     }
@@ -26,25 +26,25 @@ impl Path {
     }
 }
 
-/// A posture that the tree leads to.
+/// A posture at a leaf of the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interpretation {
     /// The joints, camera axes, metres; NaN where unknown.
     pub figure: StickFigure,
-    /// Its way down the tree.
+    /// Its path down the tree.
     pub path: Path,
-    /// How many roots each segment had; None for the neck and unknown joints. A segment without a real root
-    /// has its gap here.
+    /// Number of roots of each segment; `None` for the neck and unknown joints. For a segment without a real root
+    /// it holds the gap.
     pub kinds: PerJoint<Option<RootKind>>,
     /// Standard deviation of the extent of each segment along its ray, metres; NaN for the neck.
     pub segment_sd_m: PerJoint<f64>,
-    /// Standard deviation of each joint's distance from the camera, metres: those of the neck and of the
-    /// segments down to it.
+    /// Standard deviation of each joint's distance from the camera, metres: of the neck and of the segments
+    /// between neck and joint.
     pub depth_sd_m: PerJoint<f64>,
 }
 
 impl Interpretation {
-    /// Segments without a real root and by how much their joint's ray passes too far, metres.
+    /// Segments without a real root, with the distance by which the joint's ray misses them, metres.
     pub fn gaps_m(&self) -> impl Iterator<Item = (Joint, f64)> + '_ {
         Joint::ALL.into_iter().filter_map(|joint| match self.kinds[joint] {
             Some(RootKind::None { gap_m }) => Some((joint, gap_m)),
@@ -53,20 +53,20 @@ impl Interpretation {
     }
 }
 
-/// Nodes of one level.
+/// Number of nodes of one level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LevelCount {
-    /// Nodes the walk came to and no constraint cut.
+    /// Nodes reached and not cut by a constraint.
     pub reached: u32,
-    /// Those of them from which a leaf survives: the paper's way of counting (Tables 3 and 4).
+    /// Those of them with a surviving leaf: the paper's way of counting (Tables 3 and 4).
     pub survived: u32,
-    /// Nodes the walk came to, cut or not, whose segment has one root: equal, or merged into their middle.
+    /// Nodes reached, cut or not, whose segment has one root: equal roots, or roots merged into their middle.
     pub degenerate: u32,
-    /// Nodes the walk came to, cut or not, whose segment has no real root.
+    /// Nodes reached, cut or not, whose segment has no real root.
     pub without_root: u32,
 }
 
-/// How many branches a constraint cut.
+/// Number of branches that a constraint cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CutCount {
     /// The constraint.
@@ -77,44 +77,44 @@ pub struct CutCount {
     pub branches: u32,
 }
 
-/// A branch that was cut.
+/// A cut branch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
-    /// The way down to the level of the violation.
+    /// The path down to the level of the violation.
     pub path: Path,
-    /// Why.
+    /// The violation that cut it.
     pub violation: Violation,
 }
 
-/// The posture that breaks the constraints least, where all break some.
+/// The posture that breaks the constraints least, if no posture keeps them all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastViolating {
     /// The posture.
     pub interpretation: Interpretation,
-    /// What it breaks.
+    /// Its violations.
     pub violations: Vec<Violation>,
-    /// Sum of the squares of their severities ([`Violation::severity`]); no posture has less.
+    /// Sum of the squared severities ([`Violation::severity`]); no posture has a smaller sum.
     pub total: f64,
 }
 
-/// What is left of the tree, and what was cut.
+/// Surviving postures of a view, and counts of what was cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interpretations {
-    /// The view they are of.
+    /// The view.
     pub view: View,
-    /// Ways to the leaves that survived, in the order of the walk.
+    /// Paths to the surviving leaves, in depth-first order, near root first.
     pub survivors: Vec<Path>,
     /// Nodes of each level.
     pub counts: PerJoint<LevelCount>,
-    /// Branches cut by each constraint that cut any, in the order of [`Constraint::ALL`].
+    /// Number of branches cut, for each constraint that cut any, in the order of [`Constraint::ALL`].
     pub reasons: Vec<CutCount>,
-    /// Constraints that were asked for and could not be tried, because joints are unknown.
+    /// Requested constraints that could not be evaluated, because joints are unknown.
     pub open: Vec<Constraint>,
-    /// Where rules took the moving direction from.
+    /// Source of the moving direction that rules used.
     pub heading_source: HeadingSource,
-    /// Every cut branch in the order of the walk, if asked for.
+    /// Every cut branch in depth-first order, if requested.
     pub cuts: Vec<Cut>,
-    /// Where nothing survived: the posture nearest to surviving.
+    /// If nothing survived: the posture that breaks the constraints least.
     pub least_violating: Option<LeastViolating>,
 }
 

@@ -4,7 +4,7 @@ use super::checks::{Asked, Tree};
 use super::{LeastViolating, Path};
 use crate::model::skeleton::{JOINT_COUNT, Joint};
 
-/// Branch and bound, depth first, for the leaf of the least sum of squared severities.
+/// Branch and bound, depth first, for the leaf with the smallest sum of squared severities.
 pub(super) fn least_violating(tree: &Tree) -> LeastViolating {
     let levels = Joint::ALL.map(|joint| tree.groups(joint).map(Costs::of).collect());
     let mut search = Search { tree, levels, best: (f64::INFINITY, 0) };
@@ -18,7 +18,7 @@ pub(super) fn least_violating(tree: &Tree) -> LeastViolating {
     }
 }
 
-/// What the choices within the scope of a group of constraints cost; NaN where not yet known.
+/// Costs of the choices within the scope of a group of constraints; NaN if not yet computed.
 struct Costs<'a> {
     group: &'a [Asked],
     scope: usize,

@@ -1,16 +1,17 @@
 //! The interpretation tree: every posture that the joints of one view allow (Lee and Chen 1985, sections 2.2,
 //! 3.1-3.3).
 //!
-//! The tree has a level for each joint in the order of [`Joint::ALL`]. A node of a level has two successors,
-//! the two roots of the next segment: near (first) and far. A branch is cut as soon as the joints that
-//! a constraint needs are there; of several the first in the order of [`Constraint::ALL`] is the reason.
-//! A segment without a real root has one successor, the nearest point on its ray; so has a joint that is not
-//! seen, which is left open together with all that hangs on it.
+//! The tree has a level for each joint in the order of [`Joint::ALL`]. A node has two successors, the two roots
+//! of the next segment: near (first) and far. A branch is cut at the level at which all joints of a constraint
+//! are placed. If a branch breaks several constraints, the first in the order of [`Constraint::ALL`] is the
+//! reason. A segment without a real root has one successor, the nearest point on its ray. A joint that is not
+//! seen also has one successor; it and the joints beyond it on the limb stay unknown.
 //!
-//! What is left and cut is what a walk down every branch leaves and cuts; but the levels are grown whole, and
-//! a constraint is asked once for all nodes at which its joints stand in the same places.
+//! Survivors and cuts are the same as for a depth-first walk along every branch. For speed, whole levels are
+//! grown at once, and a constraint is evaluated once for all nodes at which its joints have the same positions.
 //!
-//! What it cannot do: choose. Hard constraints that true postures keep leave tens to hundreds of leaves.
+//! Limits: the tree does not choose a posture. Hard constraints that true postures satisfy leave tens to hundreds
+//! of leaves.
 
 mod checks;
 mod interpretation;
@@ -34,15 +35,15 @@ pub use interpretation::{Cut, CutCount, Interpretation, Interpretations, LeastVi
 pub use options::TreeOptions;
 use walk::walk;
 
-/// Uncertainty of a segment's length, with that of the joints' places on the body, metres: medians over walks
-/// of motion capture leave 3-8 mm.
+/// Uncertainty of a segment's length, including the positions of the joints on the body, metres: with medians
+/// over walks of motion capture, 3-8 mm remain.
 pub const DEFAULT_LENGTH_SD_M: f64 = 0.005;
 
-/// Why a tree cannot be grown.
+/// Why a tree was not grown.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TreeError {
-    /// The neck is not a point before the camera.
+    /// The neck is not a point in front of the camera.
     #[error("the neck must be a point before the camera (z > 0, finite), got {neck}")]
     Neck {
         /// The point.
@@ -56,7 +57,7 @@ pub enum TreeError {
         /// The vector.
         ray: DVec3,
     },
-    /// A quantity that must not be negative is, or is not finite.
+    /// A quantity is negative or not finite.
     #[error("{name} must be finite and not negative, got {value}")]
     Quantity {
         /// Its name.
@@ -64,7 +65,7 @@ pub enum TreeError {
         /// Its value.
         value: f64,
     },
-    /// A direction of the bearings is no direction.
+    /// A direction of the bearings is zero or not finite.
     #[error("{name} must be a finite direction, got {value}")]
     Direction {
         /// Its name.
@@ -72,38 +73,40 @@ pub enum TreeError {
         /// The vector.
         value: DVec3,
     },
-    /// The segment lengths are not usable.
+    /// The segment lengths are not valid.
     #[error(transparent)]
     Length(#[from] LengthError),
 }
 
-/// One view of one person, with what is known of them.
+/// One view of one person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Rays of the joints.
     pub rays: JointRays,
-    /// The neck, camera axes, metres. The ray of the neck is not used.
+    /// The neck, camera axes, metres. It replaces the ray of the neck.
     pub neck: DVec3,
-    /// Standard deviation of the neck's distance, metres. It moves the whole figure and cuts nothing.
+    /// Standard deviation of the neck's distance, metres. It moves the whole figure and does not change which
+    /// branches are cut.
     pub neck_sd_m: f64,
     /// Lengths of the segments.
     pub lengths: SegmentLengths,
     /// Standard deviation of each length, metres.
     pub length_sd_m: f64,
-    /// Roots nearer to each other are taken for one, their middle, metres. 0: only equal ones; the paper's
-    /// counts are met at 0.04.
+    /// Roots closer together than this are merged into their middle, metres. With 0 only equal roots are merged;
+    /// the counts of the paper are reproduced with 0.04.
     pub merge_m: f64,
 }
 
 impl View {
-    /// A view with a neck of known place and lengths of the usual uncertainty; only equal roots are merged.
+    /// A view with a known neck position and the default uncertainty of lengths; only equal roots are merged.
     pub fn new(rays: JointRays, neck: DVec3, lengths: SegmentLengths) -> Self {
         Self { rays, neck, neck_sd_m: 0.0, lengths, length_sd_m: DEFAULT_LENGTH_SD_M, merge_m: 0.0 }
     }
 
     /// Grows and prunes the tree.
     ///
-    /// That nothing survives is no error: `reasons` say why and `least_violating` is the nearest posture.
+    /// If nothing survives, the result is not an error: `reasons` gives the causes, and `least_violating` is the
+    /// nearest posture.
     pub fn interpret(&self, options: &TreeOptions) -> Result<Interpretations, TreeError> {
         self.check(options)?;
         Ok(walk(self, options))
@@ -123,8 +126,8 @@ impl View {
         Interpretation { figure: PlacedFigure::of(&placed).points(), path, kinds, segment_sd_m, depth_sd_m }
     }
 
-    /// The path to the posture nearest to a figure: at every segment the root whose segment vector is nearer
-    /// to the figure's (near where the figure's is unknown).
+    /// The path to the posture nearest to a figure: at every segment the root whose segment vector is nearer to
+    /// the figure's (the near root if the figure's is unknown).
     pub fn nearest_path(&self, figure: &StickFigure) -> Path {
         let mut path = Path::default();
         let mut points = PerJoint([self.neck; JOINT_COUNT]);
@@ -182,9 +185,9 @@ impl View {
         Placed { point: self.neck, ray: self.neck.normalize(), ..Placed::UNKNOWN }
     }
 
-    /// The places of a joint from its starting joint: two, or one (which may be unknown).
+    /// The positions of a joint from its starting joint: two, or one (which may be unknown).
     ///
-    /// The length's uncertainty enters d of eq. (7) as an image noise of length_sd / (√2 distance) would.
+    /// The length's uncertainty enters d of eq. (7) like an image noise of length_sd / (√2 distance).
     fn candidates(&self, start: DVec3, joint: Joint) -> ([Placed; 2], usize) {
         let ray = self.rays.ray[joint];
         if start.is_nan() || ray.is_nan() {
@@ -212,9 +215,9 @@ impl View {
     }
 }
 
-/// All constraints that a figure in space breaks, without noise; those that need unknown joints are left out.
+/// All constraints that a figure in space breaks, without noise. Constraints on unknown joints are skipped.
 ///
-/// The figure may be in any axes that the bearings of the options are in too.
+/// The figure may be in any axes, if the bearings of the options are in the same axes.
 pub fn explain(figure: &StickFigure, lengths: &SegmentLengths, options: &TreeOptions) -> Vec<Violation> {
     all_violations(&PlacedFigure::of(&placed_points(figure)), lengths, options)
 }

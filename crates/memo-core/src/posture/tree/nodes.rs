@@ -1,22 +1,22 @@
 //! Sets of the nodes of one level.
 //!
-//! A node has a number: bit n is set where the joint of level n + 1 is at the far root. So the successors of a
-//! node are its own number and that with the next bit set. A scope is a set of joints as such bits; two nodes
-//! whose numbers agree in them make the same choice within the scope, which has the number of the node that
-//! is near everywhere else.
+//! A node has a number: bit n is set if the joint of level n + 1 is at the far root. So the successors of a node
+//! have its own number and that number with the next bit set. A scope is a set of joints, given by the same bits.
+//! Two nodes whose numbers agree in these bits make the same choice within the scope; the choice has the number
+//! of the node that is near in all other bits.
 
 use crate::model::skeleton::JOINT_COUNT;
 use crate::posture::tree::Path;
 
-/// Roots a path chooses.
+/// Number of roots that a path chooses.
 const CHOICES: usize = JOINT_COUNT - 1;
 
-/// Bits of a number that lie within a word.
+/// Number of bits of a node number that select a bit within a word.
 const WORD_BITS: usize = 6;
 
 const WORDS: usize = 1 << (CHOICES - WORD_BITS);
 
-/// Numbers within a word that have not the bit set, for each bit.
+/// For each of these bits, the positions in a word whose number does not have the bit set.
 const WITHOUT_BIT: [u64; WORD_BITS] = [
     0x5555_5555_5555_5555,
     0x3333_3333_3333_3333,
@@ -30,12 +30,12 @@ const WITHOUT_BIT: [u64; WORD_BITS] = [
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Nodes {
     words: [u64; WORDS],
-    /// Roots chosen down to the level.
+    /// Number of roots chosen down to the level.
     level: usize,
 }
 
 impl Nodes {
-    /// The neck, above all choices.
+    /// The root of the tree: the neck, with no choice made.
     pub fn neck() -> Self {
         Self::of([0], 0)
     }
@@ -49,7 +49,7 @@ impl Nodes {
         nodes
     }
 
-    /// The words that the level has.
+    /// The words in use at the level.
     fn words(&self) -> &[u64] {
         &self.words[..1 << self.level.saturating_sub(WORD_BITS)]
     }
@@ -58,7 +58,7 @@ impl Nodes {
         &mut self.words[..1 << self.level.saturating_sub(WORD_BITS)]
     }
 
-    /// The successors: the near root of every node, and the far one of those of a subset.
+    /// The successors: the near root for every node, and the far root for the nodes of a subset.
     pub fn successors(&self, with_far: &Self) -> Self {
         let mut nodes = Self { level: self.level + 1, ..self.clone() };
         if self.level < WORD_BITS {
@@ -70,7 +70,7 @@ impl Nodes {
         nodes
     }
 
-    /// The nodes of the level above of which one is a successor.
+    /// The nodes of the level above that have a successor in the set.
     pub fn parents(&self) -> Self {
         let level = self.level.saturating_sub(1);
         let mut nodes = Self { words: [0; WORDS], level };
@@ -108,7 +108,7 @@ impl Nodes {
         choices
     }
 
-    /// The nodes whose choice within a scope is one of some choices.
+    /// The nodes whose choice within a scope is in `choices`.
     pub fn choosing(&self, scope: usize, choices: &Self) -> Self {
         let mut nodes = self.clone();
         let mut others = self.clone();
@@ -117,7 +117,7 @@ impl Nodes {
         nodes
     }
 
-    /// Takes out the nodes whose choice within a scope is one of some choices; how many.
+    /// Removes the nodes whose choice within a scope is in `choices`; returns their number.
     pub fn remove_choosing(&mut self, scope: usize, mut choices: Self) -> u32 {
         for bit in (0..WORD_BITS).filter(|bit| scope >> bit & 1 == 0) {
             choices.words_mut().iter_mut().for_each(|word| *word |= *word << (1 << bit));
@@ -139,9 +139,9 @@ impl Nodes {
         })
     }
 
-    /// The ways to the nodes in the order of a walk, depth first and the near root first.
+    /// The paths to the nodes in depth-first order, near root first.
     pub fn paths(&self) -> Vec<Path> {
-        // The first choice decides first: reversed, the numbers ascend.
+        // The first choice is the most significant: with reversed bits, the numbers ascend.
         let reversed = |number: usize| usize::from((number as u16).reverse_bits() >> (16 - CHOICES));
         let in_order = Self::of(self.numbers().map(reversed), CHOICES);
         let mut paths = Vec::with_capacity(self.count() as usize);
@@ -150,7 +150,7 @@ impl Nodes {
     }
 }
 
-/// Every choice there can be within a scope, ascending.
+/// All possible choices within a scope, ascending.
 pub(super) fn all_choices(scope: usize) -> impl Iterator<Item = usize> {
     let next = move |&choice: &usize| (choice != scope).then(|| choice.wrapping_sub(scope) & scope);
     std::iter::successors(Some(0), next)

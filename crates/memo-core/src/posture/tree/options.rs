@@ -1,4 +1,4 @@
-//! What a tree is pruned by.
+//! Constraints that prune the tree.
 
 use crate::model::limits::Limits;
 use crate::model::skeleton::SegmentLengths;
@@ -7,23 +7,23 @@ use crate::posture::constraint::{Constraint, ConstraintKind, Violation};
 use crate::posture::placed::{Bearings, PlacedFigure, Trunk};
 use crate::posture::rules::{MotionModel, Rule};
 
-/// What cuts.
+/// Which constraints prune the tree, and the directions they use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TreeOptions {
-    /// Limits of angles and rigid distances.
+    /// Limits of joint angles and of rigid distances.
     pub limits: Option<Limits>,
-    /// Collisions of parts of the body.
+    /// Collisions between body parts.
     pub collisions: Option<Collisions>,
-    /// Rules of a motion.
+    /// Rules of a motion model.
     pub motion: Option<MotionModel>,
     /// Vertical, moving direction and head, camera axes.
     pub bearings: Bearings,
-    /// Whether to return every cut branch with its reason.
+    /// True to return every cut branch with its reason.
     pub keep_cuts: bool,
 }
 
 impl TreeOptions {
-    /// Physical constraints at limits that real people keep; no motion model.
+    /// Physical constraints with limits that real people keep; no motion model.
     pub fn physical() -> Self {
         Self {
             limits: Some(Limits::measured()),
@@ -39,19 +39,19 @@ impl TreeOptions {
         Self { limits: Some(Limits::paper()), collisions: Some(Collisions::paper()), ..Self::physical() }
     }
 
-    /// With the rules of a motion.
+    /// The same options with a motion model.
     #[must_use]
     pub fn with_motion(self, motion: MotionModel) -> Self {
         Self { motion: Some(motion), ..self }
     }
 
-    /// With bearings in camera axes.
+    /// The same options with bearings in camera axes.
     #[must_use]
     pub fn with_bearings(self, bearings: Bearings) -> Self {
         Self { bearings, ..self }
     }
 
-    /// Whether a constraint is asked for.
+    /// True if a constraint is requested.
     pub fn asks(&self, constraint: Constraint) -> bool {
         use Constraint::{NeckBending, NeckExtension, NeckFlexion, NeckRotation};
         match constraint.kind() {
@@ -68,7 +68,7 @@ impl TreeOptions {
         }
     }
 
-    /// Checks one constraint; None where it holds or is not asked for.
+    /// Checks one constraint; `None` if it holds or is not requested.
     pub(super) fn check(
         &self,
         constraint: Constraint,

@@ -1,4 +1,4 @@
-//! Every place that the joints of a view can be at: each joint from every choice of roots above it.
+//! All possible positions of the joints of a view: each joint for every choice of roots above it.
 
 use super::View;
 use super::nodes::all_choices;
@@ -6,7 +6,7 @@ use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint};
 use crate::posture::collision::Span;
 use crate::posture::placed::{MOST_PLACES, Placed};
 
-/// A joint and those it hangs on, but the neck, as bits of a node's number: their roots say where it is.
+/// A joint and the joints between it and the neck, as bits of a node number: their roots determine its position.
 pub(super) const CHAINS: [usize; JOINT_COUNT] = {
     let mut chains = [0; JOINT_COUNT];
     let mut level = 1;
@@ -20,7 +20,7 @@ pub(super) const CHAINS: [usize; JOINT_COUNT] = {
     chains
 };
 
-/// The bits of each chain from the neck outwards; beyond its end a bit that no number has.
+/// The bits of each chain from the neck outwards; past its end, a bit that no number has.
 const CHAIN_BITS: [[u8; 4]; JOINT_COUNT] = {
     let mut bits = [[15; 4]; JOINT_COUNT];
     let mut level = 1;
@@ -39,7 +39,7 @@ const CHAIN_BITS: [[u8; 4]; JOINT_COUNT] = {
     bits
 };
 
-/// Where the places of each joint start.
+/// Index of the first position of each joint.
 const OFFSETS: [usize; JOINT_COUNT + 1] = {
     let mut offsets = [0; JOINT_COUNT + 1];
     let mut level = 0;
@@ -54,11 +54,11 @@ const PLACE_COUNT: usize = OFFSETS[JOINT_COUNT];
 
 const _: () = assert!(PLACE_COUNT <= MOST_PLACES);
 
-/// The places of all joints.
+/// The positions of all joints.
 #[derive(Debug)]
 pub(super) struct Places {
     at: [Placed; PLACE_COUNT],
-    /// Whether a place is one of two roots.
+    /// True if a position is one of two roots.
     of_two: [bool; PLACE_COUNT],
 }
 
@@ -82,7 +82,7 @@ impl Places {
         places
     }
 
-    /// How far along its ray each joint can be.
+    /// The range of distances along its ray for each joint.
     pub fn spans(&self) -> PerJoint<Span> {
         PerJoint(Joint::ALL.map(|joint| {
             let places = &self.at[OFFSETS[joint as usize]..OFFSETS[joint as usize + 1]];
@@ -100,7 +100,7 @@ impl Places {
         &self.at[place(joint, node)]
     }
 
-    /// Whether the segment to the joint has two roots at a node.
+    /// True if the segment to the joint has two roots at a node.
     pub fn has_two(&self, joint: Joint, node: usize) -> bool {
         self.of_two[place(joint, node)]
     }

@@ -1,4 +1,4 @@
-//! The tree against one that asks every constraint of every leaf anew.
+//! Compares the tree with one that evaluates every constraint at every leaf.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use crate::posture::placed::Bearings;
 use crate::posture::rules::{MotionModel, Rule, Tolerance};
 use crate::synth::Random;
 
-/// Someone upright in camera axes, 4 m away, every segment turned at random by up to `spread_rad`.
+/// A person upright in camera axes, 4 m away, with every segment rotated at random by up to `spread_rad`.
 fn figure(lengths: &SegmentLengths, facing_rad: f64, spread_rad: f64, random: &mut Random) -> StickFigure {
     let turn = glam::DQuat::from_rotation_y(facing_rad);
     let rest = |joint: Joint| match joint {
@@ -52,8 +52,8 @@ fn every_rule() -> MotionModel {
     })
 }
 
-/// What the walk must give, by looking at every one of the 2^13 leaves alone and asking every constraint
-/// on the way down to it anew.
+/// The expected result of the walk, by visiting each of the 2^13 leaves and evaluating every constraint on the
+/// path to it.
 #[derive(Default)]
 struct Plain {
     survivors: BTreeSet<Path>,
@@ -159,7 +159,7 @@ fn the_walk_is_the_plain_tree() {
 #[test]
 fn without_constraints_every_leaf_survives() {
     let options = TreeOptions { limits: None, collisions: None, ..TreeOptions::physical() };
-    // Beyond a wrong root the next segment may have none, so not every view has all 2^13 leaves.
+    // After a wrong root the next segment may have none, so not every view has all 2^13 leaves.
     let full = |view: &View| view.interpret(&options).unwrap().survivors.len() == 8192;
     let view = (0..50).map(|seed| view_of(seed, 0.0)).find(full).unwrap();
     let found = view.interpret(&options).unwrap();
@@ -176,7 +176,7 @@ fn without_constraints_every_leaf_survives() {
     }
 }
 
-/// The least violating posture is that of an exhaustive search, and it breaks what it is said to break.
+/// The least violating posture is that of an exhaustive search, and it has the reported violations.
 #[test]
 fn the_least_violating_posture_has_no_better() {
     let mut tried = 0;
@@ -240,8 +240,8 @@ fn bad_input_is_refused_with_its_values() {
     assert!(view.interpret(&options).unwrap_err().to_string().contains("up"));
 }
 
-/// Noise of a joint's depth adds up along its chain, with the neck's; that of lengths without noise of the image
-/// is the one that each length makes.
+/// Noise of a joint's depth adds up along its chain, including the neck's; without image noise, it is that of
+/// each length.
 #[test]
 fn depths_are_as_unsure_as_their_chain() {
     let view = View { neck_sd_m: 0.05, ..view_of(3, 1e-3) };
@@ -267,7 +267,7 @@ fn depths_are_as_unsure_as_their_chain() {
     }
 }
 
-/// The path of a figure is told by its segments, wherever the figure stands.
+/// The path of a figure depends on its segments, not on its position.
 #[test]
 fn a_figure_elsewhere_has_the_same_path() {
     for seed in 0..10 {
@@ -284,7 +284,7 @@ fn a_figure_elsewhere_has_the_same_path() {
     }
 }
 
-/// Cut branches come as a walk down the tree meets them: near before far, at the first joint at which they part.
+/// Cut branches are in depth-first order: near before far, at the first joint at which they differ.
 #[test]
 fn cuts_are_in_the_order_of_the_walk() {
     let options = TreeOptions { keep_cuts: true, ..TreeOptions::physical() };
@@ -297,12 +297,12 @@ fn cuts_are_in_the_order_of_the_walk() {
     }
 }
 
-/// Of postures that break the constraints alike the first of the walk is taken.
+/// Among postures with the same violations, the first of the walk is taken.
 #[test]
 fn of_equally_bad_postures_the_first_is_taken() {
     let view = view_of(4, 0.0);
     let mut lengths = view.lengths;
-    // The shoulders are much too near in every posture, and nothing else is asked.
+    // The shoulders are much too near in every posture, and nothing else is evaluated.
     lengths.rigid = [1.4; 4];
     let anything = |limits: &mut crate::model::limits::Limits| {
         let free = crate::model::limits::AngleRange::from_deg(-400.0, 400.0);
@@ -325,7 +325,7 @@ fn of_equally_bad_postures_the_first_is_taken() {
     }
 }
 
-/// Limits of the neck are asked where the head is known.
+/// Limits of the neck are evaluated if the head is known.
 #[test]
 fn the_neck_s_limits_need_the_head() {
     use crate::posture::constraint::Constraint;

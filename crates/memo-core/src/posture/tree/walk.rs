@@ -1,9 +1,9 @@
-//! Growing and pruning the tree, all nodes of a level at once.
+//! Grows and prunes the tree, all nodes of a level at once.
 //!
-//! A constraint looks at few joints, and where they are depends on few roots: those of the joints and of what
-//! they hang on, its scope. It is asked once for each choice within its scope that some node of the level
-//! makes, and the verdict goes to all nodes that make the choice. What is left and what was cut is what
-//! a walk down the branches, one by one, leaves and cuts.
+//! A constraint depends on few joints, and their positions depend on few roots: those of the joints and of the
+//! joints between them and the neck. This set of roots is the scope of the constraint. Each constraint is
+//! evaluated once per distinct choice within its scope, and the result holds for all nodes with that choice.
+//! Survivors and cuts are the same as for a depth-first walk along every branch.
 
 use super::checks::{Asked, Tree};
 use super::least::least_violating;
@@ -53,16 +53,16 @@ pub(super) fn walk(view: &View, options: &TreeOptions) -> Interpretations {
     }
 }
 
-/// The nodes of one level that are left, and what was cut on the way to it.
+/// The remaining nodes of one level, and the cuts above it.
 struct Pruned {
     nodes: Nodes,
-    /// Branches cut by each constraint of [`Constraint::ALL`].
+    /// Number of branches cut by each constraint of [`Constraint::ALL`].
     cut: [u32; CONSTRAINT_COUNT],
     cuts: Vec<Cut>,
 }
 
 impl Pruned {
-    /// Goes on to the level of a joint.
+    /// Grows the level of a joint.
     fn grow(&mut self, tree: &Tree, joint: Joint, count: &mut LevelCount) {
         let chain = CHAINS[joint as usize];
         let bit = 1 << (joint as usize - 1);
@@ -87,7 +87,7 @@ impl Pruned {
         count.without_root = of_kind(|kind| matches!(kind, RootKind::None { .. }));
     }
 
-    /// Cuts the nodes that break a constraint of a group, each by the first one it breaks.
+    /// Cuts the nodes that break a constraint of a group; the first constraint broken is the reason.
     fn prune(&mut self, tree: &Tree, group: &[Asked]) {
         let Some(Asked { scope, level, .. }) = group.first().copied() else { return };
         let mut figure = tree.figure();

@@ -61,10 +61,10 @@ fn the_interval_of_a_slope_shrinks_with_duration_and_steps() {
     assert!((short / long - 2.0 * 2f64.sqrt()).abs() < 0.15, "{short} {long}");
 }
 
-/// What was measured in a frame: time, place along the path, phase.
+/// Measurements of a frame: time, position along the path, phase.
 type Measured = (f64, f64, f64);
 
-/// Measurements as the tracker keeps them: followed by its filter, the measured phases within the cycle.
+/// Measurements as the tracker keeps them: filtered, with measured phases wrapped to the cycle.
 fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWalk {
     let (options, (first_s, along_m, phase)) = (WalkOptions::default(), measured[0]);
     let (last_s, last_m, last_phase) = measured[measured.len() - 1];
@@ -109,24 +109,25 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
 
 const ACROSS: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
 
-/// Somebody who deviates from the average as the head of the module says people do, and how he was measured.
+/// A person who deviates from the average as stated in the head of the module, with simulated measurements.
 /// Nothing here is computed by the code under test.
 struct Simulated {
     walk: TrackedWalk,
     speed_mps: f64,
     stride_s: f64,
-    /// By how much longer than half a stride the right step takes, cycles.
+    /// Duration of the right step beyond half a stride, cycles.
     late_right: f64,
-    /// By how much longer than that the right step is, metres.
+    /// Length of the right step beyond that duration times speed, metres.
     right_reach_m: f64,
 }
 
 impl Simulated {
-    /// `slant_rad` turns the path before a camera whose focal length is guessed.
+    /// `slant_rad` makes the path oblique for a camera with assumed focal length.
     fn new(random: &mut Random, slant_rad: Option<f64>) -> Self {
         let mut normal = |sd: f64| sd * f64::from(random.normal_pair()[0]);
         let (speed_mps, stride_s) = (1.25 + normal(0.1), 1.05 + normal(0.06));
-        // 1. People: steps that vary by 3 %, that by a third; strikes; reach; the height that was told.
+        // 1. People: step variability of 3 %, which itself varies by a third; strikes; reach; the body height
+        //    given.
         let varies = (0.03 * (1.0 + normal(0.33))).max(0.005);
         let shown_late = normal(0.01);
         let strikes_late = normal(0.008) - normal(0.008);
@@ -134,7 +135,7 @@ impl Simulated {
         let focal = 0.18 * slant_rad.unwrap_or(0.0).sin().powi(2);
         let distance_m = 6.0 * slant_rad.unwrap_or(0.0).cos();
         let scale = 1.0 + normal(0.1 / distance_m) + normal(0.015) + normal(focal);
-        // 2. Steps: a right one ends at an even half cycle. Longer ones take longer.
+        // 2. Steps: a right step ends at an even half cycle. Longer steps take longer.
         let (mut knots, mut ends_right) = (vec![(0.0, -1.6, 0.0)], false);
         for k in 1..=9 {
             let (time_s, place_m, _) = knots[knots.len() - 1];
@@ -146,7 +147,7 @@ impl Simulated {
             knots.push((time_s + duration_s, place_m + way_m, 0.5 * f64::from(k)));
             ends_right = !ends_right;
         }
-        // 3. Frames: noise of which neighbours share a third, and a deviation that comes back in every step.
+        // 3. Frames: noise correlated by a third between neighbours, and a deviation that repeats in every step.
         let (wave_phase, wave_m, turn) = (normal(0.006), normal(0.01), normal(3.0));
         let (mut off_phase, mut off_m) = (normal(0.008), normal(0.015));
         let mut measured = Vec::new();
@@ -173,7 +174,7 @@ impl Simulated {
         Self { walk, speed_mps, stride_s, late_right: shown_late + strikes_late, right_reach_m }
     }
 
-    /// What is true of the person, not of the steps that were seen.
+    /// The true value of the person, not of the observed steps.
     fn truth(&self, line: &GaitParameter) -> Option<f64> {
         let sign = match line.side {
             Some(Side::Right) => 1.0,
@@ -197,8 +198,8 @@ impl Simulated {
     }
 }
 
-/// How the intervals of a parameter did: errors and half widths in per cent of the truth, of symmetries in their
-/// own unit.
+/// Coverage of the intervals of a parameter: errors and half widths in per cent of the truth; for symmetries in
+/// their own unit.
 #[derive(Default)]
 struct Tally {
     held: usize,
@@ -225,8 +226,8 @@ fn tallied(people: &[Simulated]) -> BTreeMap<String, Tally> {
     tallies
 }
 
-/// Checks that the intervals hold the truth about as often as they say and are about as wide as the errors need: an
-/// infinite interval holds it always.
+/// Checks that the intervals contain the truth about as often as stated, and that their width fits the errors: an
+/// infinite interval always contains it.
 fn assert_calibrated(
     people: &[Simulated],
     held: [f64; 2],
@@ -246,7 +247,7 @@ fn assert_calibrated(
     }
 }
 
-/// Of 1,000 people 0.7 % is the standard deviation of a share of 95 %, 2.2 % that of the errors' size.
+/// For 1,000 people the standard deviation is 0.7 % for a share of 95 % and 2.2 % for the size of the errors.
 #[test]
 fn intervals_hold_the_truth_of_simulated_people_as_often_as_they_say() {
     let mut random = Random::new(2);
@@ -269,8 +270,8 @@ fn before_a_guessed_camera_lengths_along_the_view_hold_the_focal_length_too() {
     assert_calibrated(&people, [0.92, 0.985], [0.9, 1.2], is_length);
 }
 
-/// Exact measurements of 1.2 m/s and 0.9 Hz from phase 0.1 on, for so many cycles; the left heel strikes late by so
-/// much of a cycle and the phase is smooth.
+/// Exact measurements of 1.2 m/s and 0.9 Hz from phase 0.1, for this number of cycles. The left heel strikes late
+/// by this part of a cycle, and the phase is smooth.
 fn exact(cycles: f64, late_left: f64) -> Vec<Measured> {
     let frames = (cycles / 0.9 / 0.04).round() as usize;
     let turn = |cycles: f64| (std::f64::consts::TAU * cycles).cos();
@@ -352,7 +353,7 @@ fn the_stride_s_interval_holds_the_scatter_of_phase_and_place() {
     assert!((relative(GaitQuantity::Speed) / steps.hypot(scale) - 1.0).abs() < 0.03);
 }
 
-/// A place that is exactly speed times time makes lengths scatter as times do, times the speed.
+/// If position is exactly speed times time, lengths scatter as times do, multiplied by the speed.
 #[test]
 fn lengths_of_steps_scatter_as_their_times_do() {
     let mut random = Random::new(5);
@@ -397,7 +398,7 @@ fn sides_are_told_where_side_and_direction_are_likely() {
     };
     assert!(sided(&|walk| walk.start.p_other_direction = 0.19));
     assert!(!sided(&|walk| walk.start.p_other_direction = 0.21));
-    // p = 1 / (1 + exp(9.25 m)) for a margin m that one glimpse has shown.
+    // p = 1 / (1 + exp(9.25 m)) for a margin m of one glimpse.
     let margin = |walk: &mut TrackedWalk, m: f64| {
         let sum = walk.walk.twins[0].similarity_sum;
         walk.walk.twins[1].similarity_sum = (1.0 - m) * sum;
@@ -432,7 +433,7 @@ fn a_strike_is_the_median_of_the_frames_near_it() {
         let time_s = (0.5 * strike.index as f64 - 0.1) / 0.9;
         assert!((strike.time_s - time_s).abs() < 1e-9 && strike.variance_s2 < 1e-15, "{strike:?}");
     }
-    // Two of three frames that show the same time, and a third that shows another one by 0.03 cycles.
+    // Two of three frames give the same time; the third differs by 0.03 cycles.
     let mut measured = exact(2.05, 0.0);
     for (k, frame) in measured.iter_mut().enumerate() {
         frame.2 += if k % 3 == 0 { 0.03 } else { 0.0 };
@@ -474,7 +475,7 @@ fn a_step_leads_from_one_strike_to_the_next_and_is_named_after_it() {
     }
 }
 
-/// Of independent points the slope's standard deviation is sd / sqrt(sum (t - mean)²).
+/// For independent points the standard deviation of the slope is sd / sqrt(sum (t - mean)²).
 #[test]
 fn with_as_many_steps_as_points_the_interval_of_a_slope_is_that_of_the_textbook() {
     let points: Vec<(f64, f64)> = (0..200)
@@ -496,7 +497,7 @@ fn the_scale_is_uncertain_by_distance_posture_and_along_the_view_by_a_guessed_fo
         walk.camera_is_guessed = camera_is_guessed;
         walk.scale_sd()
     };
-    // The camera stands 6 m before the origin and looks along y.
+    // The camera is 6 m in front of the origin and looks along y.
     for slant_rad in [0.0, 0.3, -0.5f64] {
         let known = (0.1 / (6.0 * slant_rad.cos())).hypot(0.015);
         assert!((scale_sd(slant_rad, false) - known).abs() < 1e-12);

@@ -142,8 +142,8 @@ fn standard_deviations_grow_with_the_scatter_about_the_predictions() {
     }
 }
 
-/// Of a filter whose noise is that of the measurements the standard deviations stay as smoothed, though the
-/// state is far less certain than a measurement and some frames show nothing.
+/// If the filter's noise is that of the measurements, the standard deviations stay as smoothed, although the
+/// state is far less certain than a measurement and some frames have no measurement.
 #[test]
 fn a_filter_that_fits_keeps_its_standard_deviations() {
     let mut options = WalkOptions::default();
@@ -206,7 +206,7 @@ fn an_uncertain_distance_shows_across_the_path_and_far_from_the_camera_along_it(
 fn events_are_where_the_phase_passes_their_marks() {
     let times_s = uneven_s(50);
     let walk = followed(ACROSS, &exact(&times_s), WalkOptions::default());
-    // Adults stand for 61 % of the cycle; the left foot half a cycle later.
+    // In adults, stance takes 61 % of the cycle; the left foot is half a cycle later.
     let marks = [
         (0.0, EventKind::HeelStrike, Side::Right),
         (0.5, EventKind::HeelStrike, Side::Left),
@@ -228,7 +228,7 @@ fn events_are_where_the_phase_passes_their_marks() {
     for (event, (time_s, kind, side)) in events.iter().zip(expected) {
         assert!((event.time_s - time_s).abs() < 1e-6, "{event:?} at {time_s}");
         assert_eq!((event.kind, event.side), (kind, side));
-        // Every second frame is numbered.
+        // Only every second frame has a number.
         let after = times_s.partition_point(|t| *t <= time_s);
         let share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1]);
         assert!((event.frame - (5.0 + 2.0 * (after as f64 - 1.0 + share))).abs() < 1e-5, "{event:?}");
@@ -264,7 +264,7 @@ fn a_mark_is_passed_once_forwards_backwards_and_through_the_turn() {
         let found = passed(from, to, mark).expect("passed");
         assert!((found - share).abs() < 1e-12, "{from} to {to}: {found}");
     }
-    // On the mark: it belongs to what follows.
+    // A crossing exactly at a row belongs to the interval after it.
     assert_eq!((passed(0.5, 0.5625, 0.5), passed(0.4375, 0.5, 0.5)), (Some(0.0), None));
     assert_eq!((passed(0.4375, 0.5625, 0.0), passed(0.4375, 0.4375, 0.5)), (None, None));
     assert_eq!((passed(0.5, 0.5, 0.5), passed(0.25, 0.375, 0.5)), (None, None));

@@ -10,7 +10,7 @@ pub fn camera() -> Camera {
     Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
 }
 
-/// The image a hypothesis would show, as edges.
+/// The edges of the image that a hypothesis would show.
 pub fn edges_of(scene: &Scene<'_>, truth: &Hypothesis) -> Vec<EdgeLine> {
     let edge = |l: ModelLine| EdgeLine { start: l.start, end: l.end, gradient: 20.0, velocity: 0.0 };
     scene.lines(truth).into_iter().map(edge).collect()
@@ -26,7 +26,7 @@ fn the_printed_grid_has_4851_hypotheses() {
     assert!(Grid::whole_cycle(0.0, 1.2).phase.at(0).abs() < 1e-12);
 }
 
-/// Scores of a grid by a formula.
+/// Scores of a grid from a formula.
 fn scored(grid: Grid, score: impl Fn(&[f64; 3]) -> f64) -> SearchResult {
     let mut scores = Vec::new();
     for p in 0..grid.phase.count {

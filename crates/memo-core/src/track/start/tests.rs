@@ -3,7 +3,7 @@ use super::*;
 use crate::image::Rectangle;
 use glam::DVec2;
 
-/// A similarity curve with a peak at `phase` and a lower one half a cycle on.
+/// A similarity curve with a peak at `phase` and a lower peak half a cycle later.
 fn curve(time_s: f64, phase: f64, twin: f32) -> PhaseCurve {
     let bump = |p: f64| (-0.5 * ((p - p.round()) / 0.05).powi(2)).exp() as f32;
     let scores = (0..50)
@@ -37,7 +37,7 @@ fn a_planted_line_is_found_though_single_frames_lie() {
     assert_eq!(choice.on_line.iter().filter(|on| !**on).count(), 4);
 }
 
-/// Half a cycle in 13 frames explains a walker, one phase somebody who keeps a posture.
+/// Half a cycle in 13 frames fits a walker; a constant phase fits a person who keeps one posture.
 #[test]
 fn one_phase_explains_who_does_not_walk() {
     let curves = |rate_hz: f64| -> Vec<PhaseCurve> {
@@ -58,7 +58,7 @@ fn estimate(time_s: f64, phase: f64, similarity: f64) -> PhaseEstimate {
     PhaseEstimate { time_s, phase: phase.rem_euclid(1.0), similarity }
 }
 
-/// Estimates on a line, every one of `off` half a cycle off with its own similarity.
+/// Estimates on a line; those marked in `off` are half a cycle away and have their own similarity.
 fn mixed(phase0: f64, rate_hz: f64, off: &[bool], [on, beside]: [f64; 2]) -> Vec<PhaseEstimate> {
     let one = |(k, off): (usize, &bool)| {
         let t = 0.04 * k as f64;
@@ -112,7 +112,7 @@ fn of_equal_means_the_voted_line_wins() {
 
 #[test]
 fn the_chosen_line_is_the_least_squares_line_through_its_estimates() {
-    // Backwards, through the turn, at a rate between those voted on, with scatter.
+    // Backward, across phase 0, at a rate between the steps of the search, with scatter.
     let scatter = [0.02, -0.01, 0.005, -0.02, 0.015, 0.0, -0.005, 0.01, -0.015, 0.02, -0.01, 0.0];
     let (rate_hz, phase0) = (-0.913, 0.05);
     let off = |k: usize| k == 4 || k == 7;
@@ -174,7 +174,7 @@ fn a_curve_is_linear_between_its_phases_and_closed() {
     assert_eq!(curve.best_phase(), 0.25);
 }
 
-/// What a start that found this would have reported, sure of the direction.
+/// The report of a start that found this path and beginning, certain of the direction.
 pub fn report(path: Path, beginning: Beginning, direction: Direction) -> StartReport {
     let line = PhaseLine { phase_at_start: beginning.phase, rate_hz: beginning.rate_hz, similarity: 0.5 };
     let twin = PhaseLine { phase_at_start: (beginning.phase + 0.5).rem_euclid(1.0), similarity: 0.4, ..line };
@@ -192,8 +192,8 @@ pub fn report(path: Path, beginning: Beginning, direction: Direction) -> StartRe
     }
 }
 
-/// Five frames of a walker's contours and the course its rectangles would give; `forward` or walking
-/// backwards to the right.
+/// Five frames of a walker's contours and the course from its rectangles; `forward`, or walking backward to the
+/// right.
 fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
     let (walker, camera) = (walker(), camera());
     let heading_rad = if forward { 0.0 } else { std::f64::consts::PI };

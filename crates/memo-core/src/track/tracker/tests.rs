@@ -1,4 +1,4 @@
-//! What the tracker decides, on moving boxes and on walks put into it; no frame is drawn.
+//! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
 use super::super::locate::locate;
 use super::super::score::EdgeLine;
@@ -204,7 +204,7 @@ fn frames_of_another_size_than_the_camera_s_are_refused() {
 #[test]
 fn the_report_counts_frames_candidates_borders_and_refused_starts() {
     let mut tracker = tracker();
-    // A person who leaves to the right, then stands still: no start.
+    // A person who leaves to the right, then something too small: no start.
     let frames = [&[][..], &[person(560)], &[person(400)], &[boxed(300, 300, 8, 9)]];
     for (k, boxes) in frames.into_iter().enumerate() {
         tracker.advance(&evidence(k, boxes)).unwrap();
