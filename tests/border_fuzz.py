@@ -970,7 +970,7 @@ def posture_options(d, frames):
         )
     return size | d.options(
         noise_px=lambda: d.number(0, 9),
-        rules=lambda: d.choice("walking", "physical", "walking_general", "running", "standing"),
+        rules=lambda: d.choice("walking", "physical", "walking_general"),
         strength=lambda: d.choice("measured", "paper"),
         anchor=lambda: d.choice("auto", "ground", "trunk", "extent", "head", "combined", "given"),
         moving_direction=lambda: d.triple(-1, 1),
@@ -995,7 +995,7 @@ def _(d):
     rays = joints[0] / np.linalg.norm(joints[0], axis=1, keepdims=True)
     rays[d.random.random(14) < d.one([0.0, 0.1, 0.7])] = np.nan
     options = d.options(
-        rules=lambda: d.choice("walking", "physical", "walking_general", "running", "standing"),
+        rules=lambda: d.choice("walking", "physical", "walking_general"),
         strength=lambda: d.choice("measured", "paper"),
         noise_rad=lambda: d.number(0, 0.1),
     )

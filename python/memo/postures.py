@@ -37,7 +37,7 @@ __all__ = ["Postures", "Reason", "ReasonTotal", "SecondBest", "posture", "read_l
 
 _log = logging.getLogger(__name__)
 
-RULES = ("physical", "walking", "walking-general", "running", "standing")
+RULES = ("physical", "walking", "walking-general")
 STRENGTHS = ("measured", "paper")
 ANCHORS = ("auto", "ground", "trunk", "extent", "head", "combined")
 
@@ -310,8 +310,8 @@ def posture(
     `keypoints`: the result of `read_keypoints`, or a file or folder for it, with `fps`, `layout`, `person`.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
     to sole, refined by the frames; with neither they are estimated, with the ground as scale.
-    `rules`: "physical", "walking", "walking-general" (holds for any way of walking), "running"
-    or "standing"; `strength`: "measured" limits or those of the "paper".
+    `rules`: "physical", "walking" or "walking-general" (holds for any way of
+    walking); `strength`: "measured" limits or those of the "paper".
     `anchor`: source of the distance of the neck, "auto", "ground", "trunk", "extent", "head" or
     "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN if unknown, with its standard
     deviation `distance_sd_m` (0.05).

@@ -57,8 +57,6 @@ class Rules(StrEnum):
     PHYSICAL = "physical"
     WALKING = "walking"
     WALKING_GENERAL = "walking-general"
-    RUNNING = "running"
-    STANDING = "standing"
 
 
 class Strength(StrEnum):

@@ -73,10 +73,6 @@ pub enum Constraint {
     ThighPlane(Side),
     /// Shank out of that plane.
     ShankPlane(Side),
-    /// Leg not upright (a rule of standing).
-    LegUpright(Side),
-    /// Knee not straight (a rule of standing).
-    KneeStraight(Side),
     /// Both arms in front of or behind the torso (rule 1).
     ArmsOpposed,
     /// Both legs in front of or behind the torso (rule 1).
@@ -110,7 +106,7 @@ pub enum Constraint {
 }
 
 /// Number of constraints.
-pub const CONSTRAINT_COUNT: usize = 80;
+pub const CONSTRAINT_COUNT: usize = 76;
 
 /// Kind of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -202,10 +198,6 @@ impl Constraint {
         C::ThighPlane(Left),
         C::ShankPlane(Right),
         C::ShankPlane(Left),
-        C::LegUpright(Right),
-        C::LegUpright(Left),
-        C::KneeStraight(Right),
-        C::KneeStraight(Left),
         C::ArmsOpposed,
         C::LegsOpposed,
         C::ThighThigh,
@@ -237,7 +229,6 @@ impl Constraint {
             C::UpperArmPlane(_) | C::ForearmPlane(_) | C::ThighPlane(_) | C::ShankPlane(_) => {
                 ConstraintKind::Rule
             }
-            C::LegUpright(_) | C::KneeStraight(_) => ConstraintKind::Rule,
             C::ArmsOpposed | C::LegsOpposed | C::ArmOpposesLeg(_) => ConstraintKind::Rule,
             C::OneKneeFlexed | C::OtherLegUpright => ConstraintKind::Rule,
             _ => ConstraintKind::Angle,
@@ -267,9 +258,7 @@ impl Constraint {
             C::HipFlexionStraight(s) | C::KneeFlexion(s) | C::KneeExtension(s) => {
                 limb(&[s.hip(), s.knee(), s.ankle()])
             }
-            C::KneeAnkle(s) | C::ShankPlane(s) | C::LegUpright(s) | C::KneeStraight(s) => {
-                limb(&[s.hip(), s.knee(), s.ankle()])
-            }
+            C::KneeAnkle(s) | C::ShankPlane(s) => limb(&[s.hip(), s.knee(), s.ankle()]),
             C::UpperArmTorso(s) => limb(&[s.elbow()]).with(hips),
             C::ForearmTorso(s) => limb(&[s.elbow(), s.wrist()]).with(hips),
             C::ArmsOpposed => limb(&[Right.elbow(), Left.elbow()]),
@@ -333,8 +322,6 @@ impl Constraint {
             C::ForearmPlane(s) => of(s, "forearm_out_of_plane"),
             C::ThighPlane(s) => of(s, "thigh_out_of_plane"),
             C::ShankPlane(s) => of(s, "shank_out_of_plane"),
-            C::LegUpright(s) => of(s, "leg_not_upright"),
-            C::KneeStraight(s) => of(s, "knee_not_straight"),
             C::ArmsOpposed => "arms_on_one_side".to_owned(),
             C::LegsOpposed => "legs_on_one_side".to_owned(),
             C::ThighThigh => "thigh_in_thigh".to_owned(),
@@ -407,8 +394,6 @@ impl Constraint {
             C::ForearmPlane(s) => format!("{} forearm leaves the moving plane by", s.name()),
             C::ThighPlane(s) => format!("{} thigh leaves the moving plane by", s.name()),
             C::ShankPlane(s) => format!("{} shank leaves the moving plane by", s.name()),
-            C::LegUpright(s) => format!("{} leg leans by", s.name()),
-            C::KneeStraight(s) => format!("{} knee bent while standing by", s.name()),
             C::ArmsOpposed => "both arms swing to one side by".to_owned(),
             C::LegsOpposed => "both legs swing to one side by".to_owned(),
             C::ThighThigh => "thighs too near to each other: clearance".to_owned(),

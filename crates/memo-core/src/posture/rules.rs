@@ -46,14 +46,10 @@ pub enum Rule {
     /// Rule 5: while one knee is flexed (by [`MotionModel::knee_flexed_rad`]), the other leg, from hip to
     /// ankle, leans from the vertical by at most the angle.
     OtherLegUpright,
-    /// Standing: both legs, from hip to ankle, lean by at most the angle.
-    LegsUpright,
-    /// Standing: both knees are flexed by at most the angle.
-    KneesStraight,
 }
 
 /// Number of rules.
-pub const RULE_COUNT: usize = 13;
+pub const RULE_COUNT: usize = 11;
 
 impl Rule {
     /// All rules.
@@ -69,8 +65,6 @@ impl Rule {
         Self::LegPlane,
         Self::OneKneeFlexed,
         Self::OtherLegUpright,
-        Self::LegsUpright,
-        Self::KneesStraight,
     ];
 
     /// The name in files and messages.
@@ -87,8 +81,6 @@ impl Rule {
             Self::LegPlane => "legs_in_moving_plane",
             Self::OneKneeFlexed => "one_knee_flexed",
             Self::OtherLegUpright => "other_leg_upright",
-            Self::LegsUpright => "legs_upright",
-            Self::KneesStraight => "knees_straight",
         }
     }
 
@@ -97,16 +89,15 @@ impl Rule {
         Self::ALL.into_iter().find(|rule| rule.name() == name)
     }
 
-    /// The number in the paper; `None` for the rules of standing.
-    pub fn number(self) -> Option<u8> {
-        Some(match self {
+    /// The number in the paper.
+    pub fn number(self) -> u8 {
+        match self {
             Self::ArmsOpposed | Self::LegsOpposed => 1,
             Self::ArmOpposesLeg => 2,
             Self::ShoulderElbow | Self::ElbowWrist | Self::HipKnee | Self::KneeAnkle => 3,
             Self::ArmPlane | Self::LegPlane => 4,
             Self::OneKneeFlexed | Self::OtherLegUpright => 5,
-            Self::LegsUpright | Self::KneesStraight => return None,
-        })
+        }
     }
 
     /// The rule that a constraint belongs to.
@@ -124,8 +115,6 @@ impl Rule {
             C::ThighPlane(_) | C::ShankPlane(_) => Self::LegPlane,
             C::OneKneeFlexed => Self::OneKneeFlexed,
             C::OtherLegUpright => Self::OtherLegUpright,
-            C::LegUpright(_) => Self::LegsUpright,
-            C::KneeStraight(_) => Self::KneesStraight,
             _ => return None,
         })
     }
@@ -211,24 +200,6 @@ impl MotionModel {
         Self { noise_factor: 0.0, ..model }
     }
 
-    /// An example, not validated on running: arms and legs are in opposition, limbs stay in the moving plane;
-    /// both knees may be flexed, and no leg has to be upright.
-    pub fn running() -> Self {
-        Self::without_rules()
-            .with(Rule::ArmsOpposed, Tolerance::from_deg(25.0))
-            .with(Rule::LegsOpposed, Tolerance::from_deg(30.0))
-            .with(Rule::ArmOpposesLeg, Tolerance::from_deg(25.0))
-            .with(Rule::ArmPlane, Tolerance::from_deg(45.0))
-            .with(Rule::LegPlane, Tolerance::from_deg(25.0))
-    }
-
-    /// An example, not validated: both legs upright, both knees straight; the arms are free.
-    pub fn standing() -> Self {
-        Self::without_rules()
-            .with(Rule::LegsUpright, Tolerance::from_deg(15.0))
-            .with(Rule::KneesStraight, Tolerance::from_deg(30.0))
-    }
-
     /// The same model with another rule.
     #[must_use]
     pub fn with(mut self, rule: Rule, tolerance: Tolerance) -> Self {
@@ -276,8 +247,6 @@ impl MotionModel {
                 self.over(constraint, right.min(left), angle)
             }
             C::OtherLegUpright => self.other_leg(constraint, angle, figure, trunk),
-            C::LegUpright(s) => self.upright(constraint, angle, figure, trunk, s),
-            C::KneeStraight(s) => self.over(constraint, self.sure_flexion(figure, trunk, s, angle), angle),
             _ => None,
         }
     }

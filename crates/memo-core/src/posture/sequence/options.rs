@@ -21,16 +21,11 @@ pub enum Motion {
     Walking,
     /// Only rules 1 and 2: arms and legs swing in opposition.
     WalkingGeneral,
-    /// An example, not validated on data.
-    Running,
-    /// An example, not validated on data.
-    Standing,
 }
 
 impl Motion {
     /// All motions.
-    pub const ALL: [Self; 5] =
-        [Self::Physical, Self::Walking, Self::WalkingGeneral, Self::Running, Self::Standing];
+    pub const ALL: [Self; 3] = [Self::Physical, Self::Walking, Self::WalkingGeneral];
 
     /// The name in files and messages.
     pub fn name(self) -> &'static str {
@@ -38,8 +33,6 @@ impl Motion {
             Self::Physical => "physical",
             Self::Walking => "walking",
             Self::WalkingGeneral => "walking_general",
-            Self::Running => "running",
-            Self::Standing => "standing",
         }
     }
 
@@ -58,14 +51,12 @@ impl Motion {
             (Self::Walking, true) => options.with_motion(MotionModel::walking_paper()),
             (Self::WalkingGeneral, false) => options.with_motion(MotionModel::walking_general()),
             (Self::WalkingGeneral, true) => options.with_motion(MotionModel::walking_general_paper()),
-            (Self::Running, _) => options.with_motion(MotionModel::running()),
-            (Self::Standing, _) => options.with_motion(MotionModel::standing()),
         }
     }
 
     /// True if its rules or its prior are relative to the moving direction.
     pub(super) fn needs_heading(self) -> bool {
-        matches!(self, Self::Walking | Self::WalkingGeneral | Self::Running)
+        matches!(self, Self::Walking | Self::WalkingGeneral)
     }
 
     /// Word for a person in this motion.
@@ -73,8 +64,6 @@ impl Motion {
         match self {
             Self::Physical => "a person",
             Self::Walking | Self::WalkingGeneral => "walking",
-            Self::Running => "running",
-            Self::Standing => "standing",
         }
     }
 
@@ -82,7 +71,7 @@ impl Motion {
     pub(super) fn prior(self) -> MotionPrior {
         match self {
             Self::Walking | Self::WalkingGeneral => MotionPrior::walking(),
-            Self::Physical | Self::Running | Self::Standing => MotionPrior::any(),
+            Self::Physical => MotionPrior::any(),
         }
     }
 }
@@ -236,8 +225,6 @@ mod tests {
                 Some(MotionModel::walking_general()),
                 Some(MotionModel::walking_general_paper()),
             ),
-            (Motion::Running, 5, Some(MotionModel::running()), Some(MotionModel::running())),
-            (Motion::Standing, 2, Some(MotionModel::standing()), Some(MotionModel::standing())),
         ] {
             let [free, strict] = [Strength::Measured, Strength::Paper].map(|strength| motion.tree(strength));
             assert_eq!((&free.motion, &strict.motion), (&measured, &paper), "{motion:?}");
@@ -252,14 +239,11 @@ mod tests {
         }
     }
 
-    /// Standing and arbitrary motion have no direction; only walking has a prior.
+    /// Arbitrary motion has no direction; only walking has a prior.
     #[test]
-    fn walking_and_running_have_a_direction_and_walking_its_habits() {
+    fn walking_has_a_direction_and_its_habits() {
         let with_direction = Motion::ALL.into_iter().filter(|motion| motion.needs_heading());
-        assert_eq!(
-            with_direction.collect::<Vec<_>>(),
-            [Motion::Walking, Motion::WalkingGeneral, Motion::Running]
-        );
+        assert_eq!(with_direction.collect::<Vec<_>>(), [Motion::Walking, Motion::WalkingGeneral]);
         let walkers = Motion::ALL.into_iter().filter(|motion| motion.prior() == MotionPrior::walking());
         assert_eq!(walkers.collect::<Vec<_>>(), [Motion::Walking, Motion::WalkingGeneral]);
     }

@@ -447,11 +447,11 @@ mod tests {
     fn a_trunk_against_the_way_is_told() {
         let mut walk = walk(15.0, 20, 0.5);
         let is_told = |told: &[Warning]| told.iter().any(|w| matches!(w, Warning::Backwards { .. }));
-        assert!(!is_told(&warnings(&walk, |options| options.motion = Motion::Running)));
+        assert!(!is_told(&warnings(&walk, |options| options.motion = Motion::WalkingGeneral)));
         for points in &mut walk.points_px {
             *points = PerJoint(Joint::ALL.map(|joint| points[joint.mirrored()]));
         }
-        let told = warnings(&walk, |options| options.motion = Motion::Running);
+        let told = warnings(&walk, |options| options.motion = Motion::WalkingGeneral);
         assert!(is_told(&told), "{told:?}");
     }
 
