@@ -7,7 +7,6 @@
 //!
 //! Limits: no motion is predicted, so two people who come closer to each other than the person moves between
 //! two frames may be confused.
-//! confused, as no motion is predicted.
 
 use super::layouts::size_px;
 use crate::wording::counted;
