@@ -69,6 +69,10 @@ impl Background {
 
     /// The temporal median of frames, best spread evenly over the footage; for an even number of frames, the
     /// lower of the two middle values. Does not keep a copy of the frames.
+    ///
+    /// # Errors
+    ///
+    /// There are no frames, or they differ in size.
     pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
         let first = frames.first().ok_or(BackgroundError::NoFrames)?;
         frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
@@ -99,6 +103,10 @@ impl Background {
     }
 
     /// Moves the level towards a frame, except where `foreground` is marked.
+    ///
+    /// # Errors
+    ///
+    /// The frame or the mask differs in size from the background.
     pub fn update(&mut self, frame: &Frame, foreground: Option<&Mask>) -> Result<(), FrameError> {
         self.check_size(frame.width(), frame.height())?;
         if let Some(mask) = foreground {
@@ -111,6 +119,10 @@ impl Background {
     }
 
     /// The pixels where eq. (1) holds between a frame and the background.
+    ///
+    /// # Errors
+    ///
+    /// The frame differs in size from the background.
     pub fn foreground(&self, frame: &Frame) -> Result<Mask, FrameError> {
         pair_changes(&self.image().as_frame(), frame, &self.options.change)
     }
@@ -123,6 +135,10 @@ impl Background {
     /// to 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below
     /// half of the person's contrast: 20 to 30 on well-lit footage. Parts with less contrast are lost; in
     /// such footage use the region itself.
+    ///
+    /// # Errors
+    ///
+    /// The frame or the mask differs in size from the background.
     pub fn silhouette(&self, frame: &Frame, within: &Mask, threshold: f64) -> Result<Mask, FrameError> {
         self.check_size(frame.width(), frame.height())?;
         self.check_size(within.width(), within.height())?;

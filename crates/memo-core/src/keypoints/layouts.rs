@@ -238,6 +238,10 @@ fn layout_counts() -> Vec<String> {
 
 impl Layout {
     /// The layout called `name`, whatever its case and separators.
+    ///
+    /// # Errors
+    ///
+    /// There is no layout with this name.
     pub fn by_name(name: &str) -> Result<&'static Self, DetectorError> {
         let wanted = plain(name);
         let same = |layout: &&'static Self| plain(layout.name) == wanted;
@@ -258,6 +262,10 @@ impl Layout {
     /// the hips and 0.02 to 0.16 for the neck. The larger of the two medians over the frames decides: up to
     /// [`MIDDLE_NEAR`] the layout is BODY_25, from [`MIDDLE_FAR`] on it is not, and between them the result
     /// is an error.
+    ///
+    /// # Errors
+    ///
+    /// No layout has this number of points, or the midpoint test does not determine the layout.
     pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
         let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
         let (with_middles, without) = match fitting[..] {

@@ -152,6 +152,10 @@ pub fn joint_names() -> Vec<&'static str> {
 }
 
 /// The name used here for a point spelled in any known way: `RKnee`, `right_knee`, `RIGHT_KNEE`, `RKN`.
+///
+/// # Errors
+///
+/// There is no point with this name.
 pub fn joint_name(name: &str) -> Result<&'static str, DetectorError> {
     let plain = plain(name);
     let spelt = |own: &str, others: &[&str]| plain_is(own, &plain) || others.contains(&plain.as_str());

@@ -102,6 +102,11 @@ pub struct Motion {
 impl Motion {
     /// A motion from positions (frames x points, frame after frame; world axes, metres), names and times
     /// (seconds).
+    ///
+    /// # Errors
+    ///
+    /// There is no frame or no point, the lengths disagree, the times do not increase, or a position is
+    /// farther than 1e6 m from the origin.
     pub fn new(positions: Vec<DVec3>, names: Vec<String>, times_s: Vec<f64>) -> Result<Self, MotionError> {
         let (frames, points) = (times_s.len(), names.len());
         if frames == 0 || points == 0 {
@@ -252,6 +257,10 @@ impl WalkOptions {
 ///
 /// The limbs of the model swing in planes parallel to the walking direction, so the motion is as planar as
 /// walking is assumed to be.
+///
+/// # Errors
+///
+/// An option out of range, or a walker with a stride that is not positive.
 pub fn sampled_walk(walker: &Walker, options: &WalkOptions) -> Result<Motion, MotionError> {
     let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = *options;
     let positive = |value: f64| value > 0.0 && value.is_finite();

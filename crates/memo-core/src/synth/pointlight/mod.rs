@@ -76,6 +76,11 @@ impl PointLightDisplay {
 }
 
 /// Makes a point-light display of a motion.
+///
+/// # Errors
+///
+/// An option out of range, a motion that is too short for the phase scrambling, limbs or joints that the
+/// limited lifetime needs but the motion lacks, too many dots, or a motion of which no point is visible.
 pub fn point_light_display(
     motion: &Motion,
     options: &PointLightOptions,
