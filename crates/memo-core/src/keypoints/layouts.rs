@@ -255,7 +255,7 @@ impl Layout {
     /// The layout with `joint_count` points that fits `points_px`, given frame after frame, NaN where
     /// missing.
     ///
-    /// BODY_25 and BODY_25B both have 25 points. The **midpoint test** distinguishes them: only BODY_25 has a
+    /// BODY_25 and BODY_25B both have 25 points. The **middle test** distinguishes them: only BODY_25 has a
     /// neck and a mid-hip, which were trained as midpoints of the shoulders and of the hips. In published
     /// BODY_25 files those points lie within 0.01 of the figure's size (the diagonal of its bounding box) of
     /// the midpoints. A BODY_25B file has other points at those indices, at a distance of 0.24 to 0.45 for
@@ -265,7 +265,7 @@ impl Layout {
     ///
     /// # Errors
     ///
-    /// No layout has this number of points, or the midpoint test does not determine the layout.
+    /// No layout has this number of points, or the middle test does not determine the layout.
     pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
         let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
         let (with_middles, without) = match fitting[..] {

@@ -82,7 +82,7 @@ pub enum DetectorError {
         count: usize,
         /// The layouts with that number of points.
         names: [&'static str; 2],
-        /// Result of the midpoint test, if a frame has the points; see
+        /// Result of the middle test, if a frame has the points; see
         /// [`Layout::from_points`](super::layouts::Layout::from_points).
         distance: Option<f64>,
     },

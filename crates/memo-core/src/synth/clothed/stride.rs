@@ -38,7 +38,8 @@ const TAKES_OVER: f64 = 0.10;
 /// A foot is in stance while it is slower than this fraction of the walking speed.
 const STANDS_BELOW: f64 = 0.4;
 
-/// An angle over the gait cycle, radians: mean + sum of a_k cos 2 pi k phi + b_k sin 2 pi k phi, as mean, a_1, b_1, a_2...
+/// An angle over the gait cycle, radians: mean + sum of a_k cos 2 pi k phi + b_k sin 2 pi k phi.
+/// Stored as mean, a_1, b_1, a_2...
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve([f64; COEFFICIENTS]);
 
