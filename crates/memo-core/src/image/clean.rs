@@ -52,10 +52,6 @@ pub enum CleanError {
 
 /// Deletes pixels with few neighbours and marks pixels with many until no pixel changes. Pixels outside the
 /// mask count as unmarked.
-///
-/// # Errors
-///
-/// `few` is not less than `many`.
 pub fn clean(mask: &Mask, options: &CleanOptions) -> Result<Mask, CleanError> {
     let CleanOptions { few, many } = *options;
     if few >= many {

@@ -29,14 +29,14 @@ pub enum SceneError {
         /// Width and height, pixels.
         size: [u32; 2],
     },
-    /// An option is out of range.
+    /// An option makes no sense.
     #[error("{name} must be {wanted}, got {got}")]
     Option {
         /// Its name.
         name: &'static str,
-        /// Its allowed range.
+        /// What is accepted.
         wanted: &'static str,
-        /// The value given.
+        /// What was given.
         got: f64,
     },
 }

@@ -9,17 +9,17 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PointLightError {
-    /// A number is out of range.
+    /// A number is out of its range.
     #[error("{parameter} must be {wanted}, got {value}")]
     Parameter {
         /// Its name.
         parameter: &'static str,
-        /// Its allowed range.
+        /// What it may be.
         wanted: &'static str,
         /// Its value.
         value: f64,
     },
-    /// The recording is shorter than the requested period or shift.
+    /// The recording is shorter than the period or shift asked for.
     #[error("{parameter} of {wanted_s} s needs a longer motion: it lasts {available_s} s")]
     TooShort {
         /// The parameter.
