@@ -41,7 +41,7 @@ pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SidePair {
-    /// The group with which it is exchanged.
+    /// The group with which it is swapped.
     pub group: SwapGroup,
     /// The part without its side, such as `knee`.
     pub part: &'static str,

@@ -92,7 +92,7 @@ fn hint(nearest: &Option<&'static str>) -> String {
     nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
 }
 
-/// Points that are exchanged together when a detector confuses right and left.
+/// Points that are swapped together when a detector confuses right and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SwapGroup {
     /// Hip, knee, ankle, heel and toes.
