@@ -1,12 +1,12 @@
 //! A slowly varying image of the empty scene, for people who stop: compared with it they stay visible when
 //! eq. (1) between consecutive frames detects nothing.
 //!
-//! Each pixel of the background is a temporal median, which a person does not disturb who covers the pixel
-//! for less than half of the time. From a file, [`Background::from_frames`] takes the exact median of a few
-//! frames. On a stream the median is approximated by stochastic approximation (Robbins and Monro 1951): each
-//! frame moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory is
-//! one image, whatever the length of the stream. Foreground is what passes eq. (1) of [`super::change`]
-//! against this image.
+//! Each pixel of the background is a temporal median. A person who covers the pixel for less than half of the
+//! time does not change it. From a file, [`Background::from_frames`] takes the exact median of a few frames.
+//! On a stream the median is approximated by stochastic approximation (Robbins and Monro 1951): each frame
+//! moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory is one
+//! image, whatever the length of the stream. Foreground pixels are those for which eq. (1) of
+//! [`super::change`] holds against this image.
 //!
 //! Limits: whatever covers a pixel most of the time counts as background, and the camera must be static.
 
