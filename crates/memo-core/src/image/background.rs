@@ -1,12 +1,12 @@
 //! A slowly varying image of the empty scene, for people who stop: compared with it they stay visible when
 //! eq. (1) between consecutive frames detects nothing.
 //!
-//! Each pixel of the background is a temporal median, which a person does not disturb who covers the pixel
-//! for less than half of the time. From a file, [`Background::from_frames`] takes the exact median of a few
-//! frames. On a stream the median is approximated by stochastic approximation (Robbins and Monro 1951): each
-//! frame moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory is
-//! one image, whatever the length of the stream. Foreground is what passes eq. (1) of [`super::change`]
-//! against this image.
+//! Each pixel of the background is a temporal median. A person who covers the pixel for less than half of the
+//! time does not change it. From a file, [`Background::from_frames`] takes the exact median of a few frames.
+//! On a stream the median is approximated by stochastic approximation (Robbins and Monro 1951): each frame
+//! moves the level towards its grey value by at most a step that falls as 1/k to a constant. Memory is one
+//! image, whatever the length of the stream. Foreground pixels are those for which eq. (1) of
+//! [`super::change`] holds against this image.
 //!
 //! Limits: whatever covers a pixel most of the time counts as background, and the camera must be static.
 
@@ -79,6 +79,10 @@ impl Background {
 
     /// The temporal median of frames, best spread evenly over the footage; for an even number of frames, the
     /// lower of the two middle values. Does not keep a copy of the frames.
+    ///
+    /// # Errors
+    ///
+    /// There are no frames, or they differ in size.
     pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
         let first = frames.first().ok_or(BackgroundError::NoFrames)?;
         frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
@@ -109,6 +113,10 @@ impl Background {
     }
 
     /// Moves the level towards a frame, except where `foreground` is marked.
+    ///
+    /// # Errors
+    ///
+    /// The frame or the mask differs in size from the background.
     pub fn update(&mut self, frame: &Frame, foreground: Option<&Mask>) -> Result<(), FrameError> {
         self.check_size(frame.width(), frame.height())?;
         if let Some(mask) = foreground {
@@ -121,6 +129,10 @@ impl Background {
     }
 
     /// The pixels where eq. (1) holds between a frame and the background.
+    ///
+    /// # Errors
+    ///
+    /// The frame differs in size from the background.
     pub fn foreground(&self, frame: &Frame) -> Result<Mask, FrameError> {
         pair_changes(&self.image().as_frame(), frame, &self.options.change)
     }
@@ -133,6 +145,10 @@ impl Background {
     /// to 0.38 s. A good threshold is above the darkening by soft shadows (5 to 15 grey levels) and below
     /// half of the person's contrast: 20 to 30 on well-lit footage. Parts with less contrast are lost; in
     /// such footage use the region itself.
+    ///
+    /// # Errors
+    ///
+    /// The frame or the mask differs in size from the background.
     pub fn silhouette(&self, frame: &Frame, within: &Mask, threshold: f64) -> Result<Mask, FrameError> {
         self.check_size(frame.width(), frame.height())?;
         self.check_size(within.width(), within.height())?;

@@ -77,6 +77,10 @@ impl ChangeOptions {
 
 /// The pixels where eq. (1) holds between two frames. The result is symmetric in `a` and `b` unless the gain
 /// is compensated.
+///
+/// # Errors
+///
+/// The frames differ in size.
 pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
     a.check_same_size(b)?;
     if !options.compensate_gain {
@@ -88,6 +92,10 @@ pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mas
 }
 
 /// The left side of eq. (1), N in grey levels, for every pixel.
+///
+/// # Errors
+///
+/// The frames differ in size.
 pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
     a.check_same_size(b)?;
     let mut norms = Image::filled(a.width(), a.height(), 0f32);
@@ -99,6 +107,10 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
 }
 
 /// The threshold T that eq. (1) uses for this pair, in grey levels, without gain compensation.
+///
+/// # Errors
+///
+/// The frames differ in size.
 pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
     a.check_same_size(b)?;
     match options.threshold {
@@ -115,6 +127,10 @@ pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f
 /// distribution. Sums over 25 pixels also measure noise below one grey level, where the median absolute
 /// difference of single pixels is 0. Moving pixels bias the estimate upwards: 9 % when a fifth of the frame
 /// moves. Footage whose codec repeats more than half of the blocks gives 0.
+///
+/// # Errors
+///
+/// The frames differ in size.
 pub fn noise_sd(a: &Frame, b: &Frame) -> Result<f64, FrameError> {
     a.check_same_size(b)?;
     let mut norms = sampled_norms(a, b);

@@ -141,6 +141,10 @@ impl EdgeChains {
 /// 1. Gradient of Gaussian and its local maxima across the edge, above the low threshold.
 /// 2. Hysteresis: connected maxima stay if one of them reaches the high threshold.
 /// 3. Each point is linked to its successor and predecessor along the edge.
+///
+/// # Errors
+///
+/// Options out of range, or a mask that differs in size from the frame.
 pub fn edge_chains(
     frame: &Frame<'_>,
     domain: &EdgeDomain<'_>,

@@ -169,6 +169,10 @@ impl FlowField {
 /// 1. Smooth both frames around the region and remove components whose motion is not determined.
 /// 2. Build a pyramid of grey values, gradients and region.
 /// 3. From the coarsest level down: linearise about the motion found so far, solve, repeat.
+///
+/// # Errors
+///
+/// The frames and the mask differ in size, the region is empty, or an option is not positive.
 pub fn velocity_field(
     first: &Frame<'_>,
     second: &Frame<'_>,

@@ -68,7 +68,11 @@ impl<T: Copy> Image<T> {
         Self { width, height, data: vec![value; width * height] }
     }
 
-    /// Takes row-major data of `width * height` elements; any other length is an error.
+    /// Takes row-major data of `width * height` elements.
+    ///
+    /// # Errors
+    ///
+    /// A side is zero, or the number of elements is not `width * height`.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Result<Self, FrameError> {
         if width == 0 || height == 0 {
             return Err(FrameError::BadShape { width, height, stride: width });
@@ -163,6 +167,10 @@ pub struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     /// Borrows `height` rows of `width` bytes; each row starts `stride` bytes after the previous one.
+    ///
+    /// # Errors
+    ///
+    /// A side is zero, the stride is less than the width, or the data are too short.
     pub fn new(data: &'a [u8], width: usize, height: usize, stride: usize) -> Result<Self, FrameError> {
         if width == 0 || height == 0 || stride < width {
             return Err(FrameError::BadShape { width, height, stride });

@@ -49,6 +49,10 @@ impl Gain {
 ///
 /// With too little contrast to determine a scale, the result is scale 1 and the median difference; without
 /// usable pixels it is the identity.
+///
+/// # Errors
+///
+/// The frames differ in size.
 pub fn estimate_gain(a: &Frame, b: &Frame) -> Result<Gain, FrameError> {
     a.check_same_size(b)?;
     let pairs = sampled_pairs(a, b);

@@ -94,6 +94,10 @@ impl EdgeSegment {
 ///
 /// 1. Edge points, linked into chains ([`edge_chains`]).
 /// 2. Chains cut and fitted ([`segments_from_chains`]).
+///
+/// # Errors
+///
+/// Options out of range, or a mask that differs in size from the frame.
 pub fn edge_segments(
     frame: &Frame<'_>,
     domain: &EdgeDomain<'_>,
@@ -110,6 +114,10 @@ pub fn edge_segments(
 ///    line.
 /// 2. Join neighbouring pieces that one line fits within the tolerance.
 /// 3. Keep the pieces that are long enough.
+///
+/// # Errors
+///
+/// Options out of range.
 pub fn segments_from_chains(
     chains: &EdgeChains,
     options: &LineOptions,

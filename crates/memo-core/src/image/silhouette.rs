@@ -35,6 +35,10 @@ pub enum SilhouetteError {
 /// The silhouette of the largest candidate in each frame; an empty mask where there is no candidate.
 ///
 /// `threshold` in grey levels, as in [`Background::silhouette`].
+///
+/// # Errors
+///
+/// The threshold is negative or not finite, there are no frames, or the frames differ in size.
 pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, SilhouetteError> {
     if !(threshold >= 0.0 && threshold.is_finite()) {
         return Err(SilhouetteError::Threshold { threshold });
@@ -43,8 +47,9 @@ pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, Si
     frames.iter().map(|frame| silhouette(frame, &background, threshold)).collect()
 }
 
-/// 1. Find what differs from the background. 2. Take its largest candidate. 3. Cut the candidate to the
-///    visible edge.
+/// 1. Find what differs from the background.
+/// 2. Take its largest candidate.
+/// 3. Cut the candidate to the visible edge.
 fn silhouette(frame: &Frame<'_>, background: &Background, threshold: f64) -> Result<Mask, SilhouetteError> {
     let changed = fill_holes(&clean(&background.foreground(frame)?, &CleanOptions::default())?);
     let group = GroupOptions::default();

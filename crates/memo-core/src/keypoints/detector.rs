@@ -41,7 +41,7 @@ pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SidePair {
-    /// The group with which it is exchanged.
+    /// The group with which it is swapped.
     pub group: SwapGroup,
     /// The part without its side, such as `knee`.
     pub part: &'static str,
@@ -81,6 +81,10 @@ pub struct Detector {
 
 impl Detector {
     /// A detector from the names of a frame's points in order, each in any known spelling.
+    ///
+    /// # Errors
+    ///
+    /// An unknown name, or two names of the same point.
     pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, DetectorError> {
         let mut known: Vec<&'static str> = Vec::with_capacity(names.len().min(LAYOUTS.len() * 33));
         for name in names {
@@ -125,6 +129,10 @@ impl Detector {
     }
 
     /// The joints of the stick figure in one frame, in the order of [`STICK_JOINTS`].
+    ///
+    /// # Errors
+    ///
+    /// The number of points or scores differs from the number of names.
     pub fn stick_joints(
         &self,
         points_px: &[DVec2],
@@ -135,6 +143,10 @@ impl Detector {
 
     /// The head points in one frame, in the order of [`HEAD_POINTS`]. The neck is the upper neck of BODY_25B
     /// if there is one, otherwise the neck of the stick figure.
+    ///
+    /// # Errors
+    ///
+    /// The number of points or scores differs from the number of names.
     pub fn head_points(
         &self,
         points_px: &[DVec2],

@@ -238,6 +238,10 @@ fn layout_counts() -> Vec<String> {
 
 impl Layout {
     /// The layout called `name`, whatever its case and separators.
+    ///
+    /// # Errors
+    ///
+    /// There is no layout with this name.
     pub fn by_name(name: &str) -> Result<&'static Self, DetectorError> {
         let wanted = plain(name);
         let same = |layout: &&'static Self| plain(layout.name) == wanted;
@@ -251,13 +255,17 @@ impl Layout {
     /// The layout with `joint_count` points that fits `points_px`, given frame after frame, NaN where
     /// missing.
     ///
-    /// BODY_25 and BODY_25B both have 25 points. The **midpoint test** distinguishes them: only BODY_25 has a
+    /// BODY_25 and BODY_25B both have 25 points. The **middle test** distinguishes them: only BODY_25 has a
     /// neck and a mid-hip, which were trained as midpoints of the shoulders and of the hips. In published
     /// BODY_25 files those points lie within 0.01 of the figure's size (the diagonal of its bounding box) of
     /// the midpoints. A BODY_25B file has other points at those indices, at a distance of 0.24 to 0.45 for
     /// the hips and 0.02 to 0.16 for the neck. The larger of the two medians over the frames decides: up to
     /// [`MIDDLE_NEAR`] the layout is BODY_25, from [`MIDDLE_FAR`] on it is not, and between them the result
     /// is an error.
+    ///
+    /// # Errors
+    ///
+    /// No layout has this number of points, or the middle test does not determine the layout.
     pub fn from_points(joint_count: usize, points_px: &[DVec2]) -> Result<&'static Self, DetectorError> {
         let fitting: Vec<&'static Self> = LAYOUTS.iter().filter(|l| l.joints.len() == joint_count).collect();
         let (with_middles, without) = match fitting[..] {

@@ -1,5 +1,5 @@
 //! Two-dimensional keypoints of people, as detectors write them: which person they belong to, which joints
-//! they show, and where the right and left labels are exchanged.
+//! they show, and where the right and left labels are swapped.
 
 pub mod detector;
 pub mod layouts;

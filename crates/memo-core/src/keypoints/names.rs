@@ -82,7 +82,7 @@ pub enum DetectorError {
         count: usize,
         /// The layouts with that number of points.
         names: [&'static str; 2],
-        /// Result of the midpoint test, if a frame has the points; see
+        /// Result of the middle test, if a frame has the points; see
         /// [`Layout::from_points`](super::layouts::Layout::from_points).
         distance: Option<f64>,
     },
@@ -92,7 +92,7 @@ fn hint(nearest: &Option<&'static str>) -> String {
     nearest.map_or(String::new(), |name| format!(", did you mean `{name}`?"))
 }
 
-/// Points that are exchanged together when a detector confuses right and left.
+/// Points that are swapped together when a detector confuses right and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SwapGroup {
     /// Hip, knee, ankle, heel and toes.
@@ -152,6 +152,10 @@ pub fn joint_names() -> Vec<&'static str> {
 }
 
 /// The name used here for a point spelled in any known way: `RKnee`, `right_knee`, `RIGHT_KNEE`, `RKN`.
+///
+/// # Errors
+///
+/// There is no point with this name.
 pub fn joint_name(name: &str) -> Result<&'static str, DetectorError> {
     let plain = plain(name);
     let spelt = |own: &str, others: &[&str]| plain_is(own, &plain) || others.contains(&plain.as_str());

@@ -7,7 +7,6 @@
 //!
 //! Limits: no motion is predicted, so two people who come closer to each other than the person moves between
 //! two frames may be confused.
-//! confused, as no motion is predicted.
 
 use super::layouts::size_px;
 use crate::wording::counted;
@@ -74,6 +73,10 @@ struct Person<'a> {
 /// Marks the followed person among all people. `frames[i]` is the frame of person i, in ascending order; each
 /// person has `joint_count` points (NaN where missing) and scores. At most one person per frame is marked; if
 /// no frame contains two people, all are marked.
+///
+/// # Errors
+///
+/// The lengths of the lists are inconsistent, or the frame numbers are not in order.
 pub fn follow_person(
     frames: &[i64],
     joint_count: usize,

@@ -1,13 +1,13 @@
-//! Repair of exchanged left and right labels in 2D joints over time, from any detector.
+//! Repair of swapped left and right labels in 2D joints over time, from any detector.
 //!
-//! A detector that confuses the left leg with the right one exchanges two labels and moves no joint. For a
+//! A detector that confuses the left leg with the right one swaps two labels and moves no joint. For a
 //! pair with difference d = right - left this changes the sign of d. The labels are taken as correct where d
 //! moves smoothly: a second-order chain (change of velocity, irregular times allowed) over the bits of the
 //! levels of a limb group (hip, knee, ankle), solved for its best path (Viterbi 1967) and for the posterior
 //! of each bit (forward-backward). Noise and acceleration are estimated from the data, so image scale and
 //! frame rate do not matter.
 //!
-//! Supported: groups exchanged independently of one another; within a group every pattern of exchanged
+//! Supported: groups swapped independently of one another; within a group every pattern of swapped
 //! levels, where a change of pattern has a high cost; missing joints, gaps and uneven times; single bad
 //! detections, which are left out.
 //!
@@ -19,7 +19,7 @@
 //! * the side of a joint whose partner is missing: it follows its group and is no evidence;
 //! * that a detector put both labels on one leg: such a sample is at best left out.
 //!
-//! Only a left and a right entry are ever exchanged; no point is moved, added or removed.
+//! Only a left and a right entry are ever swapped; no point is moved, added or removed.
 
 mod chain;
 mod relative;
@@ -63,7 +63,7 @@ pub struct Keypoints<'a> {
 pub struct Level {
     /// Name in reports.
     pub name: String,
-    /// Indices (left, right) of joints that are exchanged together.
+    /// Indices (left, right) of joints that are swapped together.
     pub pairs: Vec<[usize; 2]>,
 }
 
@@ -79,7 +79,7 @@ pub struct LimbGroup {
 /// Priors, in nats (natural log of odds), and the probability required for a decision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnswapOptions {
-    /// Prior per frame against exchanged labels. Default 0.2: a run of 15 exchanged frames costs 3, far less
+    /// Prior per frame against swapped labels. Default 0.2: a run of 15 swapped frames costs 3, far less
     /// than two breaks in the motion (10 to 30), and a surplus of 11 frames decides a label with probability
     /// 0.9. Larger values are worse for long runs. Frames count as independent: if a detector errs in runs
     /// longer than half a step, the probability of a run's label is overconfident.
@@ -200,7 +200,7 @@ pub enum UnswapError {
 /// Why a frame has its labels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reason {
-    /// The motion of these levels is smooth with these labels; exchanging this frame alone would cost
+    /// The motion of these levels is smooth with these labels; swapping this frame alone would cost
     /// `gain_nats`.
     Continuity {
         /// Levels that show this on their own, most informative first; empty if only the levels together do.
@@ -229,16 +229,16 @@ pub enum Reason {
 /// The result for one group in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// Whether each level's entries were exchanged.
+    /// Whether each level's entries were swapped.
     pub level_flipped: Vec<bool>,
-    /// Posterior probability that each level was exchanged in the input; a level that is not visible takes
+    /// Posterior probability that each level was swapped in the input; a level that is not visible takes
     /// the value of the nearest visible one.
     pub level_probability: Vec<f64>,
-    /// Whether the most informative level of the group was exchanged.
+    /// Whether the most informative level of the group was swapped.
     pub flipped: bool,
-    /// Whether some of the levels were exchanged and others not.
+    /// Whether some of the levels were swapped and others not.
     pub partial: bool,
-    /// Posterior probability that the most informative level was exchanged in the input; 0.5 where nothing is
+    /// Posterior probability that the most informative level was swapped in the input; 0.5 where nothing is
     /// visible.
     pub probability: f64,
     /// Whether that probability suffices for a decision; if not, `flipped` is only the best guess.
@@ -267,7 +267,7 @@ pub struct GroupResult {
     pub verdicts: Vec<Verdict>,
     /// Runs of frames, separated by places where the limbs may have crossed unobserved.
     pub runs: Vec<Run>,
-    /// Probability that the global label is correct, as opposed to all output labels being exchanged, judging
+    /// Probability that the global label is correct, as opposed to all output labels being swapped, judging
     /// by the majority of the input's labels.
     pub global_probability: f64,
     /// Estimated standard deviation of a joint coordinate, px.
@@ -276,12 +276,12 @@ pub struct GroupResult {
     pub left_out: Vec<[usize; 2]>,
 }
 
-/// The joints with exchanged labels repaired, and the results for each group.
+/// The joints with swapped labels repaired, and the results for each group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unswapped {
     /// As [`Keypoints::points_px`].
     pub points_px: Vec<[f64; 2]>,
-    /// As [`Keypoints::scores`], exchanged together with their points.
+    /// As [`Keypoints::scores`], swapped together with their points.
     pub scores: Option<Vec<f64>>,
     /// One result per group, in the order given.
     pub groups: Vec<GroupResult>,
@@ -317,7 +317,7 @@ impl Verdict {
     }
 }
 
-/// Finds and undoes exchanged left and right labels, group by group.
+/// Finds and undoes swapped left and right labels, group by group.
 ///
 /// # Errors
 /// [`UnswapError`] if shapes disagree or values are out of range.
@@ -591,7 +591,7 @@ impl<'a> Limb<'a> {
         if gap_s > 1.5 * usual_s { Reason::UnseenCrossing { gap_s } } else { Reason::Unclear }
     }
 
-    /// Per step and level: the cost that exchanging that sample alone adds to the motion, nats.
+    /// Per step and level: the cost that swapping that sample alone adds to the motion, nats.
     fn gains(&self, solution: &Solution) -> Vec<Vec<f64>> {
         let mut gains = vec![vec![0.0; self.levels]; self.shown.len()];
         let levels = 0..self.levels;
@@ -611,7 +611,7 @@ impl<'a> Limb<'a> {
         gains
     }
 
-    /// Probability of all output labels against all of them exchanged: the motion cost is the same for both,
+    /// Probability of all output labels against all of them swapped: the motion cost is the same for both,
     /// the prior differs.
     fn global_probability(&self, solution: &Solution, options: &UnswapOptions) -> f64 {
         let surplus = self.shown.iter().zip(&solution.path).map(|(&(_, seen), bits)| {

@@ -191,6 +191,10 @@ pub struct Body {
 
 impl Body {
     /// A body with the default proportions.
+    ///
+    /// # Errors
+    ///
+    /// A height outside 0.4 to 2.6 m.
     pub fn from_height(height_m: f64) -> Result<Self, BodyError> {
         if !(0.4..=2.6).contains(&height_m) {
             return Err(BodyError::Height { height_m });

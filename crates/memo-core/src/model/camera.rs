@@ -170,6 +170,10 @@ impl Camera {
     /// On the sensor x_d = dpx (u - cx) / sx and y_d = dpy (v - cy); the ideal point is x_d (1 + kappa1
     /// r_d²), all in mm. Division by the focal length f gives fx = sx f / dpx, fy = f / dpy, kappa = kappa1
     /// f².
+    ///
+    /// # Errors
+    ///
+    /// A pixel size, focal length or `sx` that is not positive, or an invalid camera ([`Camera::validated`]).
     pub fn from_tsai(tsai: &TsaiParameters) -> Result<Self, CameraError> {
         positive("dpx", tsai.pixel_mm.x)?;
         positive("dpy", tsai.pixel_mm.y)?;
@@ -191,6 +195,11 @@ impl Camera {
     ///
     /// World X points right in the image, Y away from the camera and Z up. The origin lies on the ground in
     /// the centre column of the image, `distance_m` in front of the camera.
+    ///
+    /// # Errors
+    ///
+    /// A field of view outside 0 to 180 degrees, a camera height that is not positive, or an invalid camera
+    /// ([`Camera::validated`]).
     pub fn level(
         size: [u32; 2],
         horizontal_field_of_view_rad: f64,
@@ -219,6 +228,11 @@ impl Camera {
     ///
     /// Depths are proportional to the assumed focal length; heights and sideways positions at the person's
     /// depth do not depend on it.
+    ///
+    /// # Errors
+    ///
+    /// A person height that is not positive, a head that is not above the feet in the image, feet at or above the
+    /// horizon, and the errors of [`Camera::level`].
     pub fn from_person(
         size: [u32; 2],
         horizontal_field_of_view_rad: f64,
@@ -242,6 +256,12 @@ impl Camera {
     }
 
     /// The camera itself if its parameters are valid.
+    ///
+    /// # Errors
+    ///
+    /// A side of the image that is zero, a parameter that is not finite, a focal length that is not positive,
+    /// a principal point more than an image side outside the image, a matrix that is not a rotation, or a
+    /// distance of more than [`MAX_DISTANCE_M`] from the origin of the world.
     pub fn validated(self) -> Result<Self, CameraError> {
         check_size(self.size)?;
         self.check_finite()?;
@@ -289,6 +309,10 @@ impl Camera {
     }
 
     /// The ideal pixel that the lens maps to `pixel`, accurate to 1e-10 px.
+    ///
+    /// # Errors
+    ///
+    /// The lens model maps no ideal pixel to `pixel`.
     pub fn undistort(&self, pixel: DVec2) -> Result<DVec2, CameraError> {
         let ideal = self.distortion.undistort(self.plane_from_pixel(pixel));
         ideal.map(|x| self.pixel_from_plane(x)).ok_or(CameraError::NoIdealPixel { pixel })
@@ -339,6 +363,10 @@ impl Camera {
 
     /// The camera for the same images resized by `factor`. Pixel centres are at integers, so the corner
     /// (-0.5, -0.5) stays fixed.
+    ///
+    /// # Errors
+    ///
+    /// A factor that is not positive, or an image side that becomes zero.
     pub fn scaled(&self, factor: f64) -> Result<Self, CameraError> {
         positive("scale factor", factor)?;
         let scaled = Self {
@@ -352,6 +380,10 @@ impl Camera {
 
     /// The camera for the same images with each block of `n` by `n` pixels averaged to one pixel. Columns at
     /// the right and rows at the bottom that do not fill a block are dropped.
+    ///
+    /// # Errors
+    ///
+    /// `n` is zero, or an image side becomes zero.
     pub fn shrunk(&self, n: u32) -> Result<Self, CameraError> {
         let scaled = self.scaled(1.0 / f64::from(n))?;
         Self { size: self.size.map(|side| side / n), ..scaled }.validated()

@@ -164,6 +164,10 @@ impl Gait {
     ///
     /// Source: Boulic, Thalmann and Thalmann 1990; angles by control points through a periodic monotone
     /// cubic. Their hip angle is taken as the angle of the thigh relative to the vertical.
+    ///
+    /// # Errors
+    ///
+    /// A speed outside 0.5 to 3 leg lengths per second.
     pub fn boulic(speed_mps: f64, leg_length_m: f64) -> Result<Self, GaitError> {
         let relative = speed_mps / leg_length_m;
         if !(0.5..=3.0).contains(&relative) {

@@ -7,7 +7,6 @@
 //! upper arm lies along z. [`AngleReading::Turn`] is the angle by which a segment would have to turn to come
 //! into the range. It is the same for limbs that swing forward and back and approaches zero where the paper's
 //! angle becomes undefined:
-//! same for limbs that swing forward and back and goes to zero where the paper's angle loses its meaning:
 //!
 //! ```text
 //! flexion, extension    asin(ρ sin ε), ε the excess of θ, ρ the length of the projection of u on xy (ε < 90°)

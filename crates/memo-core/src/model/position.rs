@@ -35,6 +35,10 @@ pub struct Midpoints {
 
 impl Midpoints {
     /// The midpoints from distorted pixels measured in the image; undistorts them.
+    ///
+    /// # Errors
+    ///
+    /// The lens model maps no ideal pixel to a midpoint.
     pub fn undistorted(camera: &Camera, bottom_px: DVec2, top_px: DVec2) -> Result<Self, CameraError> {
         Ok(Self { bottom_px: camera.undistort(bottom_px)?, top_px: camera.undistort(top_px)? })
     }
@@ -153,6 +157,11 @@ pub enum PositionError {
 }
 
 /// Position by eq. (6): the last three equations hold exactly after the shift, and the first three give X_u.
+///
+/// # Errors
+///
+/// Midpoints that are not finite, upside down or at the vertical vanishing point; a height or an option out
+/// of range.
 pub fn position_from_rectangle(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -168,6 +177,10 @@ pub fn position_from_rectangle(
 /// Position from the bottom midpoint alone, on the ground z = 0.
 ///
 /// The height is only used to predict the image of the head.
+///
+/// # Errors
+///
+/// As [`position_from_rectangle`], and a ray that does not meet the ground in front of the camera.
 pub fn position_from_feet(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -183,6 +196,10 @@ pub fn position_from_feet(
 ///
 /// The result is useless where the camera is at head height, because the plane is seen edge-on; the
 /// covariance is large there.
+///
+/// # Errors
+///
+/// As [`position_from_rectangle`], and a ray that does not meet the plane z = H in front of the camera.
 pub fn position_from_head(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -199,6 +216,11 @@ pub fn position_from_head(
 /// Minimises the squared distances of the images of sole and head from the midpoints, each in units of its
 /// standard deviation. An uncertain height increases the standard deviation of the head along the image of
 /// the vertical.
+///
+/// # Errors
+///
+/// As [`position_from_rectangle`], rays that meet neither plane in front of the camera, and a search that
+/// does not converge.
 pub fn position_on_ground(
     camera: &Camera,
     midpoints: &Midpoints,
@@ -213,6 +235,11 @@ pub fn position_on_ground(
 /// The height H for which eq. (6) places the sole on the ground z = 0, metres.
 ///
 /// `bottom_weight` as in [`PositionOptions`].
+///
+/// # Errors
+///
+/// Midpoints as in [`position_from_rectangle`], a weight out of range, and a rectangle for which no positive
+/// height places the sole on the ground.
 pub fn height_on_ground(
     camera: &Camera,
     midpoints: &Midpoints,

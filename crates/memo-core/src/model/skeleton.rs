@@ -314,6 +314,10 @@ impl SegmentLengths {
     /// Lengths from body height by the anthropometric table of [`Body`] (Drillis and Contini 1966), for
     /// joints as detectors define them: the neck is the midpoint of the shoulders, and the pelvis lies on the
     /// line from the neck to the midpoint of the hips, at [`PELVIS_ON_TRUNK`] of its length.
+    ///
+    /// # Errors
+    ///
+    /// A height outside the range of [`Body::from_height`].
     pub fn from_height(height_m: f64) -> Result<Self, LengthError> {
         let body = Body::from_height(height_m)?;
         let p = body.proportions;
@@ -333,6 +337,10 @@ impl SegmentLengths {
     }
 
     /// Medians over figures with known joints, for example from motion capture.
+    ///
+    /// # Errors
+    ///
+    /// A segment that no figure contains, or an invalid median ([`SegmentLengths::validated`]).
     pub fn from_figures(figures: &[StickFigure]) -> Result<Self, LengthError> {
         let typical = |name: &str, length: &dyn Fn(&StickFigure) -> f64| {
             let mut lengths: Vec<f64> = figures.iter().map(length).filter(|l| l.is_finite()).collect();
@@ -351,6 +359,10 @@ impl SegmentLengths {
     }
 
     /// The same lengths, or an error if one is invalid.
+    ///
+    /// # Errors
+    ///
+    /// A length that is not positive, or longer than [`MAX_SEGMENT_M`].
     pub fn validated(self) -> Result<Self, LengthError> {
         for (segment, length_m) in self.named() {
             if !(length_m.is_finite() && length_m > 0.0) {

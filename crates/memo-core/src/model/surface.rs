@@ -49,6 +49,10 @@ pub struct SurfaceMap {
 ///
 /// From a camera inside a part nothing is visible, as in [`visible_contours`](super::visible_contours); a
 /// part with a semi-axis or half length that is not positive is not visible either.
+///
+/// # Errors
+///
+/// There are more than 255 parts.
 pub fn surface_map(
     cylinders: &[EllipticCylinder],
     camera: &Camera,

@@ -1,4 +1,4 @@
-//! The seeded generator of scenes with ground truth that tests, benches and the demo share.
+//! Seeded generators of scenes with ground truth, shared by tests, benches and the demo.
 
 pub mod clothed;
 pub mod motion;

@@ -1,6 +1,7 @@
-//! Named points moving in space: what a point-light display shows, whether recorded, tracked or synthetic.
+//! Named points moving in space: the motion behind a point-light display, whether recorded, tracked or
+//! synthetic.
 //!
-//! A coordinate that is NaN says that the point is not known at that instant.
+//! A NaN coordinate means that the point is unknown at that instant.
 
 use super::scene::stride_length_m;
 use crate::model::body::Part;
@@ -9,9 +10,9 @@ use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
-/// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist (`RSH`, `REL`, `RWR`, `LSH`,
-/// `LEL`, `LWR`); right then left hip, knee, ankle (`RHP`, `RKN`, `RAN`, `LHP`, `LKN`, `LAN`); head (`HEAD`).
-/// [`joint_name`](crate::keypoints::joint_name) spells them out.
+/// Names of the points of [`sampled_walk`]: right then left shoulder, elbow, wrist (`RSH`, `REL`, `RWR`,
+/// `LSH`, `LEL`, `LWR`); right then left hip, knee, ankle (`RHP`, `RKN`, `RAN`, `LHP`, `LKN`, `LAN`); head
+/// (`HEAD`). [`joint_name`](crate::keypoints::joint_name) maps them to full names.
 pub const WALKER_NAMES: [&str; 13] =
     ["RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN", "HEAD"];
 
@@ -31,49 +32,49 @@ pub const WALKER_LIMBS: [[&str; 2]; 8] = [
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MotionError {
-    /// No frame or no point.
+    /// There is no frame or no point.
     #[error("a motion needs frames and points, got {} of {}", counted(*frames, "frame"), counted(*points, "point"))]
     Empty {
-        /// Frames given.
+        /// Number of frames given.
         frames: usize,
-        /// Points given.
+        /// Number of points given.
         points: usize,
     },
-    /// Lengths disagree.
+    /// The lengths of the arguments disagree.
     #[error("wanted a position for each of {} and {}, got {positions}", counted(*frames, "time"), counted(*points, "name"))]
     Shape {
-        /// Positions given, frames times points wanted.
+        /// Number of positions given; frames times points are expected.
         positions: usize,
-        /// Times given.
+        /// Number of times given.
         frames: usize,
-        /// Names given.
+        /// Number of names given.
         points: usize,
     },
-    /// Times do not increase or are not finite.
+    /// The times do not increase or are not finite.
     #[error("times must be finite and increase: frame {frame} is at {time_s} s after {previous_s} s")]
     Times {
-        /// The offending frame.
+        /// The frame with the invalid time.
         frame: usize,
-        /// Its time.
+        /// Its time, seconds.
         time_s: f64,
-        /// The time before.
+        /// The previous time, seconds.
         previous_s: f64,
     },
-    /// A position is infinite or absurdly far away (NaN is allowed and means unknown).
+    /// A position is infinite or farther away than 1e6 m (NaN is allowed and means unknown).
     #[error("point {name} at frame {frame} is at ({x}, {y}, {z}): metres wanted, NaN for unknown")]
     Position {
         /// Name of the point.
         name: String,
         /// The frame.
         frame: usize,
-        /// Coordinate given.
+        /// Coordinate x, metres.
         x: f64,
-        /// Coordinate given.
+        /// Coordinate y, metres.
         y: f64,
-        /// Coordinate given.
+        /// Coordinate z, metres.
         z: f64,
     },
-    /// Numbers of a synthetic walk that cannot be walked.
+    /// A parameter of a synthetic walk is out of range.
     #[error("a walk with a {parameter} of {value} cannot be sampled")]
     Walk {
         /// Its name.
@@ -83,23 +84,29 @@ pub enum MotionError {
     },
 }
 
-/// Positions farther than this from the origin are refused, metres.
+/// Largest accepted distance of a position from the origin, metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// More frames than this are not sampled: over four hours at 60 Hz.
+/// Largest number of sampled frames: over four hours at 60 Hz.
 const MOST_FRAMES: usize = 1_000_000;
 
 /// Named points over time in the world, metres, Z up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// Positions, frame after frame, in each the points in the order of the names.
+    /// Positions, frame after frame; within a frame, the points are in the order of the names.
     positions: Vec<DVec3>,
     names: Vec<String>,
     times_s: Vec<f64>,
 }
 
 impl Motion {
-    /// From positions (frames x points, frame after frame), names and times.
+    /// A motion from positions (frames x points, frame after frame; world axes, metres), names and times
+    /// (seconds).
+    ///
+    /// # Errors
+    ///
+    /// There is no frame or no point, the lengths disagree, the times do not increase, or a position is
+    /// farther than 1e6 m from the origin.
     pub fn new(positions: Vec<DVec3>, names: Vec<String>, times_s: Vec<f64>) -> Result<Self, MotionError> {
         let (frames, points) = (times_s.len(), names.len());
         if frames == 0 || points == 0 {
@@ -153,14 +160,14 @@ impl Motion {
         &self.positions
     }
 
-    /// A point at a frame, `None` where it is not known or does not exist.
+    /// The position of a point at a frame, metres; `None` where it is unknown or does not exist.
     pub fn at(&self, frame: usize, point: usize) -> Option<DVec3> {
         let of_frame = self.positions.chunks_exact(self.points()).nth(frame)?;
         let p = *of_frame.get(point)?;
         (!p.is_nan()).then_some(p)
     }
 
-    /// Index of a name.
+    /// Index of a name among the points.
     pub fn index_of(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
     }
@@ -171,9 +178,9 @@ impl Motion {
         if last == 0 { 0.0 } else { (self.times_s[last] - self.times_s[0]) / last as f64 }
     }
 
-    /// Where the body is, frame by frame: the middle of the hips where both are among the points, otherwise
-    /// the mean of the points known throughout, otherwise of those known in the frame. Gaps repeat the place
-    /// before.
+    /// Position of the body in each frame: the midpoint of the hips if both are among the points, otherwise
+    /// the mean of the points known in all frames, otherwise of those known in the frame. Gaps repeat the
+    /// previous position.
     pub fn pelvis_path(&self) -> Vec<DVec3> {
         let always = |k: &usize| (0..self.frames()).all(|frame| self.at(frame, *k).is_some());
         let hips: Vec<usize> = ["RHP", "LHP"].iter().filter_map(|name| self.index_of(name)).collect();
@@ -210,24 +217,25 @@ impl Motion {
     }
 }
 
-/// The limb segments whose two ends are among the names, as indices of names.
+/// The limb segments whose two ends are among the names, as pairs of indices.
 pub fn limbs_of(names: &[String]) -> Vec<[usize; 2]> {
     let index = |name: &str| names.iter().position(|n| n == name);
     WALKER_LIMBS.iter().filter_map(|[a, b]| Some([index(a)?, index(b)?])).collect()
 }
 
-/// How the model walks for [`sampled_walk`].
+/// Options of [`sampled_walk`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WalkOptions {
     /// Number of frames.
     pub frames: usize,
-    /// Frames a second. 60, a usual display.
+    /// Frames per second. Default 60, a common display rate.
     pub rate_hz: f64,
-    /// Speed, m/s. 1.3, a comfortable walk; the cycle's duration follows from the stride of the gait.
+    /// Speed, m/s. Default 1.3, a comfortable walk; the duration of the cycle follows from the stride of the
+    /// gait.
     pub speed_mps: f64,
     /// Heading, radians about world Z, 0 along world X.
     pub heading_rad: f64,
-    /// Gait phase of the first frame.
+    /// Gait phase of the first frame, cycles.
     pub phase: f64,
 }
 
@@ -244,10 +252,15 @@ impl WalkOptions {
     }
 }
 
-/// The model of the body walking straight through the origin at half time, as 13 points: the joints of both
-/// sides and the centre of the head.
+/// The body model walking on a straight line through the origin at half time, as 13 points: the joints of
+/// both sides and the centre of the head.
 ///
-/// The model's limbs swing in planes parallel to the walk: a motion as planar as walking is assumed to be.
+/// The limbs of the model swing in planes parallel to the walking direction, so the motion is as planar as
+/// walking is assumed to be.
+///
+/// # Errors
+///
+/// An option out of range, or a walker with a stride that is not positive.
 pub fn sampled_walk(walker: &Walker, options: &WalkOptions) -> Result<Motion, MotionError> {
     let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = *options;
     let positive = |value: f64| value > 0.0 && value.is_finite();

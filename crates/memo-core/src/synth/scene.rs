@@ -1,9 +1,10 @@
-//! A walker before a wall, drawn from the 2.5D description of the model, with everything known.
+//! A walker in front of a wall, rendered from the 2½-D description of the model, with complete ground truth.
 //!
-//! The person is the model itself (the paper's synthetic sequence, Figs. 23, 26 and 27, is of this kind):
-//! what tracking reaches here is bounded by the method alone, not by how people differ from the average. Where
-//! that is asked, [`SceneOptions::uneven`] lets steps differ from each other and the feet from side to side.
-//! Frames are drawn one by one and in any order; the same seed gives the same pixels.
+//! The person is the model itself (the paper's synthetic sequence, Figs. 23, 26 and 27, is of this kind), so
+//! tracking errors here are those of the method alone, not of the differences between people and the average.
+//! If such differences are needed, [`SceneOptions::uneven`] lets steps differ from each other and the feet
+//! differ between the sides. Frames are rendered one by one and in any order; the same seed gives the same
+//! pixels.
 
 use super::random::Random;
 use crate::image::{Image, Window};
@@ -16,10 +17,10 @@ use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;
 use thiserror::Error;
 
-/// Longest side of a frame, pixels: a scene holds its background.
+/// Longest side of a frame, pixels: a scene stores its background.
 const MOST_SIDE_PX: u32 = 16_384;
 
-/// Why a scene cannot be drawn.
+/// Why a scene was not made.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -34,48 +35,50 @@ pub enum SceneError {
     Option(#[from] OptionError),
 }
 
-/// Steps drawn one by one, some fifteen hours; whoever walks on does so as in the last.
+/// Largest number of steps drawn separately, some fifteen hours; later steps equal the last one.
 const MOST_STEPS: usize = 100_000;
-/// Correlation of a step's duration and length: on four motion-captured walks (11 degrees of freedom) durations
-/// vary by 3.3 %, lengths by 3.6 % and their ratio by 3.4 %.
+/// Correlation between duration and length of a step: on four motion-captured walks (11 degrees of freedom)
+/// durations vary by 3.3 %, lengths by 3.6 % and their ratio by 3.4 %.
 const LONGER_WITH_TIME: f64 = 0.5;
 
-/// How steps differ from the average one of the same walker.
+/// How steps differ from the average step of the same walker.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Uneven {
-    /// Standard deviation of a step's duration, share of the average one, 0 to 0.2.
+    /// Standard deviation of the duration of a step, as a fraction of the average, 0 to 0.2.
     pub step_time_sd: f64,
-    /// Standard deviation of the way of the trunk in a step, share of the average one, 0 to 0.2.
+    /// Standard deviation of the distance the trunk travels in a step, as a fraction of the average, 0 to
+    /// 0.2.
     pub step_length_sd: f64,
-    /// By how much farther ahead of the trunk the right foot lands than the left, metres, -0.2 to 0.2.
+    /// How much farther ahead of the trunk the right foot lands than the left, metres, -0.2 to 0.2.
     pub right_reach_m: f64,
 }
 
-/// What is drawn.
+/// Options of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneOptions {
-    /// Everything not fixed here follows from the seed.
+    /// Seed; determines everything that is not fixed by the other options.
     pub seed: u64,
     /// Number of frames.
     pub frames: usize,
-    /// Frames before the walker is there.
+    /// Number of frames before the walker appears.
     pub empty_frames: usize,
-    /// Frames a second, 1 to 10,000. 25, as in the paper.
+    /// Frames per second, 1 to 10,000. Default 25, as in the paper.
     pub rate_hz: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// Standard deviation of the sensor noise, grey levels, 0 to 255.
     pub noise_sd: f32,
-    /// Whether the walker goes to the left; `None` lets the seed decide.
+    /// Whether the walker goes to the left; `None` means that the seed decides.
     pub leftward: Option<bool>,
-    /// By how much of a cycle the left heel strikes late, -0.1 to 0.1: the left step takes 0.5 + this of the
-    /// cycle, the right one the rest, at constant speed. 0, the symmetric gait.
+    /// Delay of the left heel strike, as a fraction of the cycle, -0.1 to 0.1: the left step takes 0.5 plus
+    /// this fraction of the cycle, the right step the rest, at constant speed. Default 0, the symmetric gait.
     pub late_left: f64,
-    /// How the steps differ. By default they are all alike.
+    /// How the steps differ. By default they are all equal.
     pub uneven: Uneven,
-    /// By how much the path is turned out of the image plane, radians, -1 to 1. 0.
+    /// Angle of the path out of the image plane, radians, -1 to 1. Default 0.
     pub slant_rad: f64,
-    /// Horizontal field of view, radians, 0.2 to 2; the camera stands as far away as shows the walker equally large. 0.9.
+    /// Horizontal field of view, radians, 0.2 to 2. The distance of the camera is such that the walker has
+    /// the same size in the image. Default 0.9.
     pub field_of_view_rad: f64,
 }
 
@@ -118,7 +121,7 @@ pub(super) fn check_size(size: [u32; 2]) -> Result<(), SceneError> {
     if is_drawn { Ok(()) } else { Err(SceneError::Size { size }) }
 }
 
-/// An option with its value, the range it may have, and that range in words.
+/// An option with its value, its allowed range, and that range in words.
 pub(super) type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>, &'static str);
 
 pub(super) fn check_ranges(options: &[Ranged]) -> Result<(), SceneError> {
@@ -128,31 +131,31 @@ pub(super) fn check_ranges(options: &[Ranged]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// The truth of one frame with a walker.
+/// The ground truth of one frame with a walker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// Number of the frame.
     pub frame: usize,
     /// Time, seconds.
     pub time_s: f64,
-    /// Place, level height and phase.
+    /// Position along the path, level height and gait phase.
     pub hypothesis: Hypothesis,
     /// The body as posed: torso centre, joints and cylinders.
     pub posed: PosedBody,
 }
 
-/// A scene: camera, walker, path, and frames on demand.
+/// A scene: camera, walker and path, with frames on demand.
 #[derive(Debug, Clone)]
 pub struct SynthScene {
     /// The camera.
     pub camera: Camera,
     /// The walker.
     pub walker: Walker,
-    /// The line walked.
+    /// The path of the walk.
     pub path: Path,
-    /// Speed, metres a second.
+    /// Speed, metres per second.
     pub speed_mps: f64,
-    /// Gait cycles a second.
+    /// Gait cycles per second.
     pub cycle_hz: f64,
     options: SceneOptions,
     start: Hypothesis,
@@ -163,11 +166,11 @@ pub struct SynthScene {
 }
 
 impl SynthScene {
-    /// Draws lots for everything the options leave open.
+    /// A scene in which the seed determines everything that the options leave open.
     ///
     /// # Errors
     ///
-    /// A size or an option out of the range it states.
+    /// A size or an option out of range.
     pub fn new(options: SceneOptions) -> Result<Self, SceneError> {
         options.check()?;
         let mut random = Random::new(options.seed);
@@ -196,12 +199,12 @@ impl SynthScene {
         Ok(Self { camera, walker, path, speed_mps, cycle_hz, options, start, steps, background, grey })
     }
 
-    /// The same scene with somebody else in it, who walks as fast, as high above the ground and with such strides
-    /// as fit the body and the style.
+    /// The same scene with another walker, who has the same speed and whose trunk height and stride follow
+    /// from body and style.
     ///
     /// # Errors
     ///
-    /// A body and style whose feet do not move: strides of less than 0.1 m.
+    /// A body and style whose feet hardly move: strides of less than 0.1 m.
     pub fn with_walker(mut self, walker: Walker) -> Result<Self, SceneError> {
         let stride_m = stride_length_m(&walker);
         let is_a_walk = (0.1..=10.0).contains(&stride_m);
@@ -227,7 +230,7 @@ impl SynthScene {
         frame as f64 / self.options.rate_hz
     }
 
-    /// The truth of a frame, `None` before the walker is there.
+    /// The ground truth of a frame; `None` before the walker appears.
     pub fn truth(&self, frame: usize) -> Option<Truth> {
         if frame < self.options.empty_frames {
             return None;
@@ -242,7 +245,7 @@ impl SynthScene {
         Some(Truth { frame, time_s, hypothesis, posed: self.posed(&hypothesis) })
     }
 
-    /// Cycles and way walked at a time, linear within a step.
+    /// Cycles and distance walked until a time, linear within a step.
     fn walked(&self, time_s: f64) -> (f64, f64) {
         let step = self.steps[self.steps.partition_point(|step| step.time_s <= time_s).max(1) - 1];
         let since_s = time_s - step.time_s;
@@ -252,7 +255,7 @@ impl SynthScene {
         )
     }
 
-    /// The body; a foot that reaches farther swings about a hip angle that is larger throughout.
+    /// The posed body. A foot that lands farther ahead swings about a hip angle with a constant offset.
     fn posed(&self, hypothesis: &Hypothesis) -> PosedBody {
         let scene = Scene { walker: &self.walker, camera: &self.camera, path: &self.path };
         let sizes = &self.walker.body.proportions;
@@ -280,7 +283,7 @@ impl SynthScene {
         (cycles + c * ((TAU * cycles).cos() - 1.0)).rem_euclid(1.0)
     }
 
-    /// The grey frame.
+    /// The rendered grey frame.
     pub fn frame(&self, frame: usize) -> Image<u8> {
         let mut levels = self.background.clone();
         if let Some(truth) = self.truth(frame) {
@@ -292,7 +295,7 @@ impl SynthScene {
         with_noise(&levels, self.options.noise_sd, random)
     }
 
-    /// Draws the body with 2x2 samples a pixel.
+    /// Renders the body with 2x2 samples per pixel.
     fn draw(&self, posed: &PosedBody, levels: &mut Image<f32>) {
         let fine = self.camera.scaled(2.0).expect("doubling a valid camera keeps it valid");
         let Some(window) = window_of(posed, &fine) else { return };
@@ -310,7 +313,7 @@ impl SynthScene {
         }
     }
 
-    /// Lambert shading of a sample, `None` where no part is seen.
+    /// Lambert shading of a sample; `None` where no part is visible.
     fn sample(&self, map: &SurfaceMap, x: usize, y: usize) -> Option<f32> {
         if x >= map.window.width || y >= map.window.height || map.part.at(x, y) == NO_PART {
             return None;
@@ -321,7 +324,7 @@ impl SynthScene {
     }
 }
 
-/// Grey values with sensor noise, rounded.
+/// Grey values with added sensor noise, rounded.
 pub(super) fn with_noise(levels: &Image<f32>, noise_sd: f32, mut random: Random) -> Image<u8> {
     let mut grey = Image::filled(levels.width(), levels.height(), 0u8);
     for (out, level) in grey.pixels_mut().chunks_mut(2).zip(levels.pixels().chunks(2)) {
@@ -333,24 +336,24 @@ pub(super) fn with_noise(levels: &Image<f32>, noise_sd: f32, mut random: Random)
     grey
 }
 
-/// A step as drawn: where it begins, and how long it takes and leads.
+/// A drawn step: its start, duration and length.
 #[derive(Debug, Clone, Copy)]
 struct DrawnStep {
     time_s: f64,
-    /// Cycles and way at its beginning.
+    /// Cycles and distance at its start.
     cycles: f64,
     along_m: f64,
     duration_s: f64,
     length_m: f64,
 }
 
-/// The steps of the whole scene, each half a cycle long; the first is under way when the scene begins.
+/// The steps of the whole scene, each half a cycle long; the first has already begun when the scene begins.
 fn drawn_steps(options: &SceneOptions, phase0: f64, cycle_hz: f64, speed_mps: f64) -> Vec<DrawnStep> {
     let mut random = Random::new(options.seed ^ 0x5EED_0F57_E950);
     let Uneven { step_time_sd, step_length_sd, .. } = options.uneven;
     let (average_s, average_m) = (0.5 / cycle_hz, 0.5 * speed_mps / cycle_hz);
     let end_s = options.frames as f64 / options.rate_hz;
-    // Deviations beyond three standard deviations are none of a walk.
+    // Deviations beyond three standard deviations do not occur in a walk.
     let share = |sd: f64, normal: f64| 1.0 + sd * normal.clamp(-3.0, 3.0);
     let mut steps: Vec<DrawnStep> = Vec::new();
     let mut cycles = (2.0 * phase0).floor() / 2.0;
@@ -370,13 +373,14 @@ fn drawn_steps(options: &SceneOptions, phase0: f64, cycle_hz: f64, speed_mps: f6
     steps
 }
 
-/// Stride length at which the stance foot does not slide: the ankle's way back in the body over mid-stance.
+/// Stride length at which the stance foot does not slide: from the backward motion of the ankle relative to
+/// the body over mid-stance.
 pub(super) fn stride_length_m(walker: &Walker) -> f64 {
     let ankle = |phase: f64| walker.pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
     (ankle(0.1) - ankle(0.4)) / 0.3
 }
 
-/// Skin light, shirt and trousers apart from each other and from the wall (150 to 180).
+/// Grey levels: light skin; shirt and trousers different from each other and from the wall (150 to 180).
 fn part_greys(random: &mut Random) -> [f32; 14] {
     let skin = random.uniform(205.0, 235.0) as f32;
     let shirt = random.uniform(70.0, 115.0) as f32;
@@ -393,7 +397,7 @@ fn part_greys(random: &mut Random) -> [f32; 14] {
     grey
 }
 
-/// Smooth random texture on a wall 2 m behind the walk and on the floor before it.
+/// Smooth random texture on a wall 2 m behind the walk and on the floor in front of it.
 fn wall_and_floor(camera: &Camera, random: &mut Random) -> Image<f32> {
     let [width, height] = camera.size.map(|side| side as usize);
     let foot = camera.project_ideal(DVec3::new(0.0, 2.0, 0.0)).map_or(height as f64, |p| p.y);

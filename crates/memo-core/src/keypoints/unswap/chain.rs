@@ -1,6 +1,6 @@
-//! The second-order chain of exchange bits of one limb group: best path, posterior, posterior from an anchor.
+//! The second-order chain of swap bits of one limb group: best path, posterior, posterior from an anchor.
 //!
-//! A level (hip, knee, ankle) has one bit in every frame that shows it: exchanged or not. The state holds the
+//! A level (hip, knee, ankle) has one bit in every frame that shows it: swapped or not. The state holds the
 //! bit of each level at the last frame that showed it (`last`) and at the frame before that (`before`), so a
 //! level that is missing for some frames keeps its bits. With L levels there are 4^L states and 2^L
 //! transitions from each; the time is linear in the number of frames.
@@ -17,7 +17,7 @@ pub(super) struct Step {
 /// Prior costs in nats.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prior {
-    /// Cost of exchanging all levels seen in a frame.
+    /// Cost of swapping all levels seen in a frame.
     pub as_is: f64,
     /// Cost of a difference between two neighbouring levels starting.
     pub partial_begin: f64,
@@ -188,7 +188,7 @@ impl<'a> Chain<'a> {
 }
 
 impl Posterior {
-    /// The probability that the level is exchanged at the last frame up to `step` that showed it.
+    /// The probability that the level is swapped at the last frame up to `step` that showed it.
     pub fn exchanged(&self, step: usize, level: usize, levels: usize) -> f64 {
         let states = 1 << (2 * levels);
         let row = step * states..(step + 1) * states;
@@ -259,7 +259,7 @@ mod tests {
     }
 
     /// Every history of bits with its cost, level by level as in the module documentation: each level has a
-    /// list of its own bits in the frames that show it; before the first it was not exchanged.
+    /// list of its own bits in the frames that show it; before the first it was not swapped.
     fn histories(levels: usize, steps: &[Step], prior: Prior) -> Vec<(Vec<Vec<usize>>, f64)> {
         let mut all: Vec<(Vec<Vec<usize>>, f64)> = vec![(vec![vec![]; levels], 0.0)];
         for step in steps {
@@ -322,7 +322,7 @@ mod tests {
         }
     }
 
-    /// Motion of one level in which every exchange costs 9 nats; the `silent` frames carry no information.
+    /// Motion of one level in which every swap costs 9 nats; the `silent` frames carry no information.
     fn one_level(frames: usize, silent: &[usize]) -> Vec<Step> {
         let motion = |k: usize| if silent.contains(&k) { vec![0.0; 4] } else { vec![0.0, 9.0, 9.0, 18.0] };
         (0..frames).map(|k| Step { seen: 1, motion: motion(k) }).collect()

@@ -1,6 +1,6 @@
 //! The position of right and left relative to one another, its noise and its acceleration.
 //!
-//! With the difference d = right - left and the mean m of a pair, an exchange changes the sign of d and
+//! With the difference d = right - left and the mean m of a pair, a swap changes the sign of d and
 //! leaves m unchanged. So m gives the noise whatever the labels, and the labels are correct where the signs
 //! make d smooth.
 
@@ -36,11 +36,11 @@ pub(super) struct Scale {
 /// detections.
 const NU: f64 = 4.0;
 /// Upper bound of the information from one triple of samples, nats: any event has at least the odds e^-8.
-/// With a smaller bound an exchange of knee and ankle alone is lost; with a larger one single bad detections
-/// exchange a whole run.
+/// With a smaller bound a swap of knee and ankle alone is lost; with a larger one single bad detections
+/// swap a whole run.
 const MOST_NATS: f64 = 8.0;
 /// Residuals of neighbouring triples share two of three samples: for white noise the log odds of a single
-/// exchange have a variance of 7.8 (d / sd)^2, while independent residuals of the same mean would have 4.
+/// swap have a variance of 7.8 (d / sd)^2, while independent residuals of the same mean would have 4.
 /// Doubling the noise variance keeps the odds from being overconfident.
 const SHARED: f64 = 2.0;
 /// Over this lag, s, the acceleration of walking is nearly constant and noise no longer masks it.
@@ -233,7 +233,7 @@ mod tests {
         assert!(found.iter().any(|cost| *cost > 0.5), "{found:?}");
     }
 
-    /// Uniform motion without an exchange costs nothing, at uneven times; a single frame never costs more
+    /// Uniform motion without a swap costs nothing, at uneven times; a single frame never costs more
     /// than 8.
     #[test]
     fn uniform_motion_is_free_and_no_frame_decides_alone() {
@@ -297,7 +297,7 @@ mod tests {
         }
     }
 
-    /// Without signs the smoothest pattern of each triple is used: exchanges do not change the estimates.
+    /// Without signs the smoothest pattern of each triple is used: swaps do not change the estimates.
     #[test]
     fn exchanges_do_not_disturb_the_scales() {
         let mut random = Random::new(4);
@@ -314,7 +314,7 @@ mod tests {
     }
 
     /// Detections off the line between their neighbours are dropped, also a small one beside a large one, in
-    /// mean or difference; exchanges are kept.
+    /// mean or difference; swaps are kept.
     #[test]
     fn outliers_go_and_exchanges_stay() {
         let mut random = Random::new(8);

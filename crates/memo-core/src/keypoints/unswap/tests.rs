@@ -157,7 +157,7 @@ fn no_frames_give_no_verdicts() {
 }
 
 /// Knee and ankle of a walker of 100 px; the two joints of each pair swing in opposite phase. The labels of
-/// some frames are exchanged: a mask of levels for each frame.
+/// some frames are swapped: a mask of levels for each frame.
 fn two_levels(times_s: &[f64], exchanged: impl Fn(usize) -> usize) -> Vec<[f64; 2]> {
     let mut points = Vec::new();
     for (t, time_s) in times_s.iter().enumerate() {
@@ -184,7 +184,7 @@ fn solve_legs(times_s: &[f64], points_px: &[[f64; 2]], options: &UnswapOptions) 
     unswap(&keypoints, &legs(), options).unwrap().groups.remove(0)
 }
 
-/// If k of n frames were exchanged, the odds that the majority is correct are exp(p (n - 2 k)) for p nats per
+/// If k of n frames were swapped, the odds that the majority is correct are exp(p (n - 2 k)) for p nats per
 /// frame; half of a frame's levels count half.
 #[test]
 fn the_global_probability_counts_the_frames_by_the_prior() {
@@ -202,7 +202,7 @@ fn the_global_probability_counts_the_frames_by_the_prior() {
     }
 }
 
-/// The prior of the labels decides which of two halves was exchanged, unless it is zero.
+/// The prior of the labels decides which of two halves was swapped, unless it is zero.
 #[test]
 fn labels_as_they_came_are_believed_by_their_prior() {
     let times_s = times(60);
@@ -237,7 +237,7 @@ fn a_frame_is_decided_from_the_probability_asked_for() {
     }
 }
 
-/// Knees and ankles exchanged independently: found level by level, unless the prior cost is too high.
+/// Knees and ankles swapped independently: found level by level, unless the prior cost is too high.
 #[test]
 fn levels_exchanged_alone_are_found_at_a_price() {
     let times_s = times(60);
@@ -306,7 +306,7 @@ fn a_stretch_that_fits_both_labels_is_unclear() {
     assert!(!reasons.iter().any(|reason| matches!(reason, Reason::UnseenCrossing { .. })));
 }
 
-/// The gain of a level is the cost that exchanging it in that frame alone would add to all its motion.
+/// The gain of a level is the cost that swapping it in that frame alone would add to all its motion.
 #[test]
 fn gains_are_what_a_single_exchange_costs() {
     let times_s = times(40);

@@ -12,7 +12,6 @@
 //! The coefficients contain neither the image size nor distortion. Their skew is ignored; they are refused if
 //! it exceeds a hundredth of the focal length. If the matrix mirrors, either v increases upwards, as in
 //! DLTdv, or the origin lies behind the camera; only the caller can tell which.
-//! upwards, as DLTdv does, or the origin lies behind the camera; only the caller knows which.
 
 use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};

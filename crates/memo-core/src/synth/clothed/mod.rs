@@ -1,16 +1,18 @@
-//! A person in clothes who walks through a room: truth that does not come from the tracker's own model.
+//! A clothed person who walks through a room: ground truth that is independent of the tracker's own model.
 //!
-//! Body, gait and picture share no code with [`model`](crate::model): round cones instead of elliptic cylinders,
-//! joint curves of other sources with deviations of 5 to 10 degrees from the shipped average, uneven sides, a
-//! pelvis that turns and drops, feet that roll from heel to toe and stand where they stand, clothes that are
-//! wider than the body, hair, stripes, a wall of blocks, tiles, and a contact shadow. Proportions, clothes, gait,
-//! heading, camera and room follow from the seed. What tracking reaches here is nearer to what it reaches on
-//! people than on [`SynthScene`](super::SynthScene), where the walker is the model.
+//! Body, gait and rendering share no code with [`model`](crate::model): round cones instead of elliptic
+//! cylinders, joint curves from other sources with deviations of 5 to 10 degrees from the shipped average,
+//! asymmetric sides, a pelvis that rotates and drops, feet that roll from heel to toe and do not slide in
+//! stance, clothes that are wider than the body, hair, stripes, a wall of blocks, tiles, and a contact
+//! shadow. Proportions, clothes, gait, heading, camera and room follow from the seed. Tracking results here
+//! are closer to those on people than the results on [`SynthScene`](super::SynthScene), where the walker is
+//! the model.
 //!
-//! Contacts are where the drawn foot touches the floor; nothing assumes a phase for them. Frames are drawn one by
-//! one and in any order; the same seed gives the same pixels.
+//! Contacts are where the rendered foot touches the floor; no gait phase is assumed for them. Frames are
+//! rendered one by one and in any order; the same seed gives the same pixels.
 //!
-//! It cannot: turn on the way, wear skirts or coats, cast shadows on the wall or reflect in the floor.
+//! Limits: the person does not turn during the walk and does not wear skirts or coats; there are no shadows
+//! on the wall and no reflections in the floor.
 
 mod person;
 mod render;
@@ -39,32 +41,32 @@ pub enum Mover {
     /// A person who walks.
     #[default]
     Walker,
-    /// The same person, carried along in one posture as on a scooter.
+    /// The same person in one constant posture, carried along as on a scooter.
     Rider,
-    /// The same person, who stands and swings the arms.
+    /// The same person, standing and swinging the arms.
     Waver,
     /// A trolley as high as a person.
     Trolley,
 }
 
-/// What is drawn.
+/// Options of a clothed scene. `None` means that the seed decides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClothedOptions {
-    /// Everything not fixed here follows from the seed.
+    /// Seed; determines everything that is not fixed by the other options.
     pub seed: u64,
-    /// Number of frames. The walker passes the middle of the picture half-way through them.
+    /// Number of frames. The walker passes the middle of the image half-way through them.
     pub frames: usize,
-    /// Frames a second, 1 to 10,000.
+    /// Frames per second, 1 to 10,000.
     pub rate_hz: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Standard deviation of the sensor noise, grey levels, 0 to 255; by lot 2 to 5.
+    /// Standard deviation of the sensor noise, grey levels, 0 to 255; by the seed 2 to 5.
     pub noise_sd: Option<f32>,
-    /// Whether the walk goes to the left; by lot.
+    /// Whether the walk goes to the left.
     pub leftward: Option<bool>,
-    /// By how much the path is turned out of the image plane, radians, -1 to 1; by lot within 0.12.
+    /// Angle of the path out of the image plane, radians, -1 to 1; by the seed within 0.12.
     pub slant_rad: Option<f64>,
-    /// By how much of a cycle the left side comes late, -0.1 to 0.1; by lot, a few thousandths.
+    /// Delay of the left side, as a fraction of the cycle, -0.1 to 0.1; by the seed a few thousandths.
     pub late_left: Option<f64>,
     /// What moves.
     pub mover: Mover,
@@ -86,27 +88,27 @@ impl Default for ClothedOptions {
     }
 }
 
-/// The truth of one frame with a walker.
+/// The ground truth of one frame with a walker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClothedTruth {
     /// Number of the frame.
     pub frame: usize,
     /// Time, seconds.
     pub time_s: f64,
-    /// Mean of both shoulders and both hips, metres.
+    /// Mean of both shoulders and both hips, world axes, metres.
     pub torso_centre: DVec3,
-    /// Joints of the right side, metres.
+    /// Joints of the right side, world axes, metres.
     pub right: SideJoints,
-    /// Joints of the left side, metres.
+    /// Joints of the left side, world axes, metres.
     pub left: SideJoints,
-    /// Angles of the right and left side in the vertical plane of the path, radians: thigh against the vertical, knee,
-    /// upper arm against the trunk, elbow.
+    /// Angles of the right and the left side in the vertical plane of the path, radians: thigh relative to
+    /// the vertical, knee, upper arm relative to the trunk, elbow.
     pub angles: [SideAngles; 2],
-    /// Gait phase, linear in time between initial contacts: right 0, left 0.5.
+    /// Gait phase, linear in time between initial contacts: right 0, left 0.5; cycles.
     pub phase: f64,
 }
 
-/// A foot that touches or leaves the floor.
+/// A foot contact event: a foot touches or leaves the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Time, seconds.
@@ -115,46 +117,46 @@ pub struct Contact {
     pub kind: EventKind,
     /// Which foot.
     pub side: Side,
-    /// Where the heel is at that time, metres.
+    /// Position of the heel at that time, world axes, metres.
     pub heel: DVec3,
 }
 
-/// A scene: a room with somebody in it, a camera, and frames on demand.
+/// A scene: a room with one mover and a camera, with frames on demand.
 #[derive(Debug, Clone)]
 pub struct ClothedScene {
     /// The camera.
     pub camera: Camera,
-    /// Body height of the person, crown to sole, metres.
+    /// Body height of the person from crown to sole, metres.
     pub height_m: f64,
-    /// Direction of the path, radians about world Z; the person faces it.
+    /// Direction of the path, radians about world Z; the person faces in this direction.
     pub heading_rad: f64,
-    /// Mean speed, metres a second.
+    /// Mean speed, metres per second.
     pub speed_mps: f64,
-    /// Mean rate of the gait, cycles a second.
+    /// Mean cadence, gait cycles per second.
     pub cycle_hz: f64,
-    /// Share of the cycle for which the right and the left foot touch the floor.
+    /// Fraction of the cycle for which the right and the left foot touch the floor.
     pub stance: [f64; 2],
     options: ClothedOptions,
     noise_sd: f32,
     sizes: Sizes,
     clothes: Clothes,
     stride: Stride,
-    /// Cycles at the beginning, and how the rate varies: amplitude and phase of a slow wave.
+    /// Cycles at the start, and the variation of the rate: amplitude and phase of a slow wave.
     start_cycles: f64,
     sway: [f64; 2],
     room: Room,
     empty: Image<f32>,
 }
 
-/// How many cycles the slow variation of the rate takes.
+/// Period of the slow variation of the rate, cycles.
 const SWAY_CYCLES: f64 = 2.3;
 
 impl ClothedScene {
-    /// Draws lots for everything the options leave open.
+    /// A scene in which the seed determines everything that the options leave open.
     ///
     /// # Errors
     ///
-    /// A size or an option out of the range it states.
+    /// A size or an option out of range.
     pub fn new(options: ClothedOptions) -> Result<Self, SceneError> {
         check(&options)?;
         let mut random = Random::new(options.seed ^ 0xC107_4ED0);
@@ -208,7 +210,7 @@ impl ClothedScene {
         frame as f64 / self.options.rate_hz
     }
 
-    /// The truth of a frame, `None` unless somebody walks.
+    /// The ground truth of a frame; `None` unless the mover is a walker.
     pub fn truth(&self, frame: usize) -> Option<ClothedTruth> {
         if self.options.mover != Mover::Walker {
             return None;
@@ -226,7 +228,8 @@ impl ClothedScene {
         })
     }
 
-    /// Initial contacts and toe-offs from the first to the last frame, in order; none unless somebody walks.
+    /// Initial contacts and toe-offs from the first to the last frame, in order; empty unless the mover is a
+    /// walker.
     pub fn contacts(&self) -> Vec<Contact> {
         if self.options.mover != Mover::Walker || self.is_empty() {
             return Vec::new();
@@ -250,8 +253,8 @@ impl ClothedScene {
         contacts
     }
 
-    /// Way from the other foot's heel to a side's own at its initial contact, and the time between these, metres and
-    /// seconds, of an undisturbed step.
+    /// Length and duration of an undisturbed step of a side, metres and seconds: from the heel of the other
+    /// foot to the side's own heel at its initial contact, and the time between the two contacts.
     pub fn step(&self, side: Side) -> (f64, f64) {
         let own = usize::from(side == Side::Left);
         let [here, there] = [own, 1 - own].map(|side| self.stride.strikes[side]);
@@ -260,7 +263,7 @@ impl ClothedScene {
         (heel(own, here) - heel(1 - own, here - lasts), lasts / self.cycle_hz)
     }
 
-    /// The grey frame.
+    /// The rendered grey frame.
     pub fn frame(&self, frame: usize) -> Image<u8> {
         let mut levels = self.empty.clone();
         let (solids, shadows) = self.solids(self.time_s(frame));
@@ -269,7 +272,7 @@ impl ClothedScene {
         super::scene::with_noise(&levels, self.noise_sd, Random::new(self.options.seed ^ lot))
     }
 
-    /// What stands in the room at a time, and the spheres near the floor that take its light.
+    /// The solids in the room at a time, and the spheres near the floor that cast the contact shadow.
     fn solids(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
         if self.options.mover == Mover::Trolley {
             return self.trolley(time_s);
@@ -280,12 +283,12 @@ impl ClothedScene {
         (person::solids(&figure, &self.sizes, &self.clothes), feet.collect())
     }
 
-    /// The person as posed at a time.
+    /// The posed person at a time.
     fn figure(&self, time_s: f64) -> Figure {
         let cycles = self.cycles(time_s);
         let middle = self.stride.length_m * self.cycles(self.middle_s());
         let still = self.start_cycles;
-        // Carried on from where the posture of the beginning stands.
+        // Carried on from the position of the initial posture.
         let carried =
             |way: f64| self.stride.figure(still).placed(0.0, DVec3::X * (way - self.stride.length_m * still));
         let figure = match self.options.mover {
@@ -318,7 +321,7 @@ impl ClothedScene {
         (solids, wheels)
     }
 
-    /// The time at which the middle of the picture is passed.
+    /// The time at which the mover passes the middle of the image.
     fn middle_s(&self) -> f64 {
         0.5 * self.options.frames as f64 / self.options.rate_hz
     }
@@ -330,7 +333,8 @@ impl ClothedScene {
         self.start_cycles + even + amplitude * ((TAU * even / SWAY_CYCLES + phase).sin() - phase.sin())
     }
 
-    /// The time at which so many cycles are walked, by bisection: the wave is small, the cycles rise.
+    /// The time at which a number of cycles is completed, by bisection: the wave is small, so the cycles
+    /// increase.
     fn time_of(&self, cycles: f64) -> f64 {
         let even = (cycles - self.start_cycles) / self.cycle_hz;
         let (mut low, mut high) = (even - 0.1, even + 0.1);
@@ -344,7 +348,7 @@ impl ClothedScene {
     fn phase(&self, time_s: f64) -> f64 {
         let cycles = self.cycles(time_s);
         let [right, left] = self.stride.strikes;
-        // The last contact of either side, then the next of the other.
+        // The last contact of either side, then the next contact of the other side.
         let since = |strike: f64| (cycles - strike).rem_euclid(1.0);
         let (base, from, to) = if since(right) < since(left) {
             (0.0, cycles - since(right), left)
@@ -383,11 +387,11 @@ fn check(options: &ClothedOptions) -> Result<(), SceneError> {
     ])
 }
 
-/// A camera on a tripod, nearly level, that sees the walk across the middle of the picture.
+/// A camera on a tripod, nearly level, that sees the walk across the middle of the image.
 fn drawn_camera(size: [u32; 2], random: &mut Random) -> Camera {
     let field_of_view_rad = random.uniform(0.7, 1.05);
     let height_m = random.uniform(0.8, 1.7);
-    // Wide pictures show more than the walk; narrow ones must hold the person.
+    // Wide images show more than the walk; narrow images must contain the person.
     let distance_m = random.uniform(5.2, 6.4) * (0.5 * 0.9f64).tan() / (0.5 * field_of_view_rad).tan();
     let pitch_rad = ((height_m - 0.95) / distance_m).atan() + random.uniform(-0.01, 0.01);
     let level = Camera::level(size, field_of_view_rad, height_m, distance_m)
@@ -396,7 +400,7 @@ fn drawn_camera(size: [u32; 2], random: &mut Random) -> Camera {
     Camera { translation: rotation * -level.position(), rotation, ..level }
 }
 
-/// Arms that swing about the shoulders by a share of 1 rad, and a head that nods.
+/// Arms that swing about the shoulders by a fraction of 1 rad, and a nodding head.
 fn waving(mut figure: Figure, swings: f64) -> Figure {
     for (joints, hand) in figure.joints.iter_mut().zip(&mut figure.hands) {
         let turn = DMat3::from_rotation_y(-swings);

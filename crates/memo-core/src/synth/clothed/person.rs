@@ -1,7 +1,8 @@
-//! Sizes and clothes of a drawn person, and the solids that show them.
+//! Sizes and clothes of a rendered person, and the solids that represent them.
 //!
 //! Mean lengths are those of Drillis and Contini 1966 (in Winter, *Biomechanics and Motor Control of Human
-//! Movement*, fig. 4.1); every person's differ from them by 3 %. Girths are chosen, clothes drawn by lot.
+//! Movement*, fig. 4.1); the lengths of each person differ from them by 3 %. Girths are chosen; clothes are
+//! random.
 
 use super::round_cone::RoundCone;
 use super::sizes::Sizes;
@@ -9,16 +10,16 @@ use super::stride::Figure;
 use crate::synth::Random;
 use glam::DVec3;
 
-/// What a solid is made of.
+/// The material of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cloth {
     /// Grey level in full light.
     pub(super) grey: f64,
-    /// Stripes across the solid: share by which they are darker, and how many there are.
+    /// Stripes across the solid: the fraction by which they are darker, and their number.
     pub(super) stripes: (f64, f64),
 }
 
-/// A solid as drawn.
+/// A solid with its material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Solid {
     pub(super) shape: RoundCone,
@@ -40,7 +41,8 @@ pub(super) struct Clothes {
 }
 
 impl Clothes {
-    /// Draws lots before a wall of a grey level: shirt and trousers differ from it and from each other.
+    /// Random clothes in front of a wall of a given grey level: shirt and trousers differ from it and from
+    /// each other.
     pub(super) fn drawn(wall: f64, random: &mut Random) -> Self {
         let plain = |grey: f64| Cloth { grey, stripes: (0.0, 0.0) };
         let skin = random.uniform(110.0, 215.0);
@@ -68,7 +70,7 @@ impl Clothes {
 }
 
 impl Clothes {
-    /// What a trolley of the same colours is covered with, and its wheels.
+    /// The covering of a trolley in the same colours, and its wheels.
     pub(super) fn of_a_trolley(&self) -> [Cloth; 2] {
         [self.shirt, self.shoes]
     }

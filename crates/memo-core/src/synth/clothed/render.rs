@@ -1,4 +1,4 @@
-//! Drawing solids over a room by casting rays.
+//! Rendering of solids in front of a room by ray casting.
 
 use super::person::Solid;
 use super::room::Room;
@@ -7,7 +7,7 @@ use crate::model::Camera;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
-/// Fine pixels along a side of a pixel.
+/// Fine pixels per side of a pixel.
 const FINE: usize = 2;
 
 /// A window of fine pixels with the nearest surface of each.
@@ -15,11 +15,11 @@ struct Canvas {
     /// First fine column and row.
     origin: [usize; 2],
     size: [usize; 2],
-    /// Ray parameter and grey level; infinite where nothing is.
+    /// Ray parameter and grey level; infinite where there is no surface.
     nearest: Vec<(f64, f32)>,
 }
 
-/// Draws the solids and what they take of the light on the floor.
+/// Renders the solids and their contact shadow on the floor.
 pub(super) fn draw(
     solids: &[Solid],
     shadows: &[(DVec3, f64)],
@@ -48,8 +48,8 @@ fn spheres(solid: &Solid) -> [(DVec3, f64); 2] {
     [0, 1].map(|end| (solid.shape.ends[end], solid.shape.radii[end]))
 }
 
-/// Fine pixels from (left, top) to before (right, bottom) that can show the spheres; `None` outside the picture or
-/// where the camera stands in one of them.
+/// Fine pixels from (left, top) to before (right, bottom) that can show the spheres; `None` outside the image
+/// or if the camera is inside one of them.
 fn window(spheres: &[(DVec3, f64)], camera: &Camera) -> Option<[usize; 4]> {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for (centre, radius) in spheres {
@@ -58,7 +58,8 @@ fn window(spheres: &[(DVec3, f64)], camera: &Camera) -> Option<[usize; 4]> {
             return None;
         }
         let pixel = camera.project_ideal(*centre)?;
-        // A sphere off the axis looks larger than radius / depth, by less than 1.5 within 45 degrees.
+        // A sphere off the axis appears larger than radius / depth, by a factor of less than 1.5 within 45
+        // degrees.
         let reach = 1.5 * camera.focal_px * *radius / (depth - radius);
         (low, high) = (low.min(pixel - reach), high.max(pixel + reach));
     }
@@ -77,7 +78,7 @@ impl Canvas {
     /// Casts the rays of a window at a solid.
     fn add(&mut self, solid: &Solid, [left, top, right, bottom]: [usize; 4], light: DVec3, camera: &Camera) {
         let eye = camera.position();
-        // Rays are affine in the pixel: one at a corner and its change along either side.
+        // Rays are affine in the pixel: the ray at a corner plus its change along each side.
         let sample = |x: usize, y: usize| {
             let at = |fine: usize| (fine as f64 + 0.5) / FINE as f64 - 0.5;
             let in_camera = ((DVec2::new(at(x), at(y)) - camera.centre_px) / camera.focal_px).extend(1.0);
@@ -102,7 +103,7 @@ impl Canvas {
         }
     }
 
-    /// Averages the fine pixels over what is behind.
+    /// Averages the fine pixels over the background.
     fn blend(&self, levels: &mut Image<f32>) {
         for y in (0..self.size[1]).step_by(FINE) {
             for x in (0..self.size[0]).step_by(FINE) {
@@ -118,7 +119,7 @@ impl Canvas {
     }
 }
 
-/// Darkens the floor near the bodies.
+/// Darkens the floor close to the bodies.
 fn shade_floor(bodies: &[(DVec3, f64)], room: &Room, camera: &Camera, levels: &mut Image<f32>) {
     let on_floor: Vec<(DVec3, f64)> = bodies.iter().map(|(centre, _)| (centre.with_z(0.0), 0.35)).collect();
     let Some([left, top, right, bottom]) = window(&on_floor, camera) else { return };

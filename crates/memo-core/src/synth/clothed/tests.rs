@@ -9,7 +9,7 @@ fn of_seed(seed: u64) -> ClothedScene {
     scene(ClothedOptions { seed, ..ClothedOptions::default() })
 }
 
-/// Small pictures, for what does not need large ones.
+/// A scene with small images, for tests that do not need large ones.
 fn small(seed: u64, mover: Mover) -> ClothedScene {
     scene(ClothedOptions { seed, mover, size: [160, 120], noise_sd: Some(0.0), ..ClothedOptions::default() })
 }
@@ -48,7 +48,7 @@ fn a_seed_gives_the_same_pixels_in_any_order_and_seeds_differ() {
     assert_ne!(a.frame(5), small(1, Mover::Walker).frame(5));
 }
 
-/// The foot as drawn: heel, ball and toe less their radii.
+/// The rendered foot: heel, ball and toe minus their radii.
 fn soles(scene: &ClothedScene, side: usize, cycles: f64) -> [DVec3; 3] {
     let radii = scene.sizes.foot_radii_m();
     let foot = scene.stride.figure(cycles).feet[side];
@@ -69,12 +69,12 @@ fn standing_feet_stand_on_the_floor_and_swinging_feet_clear_it() {
                 "seed {seed}: the heel moves by {}",
                 (early - late).length()
             );
-            // 2. Some point of the foot is near the floor all the while, and none far below it.
+            // 2. Some point of the foot is always near the floor, and none is far below it.
             for k in 0..=20 {
                 let low = at(0.05 * f64::from(k)).iter().map(|sole| sole.z).fold(f64::INFINITY, f64::min);
                 assert!((-0.03..0.035).contains(&low), "seed {seed}: {low} m above the floor in stance");
             }
-            // 3. It is lifted in mid-swing, and goes ahead by a stride in all.
+            // 3. It is lifted in mid-swing, and moves ahead by a stride in total.
             let swing = strike + 1.0 - 0.5 * (1.0 - (leave - strike));
             let low = soles(&scene, side, swing).iter().map(|sole| sole.z).fold(f64::INFINITY, f64::min);
             assert!(low > 0.004, "seed {seed}: {low} m above the floor in swing");
@@ -91,7 +91,7 @@ fn people_walk_as_people_do() {
         assert!((0.55..0.68).contains(&scene.stance[0]) && (0.55..0.68).contains(&scene.stance[1]));
         let relative = scene.stride.length_m / scene.height_m;
         assert!((0.55..0.95).contains(&relative), "seed {seed}: a stride of {relative} heights");
-        // The trunk neither lurches nor stops.
+        // The trunk moves evenly and does not stop.
         let speeds = (1..scene.len()).map(|k| {
             let [a, b] = [k - 1, k].map(|k| scene.truth(k).unwrap().torso_centre);
             (b - a).length() * scene.options.rate_hz / scene.speed_mps
@@ -102,14 +102,15 @@ fn people_walk_as_people_do() {
         let walked = (last.torso_centre - first.torso_centre).truncate().dot(ahead);
         let mean = walked / (last.time_s - first.time_s);
         assert!((mean / scene.speed_mps - 1.0).abs() < 0.05, "seed {seed}: {mean} m/s");
-        // Steps of both sides make the stride.
+        // The steps of both sides add up to the stride.
         let (right, left) = (scene.step(Side::Right), scene.step(Side::Left));
         assert!((right.0 + left.0 - scene.stride.length_m).abs() < 1e-9);
         assert!((right.1 + left.1 - 1.0 / scene.cycle_hz).abs() < 1e-9);
     }
 }
 
-/// Root mean square over both sides and all frames of hip and knee against the shipped average, degrees.
+/// Root mean square deviation of hip and knee from the shipped average over both sides and all frames,
+/// degrees.
 fn deviation_deg(scene: &ClothedScene) -> [f64; 2] {
     let average = Gait::dense();
     let mut sums = [0.0; 2];
@@ -168,7 +169,7 @@ fn a_late_left_side_takes_longer_steps_in_time() {
     }
 }
 
-/// Pixels that differ from the empty room are where the joints are projected.
+/// Pixels that differ from the empty room lie where the joints are projected.
 #[test]
 fn the_picture_shows_the_body_where_the_truth_has_it() {
     for mover in [Mover::Walker, Mover::Rider, Mover::Waver, Mover::Trolley] {
@@ -210,7 +211,7 @@ fn a_rider_keeps_the_posture_and_a_waver_the_place() {
     assert!(waver.truth(3).is_none() && rider.contacts().is_empty());
 }
 
-/// How far solids reach along a direction, metres.
+/// The extent of solids along a direction, metres.
 fn reach(solids: &[Solid], direction: DVec3) -> [f64; 2] {
     let spheres = solids.iter().flat_map(|solid| solid.shape.ends.into_iter().zip(solid.shape.radii));
     spheres.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (centre, radius)| {
@@ -219,8 +220,9 @@ fn reach(solids: &[Solid], direction: DVec3) -> [f64; 2] {
     })
 }
 
-/// Sizes over the body height of 4082 men of 1756 mm in the second survey of the US Army (Gordon and others,
-/// NATICK/TR-15/007, 2014); clothes are up to 14 mm thick on either side, and people differ by 6 %.
+/// Sizes divided by body height, compared with 4082 men of 1756 mm in the second survey of the US Army
+/// (Gordon and others, NATICK/TR-15/007, 2014); clothes are up to 14 mm thick on either side, and people
+/// differ by 6 %.
 #[test]
 fn the_drawn_body_has_the_sizes_of_people() {
     for seed in 0..8 {
@@ -245,7 +247,7 @@ fn the_drawn_body_has_the_sizes_of_people() {
         is("breadth of shoulders", &clothes, left, 416.0, 0.25);
         is("shoulders to crotch", &clothes, DVec3::Z, 593.0, 0.25);
         is("breadth of legs", &legs, left, 346.0, 0.2);
-        // The chin is below and ahead of the head's middle, the hair above and behind it.
+        // The chin is below and in front of the centre of the head, the hair above and behind it.
         let [skull, chin, hair] = [head[0], head[1], head[2]].map(|solid| solid.shape.ends[1]);
         let of = |point: DVec3| [(point - skull).dot(ahead), (point - skull).dot(DVec3::Z)];
         assert!(of(chin)[0] > 0.01 && of(chin)[1] < -0.05, "{:?}", of(chin));
@@ -254,7 +256,7 @@ fn the_drawn_body_has_the_sizes_of_people() {
         let above =
             [figure.neck, figure.head].map(|point| (point - shoulders).dot(DVec3::Z) / scene.height_m);
         assert!(0.02 < above[0] && above[0] + 0.03 < above[1] && above[1] < 0.14, "{above:?}");
-        // The seat is behind the hips, toes are ahead of heels.
+        // The seat is behind the hips; toes are in front of heels.
         let hips = figure.joints[0].hip.midpoint(figure.joints[1].hip);
         assert!((trunk[6].shape.ends[0] - hips).dot(ahead) < -0.02);
         for [heel, _, toe] in figure.feet {

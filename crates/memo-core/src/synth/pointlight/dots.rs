@@ -9,7 +9,7 @@ use crate::synth::motion::{Motion, limbs_of};
 use glam::DVec2;
 use std::f64::consts::TAU;
 
-/// Some dots of a display, T x dots.
+/// The dots of one kind in a display, T x dots.
 #[derive(Debug, Default)]
 pub(super) struct Layer {
     dots: usize,
@@ -23,7 +23,7 @@ pub(super) fn all_points(figure: &Figure) -> Layer {
     Layer { dots: figure.points, positions: figure.positions.clone(), sources }
 }
 
-/// The limbs on which dots may live.
+/// The limbs on which dots may be placed.
 pub(super) fn limbs(motion: &Motion, life: &LimitedLife) -> Result<Vec<[usize; 2]>, PointLightError> {
     let LifeSites::Limbs(given) = &life.sites else { return Ok(Vec::new()) };
     let limbs = if given.is_empty() { limbs_of(motion.names()) } else { given.clone() };
@@ -34,7 +34,7 @@ pub(super) fn limbs(motion: &Motion, life: &LimitedLife) -> Result<Vec<[usize; 2
     if limbs.is_empty() { Err(PointLightError::NoLimbs) } else { Ok(limbs) }
 }
 
-/// In which frames a dot jumps: its ages at frame 0, then every `frames` frames.
+/// The ages of the dots at frame 0; a dot jumps every `frames` frames of age.
 fn first_ages(dots: usize, life: &LimitedLife, random: &mut Random) -> Vec<usize> {
     (0..dots).map(|_| if life.synchronous { 0 } else { below(random, life.frames) }).collect()
 }
@@ -67,7 +67,7 @@ pub(super) fn limited(
     layer
 }
 
-/// A joint that has no dot now, which excludes the dot's own.
+/// A joint without a dot; this excludes the dot's own joint.
 fn free_joint(taken: &[DotSource], points: usize, random: &mut Random) -> DotSource {
     let free: Vec<usize> = (0..points).filter(|&k| !taken.contains(&DotSource::Joint(k))).collect();
     DotSource::Joint(free[below(random, free.len())])
@@ -112,7 +112,7 @@ pub(super) fn noise_layer(
 
 /// One noise dot since its last jump.
 struct NoiseDot {
-    /// Shift of its trajectory, or its first place.
+    /// Shift of its trajectory, or its initial position.
     place: DVec2,
     point: usize,
     since: usize,
@@ -120,7 +120,7 @@ struct NoiseDot {
 }
 
 impl NoiseDot {
-    /// Where it is, and which point's trajectory it copies.
+    /// Its position, and the point whose trajectory it copies.
     fn at(
         &self,
         frame: usize,
@@ -140,14 +140,14 @@ impl NoiseDot {
     }
 }
 
-/// A point that left the area, re-entered on the other side.
+/// A point that left the area, moved to the opposite side.
 fn wrapped(point: DVec2, area: &Extent) -> DVec2 {
     let side = area.high - area.low;
     let wrap = |x: f64, low: f64, side: f64| if side > 0.0 { low + (x - low).rem_euclid(side) } else { low };
     DVec2::new(wrap(point.x, area.low.x, side.x), wrap(point.y, area.low.y, side.y))
 }
 
-/// The dots of two layers side by side.
+/// The dots of two layers in one display.
 pub(super) fn beside(first: Layer, second: Layer, times_s: Vec<f64>) -> PointLightDisplay {
     let dots = first.dots + second.dots;
     let mut positions_px = Vec::with_capacity(dots * times_s.len());

@@ -1,11 +1,11 @@
-//! The points of a motion in the image, and the places they fill.
+//! The points of a motion in the image, and the areas they cover.
 
 use super::{DotSource, PointLightError, View};
 use crate::synth::Random;
 use crate::synth::motion::Motion;
 use glam::{DVec2, DVec3};
 
-/// A rectangle of the image.
+/// A rectangle in the image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extent {
     pub low: DVec2,
@@ -15,7 +15,7 @@ pub(super) struct Extent {
 impl Extent {
     pub const NOTHING: Self = Self { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
 
-    /// Around all finite points.
+    /// The bounding rectangle of all finite points.
     pub fn of(points: impl Iterator<Item = DVec2>) -> Self {
         points
             .filter(|p| p.is_finite())
@@ -40,20 +40,20 @@ impl Extent {
         self.low + DVec2::new(x, y) * (self.high - self.low)
     }
 
-    /// A shift that puts `part` at a random place within this extent, as far as it fits.
+    /// A shift that moves `part` to a random position within this extent, if it fits.
     pub fn draw_shift(&self, part: &Self, random: &mut Random) -> DVec2 {
         let (least, most) = (self.low - part.low, self.high - part.high);
         Self { low: least.min(most), high: least.max(most) }.draw(random)
     }
 }
 
-/// The points of a motion in the image, with the place of the body.
+/// The points of a motion in the image, with the position of the body.
 #[derive(Debug, Clone)]
 pub(super) struct Figure {
     pub points: usize,
-    /// T x K, NaN where not seen.
+    /// T x K, NaN where not visible.
     pub positions: Vec<DVec2>,
-    /// Image of the body's place, T.
+    /// Image of the body position, T.
     pub path: Vec<DVec2>,
 }
 
@@ -80,7 +80,7 @@ impl Figure {
         self.positions[frame * self.points + point]
     }
 
-    /// Where a point is against the body.
+    /// Position of a point relative to the body.
     pub fn against_body(&self, frame: usize, point: usize) -> DVec2 {
         self.at(frame, point) - self.path[frame]
     }
@@ -102,7 +102,7 @@ impl Figure {
         }
     }
 
-    /// Flips about the middle of all that is shown, by axis where `sign` is -1.
+    /// Mirrors about the centre of all points, along each axis where `sign` is -1.
     pub fn flip(&mut self, sign: DVec2) {
         let middle = Extent::of(self.positions.iter().copied()).middle();
         for p in self.positions.iter_mut().chain(&mut self.path) {

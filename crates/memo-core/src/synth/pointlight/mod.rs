@@ -1,15 +1,15 @@
-//! Point-light displays: a motion reduced to dots, and the controls that vision science compares it with.
+//! Point-light displays: a motion reduced to dots, with the control conditions of vision science.
 //!
 //! Sources: Johansson 1973 (lights at the joints); Cutting 1978 (the synthetic walker on the spot); Sumi 1984
-//! (inversion); Cutting, Moore and Morrison 1988 (masks of scrambled walkers); Neri, Morrone and Burr 1998 and
-//! Beintema and Lappe 2002 (limited lifetime); van Boxtel and Lu 2013 (the usual set of options).
+//! (inversion); Cutting, Moore and Morrison 1988 (masks of scrambled walkers); Neri, Morrone and Burr 1998
+//! and Beintema and Lappe 2002 (limited lifetime); van Boxtel and Lu 2013 (the usual set of options).
 //!
-//! The steps, in their order: time reversal, locomotion, phase scrambling (in space); projection; position
+//! The steps, in order: time reversal, locomotion, phase scrambling (in space); projection; position
 //! scrambling, inversion and mirroring (in the image); limited lifetime; noise dots; pixel noise. Every step
-//! draws from its own stream of the seed, so that switching one on does not change the others.
+//! uses its own random stream of the seed, so that switching one step on does not change the others.
 //!
-//! Dots are not hidden by the body (Cutting's walker hid those behind a limb): mark what is hidden as NaN in
-//! the motion. Nothing is drawn here.
+//! Limits: the body does not hide dots (Cutting's walker hid dots behind a limb); mark hidden points as NaN
+//! in the motion. This module does not render images.
 
 mod dots;
 mod figure;
@@ -30,7 +30,7 @@ use glam::DVec2;
 use motion::{phase_scrambled, without_advance};
 use std::f64::consts::FRAC_PI_2;
 
-/// More dots than this over all frames are not made.
+/// Largest number of dots over all frames.
 const MOST_DOTS: usize = 50_000_000;
 
 /// What a dot shows in one frame.
@@ -38,27 +38,28 @@ const MOST_DOTS: usize = 50_000_000;
 pub enum DotSource {
     /// A point of the motion, by index.
     Joint(usize),
-    /// A place on a limb: ends by index, and the fraction of the way from the first to the second.
+    /// A point on a limb: its ends by index, and the fraction of the distance from the first end to the
+    /// second.
     Limb([usize; 2], f64),
-    /// A noise dot, with the index of the point whose trajectory it copies, if it does.
+    /// A noise dot, with the index of the point whose trajectory it copies, if any.
     Noise(Option<usize>),
 }
 
-/// A point-light display. Dots keep their index over time, also when they jump.
+/// A point-light display. Dots keep their index over time, even when they jump.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLightDisplay {
     /// Times of the T frames, seconds.
     pub times_s: Vec<f64>,
     /// Number of dots N.
     pub dots: usize,
-    /// Pixels (u, v), frame after frame, T x N; NaN where the dot is not visible.
+    /// Pixel positions (u, v), frame after frame, T x N; NaN where the dot is not visible.
     pub positions_px: Vec<DVec2>,
     /// What each dot shows, T x N.
     pub sources: Vec<DotSource>,
 }
 
 impl PointLightDisplay {
-    /// A dot at a frame, `None` where it is not visible or does not exist.
+    /// The position of a dot at a frame, pixels; `None` where it is not visible or does not exist.
     pub fn at(&self, frame: usize, dot: usize) -> Option<DVec2> {
         if dot >= self.dots {
             return None;
@@ -67,8 +68,8 @@ impl PointLightDisplay {
         self.positions_px.get(index).copied().filter(|p| p.is_finite())
     }
 
-    /// The dots one by one, N tracks of T pixels, as [`interpret_figure`](crate::planar::interpret_figure) takes
-    /// them.
+    /// The tracks of the dots, N tracks of T pixel positions, in the form of
+    /// [`interpret_figure`](crate::planar::interpret_figure).
     pub fn tracks(&self) -> Vec<Vec<DVec2>> {
         let track = |dot| self.positions_px.iter().skip(dot).step_by(self.dots).copied().collect();
         (0..self.dots).map(track).collect()
@@ -76,6 +77,11 @@ impl PointLightDisplay {
 }
 
 /// Makes a point-light display of a motion.
+///
+/// # Errors
+///
+/// An option out of range, a motion that is too short for the phase scrambling, limbs or joints that the
+/// limited lifetime needs but the motion lacks, too many dots, or a motion of which no point is visible.
 pub fn point_light_display(
     motion: &Motion,
     options: &PointLightOptions,
@@ -116,7 +122,7 @@ pub fn point_light_display(
     Ok(display)
 }
 
-/// The random numbers of one step.
+/// The random stream of one step.
 fn stream(seed: u64, step: u64) -> Random {
     Random::new(seed ^ step.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }

@@ -1,4 +1,4 @@
-//! What happens to the motion in space before it is seen: its advance, and shifts in time.
+//! Changes to the motion in space before projection: removal of the locomotion, and shifts in time.
 
 use super::{Locomotion, PhaseScramble, PointLightError, below};
 use crate::option_error::OptionError;
@@ -6,7 +6,7 @@ use crate::synth::Random;
 use crate::synth::motion::Motion;
 use glam::DVec3;
 
-/// Takes the advance out, keeping the place of the middle of the motion.
+/// Removes the locomotion and keeps the position of the middle of the motion.
 pub(super) fn without_advance(motion: Motion, locomotion: Locomotion) -> Motion {
     let path = motion.pelvis_path();
     let mean = path.iter().sum::<DVec3>() / path.len() as f64;
@@ -24,7 +24,8 @@ pub(super) fn without_advance(motion: Motion, locomotion: Locomotion) -> Motion 
     }
 }
 
-/// p_k(t) = c(t) + r_k(t + s_k) with the horizontal path c of the body, r_k = p_k - c and a shift s_k a point.
+/// p_k(t) = c(t) + r_k(t + s_k) with the horizontal path c of the body, r_k = p_k - c and one shift s_k per
+/// point.
 pub(super) fn phase_scrambled(
     motion: &Motion,
     scramble: &PhaseScramble,

@@ -1,4 +1,4 @@
-//! Which display is made, and why one could not be.
+//! Options of a display, and errors.
 
 use crate::model::Camera;
 use crate::option_error::OptionError;
@@ -16,55 +16,55 @@ pub enum PointLightError {
     /// The recording is shorter than the period or shift asked for.
     #[error("{parameter} of {wanted_s} s needs a longer motion: it lasts {available_s} s")]
     TooShort {
-        /// What was asked for.
+        /// The parameter.
         parameter: &'static str,
-        /// How long it is, seconds.
+        /// The duration requested, seconds.
         wanted_s: f64,
         /// Length of the motion, seconds.
         available_s: f64,
     },
-    /// Dots on joints with a limited lifetime, and no free joint to jump to.
+    /// The dots are on joints with a limited lifetime, and there is no free joint to jump to.
     #[error("nowhere to jump for {} on {}: fewer dots than joints wanted", counted(*dots, "dot"), counted(*points, "joint"))]
     NoFreeJoint {
-        /// Dots asked for.
+        /// Number of dots requested.
         dots: usize,
-        /// Points of the motion.
+        /// Number of points of the motion.
         points: usize,
     },
-    /// Dots on limbs, and no limb.
+    /// The dots are on limbs, and the motion has no limb.
     #[error("dots on limbs need limbs: none given and none of the usual joint names (RSH, REL, ...) found")]
     NoLimbs,
-    /// A limb names a point that does not exist.
+    /// A limb refers to a point that does not exist.
     #[error("limb ({}, {}) of a motion with {}", limb[0], limb[1], counted(*points, "point"))]
     Limb {
         /// The two indices.
         limb: [usize; 2],
-        /// Points of the motion.
+        /// Number of points of the motion.
         points: usize,
     },
-    /// More dots than can be held.
+    /// There are more dots than can be stored.
     #[error("too many dots to be held: {} in {}", counted(*dots, "dot"), counted(*frames, "frame"))]
     TooMany {
-        /// Dots a frame.
+        /// Dots per frame.
         dots: usize,
-        /// Frames.
+        /// Number of frames.
         frames: usize,
     },
-    /// Nothing of the motion is known or before the camera.
+    /// No point of the motion is known and in front of the camera.
     #[error("no point of the motion is ever seen")]
     NothingSeen,
 }
 
-/// From where the motion is seen.
+/// The projection of the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum View {
-    /// Parallel projection. Pixel (0, 0) is the world's origin, u right, v down.
+    /// Parallel projection. Pixel (0, 0) is the origin of the world, u points right, v down.
     Orthographic {
-        /// Direction of the viewer about world Z, radians: at 0 the viewer looks along world +Y and sees world
-        /// X to the right (a walk along X from its right side); at +π/2 the viewer stands at +X (a walk along X
-        /// from the front).
+        /// Viewing direction about world Z, radians: at 0 the viewer looks along world +Y and sees world X to
+        /// the right (a walk along X from its right side); at +π/2 the viewer is at +X (a walk along X from
+        /// the front).
         azimuth_rad: f64,
-        /// Height of the viewer above the horizontal, radians: π/2 looks straight down.
+        /// Elevation of the viewer above the horizontal, radians: π/2 looks straight down.
         elevation_rad: f64,
         /// Scale, pixels per metre.
         px_per_m: f64,
@@ -74,7 +74,7 @@ pub enum View {
 }
 
 impl View {
-    /// Where a point of the world is seen, pixels; `None` where the camera cannot see it.
+    /// The image of a world point, pixels; `None` where the camera does not see it.
     pub fn project(&self, point_in_world: DVec3) -> Option<DVec2> {
         match self {
             Self::Perspective(camera) => camera.project(point_in_world),
@@ -90,56 +90,58 @@ impl View {
     }
 }
 
-/// What happens to the walker's advance.
+/// Treatment of the walker's forward motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Locomotion {
-    /// Left as it is.
+    /// Unchanged.
     Translating,
-    /// The straight advance at constant speed is taken out; the body still bobs, sways and surges.
+    /// The straight motion at constant speed is removed; the body still moves up and down, sideways and back
+    /// and forth.
     Treadmill,
-    /// The middle of the hips (or of all points, where there are no hips) is fixed.
+    /// The midpoint of the hips (or of all points, if there are no hips) is fixed.
     PelvisFixed,
 }
 
-/// Each point's trajectory shifted in time by its own random amount, against the horizontal path of the body.
+/// Phase scrambling: the trajectory of each point is shifted in time by its own random amount, relative to
+/// the horizontal path of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PhaseScramble {
-    /// The motion repeats: a shift of up to one period, later frames taken from one period earlier. The
-    /// trajectory has no jump if the motion has this period.
+    /// The motion is periodic: shifts of up to one period, where later frames are taken from one period
+    /// earlier. The trajectory has no jump if the motion has this period.
     Periodic {
-        /// The period, seconds; `None` for the whole motion (one cycle, or a whole number of them).
+        /// The period, seconds; `None` for the whole motion (one cycle, or a whole number of cycles).
         period_s: Option<f64>,
     },
-    /// The motion does not repeat: shifts from 0 to this; the display is shorter by it.
+    /// The motion is not periodic: shifts from 0 to this value, which also shortens the display.
     Shortened {
         /// Largest shift, seconds.
         max_shift_s: f64,
     },
 }
 
-/// Where dots of limited lifetime live.
+/// Positions of dots with limited lifetime.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LifeSites {
-    /// On the joints: after its lifetime a dot goes to another joint that has no dot (Neri, Morrone and Burr
+    /// On the joints: after its lifetime a dot jumps to another joint without a dot (Neri, Morrone and Burr
     /// 1998).
     Joints,
-    /// Anywhere on the limbs: after its lifetime a dot goes to a random place on a random limb, all limbs
-    /// alike, and moves with it (Beintema and Lappe 2002, whose lifetime was 1, 2, 4 or 8 frames). Limbs as
-    /// pairs of points; empty for the eight usual ones by name.
+    /// On the limbs: after its lifetime a dot jumps to a random position on a random limb, all limbs equally
+    /// likely, and moves with it (Beintema and Lappe 2002, with lifetimes of 1, 2, 4 or 8 frames). Limbs are
+    /// pairs of points; an empty list means the eight usual ones by name.
     Limbs(Vec<[usize; 2]>),
 }
 
-/// Dots that live for a number of frames, then jump.
+/// Dots that jump after a number of frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitedLife {
-    /// Dots shown at a time. Beintema and Lappe showed 1 to 8.
+    /// Number of dots visible at a time. Beintema and Lappe used 1 to 8.
     pub dots: usize,
     /// Lifetime in frames, at least 1.
     pub frames: usize,
-    /// Where they live.
+    /// Positions of the dots.
     pub sites: LifeSites,
-    /// Whether all dots jump in the same frame. By default they do not: each starts with a random age, so that
-    /// about dots / frames jump in each frame.
+    /// Whether all dots jump in the same frame. By default each dot starts with a random age, so that about
+    /// dots / frames jump in each frame.
     pub synchronous: bool,
 }
 
@@ -149,30 +151,30 @@ impl Default for LimitedLife {
     }
 }
 
-/// How noise dots move.
+/// Motion of noise dots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseKind {
-    /// As the figure's own points do, at other places: every noise dot has the trajectory of one point (each
-    /// point about equally often), moved to a random place (Cutting, Moore and Morrison 1988).
+    /// As the figure's own points, at other positions: every noise dot has the trajectory of one point (each
+    /// point about equally often), shifted to a random position (Cutting, Moore and Morrison 1988).
     ScrambledWalker,
-    /// In a straight line in a random direction, re-entering on the other side of the area.
+    /// In a straight line in a random direction, re-entering on the opposite side of the area.
     Linear {
-        /// Speed, pixels a second.
+        /// Speed, pixels per second.
         speed_px_s: f64,
     },
-    /// At a new random place in every frame.
+    /// At a new random position in every frame.
     Flicker,
 }
 
-/// Dots that belong to no figure. With a limited lifetime they have it too.
+/// Dots that belong to no figure. A limited lifetime applies to them too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseDots {
-    /// How many.
+    /// Number of noise dots.
     pub count: usize,
-    /// How they move.
+    /// Their motion.
     pub kind: NoiseKind,
-    /// Sides of their area as multiples of the figure's extent. The area of scrambled-walker dots goes with
-    /// the figure; that of the others stands still around everything the figure covers.
+    /// Sides of their area as multiples of the figure's extent. The area of scrambled-walker dots moves with
+    /// the figure; that of the others is fixed around everything the figure covers.
     pub area_scale: f64,
 }
 
@@ -182,27 +184,28 @@ impl Default for NoiseDots {
     }
 }
 
-/// Which display is made; the default is the upright walker from the side, in one place, at 200 px/m.
+/// Options of a display; the default is the upright walker from the side, on the spot, at 200 px/m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLightOptions {
-    /// Of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// From where.
+    /// The projection.
     pub view: View,
-    /// Advance kept, or taken out.
+    /// Whether the forward motion is kept or removed.
     pub locomotion: Locomotion,
-    /// Upside down: the display is flipped about the horizontal through its middle; the facing direction
-    /// stays.
+    /// Inverted: the display is flipped about the horizontal line through its middle; the facing direction
+    /// does not change.
     pub is_inverted: bool,
-    /// Flipped about the vertical through its middle: the figure faces the other way.
+    /// Mirrored about the vertical line through the middle: the figure faces the other way.
     pub is_mirrored: bool,
-    /// Played backwards.
+    /// Time-reversed.
     pub is_reversed: bool,
-    /// Each point's trajectory moved as a whole to a random place, within the extent of the figure.
+    /// Position scrambling: the trajectory of each point is shifted as a whole to a random position within
+    /// the extent of the figure.
     pub scrambles_position: bool,
-    /// Each point's trajectory shifted in time.
+    /// Phase scrambling: the trajectory of each point is shifted in time.
     pub scrambles_phase: Option<PhaseScramble>,
-    /// Dots that live for some frames only.
+    /// Dots with limited lifetime.
     pub limited_life: Option<LimitedLife>,
     /// Dots that belong to no figure.
     pub noise_dots: Option<NoiseDots>,

@@ -35,7 +35,7 @@ fn views_have_the_documented_axes() {
             assert!((view.project(axis).unwrap() - DVec2::from(wanted)).length() < 1e-9);
         }
     }
-    // A camera far away sees what the parallel projection sees.
+    // A camera far away agrees with the parallel projection.
     let camera = Camera::level([640, 480], 0.02, 1.0, 60.0).unwrap();
     let (middle, scale) = (camera.centre_px, camera.focal_px.x / 60.0);
     let point = DVec3::new(0.4, 0.2, 1.3);
@@ -121,7 +121,7 @@ fn phase_scrambling_shifts_whole_cycles_without_a_jump_and_keeps_the_mean_places
     shifts.sort_unstable();
     shifts.dedup();
     assert!(shifts.len() > 7);
-    // With a translating walker the advance is not shifted, so steps stay small over the seam.
+    // With a translating walker the forward motion is not shifted, so steps stay small at the seam.
     let walking = display(PointLightOptions {
         locomotion: Locomotion::Translating,
         scrambles_phase: scramble,
