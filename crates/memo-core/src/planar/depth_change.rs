@@ -1,9 +1,9 @@
 //! People who walk in depth, and the error of parallel projection.
 //!
 //! Hoffman and Flinchbaugh 1982 assume parallel (orthographic) projection. If a person approaches, the image
-//! grows: scaled orthography, image_i = s_i (X_i, Y_i). Given scales are divided out. Otherwise a hinge
-//! determines them, under the assumption of a steady walk: the distance changes linearly with time, s_i ~ 1 / (1
-//! + change tau_i), tau from -1/2 to 1/2 over the views.
+//! grows: scaled orthography, image_i = s_i (X_i, Y_i). Given scales are divided out. Otherwise a hinge determines
+//! them, under the assumption of a steady walk: the distance changes linearly with time,
+//! s_i ~ 1 / (1 + change tau_i), tau from -1/2 to 1/2 over the views.
 //!
 //! Limits: perspective within the figure is not modelled. [`perspective_error_px`] gives the resulting error.
 

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Two closed forms are implemented. [`rod_by_paper`] eliminates as the paper does and can divide by zero;
-//! [`rod_from_three_views`] orders the views to avoid this. [`rod_from_ellipse`] is Horn's: the end lies on A x^2
-//! + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and |cos tilt| as the
+//! [`rod_from_three_views`] orders the views to avoid this. [`rod_from_ellipse`] is Horn's: the end lies on
+//! A x^2 + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and |cos tilt| as the
 //! ratio of the axes. [`fit_rod`] takes any number of noisy views.
 //!
 //! The ellipse through three points is unique unless two of them are equal or opposite, and every plane has its
