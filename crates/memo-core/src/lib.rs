@@ -49,7 +49,7 @@
 //!     Camera, Detector, Joint, KeypointSequence, PerJoint, SequenceOptions, TrackerOptions, postures,
 //! };
 //!
-//! // A walk seen from its side, its points called RSH, REL and so on; of a known detector it is
+//! // A walk seen from its side. Its points are named RSH, REL and so on; for a known detector use
 //! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
 //! let walk = sampled_walk(&walker, &WalkOptions { frames: 30, rate_hz: 25.0, ..WalkOptions::default() })?;

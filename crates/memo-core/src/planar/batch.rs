@@ -1,28 +1,28 @@
-//! Depths of many rods from three views each, or hinges from two, and nothing else.
+//! Depths of many rods from three views each, or of hinges from two, without other results.
 //!
-//! Hoffman and Flinchbaugh 1982, Propositions 1 and 2, by Horn's ellipse (footnote 14). Both give two pairs
-//! of image vectors of which each belongs to one length: |a|^2 + (g.a)^2 = |b|^2 + (g.b)^2. So M = I + g g'
-//! is perpendicular to two differences of (x^2, 2 x y, y^2), and
+//! Hoffman and Flinchbaugh 1982, Propositions 1 and 2, by Horn's ellipse (footnote 14). Both give two pairs of
+//! image vectors, each pair of one length: |a|^2 + (g.a)^2 = |b|^2 + (g.b)^2. So M = I + g g' is perpendicular to
+//! two differences of (x^2, 2 x y, y^2), and
 //!
 //! ```text
 //! (A, B, C) = k (1 + p^2, p q, 1 + q^2)    k = (A + C)/2 - sqrt((A - C)^2/4 + B^2), its smaller eigenvalue
 //! g = (A - k, B) / sqrt(k (A - k)) = (B, C - k) / sqrt(k (C - k))
 //! ```
 //!
-//! Not polished, with no word on conditioning: k cancels where the plane is seen nearly edge-on (three times
-//! the digits that the problem loses). Where that matters take
+//! The results are not refined and have no condition number. k loses digits by cancellation if the plane is seen
+//! nearly edge-on (three times as many as the problem requires). If that matters, use
 //! [`rod_from_three_views`](super::rod_from_three_views) and
-//! [`hinge_from_two_views`](super::hinge_from_two_views). NaN says that there is no interpretation, or that
-//! the plane is parallel to the image, or that two views say the same.
+//! [`hinge_from_two_views`](super::hinge_from_two_views). NaN means that there is no interpretation, that the
+//! plane is parallel to the image, or that two views are equal.
 
-/// Problems worked on together: their columns stay in the cache.
+/// Number of problems per block: its columns fit in the cache.
 const BLOCK: usize = 64;
 
-/// z1, z2, z3 of rods, (x, y) from pivot to end view by view; NaN (all) where there is no rod. Or all with
-/// the other sign.
+/// Depths z1, z2, z3 of rods from (x, y) from pivot to end, view by view; all NaN if there is no rod. All signs
+/// may be opposite.
 ///
 /// # Panics
-/// If there are not as many depths as problems.
+/// If the numbers of depths and problems differ.
 pub fn rod_depths(problems: &[[[f64; 2]; 3]], depths: &mut [[f64; 3]]) {
     assert_eq!(problems.len(), depths.len(), "a row of depths for every problem");
     let pairs = |d: &[[f64; 2]; 3]| [d[0], d[1], d[0], d[2]];
@@ -30,11 +30,11 @@ pub fn rod_depths(problems: &[[[f64; 2]; 3]], depths: &mut [[f64; 3]]) {
     pulp::Arch::new().dispatch(Blocks { problems, depths, pairs, lift });
 }
 
-/// Depths of hinges, (x, y) from the pivot to the first end in both views, then to the second, in the same
-/// order; NaN (all) where there is no hinge. Or all with the other sign.
+/// Depths of hinges from (x, y) from the pivot to the first end in both views, then to the second; depths in the
+/// same order; all NaN if there is no hinge. All signs may be opposite.
 ///
 /// # Panics
-/// If there are not as many depths as problems.
+/// If the numbers of depths and problems differ.
 pub fn hinge_depths(problems: &[[[f64; 2]; 4]], depths: &mut [[f64; 4]]) {
     assert_eq!(problems.len(), depths.len(), "a row of depths for every problem");
     let pairs = |d: &[[f64; 2]; 4]| *d;
@@ -42,7 +42,7 @@ pub fn hinge_depths(problems: &[[[f64; 2]; 4]], depths: &mut [[f64; 4]]) {
     pulp::Arch::new().dispatch(Blocks { problems, depths, pairs, lift });
 }
 
-/// Block by block: problems into columns, slopes of columns, depths back into rows.
+/// Processes blocks: problems into columns, slopes of columns, depths back into rows.
 struct Blocks<'a, P, Z, Pairs, Lift> {
     problems: &'a [P],
     depths: &'a mut [Z],
@@ -74,7 +74,7 @@ impl<P, Z, Pairs: Fn(&P) -> [[f64; 2]; 4], Lift: Fn([f64; 2], &P) -> Z> pulp::Wi
     }
 }
 
-/// Slopes (p, q) of x and y of a, b and c, d that have the same length in space.
+/// Slopes (p, q) for x and y of a, b and c, d, pairs of the same length in space.
 #[inline(always)]
 fn slopes_of_columns(columns: &[[f64; BLOCK]; 8], slopes: &mut [[f64; BLOCK]; 2]) {
     let [ax, ay, bx, by, cx, cy, dx, dy] = columns;
@@ -110,7 +110,8 @@ mod tests {
         [(); N].map(|()| random.normal_pair().map(f64::from))
     }
 
-    /// Depths over the size of the problem against those of the careful solution, up to the mirror.
+    /// Compares depths, divided by the size of the problem, with those of the accurate solution, up to the
+    /// mirror.
     fn is_near(z: &[f64], truth: &[f64], tolerance: f64) -> bool {
         let off = |sign: f64| z.iter().zip(truth).map(|(z, t)| (z - sign * t).abs()).fold(0.0, f64::max);
         z.iter().all(|z| z.is_finite()) && off(1.0).min(off(-1.0)) <= tolerance

@@ -1,33 +1,33 @@
-//! A person who walks in depth, and how far parallel projection is from the truth.
+//! People who walk in depth, and the error of parallel projection.
 //!
-//! Hoffman and Flinchbaugh 1982 assume parallel (orthographic) projection. Of a person who comes nearer the
-//! image grows: scaled orthography, image_i = s_i (X_i, Y_i). Given scales are divided out; else a hinge
-//! tells them under the assumption of a steady walk: the distance changes linearly with time, s_i ~ 1 / (1 +
-//! change tau_i), tau from -1/2 to 1/2 over the views.
+//! Hoffman and Flinchbaugh 1982 assume parallel (orthographic) projection. If a person approaches, the image
+//! grows: scaled orthography, image_i = s_i (X_i, Y_i). Given scales are divided out. Otherwise a hinge determines
+//! them, under the assumption of a steady walk: the distance changes linearly with time,
+//! s_i ~ 1 / (1 + change tau_i), tau from -1/2 to 1/2 over the views.
 //!
-//! What it cannot do: perspective within the figure. [`perspective_error_px`] says what that costs.
+//! Limits: perspective within the figure is not modelled. [`perspective_error_px`] gives the resulting error.
 
 use super::{FitError, FitOptions, HingeFit, fit_hinge};
 use crate::wording::counted;
 use glam::DVec2;
 use thiserror::Error;
 
-/// Why views could not be brought to one scale.
+/// Why views could not be scaled.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ScaleError {
-    /// Every view needs one.
+    /// There are not as many scales or times as views.
     #[error("{} of the points, scales or times of {given}", counted(*points, "view"))]
     Lengths {
-        /// Views.
+        /// Number of views.
         points: usize,
-        /// Scales or times.
+        /// Number of scales or times.
         given: usize,
     },
-    /// A scale must be positive, a time finite and later than the one before.
+    /// A scale is not positive, or a time is not finite or does not increase.
     #[error("view {view}: {value} is no scale or comes out of order as a time")]
     Value {
-        /// The view.
+        /// Index of the view.
         view: usize,
         /// Its scale or time.
         value: f64,
@@ -37,10 +37,10 @@ pub enum ScaleError {
     Fit(#[from] FitError),
 }
 
-/// Image points at the scale of 1: divides by each view's scale.
+/// Image points with their scales divided out.
 ///
 /// # Errors
-/// Differing numbers of views, scales that are not positive.
+/// Different numbers of views, scales that are not positive.
 pub fn at_one_scale(points: &[DVec2], scales: &[f64]) -> Result<Vec<DVec2>, ScaleError> {
     if points.len() != scales.len() {
         return Err(ScaleError::Lengths { points: points.len(), given: scales.len() });
@@ -51,23 +51,23 @@ pub fn at_one_scale(points: &[DVec2], scales: &[f64]) -> Result<Vec<DVec2>, Scal
     Ok(points.iter().zip(scales).map(|(p, s)| *p / *s).collect())
 }
 
-/// A hinge that comes nearer or goes away at a steady pace.
+/// A hinge that approaches or moves away at constant speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecedingHinge {
-    /// The hinge at the scale of the middle of the time; its covariance is that of a known change.
+    /// The hinge at the scale of the middle of the time; its covariance is that for a known change.
     pub fit: HingeFit,
-    /// Change of the distance over the views, relative to the distance in the middle; positive = going away;
-    /// at +-0.6, the largest that is tried, it may be more.
+    /// Change of the distance over the views, relative to the distance in the middle; positive = moving away. At
+    /// +-0.6, the largest change tried, the true change may be larger.
     pub distance_change: f64,
 }
 
 /// Largest relative change of distance that is tried.
 const LARGEST_CHANGE: f64 = 0.6;
 
-/// Fits a hinge and the steady change of its distance; one unknown more than [`fit_hinge`].
+/// Fits a hinge and the constant change of its distance; one unknown more than [`fit_hinge`].
 ///
-/// The change is searched on a grid, then by golden sections. Views out of a person who only swings limbs in
-/// place are told from one who walks away by the lengths alone: give several steps where possible.
+/// The change is found on a grid, then by golden-section search. Only the lengths distinguish a person who walks
+/// away from one who swings the limbs in place: use several steps if possible.
 ///
 /// # Errors
 /// Those of [`fit_hinge`], times that are not finite or do not increase.
@@ -86,7 +86,7 @@ pub fn fit_hinge_in_depth(
     if let Some(view) = disorder {
         return Err(ScaleError::Value { view, value: times_s[view] });
     }
-    // What is wrong with the points shows before they are scaled.
+    // Errors of the points are found before they are scaled.
     fit_hinge(first, pivot, second, options)?;
     let span = times_s
         .last()
@@ -96,7 +96,7 @@ pub fn fit_hinge_in_depth(
         let middle = times_s.first().copied().unwrap_or(0.0) + 0.5 * span;
         let grow: Vec<f64> = times_s.iter().map(|t| 1.0 + change * (t - middle) / span).collect();
         let scaled = |points: &[DVec2]| points.iter().zip(&grow).map(|(p, s)| *p * *s).collect::<Vec<_>>();
-        // The scale is about the pivot: a translation does not matter.
+        // The scale is about the pivot, so a translation has no effect.
         let relative = |points: &[DVec2]| points.iter().zip(pivot).map(|(p, o)| *p - *o).collect::<Vec<_>>();
         fit_hinge(&scaled(&relative(first)), &vec![DVec2::ZERO; n], &scaled(&relative(second)), options)
     };
@@ -117,11 +117,11 @@ pub fn fit_hinge_in_depth(
     Ok(RecedingHinge { fit, distance_change })
 }
 
-/// Error of a joint's image, pixels, from taking central projection for scaled parallel projection.
+/// Error of a joint's image, pixels, if central projection is approximated by scaled parallel projection.
 ///
-/// A joint that lies `depth_m` behind or before its pivot at `distance_m`, seen `offset_px` from the
-/// principal point: X f / (Z + z) against X f / Z differ by offset z / Z. Compare it with the noise: where it
-/// is larger, expect residuals of that size.
+/// A joint `depth_m` behind or in front of its pivot at `distance_m`, seen `offset_px` from the principal point:
+/// X f / (Z + z) and X f / Z differ by offset z / Z. Compare it with the noise: if it is larger, residuals of
+/// that size are to be expected.
 ///
 /// First order in depth over distance. Infinite for distances that are not positive; NaN for NaN.
 pub fn perspective_error_px(offset_px: f64, depth_m: f64, distance_m: f64) -> f64 {
@@ -135,12 +135,11 @@ pub fn perspective_error_px(offset_px: f64, depth_m: f64, distance_m: f64) -> f6
     }
 }
 
-/// By how much perspective moves a point of a figure at most, pixels: [`perspective_error_px`] of all points
-/// whose depth is known (T x K), about the middle of the figure, whose direction is that of the parallel
-/// rays.
+/// Largest displacement of a figure's points by perspective, pixels: [`perspective_error_px`] of all points of
+/// known depth (T x K), relative to the middle of the figure, whose ray gives the direction of projection.
 ///
-/// In pixels at the figure's scale its distance **is** the focal length, so that is all that is asked for.
-/// NaN if no depth is known.
+/// In pixels at the figure's scale, its distance **is** the focal length, so no other value is needed. NaN if no
+/// depth is known.
 pub fn perspective_of_figure_px(tracks: &[Vec<DVec2>], depth: &[f64], focal_px: f64) -> f64 {
     let count = tracks.len().max(1);
     let errors = depth.chunks(count).enumerate().flat_map(|(t, row)| {
@@ -189,7 +188,7 @@ mod tests {
             assert!((found.distance_change - change).abs() < 0.03, "{change}: {}", found.distance_change);
             assert!((found.fit.lengths[0] - 0.45).abs() < 0.01, "{:?}", found.fit.lengths);
             assert!((found.fit.plane.tilt_rad().cos() - 0.7).abs() < 0.04, "{:?}", found.fit.plane);
-            // Scales that are given do the same.
+            // Given scales have the same effect.
             let scales: Vec<f64> = meta.iter().map(|m| m.y).collect();
             let [a, o, b] = [&hip, &knee, &ankle].map(|points| at_one_scale(points, &scales).unwrap());
             let given = fit_hinge(&a, &o, &b, &options).unwrap();
@@ -227,7 +226,7 @@ mod tests {
         assert!(perspective_error_px(f64::NAN, 0.2, 3.0).is_nan());
     }
 
-    /// The change of the distance is one more unknown than those of the plain fit.
+    /// The change of the distance is one more unknown than in the plain fit.
     #[test]
     fn the_change_takes_one_equation() {
         let [hip, knee, ankle, meta] = leg(30, 0.1, 0.002);

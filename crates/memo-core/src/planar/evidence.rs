@@ -1,25 +1,24 @@
-//! Whether a fit is evidence of planar motion: a statistic with a stated rate of false targets.
+//! Evidence of planar motion: a statistic of a fit with a stated false-target rate.
 //!
-//! Hoffman and Flinchbaugh 1982 take any interpretation of the fewest views as evidence; a third of unrelated
-//! points has one. What counts is how small the residual of many views is against noise and motion:
+//! Hoffman and Flinchbaugh 1982 take any interpretation of the minimum number of views as evidence, but a third
+//! of unrelated points has one. Here the residual of many views is compared with noise and motion:
 //!
 //! ```text
 //! F = residual^2 N / (N - u) / (2 noise^2 + (r0 m)^2)
 //! ```
 //!
-//! with N residuals, u unknowns, m the RMS motion of the least moving rod in the image, and r0 how far real
-//! limbs leave their plane, relative to that motion. A tolerance relative to the length instead would accept
-//! every point that hardly moves.
+//! with N residuals, u unknowns, m the RMS motion in the image of the rod that moves least, and r0 the departure
+//! of real limbs from their plane, relative to that motion. A tolerance relative to the length would accept every
+//! point that hardly moves.
 //!
-//! The rates are against **unrelated** motions: joints of different walkers, one stride, 8 to 60 views.
-//! Points of one body are related, and some false triples of one body are nearly planar hinges (see
-//! `tests/planar_rates.rs` for both rates): which of several readings of a body holds is for the whole figure
-//! to say.
+//! The rates are for **unrelated** motions: joints of different walkers, one stride, 8 to 60 views. Points of one
+//! body are related, and some false triples of one body are nearly planar hinges (see `tests/planar_rates.rs` for
+//! both rates). Which of several readings of a body is right has to be decided for the whole figure.
 
 use super::{FitError, FitOptions, HingeFit, RodFit, fit_hinge};
 use glam::DVec2;
 
-/// Rate of unrelated points that pass as planar.
+/// Rate at which unrelated points are accepted as planar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FalseTargetRate {
     /// 1 in 100.
@@ -29,7 +28,7 @@ pub enum FalseTargetRate {
 }
 
 impl FalseTargetRate {
-    /// As a fraction.
+    /// The rate as a fraction.
     pub fn fraction(self) -> f64 {
         match self {
             Self::OnePercent => 0.01,
@@ -41,10 +40,10 @@ impl FalseTargetRate {
 /// Options of the verdicts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvidenceOptions {
-    /// Rate of false targets accepted.
+    /// False-target rate that is accepted.
     pub rate: FalseTargetRate,
-    /// Motion below this is undecided, in the unit of the points. 0: the gates by noise and length suffice
-    /// where the noise is known.
+    /// Minimum motion, in the unit of the points; below it the verdict is undecided. Default 0: if the noise is
+    /// known, the minimum by noise and length is enough.
     pub least_motion: f64,
 }
 
@@ -54,66 +53,66 @@ impl Default for EvidenceOptions {
     }
 }
 
-/// What a fit says about planar motion.
+/// Verdict on planar motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// Planar at the rate of false targets asked for.
+    /// Planar, at the requested false-target rate.
     Planar,
-    /// Farther from planar than limbs are.
+    /// Farther from planar than real limbs are.
     NotPlanar,
-    /// The views do not tell.
+    /// The views are not sufficient for a verdict.
     Undecided(Undecided),
-    /// As many unknowns as equations: an interpretation exists by counting and says nothing.
+    /// There are as many unknowns as equations: an interpretation always exists and is not evidence.
     Unfalsifiable,
 }
 
-/// Why views do not tell.
+/// Why the views are not sufficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Undecided {
-    /// A rod hardly moves in the image: what rests is planar.
+    /// A rod hardly moves in the image: without motion everything is planar.
     LittleMotion,
-    /// The best plane is at the limit of tilt: seen edge-on any motion along a line is planar.
+    /// The best plane is at the tilt limit: seen edge-on, any motion along a line is planar.
     EdgeOn,
-    /// Too few views for the rate to hold.
+    /// Too few views for the false-target rate to hold.
     FewViews,
 }
 
-/// Verdict and what it rests on.
+/// A verdict with the numbers it is based on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// The verdict.
     pub verdict: Verdict,
     /// F; infinite without redundancy.
     pub statistic: f64,
-    /// Largest F that is planar.
+    /// Largest F that counts as planar.
     pub threshold: f64,
     /// RMS motion of the least moving rod, in the unit of the points.
     pub motion: f64,
-    /// Motion below which nothing is said.
+    /// Minimum motion for a verdict.
     pub least_motion: f64,
-    /// The rate of false targets asked for.
+    /// The false-target rate requested.
     pub rate: FalseTargetRate,
 }
 
-/// r0, gates and thresholds of one kind of group.
+/// r0, minimum motion and thresholds of one kind of group.
 struct Calibration {
-    /// r0: how far limbs leave their plane, relative to the motion.
+    /// r0: departure of limbs from their plane, relative to the motion.
     departure: f64,
-    /// Least motion over the noise's standard deviation. Resting points show 2.
+    /// Minimum motion divided by the noise's standard deviation. Points at rest have 2.
     motion_by_noise: f64,
-    /// Least motion over the length of the shortest rod.
+    /// Minimum motion divided by the length of the shortest rod.
     motion_by_length: f64,
-    /// Redundancy from which the rates hold.
+    /// Minimum redundancy for which the rates hold.
     redundancy: usize,
-    /// Threshold of F with up to 26 redundant equations and from 116 on, linear between: fewer views let more
+    /// Threshold of F up to 26 redundant equations and from 116 on, linear in between: with fewer views more
     /// unrelated points pass by chance.
     one_percent: [f64; 2],
     five_percent: f64,
 }
 
-/// From strides of pairs of walkers and 0 to 2 px of noise at 200 px/m, 3000 draws for each number of views
-/// and noise: 0.1 to 0.9 % (0.3 to 3.6 %) of unrelated triples pass, most at 2 px and 8 or 15 views; true
-/// hinges pass in 60 to 80 % (75 to 91 %) at 0 and 1 px or 60 views, in 55 % (85 %) of 15 views at 2 px.
+/// From strides of pairs of walkers and 0 to 2 px of noise at 200 px/m, 3000 samples for each number of views and
+/// noise: 0.1 to 0.9 % (0.3 to 3.6 %) of unrelated triples pass, most at 2 px and 8 or 15 views. True hinges pass
+/// in 60 to 80 % (75 to 91 %) at 0 and 1 px or 60 views, in 55 % (85 %) of 15 views at 2 px.
 const HINGE: Calibration = Calibration {
     departure: 0.09,
     motion_by_noise: 2.5,
@@ -123,7 +122,7 @@ const HINGE: Calibration = Calibration {
     five_percent: 1.5,
 };
 
-/// A rod says less than a hinge: it must move more and fit better.
+/// A rod is weaker evidence than a hinge: it must move more and fit better.
 const ROD: Calibration = Calibration {
     departure: 0.06,
     motion_by_noise: 4.0,
@@ -133,7 +132,7 @@ const ROD: Calibration = Calibration {
     five_percent: 1.25,
 };
 
-/// Evidence of a hinge; `noise_sd` as given to the fit.
+/// Evidence of a hinge; `noise_sd` is that given to the fit.
 pub fn hinge_evidence(fit: &HingeFit, noise_sd: f64, options: &EvidenceOptions) -> Evidence {
     let group = Group {
         residual_rms: fit.residual_rms,
@@ -146,7 +145,7 @@ pub fn hinge_evidence(fit: &HingeFit, noise_sd: f64, options: &EvidenceOptions) 
     judge(&group, &HINGE, noise_sd, options)
 }
 
-/// Evidence of a rod; `noise_sd` as given to the fit.
+/// Evidence of a rod; `noise_sd` is that given to the fit.
 pub fn rod_evidence(fit: &RodFit, noise_sd: f64, options: &EvidenceOptions) -> Evidence {
     let group = Group {
         residual_rms: fit.residual_rms,
@@ -159,19 +158,19 @@ pub fn rod_evidence(fit: &RodFit, noise_sd: f64, options: &EvidenceOptions) -> E
     judge(&group, &ROD, noise_sd, options)
 }
 
-/// Three points tried with each as the pivot.
+/// Three points with each one tried as the pivot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linkage {
     /// Fit with point i as the pivot and the two others, in order, as ends.
     pub fits: [HingeFit; 3],
     /// Evidence for each role.
     pub evidence: [Evidence; 3],
-    /// The pivot, if exactly one role is planar: the two other points are then not linked.
+    /// The pivot, if exactly one role is planar; then the two other points are not linked.
     pub pivot: Option<usize>,
 }
 
-/// Finds which of three points is the joint of the other two ("Linking the feature points" in the paper): the
-/// links fall out of the one role that is planar.
+/// Finds which of three points is the joint of the other two ("Linking the feature points" in the paper): the one
+/// role that is planar gives the links.
 ///
 /// # Errors
 /// Those of [`fit_hinge`].
@@ -189,7 +188,7 @@ pub fn link_three(
     Ok(Linkage { fits, evidence, pivot })
 }
 
-/// What a verdict needs of a fit.
+/// Values of a fit that a verdict needs.
 struct Group {
     residual_rms: f64,
     unknowns: usize,
@@ -243,7 +242,7 @@ mod tests {
         hinge_evidence(&fit, noise_sd, &EvidenceOptions::default()).verdict
     }
 
-    /// A leg that swings in a plane seen at a slant, in the image.
+    /// The image of a leg that swings in an oblique plane.
     fn leg(views: usize, swing: f64) -> [Vec<DVec2>; 3] {
         let mut points = [vec![], vec![], vec![]];
         for view in 0..views {
@@ -306,13 +305,13 @@ mod tests {
 
     const FIVE: EvidenceOptions = EvidenceOptions { rate: FalseTargetRate::FivePercent, least_motion: 0.0 };
 
-    /// The statistic of the head, and the thresholds at which the rates were measured.
+    /// The statistic of the module head, and the thresholds at which the rates were measured.
     #[test]
     fn statistic_and_thresholds_are_the_calibrated_ones() {
         let (one, noise_sd) = (EvidenceOptions::default(), 0.004f64);
         for (redundancy, hinge_limit) in [(12, 1.0), (26, 1.0), (71, 1.075), (116, 1.15), (300, 1.15)] {
             let n = redundancy as f64;
-            // u = 4 unknowns, r0 = 0.09 of the motion of the rod that moves least.
+            // u = 4 unknowns; r0 m is 0.09 times the motion of the rod that moves least.
             let of_hinge = hinge_evidence(&hinge(0.02, redundancy), noise_sd, &one);
             let expected =
                 0.02f64.powi(2) * (n + 4.0) / n / (2.0 * noise_sd.powi(2) + (0.09 * 0.3f64).powi(2));
@@ -351,7 +350,8 @@ mod tests {
         }
     }
 
-    /// Motion of 2.5 (a rod: 4) standard deviations of the noise, 5 % (15 %) of the shortest rod, or as asked.
+    /// Minimum motion: 2.5 (a rod: 4) standard deviations of the noise, 5 % (15 %) of the shortest rod, or as
+    /// requested.
     #[test]
     fn motion_must_be_more_than_noise_and_a_share_of_the_length() {
         let one = EvidenceOptions::default();
@@ -372,7 +372,7 @@ mod tests {
         }
     }
 
-    /// Good fits that say little: at the tilt limit, or of fewer views than the rates hold for.
+    /// Good fits without a verdict: at the tilt limit, or with fewer views than the rates require.
     #[test]
     fn edge_on_and_few_views_are_undecided() {
         let one = EvidenceOptions::default();
@@ -381,7 +381,7 @@ mod tests {
         assert_eq!(hinge_evidence(&steep, 0.0, &one).verdict, edge_on);
         let steep = RodFit { at_tilt_limit: true, ..rod(0.001, 40) };
         assert_eq!(rod_evidence(&steep, 0.0, &one).verdict, edge_on);
-        // A bad fit is none, however steep.
+        // A bad fit is not planar, however steep.
         let bad = RodFit { residual_rms: 0.2, ..steep };
         assert_eq!(rod_evidence(&bad, 0.0, &one).verdict, Verdict::NotPlanar);
         for (redundancy, verdict) in [
@@ -394,7 +394,7 @@ mod tests {
         }
     }
 
-    /// Of three points the pivot is the one that alone makes a hinge.
+    /// The pivot is the only one of three points that gives a hinge.
     #[test]
     fn the_pivot_is_the_only_one_that_fits() {
         let [hip, knee, ankle] = leg(30, 0.4);
@@ -406,7 +406,7 @@ mod tests {
             let found = link_three(order.map(|p| &p[..]), &fit, &one).unwrap();
             assert_eq!(found.pivot, Some(pivot));
         }
-        // Of a rigid triangle that turns in its plane every corner fits, and none is the pivot.
+        // In a rigid triangle that turns in its plane every corner fits, and none is the pivot.
         let corner = |phase: f64| -> Vec<DVec2> {
             (0..30)
                 .map(|i| {

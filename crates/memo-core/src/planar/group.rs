@@ -1,7 +1,7 @@
-//! The first two steps of the interpretation scheme: all groups of two and three points, each tested.
+//! The first two steps of the interpretation scheme: all groups of two and three points are tested.
 //!
-//! Hoffman and Flinchbaugh 1982, section 6: "(1) divide the image into groups of two or three elements each,
-//! (2) test each group for pairwise-rigid planar motion, (3) combine the results". Combining is
+//! Hoffman and Flinchbaugh 1982, section 6: "(1) divide the image into groups of two or three elements each, (2)
+//! test each group for pairwise-rigid planar motion, (3) combine the results". Step (3) is
 //! [`interpret_figure`](super::interpret_figure).
 
 use super::{
@@ -11,21 +11,21 @@ use super::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-/// Two points tried as a rod.
+/// Two points fitted as a rod.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// The points, the lower index first; it is the fit's pivot.
+    /// The points, the lower index first; it is the pivot of the fit.
     pub points: [usize; 2],
-    /// The fit and what it says, or why there is none.
+    /// The fit and its evidence, or why there is none.
     pub tested: Result<(RodFit, Evidence), FitError>,
 }
 
-/// Three points tried as a hinge.
+/// Three points fitted as a hinge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triple {
     /// End, pivot, end; the lower end first.
     pub points: [usize; 3],
-    /// The fit and what it says, or why there is none.
+    /// The fit and its evidence, or why there is none.
     pub tested: Result<(HingeFit, Evidence), FitError>,
 }
 
@@ -41,7 +41,7 @@ pub fn test_pairs(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &EvidenceOpti
     pairs.into_par_iter().map(|points| Pair { points, tested: tested(points) }).collect()
 }
 
-/// Tests all K (K - 1) (K - 2) / 2 triples of K tracks, every point of three as the pivot, by pivot.
+/// Tests all triples of K tracks with every point as the pivot, K (K - 1) (K - 2) / 2 hinges, ordered by pivot.
 pub fn test_triples(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &EvidenceOptions) -> Vec<Triple> {
     let count = tracks.len();
     let ends = |pivot: usize| {
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
     use crate::planar::Verdict;
 
-    /// A leg that swings in a plane, its image; then a point that is never seen.
+    /// The image of a leg that swings in a plane; then a point that is never seen.
     fn points() -> Vec<Vec<DVec2>> {
         let at = |view: usize| {
             let t = 0.2 * f64::from(view as u32);

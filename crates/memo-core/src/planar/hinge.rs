@@ -1,20 +1,20 @@
 //! A hinge: three points, two rods that share a pivot and a plane.
 //!
-//! Source: Hoffman and Flinchbaugh 1982, Proposition 2 and appendix 2, eqs. (1)-(8); the paper leaves the
-//! proof of uniqueness out. With the plane z = p x + q y, eqs. (7) and (8) hold by themselves, and (5), (6)
-//! become two quadratic forms in (p, q), one a rod, a_1 and a_2 being the image vectors of the two views:
+//! Source: Hoffman and Flinchbaugh 1982, Proposition 2 and appendix 2, eqs. (1)-(8); the paper omits the proof of
+//! uniqueness. With the plane z = p x + q y, eqs. (7) and (8) are always satisfied, and (5), (6) become two
+//! quadratic forms in (p, q), one per rod, where a_1 and a_2 are the image vectors in the two views:
 //!
 //! ```text
 //! (1 + p^2) X + 2 p q Y + (1 + q^2) Z = 0    X = x1^2 - x2^2, Y = x1 y1 - x2 y2, Z = y1^2 - y2^2
 //! ```
 //!
-//! Taking X + Z of one times the other away leaves one homogeneous quadratic in (p, q). Written in the
-//! ellipse (A, B, C) = (1 + p^2, p q, 1 + q^2) both are linear and homogeneous, so (A, B, C) is the cross
-//! product of the two rows (X, 2 Y, Z): one plane up to the mirror, or none if the form is indefinite, unless
-//! the rows are parallel. That is the proof.
+//! Multiplying each equation by X + Z of the other and subtracting gives one homogeneous quadratic in (p, q).
+//! Written for the ellipse (A, B, C) = (1 + p^2, p q, 1 + q^2), both equations are linear and homogeneous, so (A,
+//! B, C) is the cross product of the two rows (X, 2 Y, Z). Unless the rows are parallel, there is one plane up to
+//! the mirror, or none if the form is indefinite. This is the proof.
 //!
-//! What it cannot do: two views have as many equations as unknowns, and a third of unrelated triples get an
-//! interpretation: two views are evidence of nothing. [`fit_hinge`] takes more.
+//! Limits: two views have as many equations as unknowns, and a third of unrelated triples have an interpretation,
+//! so two views are not evidence of planar motion. [`fit_hinge`] takes more views.
 
 use super::Plane;
 use super::fit::{self, FitError, FitOptions};
@@ -23,27 +23,27 @@ use glam::{DMat2, DVec2};
 use nalgebra::Matrix4;
 use thiserror::Error;
 
-/// Rows nearer to parallel than this sine say the same.
+/// Rows are parallel if the sine of their angle is smaller than this.
 const PARALLEL: f64 = 1e-13;
 
-/// Why two views of three points have no hinge, or not one alone.
+/// Why two views of three points determine no hinge or more than one.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum HingeRefusal {
     /// An image vector is NaN, infinite, or so large or small that its square is not a number.
     #[error("an image vector is not a usable number")]
     NotFinite,
-    /// A rod shows equal or opposite image vectors in both views: one equation is left for two unknowns.
+    /// A rod has equal or opposite image vectors in both views: one equation is left for two unknowns.
     #[error("rod {rod} shows equal or opposite image vectors")]
     EqualProjections {
-        /// 0 = to the first end, 1 = to the second.
+        /// Index of the rod: 0 to the first end, 1 to the second.
         rod: usize,
     },
-    /// All image vectors lie on one line: the plane is seen edge-on and leaves the lengths open.
+    /// All image vectors are on one line: the plane is seen edge-on, and the lengths are not determined.
     #[error("all image vectors are collinear")]
     CollinearImages,
-    /// Both rods keep the lengths of their projections: the plane is parallel to the image and all depths are
-    /// 0, certain only to the root of the input's precision.
+    /// The projections of both rods keep their lengths: the plane is parallel to the image and all depths are 0,
+    /// accurate only to the square root of the input's precision.
     #[error("the plane is parallel to the image; the rods are {} and {} long", .lengths[0], .lengths[1])]
     ParallelToImage {
         /// Lengths of the rods.
@@ -53,12 +53,12 @@ pub enum HingeRefusal {
     /// planes fits.
     #[error("both rods give the same equation")]
     SameEquation,
-    /// All roots are imaginary: no hinge in planar motion makes these images.
+    /// All roots are imaginary: no hinge in planar motion has these images.
     #[error("no hinge in planar motion has these images")]
     Imaginary,
 }
 
-/// A hinge from two views. Its mirror (all depths and both slopes with the other sign) fits as well.
+/// A hinge from two views. Its mirror (all depths and both slopes with the opposite sign) fits as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hinge {
     /// Plane of the motion.
@@ -67,27 +67,27 @@ pub struct Hinge {
     pub lengths: [f64; 2],
     /// Depths relative to the pivot, `depth[view][rod]`.
     pub depth: [[f64; 2]; 2],
-    /// Determinant of the Jacobian of the two quadratic forms by (p, q), each over its length^2.
+    /// Determinant of the Jacobian of the two quadratic forms by (p, q), each divided by its length^2.
     pub jacobian: f64,
     /// First-order bound of (depth error / length) / (relative error of the input's coordinates).
     pub condition: f64,
 }
 
 impl Hinge {
-    /// The same images read the other way round.
+    /// The mirror solution of the same images.
     #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|view| view.map(|z| -z)), ..*self }
     }
 
-    /// Bound of a depth's error over its rod's length when the input is exact to double precision.
+    /// Bound of a depth's error divided by its rod's length, for input that is exact to double precision.
     pub fn relative_error(&self) -> f64 {
         ROUNDING * self.condition
     }
 }
 
-/// The hinge of two views of three points: `first` and `second` hold each end's image vector from the pivot
-/// in the two views.
+/// The hinge from two views of three points: `first` and `second` are each end's image vectors from the pivot in
+/// the two views.
 ///
 /// # Errors
 /// A [`HingeRefusal`].
@@ -118,7 +118,7 @@ pub fn hinge_from_two_views(first: &[DVec2; 2], second: &[DVec2; 2]) -> Result<H
     if finite { Ok(hinge) } else { Err(HingeRefusal::NotFinite) }
 }
 
-/// Finds the degenerate cases.
+/// An error for degenerate cases.
 fn check(rods: [&[DVec2; 2]; 2]) -> Result<(), HingeRefusal> {
     let largest = |rod: &[DVec2; 2]| rod[0].length_squared().max(rod[1].length_squared());
     let finite =
@@ -152,28 +152,28 @@ pub struct HingeFit {
     pub plane: Plane,
     /// Lengths of the rods from the pivot to each end, in the unit of the points.
     pub lengths: [f64; 2],
-    /// Covariance of (p, q, length to the first end, length to the second): the noise given or the residuals,
-    /// whichever is larger. Infinite where the views do not determine the plane.
+    /// Covariance of (p, q, length to the first end, length to the second), from the given noise or the
+    /// residuals, whichever is larger. Infinite if the views do not determine the plane.
     pub covariance: Matrix4<f64>,
-    /// Depth of each end relative to the pivot per view; NaN where missing. Or all with the other sign.
+    /// Depth of each end relative to the pivot per view; NaN if missing. All signs may be opposite.
     pub depth: Vec<[f64; 2]>,
-    /// Residuals per view and rod (distance in the image), outliers included; NaN where missing.
+    /// Residuals per view and rod (distance in the image), including outliers; NaN if missing.
     pub residuals: Vec<[f64; 2]>,
-    /// Views left out as outliers.
+    /// True for views excluded as outliers.
     pub outliers: Vec<bool>,
     /// RMS of the residuals of the views used.
     pub residual_rms: f64,
     /// RMS distance of each rod's image vector from its mean.
     pub motion: [f64; 2],
-    /// Equations less unknowns; 0 = the views cannot contradict a plane.
+    /// Number of equations less unknowns; at 0 the views cannot contradict a plane.
     pub redundancy: usize,
-    /// Whether the plane lies at the largest tilt allowed: lengths and depths are then lower bounds at best.
+    /// True if the plane has the largest tilt allowed: then lengths and depths are lower bounds at best.
     pub at_tilt_limit: bool,
 }
 
 impl HingeFit {
-    /// Standard deviation of the depth of an end at an image vector from the pivot (first order): of the
-    /// plane, and of the noise `noise_sd` of each coordinate of both points.
+    /// Standard deviation of the depth of an end at an image vector from the pivot (first order): from the plane
+    /// and from the noise `noise_sd` of each coordinate of both points.
     pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
         let c = &self.covariance;
         let of_slope = DMat2::from_cols_array(&[c[(0, 0)], c[(1, 0)], c[(0, 1)], c[(1, 1)]]);
@@ -181,10 +181,10 @@ impl HingeFit {
     }
 }
 
-/// Fits a hinge in planar motion to views of its ends and pivot (any translation; NaN = not seen).
+/// Fits a hinge in planar motion to views of its ends and pivot (any translation; NaN for points not seen).
 ///
 /// # Errors
-/// Differing numbers of views, infinite positions, fewer than two views, no motion, senseless options.
+/// Different numbers of views, infinite positions, fewer than two views, no motion, invalid options.
 pub fn fit_hinge(
     first: &[DVec2],
     pivot: &[DVec2],
@@ -231,7 +231,7 @@ mod tests {
             1 => tilt = std::f64::consts::FRAC_PI_2 - tiny,
             2 => angles[1][0] = angles[0][0] + tiny,
             3 => angles[1][1] = angles[0][1] + std::f64::consts::PI - tiny,
-            // Parallel bisectors: both rods say the same.
+            // Parallel bisectors: both rods give the same equation.
             4 => angles[1][1] = angles[0][0] + angles[1][0] - angles[0][1] + tiny,
             _ => {}
         }
@@ -239,8 +239,8 @@ mod tests {
         (slope, angles, [0; 2].map(|_| 10f64.powf(random.uniform(-1.0, 1.0))))
     }
 
-    /// Depth error over length <= ROUNDING condition, and 1e-8 unless that bound says otherwise. Returns
-    /// (recovered, flagged, refused).
+    /// The criterion is depth error divided by length <= ROUNDING condition, and 1e-8 unless that bound is
+    /// larger. Returns (recovered, flagged, refused).
     fn plant_and_recover(count: usize) -> [usize; 3] {
         let mut random = Random::new(23);
         let mut tally = [0; 3];
@@ -383,7 +383,8 @@ mod tests {
         }
     }
 
-    /// Jacobian and condition are of the equations over the rods' lengths: a rod twice as long changes neither.
+    /// Jacobian and condition are those of the equations divided by the rods' lengths: a rod twice as long
+    /// changes neither.
     #[test]
     fn the_condition_does_not_depend_on_the_rods_lengths() {
         let hinge = |lengths: [f64; 2]| {
@@ -422,7 +423,7 @@ mod tests {
         assert!(ratios.len() > 10_000 && worst <= ROUNDING / f64::EPSILON, "{worst}");
     }
 
-    /// A plane seen nearly edge-on: the fit stops at the largest tilt and says so; the default is 80 degrees.
+    /// A plane seen nearly edge-on: the fit stops at the largest tilt and reports it; the default is 80 degrees.
     #[test]
     fn a_fit_at_the_tilt_limit_says_so() {
         use crate::planar::fit_rod;

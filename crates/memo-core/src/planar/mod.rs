@@ -1,10 +1,10 @@
-//! Structure from planar motion: limbs that swing in one plane, seen as points under parallel projection.
+//! Structure from planar motion: limbs that swing in one plane, seen as points in parallel projection.
 //!
-//! Source: Hoffman and Flinchbaugh 1982 ("The interpretation of biological motion", Biological Cybernetics
-//! 42). Image coordinates are metres (or pixels: every length then is in pixels), x right, y down; depth z
-//! points away from the camera. Only differences of points are used, so neither the figure's nor the pivot's
-//! translation matters. Depths and planes are known up to a reflection about the image plane: the mirror of
-//! (p, q) is (-p, -q).
+//! Source: Hoffman and Flinchbaugh 1982 ("The interpretation of biological motion", Biological Cybernetics 42).
+//! Image coordinates are metres (or pixels; then every length is in pixels), x right, y down; depth z points away
+//! from the camera. Only differences of points are used, so translation of the figure or of the pivot has no
+//! effect. Depths and planes are known up to a reflection about the image plane: the mirror of (p, q) is (-p,
+//! -q).
 
 pub mod batch;
 pub mod depth_change;

@@ -1,19 +1,19 @@
-//! The same structure from positions and velocities instead of several views.
+//! Structure from positions and velocities instead of several views.
 //!
-//! Source: the continuous kind of input in fig. 2 of Hoffman and Flinchbaugh 1982, which the paper leaves
-//! open; the derivation is this. A rod's image vector d has d' M d = length^2 with M = I + g g', g = (p, q).
-//! Its time derivative has no length in it:
+//! Source: the continuous kind of input in fig. 2 of Hoffman and Flinchbaugh 1982, which the paper does not treat;
+//! this module derives it. A rod's image vector d satisfies d' M d = length^2 with M = I + g g', g = (p, q). The
+//! time derivative of this equation does not contain the length:
 //!
 //! ```text
 //! d' M v = 0:    (1 + p^2) x vx + p q (x vy + y vx) + (1 + q^2) y vy = 0
 //! ```
 //!
-//! One linear, homogeneous equation in (1 + p^2, p q, 1 + q^2) for every rod and instant. Two of them
-//! determine the plane up to its mirror: **one instant of a hinge, or two of a rod**, as two views of a hinge
-//! and three of a rod. A rod's two instants must differ in direction.
+//! This is one linear, homogeneous equation in (1 + p^2, p q, 1 + q^2) for every rod and instant. Two of them
+//! determine the plane up to its mirror: **one instant of a hinge, or two of a rod**, like two views of a hinge
+//! and three of a rod. The two instants of a rod must differ in direction.
 //!
-//! What it cannot do: two equations are as many as unknowns and evidence of nothing. Velocities are
-//! differences of noisy positions: where views are at hand, [`fit_hinge`](super::fit_hinge) uses them better.
+//! Limits: two equations are as many as unknowns and are not evidence of planar motion. Velocities are
+//! differences of noisy positions: if views are available, [`fit_hinge`](super::fit_hinge) uses them better.
 
 use super::Plane;
 use super::fit::{form, slope_from_form};
@@ -22,7 +22,7 @@ use glam::{DVec2, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use thiserror::Error;
 
-/// Image vector of a rod from its pivot and the rate at which it changes.
+/// Image vector of a rod from its pivot, and its rate of change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RodMotion {
     /// Image vector, in the unit of the points.
@@ -31,46 +31,46 @@ pub struct RodMotion {
     pub velocity: DVec2,
 }
 
-/// Why motions have no plane, or not one alone.
+/// Why motions determine no plane or more than one.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MotionRefusal {
-    /// A vector is NaN, infinite, or its square is.
+    /// A vector, or its square, is NaN or infinite.
     #[error("a position or velocity is not a usable number")]
     NotFinite,
-    /// Fewer than two rods or instants that move.
+    /// Fewer than two rods or instants with motion.
     #[error("2 motions that give an equation are needed, got {found}")]
     TooFew {
-        /// Motions that are not at rest.
+        /// Number of motions that are not zero.
         found: usize,
     },
     /// All motions give the same equation: a family of planes fits.
     #[error("all motions give the same equation")]
     SameEquation,
-    /// All velocities stand square on their rods: the plane is parallel to the image.
+    /// All velocities are perpendicular to their rods: the plane is parallel to the image.
     #[error("the plane is parallel to the image")]
     ParallelToImage,
-    /// The best form is no plane's: not one planar motion.
+    /// The best form is not that of a plane: not one planar motion.
     #[error("no planar motion has these positions and velocities")]
     Imaginary,
 }
 
-/// The plane of motions that share it.
+/// The plane of motions in one plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionFit {
     /// The plane, or its mirror.
     pub plane: Plane,
-    /// Length of the rod by each motion, in the unit of the points.
+    /// Length of the rod from each motion, in the unit of the points.
     pub lengths: Vec<f64>,
-    /// Residuals: velocity along the rod in space over what the noise lets expect of it; 1 is typical.
+    /// Residuals: velocity along the rod in space divided by that expected from noise; 1 is typical.
     pub residuals: Vec<f64>,
-    /// Equations less unknowns; 0 = nothing could contradict a plane.
+    /// Number of equations less unknowns; at 0 nothing can contradict a plane.
     pub redundancy: usize,
 }
 
 /// Fits a plane to motions of one or more rods in it: one instant of a hinge's two rods, or any number of
-/// instants. `position_sd` and `velocity_sd` are the standard deviations of the coordinates of the vectors;
-/// both 0 weighs positions and velocities as if one second were the unit of time.
+/// instants. `position_sd` and `velocity_sd` are the standard deviations of the coordinates of the vectors. If
+/// both are 0, positions and velocities are weighted as if one second were the unit of time.
 ///
 /// # Errors
 /// A [`MotionRefusal`].
@@ -116,9 +116,9 @@ pub fn plane_from_motions(
     })
 }
 
-/// Of each motion the coefficients of (1 + p^2, p q, 1 + q^2); checked.
+/// The checked coefficients of (1 + p^2, p q, 1 + q^2) for each motion.
 fn rows(motions: &[RodMotion]) -> Result<Vec<DVec3>, MotionRefusal> {
-    // |d + v / 2|^2 - |d - v / 2|^2 and its like have twice these coefficients: d and v as two views.
+    // With d and v as two views, |d + v / 2|^2 - |d - v / 2|^2 and the like have twice these coefficients.
     let row = |m: &RodMotion| {
         0.5 * difference_of_powers(m.position + 0.5 * m.velocity, m.position - 0.5 * m.velocity)
     };
@@ -135,7 +135,7 @@ fn rows(motions: &[RodMotion]) -> Result<Vec<DVec3>, MotionRefusal> {
     if motions.iter().all(square) { Err(MotionRefusal::ParallelToImage) } else { Ok(rows) }
 }
 
-/// Eigenvector of the least eigenvalue, if the others leave no choice.
+/// Eigenvector of the smallest eigenvalue; an error if it is not unique.
 fn smallest(normal: Matrix3<f64>) -> Result<DVec3, MotionRefusal> {
     if normal.iter().any(|x| !x.is_finite()) {
         return Err(MotionRefusal::NotFinite);
@@ -157,7 +157,7 @@ mod tests {
     use crate::synth::Random;
     use proptest::prelude::*;
 
-    /// A rod in the plane at an angle, turning.
+    /// A rod in the plane at an angle, rotating.
     fn turning(slope: DVec2, angle: f64, rate: f64, length: f64) -> RodMotion {
         let along = slope.try_normalize().unwrap_or(DVec2::X);
         let cos_tilt = 1.0 / (1.0 + slope.length_squared()).sqrt();
@@ -180,7 +180,7 @@ mod tests {
             prop_assert!(fit.plane.angle_up_to_mirror_rad(&Plane::from_slope(slope)) < 1e-7);
             prop_assert!((fit.lengths[0] - 0.4).abs() < 1e-6 && (fit.lengths[1] - 0.5).abs() < 1e-6);
             prop_assert_eq!(fit.redundancy, 0);
-            // It is the limit of two views close in time.
+            // It is the limit of two views close together in time.
             let views = |rod: f64, rate: f64, length: f64| {
                 [-5e-5, 5e-5].map(|t| turning(slope, rod + rate * t, 0.0, length).position)
             };
@@ -227,8 +227,8 @@ mod tests {
         assert_eq!(refuse(&[apart(DVec2::X), apart(DVec2::Y)]), MotionRefusal::Imaginary);
     }
 
-    /// Weights and plane belong to each other: the least squares once more with the weights of the plane found
-    /// give the same plane.
+    /// Weights and plane are consistent: least squares once more with the weights of the plane found give the
+    /// same plane.
     #[test]
     fn the_plane_is_that_of_its_own_weights() {
         let mut random = Random::new(13);

@@ -1,10 +1,10 @@
-//! The plane of motion through the pivot, z = p x + q y.
+//! A plane of motion through the pivot, z = p x + q y.
 
 use glam::{DMat2, DVec2, DVec3};
 
 /// Plane z = p x + q y; x right, y down, z away from the camera.
 ///
-/// Parallel projection cannot tell it from its [mirror](Plane::mirror).
+/// In parallel projection it cannot be distinguished from its [mirror](Plane::mirror).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// dz/dx.
@@ -24,7 +24,7 @@ impl Plane {
         DVec2::new(self.p, self.q)
     }
 
-    /// Reflected about the image plane: the other reading of the same images.
+    /// The plane reflected about the image plane: the mirror solution of the same images.
     #[must_use]
     pub fn mirror(&self) -> Self {
         Self { p: -self.p, q: -self.q }
@@ -40,8 +40,8 @@ impl Plane {
         image.extend(self.depth(image))
     }
 
-    /// Standard deviation of the depth of an image vector (first order): of the slope, with its covariance,
-    /// and of the noise `noise_sd` of each coordinate of both ends.
+    /// Standard deviation of the depth of an image vector (first order): from the slope with its covariance, and
+    /// from the noise `noise_sd` of each coordinate of both ends.
     pub(super) fn depth_sd(&self, slope_covariance: DMat2, image: DVec2, noise_sd: f64) -> f64 {
         let of_slope = image.dot(slope_covariance * image);
         (of_slope + 2.0 * noise_sd * noise_sd * self.slope().length_squared()).sqrt()

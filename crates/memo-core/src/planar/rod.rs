@@ -9,28 +9,28 @@
 //! k3 z1 + k4 z2 + k5 z3 = 0 (6)    k3 = x2 y3 - x3 y2
 //! ```
 //!
-//! Two solutions are given: [`rod_by_paper`] eliminates as the paper does and meets its divisions by zero;
-//! [`rod_from_three_views`] orders the views so that they do not occur. [`rod_from_ellipse`] is Horn's: the
-//! end lies on A x^2 + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and
-//! |cos tilt| as the ratio of the axes. [`fit_rod`] takes any number of noisy views.
+//! Two closed forms are implemented. [`rod_by_paper`] eliminates as the paper does and can divide by zero;
+//! [`rod_from_three_views`] orders the views to avoid this. [`rod_from_ellipse`] is Horn's: the end lies on
+//! A x^2 + 2 B xy + C y^2 = 1, linear in (A, B, C), with the rod's length as major semi-axis and |cos tilt| as the
+//! ratio of the axes. [`fit_rod`] takes any number of noisy views.
 //!
-//! The ellipse through three points is unique unless two of them are equal or opposite, and every plane has
-//! its own: so there is one plane up to the mirror. k1 = k2, which the paper counts as degenerate, is not: of
-//! the two roots x = 1 and x = -1 exactly one is real.
+//! The ellipse through three points is unique unless two of them are equal or opposite, and every plane has its
+//! own ellipse, so there is one plane up to the mirror. The case k1 = k2, which the paper counts as degenerate,
+//! is not degenerate: of the two roots x = 1 and x = -1 exactly one is real.
 //!
-//! What it cannot do: three views have as many equations as unknowns. About a third of unrelated point pairs
-//! have a "planar" interpretation, so three views are evidence of nothing.
+//! Limits: three views have as many equations as unknowns. About a third of unrelated point pairs have a "planar"
+//! interpretation, so three views are not evidence of planar motion.
 
 use super::Plane;
 use super::fit::{self, FitError, FitOptions, slope_from_form};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use thiserror::Error;
 
-/// Image vectors that differ by less than this, relative to their length, count as equal, and directions
-/// nearer than this, in radians, as the same. Rounding of the input makes 1e-16.
+/// Image vectors that differ by less than this, relative to their length, are equal; directions closer than this,
+/// in radians, are the same. Rounding of the input is 1e-16.
 const SAME: f64 = 1e-13;
 
-/// Why three views of two points have no rod, or not one alone.
+/// Why three views of two points determine no rod or more than one.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RodRefusal {
@@ -40,35 +40,36 @@ pub enum RodRefusal {
     /// Two image vectors are equal or opposite: two equations are left for three unknowns.
     #[error("views {} and {} show equal or opposite image vectors", .views[0], .views[1])]
     EqualProjections {
-        /// The two views.
+        /// Indices of the two views.
         views: [usize; 2],
     },
-    /// Two image vectors lie on one line with different lengths: only a plane seen edge-on does that, and
-    /// it leaves the length open.
+    /// Two image vectors are on one line and have different lengths: the plane is seen edge-on, and the length is
+    /// not determined.
     #[error("the image vectors of views {} and {} are collinear", .views[0], .views[1])]
     CollinearImages {
-        /// The two views.
+        /// Indices of the two views.
         views: [usize; 2],
     },
-    /// All projections are equally long: the plane is parallel to the image, all depths are 0, and the mirror
-    /// pair is one. The Jacobian vanishes: the depths are certain only to the root of the input's precision.
+    /// All projections have the same length: the plane is parallel to the image, all depths are 0, and the mirror
+    /// images are equal. The Jacobian is 0: the depths are accurate only to the square root of the input's
+    /// precision.
     #[error("the plane is parallel to the image; the rod is {length} long")]
     ParallelToImage {
         /// Length of the rod.
         length: f64,
     },
-    /// k1 = 0: eq. (14) is 0/0. Only in [`rod_by_paper`].
+    /// k1 = 0: eq. (14) is 0/0. Only from [`rod_by_paper`].
     #[error("views 1 and 2 show equally long projections (k1 = 0)")]
     K1Zero,
-    /// k3 = 0: eq. (6) cannot be solved for z1. Only in [`rod_by_paper`].
+    /// k3 = 0: eq. (6) cannot be solved for z1. Only from [`rod_by_paper`].
     #[error("the image vectors of views 2 and 3 are collinear (k3 = 0)")]
     K3Zero,
-    /// All roots are imaginary: no rod in planar motion makes these images.
+    /// All roots are imaginary: no rod in planar motion has these images.
     #[error("no rod in planar motion has these images")]
     Imaginary,
 }
 
-/// A rod from three views. Its mirror (all depths and both slopes with the other sign) fits as well.
+/// A rod from three views. Its mirror (all depths and both slopes with the opposite sign) fits as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rod {
     /// Plane of the motion.
@@ -77,21 +78,21 @@ pub struct Rod {
     pub length: f64,
     /// z1, z2, z3.
     pub depth: [f64; 3],
-    /// Determinant of the Jacobian of (4)-(6), 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), over length^4.
+    /// Determinant of the Jacobian of (4)-(6), 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), divided by length^4.
     pub jacobian: f64,
     /// First-order bound of (depth error / length) / (relative error of the input's coordinates).
     pub condition: f64,
 }
 
 impl Rod {
-    /// The same images read the other way round.
+    /// The mirror solution of the same images.
     #[must_use]
     pub fn mirror(&self) -> Self {
         Self { plane: self.plane.mirror(), depth: self.depth.map(|z| -z), ..*self }
     }
 
-    /// Bound of a depth's error over the rod's length when the input is exact to double precision:
-    /// [`ROUNDING`] condition.
+    /// Bound of a depth's error divided by the rod's length, for input that is exact to double precision:
+    /// [`ROUNDING`] times `condition`.
     pub fn relative_error(&self) -> f64 {
         ROUNDING * self.condition
     }
@@ -112,16 +113,16 @@ impl Rod {
     }
 }
 
-/// Error of the closed forms per unit of condition, from 10^6 problems drawn at random (see the tests): some
-/// tens of roundings.
+/// Error of the closed forms per unit of condition, from 10^6 random problems (see the tests): some tens of
+/// roundings.
 pub const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// First-order bound of depth error over length, per relative error of the coordinates.
+/// First-order bound of depth error divided by length, per relative error of the coordinates.
 ///
-/// Each of two equations, divided by length^2, errs by at most 4; so the slope errs by 4 sqrt(2) |J^-1|, and
-/// z = g . d by |d| times that plus |g| |d|. `rows` is J by the slope. The second derivatives are at most 4,
-/// so Kantorovich's condition for the first order to bound anything is 16 sqrt(2) |J^-1|^2 ROUNDING < 1/2;
-/// where it fails the bound is infinite.
+/// The error of each of two equations, divided by length^2, is at most 4. So the slope's error is 4 sqrt(2)
+/// J^-1|, and that of z = g . d is |d| times that plus |g| |d|. `rows` is J by the slope. The second derivatives are at
+/// most 4, so Kantorovich's condition for a valid first-order bound is 16 sqrt(2) |J^-1|^2 ROUNDING < 1/2; where
+/// it is not satisfied the bound is infinite.
 pub(super) fn condition(rows: [DVec2; 2], plane: Plane) -> f64 {
     let size = (rows[0].length_squared() + rows[1].length_squared()).sqrt();
     let slope_error = 4.0 * std::f64::consts::SQRT_2 * size / rows[0].perp_dot(rows[1]).abs();
@@ -129,10 +130,9 @@ pub(super) fn condition(rows: [DVec2; 2], plane: Plane) -> f64 {
     if is_first_order { slope_error + plane.slope().length() } else { f64::INFINITY }
 }
 
-/// The rod of three views of two points, `views[i]` from pivot to end: eqs. (4)-(14).
+/// The rod from three views of two points; `views[i]` is from pivot to end: eqs. (4)-(14).
 ///
-/// The views are ordered so that |k3| is largest, then of (4) and (5) the one with the larger constant is
-/// used.
+/// The views are ordered to maximise |k3|; then of (4) and (5) the one with the larger constant is used.
 ///
 /// # Errors
 /// A [`RodRefusal`] other than K1Zero and K3Zero.
@@ -151,7 +151,7 @@ pub fn rod_from_three_views(views: &[DVec2; 3]) -> Result<Rod, RodRefusal> {
     Rod::from_plane(views, Plane::from_slope(slope))
 }
 
-/// Eqs. (4)-(14) in the order given, as printed: fails where k1 or k3 vanish.
+/// Eqs. (4)-(14) in the given order, as printed: fails if k1 or k3 is 0.
 ///
 /// # Errors
 /// Any [`RodRefusal`].
@@ -167,7 +167,7 @@ pub fn rod_by_paper(views: &[DVec2; 3]) -> Result<Rod, RodRefusal> {
     Rod::from_plane(views, Plane::from_slope(eliminate(views)?))
 }
 
-/// The rod of three views by Horn's ellipse: its form is perpendicular to (x_i^2 - x_j^2, 2 (x_i y_i - x_j
+/// The rod from three views by Horn's ellipse: its form is perpendicular to (x_i^2 - x_j^2, 2 (x_i y_i - x_j
 /// y_j), y_i^2 - y_j^2) for two pairs of views.
 ///
 /// # Errors
@@ -179,11 +179,11 @@ pub fn rod_from_ellipse(views: &[DVec2; 3]) -> Result<Rod, RodRefusal> {
     Rod::from_plane(views, Plane::from_slope(polish(pairs, slope)))
 }
 
-/// The slope whose ellipse gives both vectors of each pair the same length; none if there is none.
+/// The slope whose ellipse gives both vectors of each pair the same length; `None` if there is none.
 ///
-/// The form is the cross product of the pairs' differences of (x^2, 2 x y, y^2). Near edge-on all image
-/// vectors nearly share a line; they are turned to it and stretched across it first, or the product loses
-/// three times the digits that the problem does.
+/// The form is the cross product of the pairs' differences of (x^2, 2 x y, y^2). Near edge-on all image vectors
+/// are nearly on one line. They are rotated to it and stretched across it first; otherwise the product loses
+/// three times as many digits as the problem requires.
 pub(super) fn slope_of_pairs(pairs: [[DVec2; 2]; 2]) -> Option<DVec2> {
     let vectors = || pairs.iter().flatten();
     let longest =
@@ -203,8 +203,9 @@ pub(super) fn slope_of_pairs(pairs: [[DVec2; 2]; 2]) -> Option<DVec2> {
     Some(slope.x * along + slope.y * along.perp())
 }
 
-/// Newton steps on the two equations |a|^2 - |b|^2 + (g . a)^2 - (g . b)^2 = 0 while they help: the
-/// eliminations' products of squares cost digits that the equations have, most of them near edge-on.
+/// Newton steps on the two equations |a|^2 - |b|^2 + (g . a)^2 - (g . b)^2 = 0 as long as they reduce the error.
+/// The products of squares in the elimination lose digits that the equations still have, most of them near
+/// edge-on.
 pub(super) fn polish(pairs: [[DVec2; 2]; 2], mut g: DVec2) -> DVec2 {
     let errors = |g: DVec2| {
         let error = |[a, b]: [DVec2; 2]| difference_of_squares(a, b) + g.dot(a - b) * g.dot(a + b);
@@ -215,7 +216,7 @@ pub(super) fn polish(pairs: [[DVec2; 2]; 2], mut g: DVec2) -> DVec2 {
         let [first, second] = pairs.map(|[a, b]| 2.0 * (g.dot(a) * a - g.dot(b) * b));
         let next = g - DMat2::from_cols(first, second).transpose().inverse() * error;
         let next_error = errors(next);
-        // Not so for NaN.
+        // False for NaN.
         let helps = next_error.length_squared() < 0.25 * error.length_squared();
         if !helps {
             break;
@@ -230,19 +231,19 @@ fn difference_of_squares(a: DVec2, b: DVec2) -> f64 {
     (a - b).dot(a + b)
 }
 
-/// (x^2, 2 x y, y^2) of a less that of b, without cancellation.
+/// Difference of (x^2, 2 x y, y^2) of a and of b, without cancellation.
 pub(super) fn difference_of_powers(a: DVec2, b: DVec2) -> DVec3 {
     let (m, s) = (a - b, a + b);
     DVec3::new(m.x * s.x, m.x * s.y + s.x * m.y, m.y * s.y)
 }
 
-/// Whether b = a or b = -a as nearly as numbers tell.
+/// True if b = a or b = -a within rounding.
 pub(super) fn is_same_or_opposite(a: DVec2, b: DVec2) -> bool {
     let least = (a - b).length_squared().min((a + b).length_squared());
     least <= SAME * SAME * a.length_squared().max(b.length_squared())
 }
 
-/// Finds the degenerate cases.
+/// An error for degenerate cases.
 fn check(d: &[DVec2; 3]) -> Result<(), RodRefusal> {
     let sizes = d.map(|d| d.length_squared());
     let largest = sizes[0].max(sizes[1]).max(sizes[2]);
@@ -268,9 +269,9 @@ fn check(d: &[DVec2; 3]) -> Result<(), RodRefusal> {
     Ok(())
 }
 
-/// The slope from eqs. (6)-(14); k3 and one of k1, k2 must not be 0.
+/// The slope from eqs. (6)-(14). k3 and one of k1, k2 must not be 0.
 ///
-/// (9) is solved for the ratio (z2 : z3) = (m : n) rather than x = z2 / z3, which fails at z3 = 0.
+/// (9) is solved for the ratio (z2 : z3) = (m : n) instead of x = z2 / z3, which fails at z3 = 0.
 fn eliminate(d: &[DVec2; 3]) -> Result<DVec2, RodRefusal> {
     let (k1, k2) = (difference_of_squares(d[0], d[1]), difference_of_squares(d[0], d[2]));
     let (k3, k4, k5) = (d[1].perp_dot(d[2]), d[2].perp_dot(d[0]), d[0].perp_dot(d[1]));
@@ -293,7 +294,8 @@ fn eliminate(d: &[DVec2; 3]) -> Result<DVec2, RodRefusal> {
             (k2, k4 * k4 * m * m + (k5 * k5 - k3 * k3) * n * n + 2.0 * k4 * k5 * m * n)
         };
         let s_sq = -k * k3 * k3 / form;
-        // By the claim at most one root is real; should rounding make both so, the smaller depths are.
+        // By the claim at most one root is real. If both are real because of rounding, the smaller depths are
+        // taken.
         if s_sq > 0.0 && s_sq.is_finite() {
             let z = s_sq.sqrt() * DVec2::new(m, n);
             if best.is_none_or(|(least, _)| z.length_squared() < least) {
@@ -313,39 +315,38 @@ pub struct RodFit {
     pub plane: Plane,
     /// Length of the rod, in the unit of the points.
     pub length: f64,
-    /// Covariance of (p, q, length): the noise given or the residuals, whichever is larger. Infinite where
-    /// the views do not determine the plane. First order: meaningless for planes within a few degrees of
-    /// parallel to the image.
+    /// Covariance of (p, q, length), from the given noise or the residuals, whichever is larger. Infinite if the
+    /// views do not determine the plane. First order: not valid for planes within a few degrees of parallel to
+    /// the image.
     pub covariance: DMat3,
-    /// Depth of the end relative to the pivot per view; NaN where a point is missing. Or all with the other
-    /// sign.
+    /// Depth of the end relative to the pivot per view; NaN if a point is missing. All signs may be opposite.
     pub depth: Vec<f64>,
-    /// Residual per view (distance in the image), outliers included; NaN where missing.
+    /// Residual per view (distance in the image), including outliers; NaN if missing.
     pub residuals: Vec<f64>,
-    /// Views left out as outliers.
+    /// True for views excluded as outliers.
     pub outliers: Vec<bool>,
     /// RMS of the residuals of the views used.
     pub residual_rms: f64,
     /// RMS distance of the image vector from its mean.
     pub motion: f64,
-    /// Equations less unknowns; 0 = the views cannot contradict a plane.
+    /// Number of equations less unknowns; at 0 the views cannot contradict a plane.
     pub redundancy: usize,
-    /// Whether the plane lies at the largest tilt allowed: length and depths are then lower bounds at best.
+    /// True if the plane has the largest tilt allowed: then length and depths are lower bounds at best.
     pub at_tilt_limit: bool,
 }
 
 impl RodFit {
-    /// Standard deviation of the depth of the end at an image vector from the pivot (first order): of the
-    /// plane, and of the noise `noise_sd` of each coordinate of both points.
+    /// Standard deviation of the depth of the end at an image vector from the pivot (first order): from the plane
+    /// and from the noise `noise_sd` of each coordinate of both points.
     pub fn depth_sd(&self, image: DVec2, noise_sd: f64) -> f64 {
         self.plane.depth_sd(DMat2::from_mat3(self.covariance), image, noise_sd)
     }
 }
 
-/// Fits a rod in planar motion to views of its two ends (any translation; NaN = not seen).
+/// Fits a rod in planar motion to views of its two ends (any translation; NaN for points not seen).
 ///
 /// # Errors
-/// Differing numbers of views, infinite positions, fewer than three views, no motion, senseless options.
+/// Different numbers of views, infinite positions, fewer than three views, no motion, invalid options.
 pub fn fit_rod(pivot: &[DVec2], end: &[DVec2], options: &FitOptions) -> Result<RodFit, FitError> {
     let views = fit::views(pivot, [end])?;
     let fit = fit::fit(&views, options)?;
@@ -370,14 +371,14 @@ mod tests {
     use crate::synth::Random;
     use proptest::prelude::*;
 
-    /// A rod in a plane of given slope at three angles within the plane.
+    /// A rod in a plane of given slope, at three angles within the plane.
     fn planted(slope: DVec2, angles: [f64; 3], length: f64) -> [DVec2; 3] {
         let along = slope.try_normalize().unwrap_or(DVec2::X);
         let cos_tilt = 1.0 / (1.0 + slope.length_squared()).sqrt();
         angles.map(|a| length * (a.cos() * cos_tilt * along + a.sin() * along.perp()))
     }
 
-    /// Slopes and angles of which one draw in three is nearly degenerate, down to 1e-9.
+    /// Slopes and angles; one in three is nearly degenerate, down to 1e-9.
     fn draw(random: &mut Random) -> (DVec2, [f64; 3], f64) {
         let tiny = 10f64.powf(random.uniform(-9.0, -1.0));
         let mut tilt = random.uniform(0.0, 1.5);
@@ -403,8 +404,8 @@ mod tests {
         beyond: usize,
     }
 
-    /// Plants `count` rods; the criterion is depth error over length <= ROUNDING condition, and 1e-8 unless
-    /// that bound says otherwise.
+    /// Plants `count` rods. The criterion is depth error divided by length <= ROUNDING condition, and 1e-8 unless
+    /// that bound is larger.
     fn plant_and_recover(count: usize, solve: fn(&[DVec2; 3]) -> Result<Rod, RodRefusal>) -> Tally {
         let mut random = Random::new(17);
         let mut tally = Tally::default();
@@ -431,7 +432,7 @@ mod tests {
                         assert!(error < 1e-8, "{rod:?} {slope} {angles:?} {error}");
                     }
                 }
-                // A refusal must have a reason: the true rod is ill-conditioned.
+                // A refusal must be justified: the true rod is ill-conditioned.
                 Err(refusal) => {
                     tally.refused += 1;
                     let truth = Rod::from_plane(&views, truth).unwrap();
@@ -450,7 +451,7 @@ mod tests {
             println!("{tally:?}");
             assert_eq!(tally.beyond, 0, "{tally:?}");
             assert!(10 * tally.recovered > 6 * draws, "{tally:?}");
-            // Of fifty thousand draws none needs more than a few of the stated roundings.
+            // Of fifty thousand problems none needs more than a few of the stated roundings.
             assert!(draws > 50_000 || tally.worst < 3.0, "{tally:?}");
         }
     }
@@ -466,7 +467,7 @@ mod tests {
             match (by_paper, by_ellipse) {
                 (Ok(_), Ok(_)) => planar += 1,
                 (Err(a), Err(b)) => assert_eq!(a, b),
-                // Rounding decides only near an ellipse that is a pair of lines.
+                // Rounding decides only near an ellipse that degenerates to a pair of lines.
                 (Ok(rod), Err(_)) | (Err(_), Ok(rod)) => assert!(rod.relative_error() > 1e-8, "{rod:?}"),
             }
         }
@@ -485,7 +486,7 @@ mod tests {
             ([v(1.0, 0.2), v(0.3, 1.0), v(0.5, 0.1)], RodRefusal::CollinearImages { views: [0, 2] }),
             ([v(1.0, 0.2), v(0.3, 1.0), v(0.0, 0.0)], RodRefusal::CollinearImages { views: [0, 2] }),
             ([v(1.0, 0.0), v(0.6, 0.8), v(0.0, -1.0)], RodRefusal::ParallelToImage { length: 1.0 }),
-            // The point between two others on a line through them: no ellipse about the pivot.
+            // The third point is between two others on a line through them: there is no ellipse about the pivot.
             ([v(1.0, 1.0), v(1.0, -1.0), v(0.5, 0.0)], RodRefusal::Imaginary),
         ];
         for (views, refusal) in cases {
@@ -559,8 +560,8 @@ mod tests {
         }
     }
 
-    /// Coordinates changed by at most so much of the rod move its depths by no more than the condition says,
-    /// and by a fair part of it in the worst of many changes.
+    /// If the coordinates change by at most this share of the rod, its depths change by no more than the
+    /// condition allows, and by a fair part of it in the worst of many changes.
     #[test]
     fn the_condition_bounds_what_errors_of_the_image_do() {
         let mut random = Random::new(31);

@@ -155,7 +155,7 @@ mod tests {
             let length = step.length();
             prop_assume!(length > 1e-3);
             let f = 0.05;
-            // Eq. (6b): z_e = f (k - 1), with the paper's origin at the image plane, f before the lens.
+            // Eq. (6b): z_e = f (k - 1), with the paper's origin at the image plane, f in front of the lens.
             let (xs, ys, zs) = (start.x, -start.y, start.z - f);
             let (xp, yp) = (f * end.x / end.z, f * -end.y / end.z);
             let a = xp * xp + yp * yp + f * f;

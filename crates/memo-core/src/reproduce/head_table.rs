@@ -1,7 +1,7 @@
-//! Table 2 of Lee and Chen 1985 again, from Table A.2, by the linear solution and by least squares.
+//! Table 2 of Lee and Chen 1985, recomputed from Table A.2 by the linear solution and by least squares.
 //!
-//! A.2(b) is printed with five digits, of which Table 2's are the result of more: no method gets them back.
-//! [`exact_projections`] does, as it is what A.2(b) was before rounding.
+//! A.2(b) is printed with five digits, but Table 2 was computed from more: no method reproduces them from the
+//! printed digits. [`exact_projections`] does, because it is A.2(b) before rounding.
 
 use crate::model::resection::{
     Conditioning, Focal, LinearResection, PaperView, ResectedPose, ResectionError, ResectionOptions,
@@ -19,17 +19,17 @@ const TABLE_A2_PROJECTIONS: [DVec2; 6] = [
     DVec2::new(-0.09680, 0.68273),
     DVec2::new(0.09631, 0.68273),
 ];
-/// f with which A.2(b) was made, centimetres.
+/// f used for A.2(b), centimetres.
 const FOCAL_CM: f64 = 5.0;
 /// The camera of SEQ1 in the head's frame, centimetres.
 const CAMERA_CM: DVec3 = DVec3::new(400.0, 0.0, 0.0);
 /// Standard deviation of a number rounded to five digits: 1e-5 / sqrt 12.
 const ROUNDING_SD: f64 = 1e-5 * 0.288_675_134_594_812_9;
 
-/// One way to fill Table 2; centimetres, the paper's axes.
+/// One computation of Table 2; centimetres, the paper's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadTableColumn {
-    /// What was done.
+    /// Name of the method.
     pub method: &'static str,
     /// (a) `[T]`: its columns.
     pub transform: [DVec4; 3],
@@ -37,7 +37,7 @@ pub struct HeadTableColumn {
     pub rotation: DMat3,
     /// f.
     pub focal: f64,
-    /// Standard deviation of f: 0 if it was given, `None` if the method has no uncertainty.
+    /// Standard deviation of f: 0 if f was given, `None` if the method gives no uncertainty.
     pub focal_sd: Option<f64>,
     /// (c) Camera position (x0, y0, z0).
     pub camera_position: DVec3,
@@ -52,7 +52,7 @@ pub struct HeadTableColumn {
 /// Table 2 as printed and as recomputed from A.2(b).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadTable {
-    /// The paper's figures; f follows from `[T]`.
+    /// The paper's numbers; f follows from `[T]`.
     pub printed: HeadTableColumn,
     /// Eqs. (1)-(5) on A.2(b) as printed, without conditioning.
     pub linear: HeadTableColumn,
@@ -64,18 +64,18 @@ pub struct HeadTable {
     pub focal_known: HeadTableColumn,
 }
 
-/// What A.2(b) was before it was rounded: the head seen from (400, 0, 0) with f = 5, y' up.
+/// A.2(b) before rounding: the head seen from (400, 0, 0) with f = 5, y' up.
 pub fn exact_projections() -> [DVec2; 6] {
     let axes = DMat3::from_cols(DVec3::NEG_Z, DVec3::Y, DVec3::X);
     let view = PaperView { rotation: axes, camera_position: CAMERA_CM, focal: FOCAL_CM };
     TABLE_A2_POINTS_CM.map(|point| view.project(point).unwrap_or(DVec2::NAN))
 }
 
-/// Table 2 by every method side by side.
+/// Table 2 by all methods, side by side.
 ///
 /// # Errors
 ///
-/// None for the printed data; the type is that of the methods.
+/// None for the printed data; the type is the error of the methods.
 pub fn table_2() -> Result<HeadTable, ResectionError> {
     let linear = |image: &[DVec2; 6]| linear_resection(&TABLE_A2_POINTS_CM, image, Conditioning::AsPrinted);
     let downwards = TABLE_A2_PROJECTIONS.map(|q| DVec2::new(q.x, -q.y));
@@ -187,7 +187,7 @@ mod tests {
         assert!(is_close(known.camera_position_sd.unwrap(), scipy_sd, DVec3::splat(1e-6)));
     }
 
-    /// Table 2(d) is itself off the geometry of A.2 by up to (0.0051, 0.0237, 0.0085) cm.
+    /// Table 2(d) itself differs from the geometry of A.2 by up to (0.0051, 0.0237, 0.0085) cm.
     #[test]
     fn exact_projections_give_table_2_to_its_digits() {
         let table = table_2().unwrap();
@@ -209,7 +209,7 @@ mod tests {
     fn rounding_the_exact_projections_gives_a2_but_for_a_shift_of_x() {
         for (exact, printed) in exact_projections().iter().zip(TABLE_A2_PROJECTIONS) {
             assert!((exact.y - printed.y).abs() < 0.5e-5);
-            // A.2(b) is 2.45e-4 to the left of the symmetric projection: T41 = -0.02061 of Table 2(a).
+            // A.2(b) is shifted by 2.45e-4 to the left of the symmetric projection: T41 = -0.02061 of Table 2(a).
             assert!((exact.x - printed.x - 2.45e-4).abs() < 0.6e-5);
         }
     }

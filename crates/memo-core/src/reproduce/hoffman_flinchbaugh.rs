@@ -1,10 +1,10 @@
-//! The statements of Hoffman and Flinchbaugh (1982) as counts over random problems: do three views of a rod and
-//! two of a hinge fix the plane, which of the two roots of eq. (9) holds, what makes a problem degenerate, and
-//! how often unrelated points have a planar interpretation.
+//! The claims of Hoffman and Flinchbaugh (1982), tested by counts over random problems: whether three views of a
+//! rod and two of a hinge determine the plane, which of the two roots of eq. (9) is valid, what makes a problem
+//! degenerate, and how often unrelated points have a planar interpretation.
 //!
-//! Everything follows from the seed. Rods and hinges are drawn with the tilt of their plane between 5 and 85
-//! degrees and all angles uniform; a depth counts as recovered when it errs by less than 1e-6 of the length, up
-//! to the mirror. Counts say what happens to problems as drawn; they prove nothing about every problem.
+//! Results depend only on the seed. Rods and hinges have a plane tilted between 5 and 85 degrees, and all angles
+//! are uniform. A depth counts as recovered if its error is less than 1e-6 of the length, up to the mirror. The
+//! counts hold for these distributions and are not a proof for every problem.
 
 use crate::planar::Plane;
 use crate::planar::hinge::{HingeRefusal, hinge_from_two_views};
@@ -14,11 +14,11 @@ use glam::{DVec2, DVec3};
 use nalgebra::{Matrix3, Matrix4};
 use std::f64::consts::TAU;
 
-/// Error of a recovered depth over the length, and of an equation that holds.
+/// Limit of a recovered depth's error divided by the length, and of the error of a satisfied equation.
 const EXACT: f64 = 1e-6;
-/// A Jacobian whose smallest singular value is below this part of its largest has lost rank.
+/// A Jacobian has lost rank if its smallest singular value is below this share of its largest.
 const RANK: f64 = 1e-9;
-/// A rod that never comes nearer than this to its full length in the image counts as never extended.
+/// A rod is never extended if its image is always shorter than this share of its full length.
 const EXTENDED: f64 = 0.9;
 
 /// Eqs. (4)-(14) of appendix 1 on three views, as printed.
@@ -26,14 +26,14 @@ const EXTENDED: f64 = 0.9;
 pub struct PrintedRod {
     /// k1 to k5.
     pub k: [f64; 5],
-    /// The two roots x = z2 / z3 of eq. (9); none where they are complex or a = 0.
+    /// The two roots x = z2 / z3 of eq. (9); `None` if they are complex or a = 0.
     pub roots: Option<[f64; 2]>,
-    /// z3^2 of eq. (14) for each root; a root holds where this is positive.
+    /// z3^2 of eq. (14) for each root; a root is valid if this is positive.
     pub z3_sq: [f64; 2],
 }
 
 impl PrintedRod {
-    /// Follows the text: k's of footnote 11, roots by (10), z3^2 by (14).
+    /// Computed as in the text: k's of footnote 11, roots by (10), z3^2 by (14).
     pub fn new(views: &[DVec2; 3]) -> Self {
         let k = ks(views);
         let [k1, k2, k3, k4, k5] = k;
@@ -47,13 +47,13 @@ impl PrintedRod {
         Self { k, roots, z3_sq: roots.map_or([f64::NAN; 2], |roots| roots.map(z3_sq)) }
     }
 
-    /// How many of the roots give a real z3 and, with either sign of z1, fulfil (4)-(6).
+    /// Number of roots that give a real z3 and, with either sign of z1, satisfy (4)-(6).
     pub fn valid_roots(&self) -> usize {
         self.solutions().filter(|(_, _, error)| *error < EXACT).count()
     }
 
-    /// Of each root with a real z3: (z1, z2, z3) with z3 > 0, whether z1 has the printed sign (+), and by how
-    /// much (6) fails, over the largest term.
+    /// For each root with a real z3: (z1, z2, z3) with z3 > 0, whether z1 has the printed sign (+), and the error
+    /// of (6) divided by the largest term.
     fn solutions(&self) -> impl Iterator<Item = ([f64; 3], bool, f64)> + '_ {
         let [_, k2, k3, k4, k5] = self.k;
         let of_root = move |(x, z3_sq): (f64, f64)| {
@@ -73,7 +73,7 @@ impl PrintedRod {
         self.roots.into_iter().flatten().zip(self.z3_sq).filter_map(of_root)
     }
 
-    /// z1, z2, z3 of the root that holds, z3 > 0; its mirror fits as well.
+    /// z1, z2, z3 of the valid root, z3 > 0; its mirror fits as well.
     pub fn depths(&self) -> Option<[f64; 3]> {
         self.solutions().min_by(|a, b| a.2.total_cmp(&b.2)).map(|(z, _, _)| z)
     }
@@ -86,38 +86,38 @@ fn ks(d: &[DVec2; 3]) -> [f64; 5] {
     [square(0) - square(1), square(0) - square(2), cross(1, 2), cross(2, 0), cross(0, 1)]
 }
 
-/// What happened to random rods seen three times (Proposition 1).
+/// Results for random rods in three views (Proposition 1).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RodTrials {
-    /// Rods drawn.
+    /// Number of rods.
     pub trials: usize,
-    /// Depths recovered by [`rod_from_three_views`].
+    /// Rods with depths recovered by [`rod_from_three_views`].
     pub recovered: usize,
     /// Recovered by the ellipse of footnote 14.
     pub recovered_by_ellipse: usize,
     /// Recovered by eqs. (4)-(14) in the printed order.
     pub recovered_as_printed: usize,
-    /// Rods with exactly one root of eq. (9) that holds.
+    /// Rods with exactly one valid root of eq. (9).
     pub one_root: usize,
-    /// Rods for which the printed z1 = + sqrt(z3^2 - k2) has the sign that (6) wants, z3 being positive.
+    /// Rods for which the printed z1 = + sqrt(z3^2 - k2) has the sign required by (6), for positive z3.
     pub printed_z1: usize,
     /// Rods whose Jacobian has rank three.
     pub full_rank: usize,
-    /// Largest |[a1 a2 a3] - (k3 z1 + k4 z2 + k5 z3)| over length^3, for any three vectors.
+    /// Largest |[a1 a2 a3] - (k3 z1 + k4 z2 + k5 z3)| divided by length^3, for any three vectors.
     pub triple_product_error: f64,
-    /// Largest |det J - 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2)| over length^4.
+    /// Largest |det J - 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2)| divided by length^4.
     pub jacobian_error: f64,
-    /// Rods never seen longer than nine tenths of their length.
+    /// Rods whose images are never longer than nine tenths of their length.
     pub never_extended: usize,
     /// Of these, recovered.
     pub never_extended_recovered: usize,
-    /// Rods drawn with equally long images in views 2 and 3 (k1 = k2), not collinear.
+    /// Rods with images of equal length in views 2 and 3 (k1 = k2), not collinear.
     pub equal_images: usize,
-    /// Of these, with exactly one root of eq. (9) that holds.
+    /// Of these, rods with exactly one valid root of eq. (9).
     pub equal_images_one_root: usize,
 }
 
-/// Draws rods and solves them.
+/// Solves random rods.
 pub fn rod_trials(trials: usize, seed: u64) -> RodTrials {
     let mut random = Random::new(seed);
     let mut tally = RodTrials { trials, ..RodTrials::default() };
@@ -147,7 +147,7 @@ pub fn rod_trials(trials: usize, seed: u64) -> RodTrials {
             tally.never_extended += 1;
             tally.never_extended_recovered += usize::from(recovered);
         }
-        // Views 2 and 3 mirrored in the axis of the ellipse are equally long.
+        // Views 2 and 3 mirrored in the axis of the ellipse have the same length.
         let mirrored = [angles[0], angles[1], -angles[1]].map(|angle| in_plane(plane, angle));
         tally.equal_images += 1;
         tally.equal_images_one_root += usize::from(PrintedRod::new(&mirrored).valid_roots() == 1);
@@ -155,12 +155,12 @@ pub fn rod_trials(trials: usize, seed: u64) -> RodTrials {
     tally
 }
 
-/// What happened to random hinges seen twice (Proposition 2).
+/// Results for random hinges in two views (Proposition 2).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HingeTrials {
-    /// Hinges drawn.
+    /// Number of hinges.
     pub trials: usize,
-    /// Depths recovered by [`hinge_from_two_views`].
+    /// Hinges with depths recovered by [`hinge_from_two_views`].
     pub recovered: usize,
     /// Hinges whose Jacobian has rank four.
     pub full_rank: usize,
@@ -170,13 +170,13 @@ pub struct HingeTrials {
     pub one_plane: usize,
     /// Largest number of planes found for one.
     pub most_planes: usize,
-    /// Problems with an interpretation when the middle point is taken for the joint.
+    /// Problems with an interpretation if the middle point is taken as the joint.
     pub joint_in_the_middle: usize,
-    /// Problems with one when an end point is taken for the joint.
+    /// Problems with an interpretation if an end point is taken as the joint.
     pub joint_at_an_end: usize,
 }
 
-/// Draws hinges and solves them; of the first `searched`, planes are counted by brute force.
+/// Solves random hinges; for the first `searched`, planes are counted by brute force.
 pub fn hinge_trials(trials: usize, searched: usize, seed: u64) -> HingeTrials {
     let mut random = Random::new(seed);
     let mut tally = HingeTrials { trials, searched: searched.min(trials), ..HingeTrials::default() };
@@ -199,7 +199,7 @@ pub fn hinge_trials(trials: usize, searched: usize, seed: u64) -> HingeTrials {
             tally.one_plane += usize::from(planes == 1);
             tally.most_planes = tally.most_planes.max(planes);
         }
-        // The first end as the joint: the other end and the middle point are seen from there.
+        // With the first end as the joint, vectors to the other end and the middle point start there.
         let from_end = [[-first[0], -first[1]], [second[0] - first[0], second[1] - first[1]]];
         tally.joint_in_the_middle += usize::from(found.is_some());
         tally.joint_at_an_end += usize::from(hinge_from_two_views(&from_end[0], &from_end[1]).is_ok());
@@ -207,7 +207,7 @@ pub fn hinge_trials(trials: usize, searched: usize, seed: u64) -> HingeTrials {
     tally
 }
 
-/// How many of `trials` unrelated pairs in three views, and triples in two, have a planar interpretation: image
+/// Number of `trials` unrelated pairs in three views, and of triples in two, with a planar interpretation: image
 /// vectors are independent normal numbers.
 pub fn false_targets(trials: usize, seed: u64) -> [usize; 2] {
     let mut random = Random::new(seed);
@@ -218,8 +218,8 @@ pub fn false_targets(trials: usize, seed: u64) -> [usize; 2] {
     [rods, hinges]
 }
 
-/// How many of `trials` rods and hinges are refused, when the problem is made degenerate on purpose; in the
-/// order of [`DEGENERATE`].
+/// Number of `trials` rods and hinges that are refused if the problem is made degenerate, in the order of
+/// [`DEGENERATE`].
 pub fn degenerate_refusals(trials: usize, seed: u64) -> [usize; DEGENERATE.len()] {
     let mut random = Random::new(seed);
     let mut refused = [0; DEGENERATE.len()];
@@ -250,7 +250,7 @@ pub fn degenerate_refusals(trials: usize, seed: u64) -> [usize; DEGENERATE.len()
     refused
 }
 
-/// What [`degenerate_refusals`] draws.
+/// Kinds of problems of [`degenerate_refusals`].
 pub const DEGENERATE: [&str; 4] = [
     "rod in a plane parallel to the image",
     "rod in a plane seen edge-on",
@@ -258,11 +258,12 @@ pub const DEGENERATE: [&str; 4] = [
     "hinge with one rod that does not move",
 ];
 
-/// All planes through the pivot in which each pair of image vectors has one length, by search: the changes of
-/// sign of the second equation along the curve of slopes that the first allows.
+/// All planes through the pivot in which both vectors of each pair have the same length, by search: the sign
+/// changes of the second equation along the curve of slopes that satisfy the first.
 ///
-/// Along the direction u the first equation fixes |g|^2 = -(|a|^2 - |b|^2) / ((u.a)^2 - (u.b)^2). One slope of
-/// each mirror pair. Independent of the closed forms; misses planes nearer to each other than 0.025 degrees.
+/// Along the direction u the first equation gives |g|^2 = -(|a|^2 - |b|^2) / ((u.a)^2 - (u.b)^2). One slope of
+/// each mirror pair. The search does not use the closed forms; it misses planes closer to each other than 0.025
+/// degrees.
 pub fn planes_by_search(first: &[DVec2; 2], second: &[DVec2; 2]) -> Vec<DVec2> {
     const STEPS: usize = 7200;
     let excess = |rod: &[DVec2; 2], g: DVec2| {
@@ -292,7 +293,7 @@ pub fn planes_by_search(first: &[DVec2; 2], second: &[DVec2; 2]) -> Vec<DVec2> {
             }
         }
         let Some(g) = on_first(low) else { continue };
-        // A pole of |g| changes the sign as well, without a zero.
+        // At a pole of |g| the sign changes as well, but there is no zero.
         if excess(second, g).abs() < EXACT * (1.0 + g.length_squared()) {
             found.push(g);
         }
@@ -313,7 +314,7 @@ fn in_plane(plane: Plane, angle: f64) -> DVec2 {
     angle.cos() * plane.tilt_rad().cos() * steepest + angle.sin() * steepest.perp()
 }
 
-/// The largest difference of depths, for the better of the two mirror images.
+/// The largest difference of depths, for the better of the two mirror solutions.
 fn up_to_mirror<const N: usize>(found: &[f64; N], truth: &[f64; N]) -> f64 {
     let off = |sign: f64| (0..N).map(|i| (found[i] - sign * truth[i]).abs()).fold(0.0, f64::max);
     off(1.0).min(off(-1.0))
@@ -345,7 +346,7 @@ fn hinge_jacobian(a: &[DVec2; 2], b: &[DVec2; 2], [za, zb]: [[f64; 2]; 2]) -> Ma
     rows
 }
 
-/// Eq. (3) against eq. (6) for three vectors that need not lie in a plane.
+/// Eq. (3) compared with eq. (6) for three vectors that need not be in a plane.
 fn triple_product_error(random: &mut Random) -> f64 {
     let vectors = [0; 3].map(|_| DVec3::from_array([0; 3].map(|_| random.uniform(-1.0, 1.0))));
     let [_, _, k3, k4, k5] = ks(&vectors.map(|v| v.truncate()));
@@ -360,11 +361,11 @@ mod tests {
     #[test]
     fn three_views_of_a_rod_leave_one_root_and_its_mirror() {
         let t = rod_trials(2000, 1);
-        // A draw may be near-degenerate; nearly all are recovered.
+        // Problems may be nearly degenerate; nearly all are recovered.
         assert!(t.recovered > 1990 && t.recovered_by_ellipse > 1990, "{t:?}");
         assert!(t.one_root > 1950 && t.equal_images_one_root > 1950, "{t:?}");
         assert!(t.triple_product_error < 1e-14 && t.jacobian_error < 1e-12, "{t:?}");
-        // The printed sign of z1 is right when z1 and z3 have the same: half of the time.
+        // The printed sign of z1 is right if z1 and z3 have the same sign: half of the time.
         assert!((850..1150).contains(&t.printed_z1), "{t:?}");
         assert!(t.never_extended_recovered * 100 >= t.never_extended * 99, "{t:?}");
     }
@@ -397,12 +398,12 @@ mod tests {
         assert!((6600..7400).contains(&rods) && (6200..7000).contains(&hinges), "{rods} {hinges}");
     }
 
-    /// Rods that are never seen at more than nine tenths of their length are some of all, not all.
+    /// Some rods, but not all, are never seen at more than nine tenths of their length.
     #[test]
     fn never_extended_rods_are_counted_apart() {
         let t = rod_trials(2000, 7);
         let mut random = Random::new(7);
-        // As often as three projections of random tilts and angles are all short: by other draws.
+        // The same share as that of three short projections with random tilts and angles, from other samples.
         let share = (0..4000)
             .filter(|_| {
                 let plane = drawn_plane(&mut random);

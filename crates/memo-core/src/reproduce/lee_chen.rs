@@ -1,9 +1,10 @@
-//! The experiments of Lee and Chen (1985, section 4) on the walker made anew: nodes of each level (Tables 3
-//! and 4), the survivors of frame 1 (Figs. 6-8), and how many postures all rules leave.
+//! The experiments of Lee and Chen (1985, section 4) on the synthetic walker: nodes of each level (Tables 3 and
+//! 4), the survivors of frame 1 (Figs. 6-8), and the number of postures that satisfy all rules.
 //!
-//! What is not printed is chosen and stated here: gait phase and cadence ([`PHASE0`], [`CADENCE_HZ`]), the
-//! distance at which two roots are one ([`MERGE_M`]), the tolerances of the rules ([`Reading`]). The joint
-//! coordinates being other ones, counts can be near the printed ones, not the same by right.
+//! Values that are not printed are chosen and stated here: gait phase and cadence ([`PHASE0`], [`CADENCE_HZ`]),
+//! the distance within which two roots are merged ([`MERGE_M`]), the tolerances of the rules ([`Reading`]).
+//! Because the joint coordinates differ from the paper's, counts can be close to the printed ones but need not be
+//! equal.
 
 use crate::model::skeleton::{JOINT_COUNT, Joint, Side, StickFigure};
 use crate::posture::Bearings;
@@ -14,27 +15,28 @@ use crate::posture::tree::{Interpretations, Path, TreeError, TreeOptions, View};
 use crate::reproduce::stick_walker::{StickCamera, StickWalker};
 use glam::{DMat3, DVec3};
 
-/// The frames of Tables 3 and 4, counted from 0; the paper counts them 1, 3, 5.
+/// The frames of Tables 3 and 4, counted from 0; the paper counts from 1: 1, 3, 5.
 pub const FRAMES: [usize; 3] = [0, 2, 4];
 
-/// Gait phase of frame 1, the end of the right leg's swing, with the right arm behind as section 4.2 tells.
+/// Gait phase of frame 1: the end of the right leg's swing, with the right arm behind, as described in section
+/// 4.2.
 ///
-/// It is not printed. Of 50 phases this one brings frame 1 of both sequences nearest to Tables 3 and 4 (least
-/// sum of the absolute logarithms of the ratios of the counts).
+/// It is not printed. Of 50 phases, this one has the counts of frame 1 of both sequences closest to Tables 3 and
+/// 4 (smallest sum of the absolute logarithms of the ratios of the counts).
 pub const PHASE0: f64 = 0.94;
 
-/// Gait cycles a second, 114 steps a minute: an ordinary cadence, for the paper's is not printed.
+/// Gait cycles per second, 114 steps per minute: an ordinary cadence, because the paper's is not printed.
 pub const CADENCE_HZ: f64 = 0.95;
 
-/// Roots nearer than this are one, metres: the paper's degenerate case (i) names the pelvis, whose roots are
-/// 1.2 cm apart in this walker.
+/// Roots closer together than this are merged, metres: the paper's degenerate case (i) names the pelvis, whose
+/// roots are 1.2 cm apart in this walker.
 pub const MERGE_M: f64 = 0.04;
 
-/// Distance within which the postures of Figs. 6 and 8 are grouped, metres. The paper's 32 of SEQ1 become 16.
-/// That grouping is finer than 10 cm, which joins the two places of a shoulder (Fig. 7, a1 and a2).
+/// Distance within which the postures of Figs. 6 and 8 are grouped, metres. The paper's 32 of SEQ1 become 16. Its
+/// grouping is finer than 10 cm, which would join the two positions of a shoulder (Fig. 7, a1 and a2).
 pub const FIGURE_GROUP_M: f64 = 0.05;
 
-/// Phases of frame 1 over which the last stage is judged.
+/// Phases of frame 1 for which the last stage is evaluated.
 pub const LAST_STAGE_PHASES: [f64; 10] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /// The paper's image sequences.
@@ -59,10 +61,10 @@ pub struct Counts {
 }
 
 impl Sequence {
-    /// Both.
+    /// Both sequences.
     pub const ALL: [Self; 2] = [Self::Seq1, Self::Seq2];
 
-    /// The paper's name.
+    /// The name in the paper.
     pub fn name(self) -> &'static str {
         match self {
             Self::Seq1 => "SEQ1",
@@ -164,38 +166,38 @@ const TABLE_4: Counts = Counts {
     ],
 };
 
-/// Tables 3 or 4 on the walker.
+/// Tables 3 or 4 for the synthetic walker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CountTable {
     /// Gait phases of the three frames.
     pub phases: [f64; 3],
     /// The counts.
     pub counts: Counts,
-    /// Whether the true posture is among the leaves, after the physical constraints and after rules 1 and 2.
+    /// True if the true posture is among the leaves, after the physical constraints and after rules 1 and 2.
     pub truth_kept: [[bool; 2]; 3],
 }
 
-/// How rules 1 to 5 are read.
+/// Reading of rules 1 to 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Reading {
     /// [`MotionModel::walking_paper`].
     AsPrinted,
-    /// What true walking keeps, with the torso as a rigid body.
+    /// Tolerances that true walking keeps, with the torso as a rigid body.
     ///
-    /// - Rule 3 at the shoulder is left out. The lengths of Table A.1 put the shoulders 3.7 cm behind the
-    ///   neck, so both lie behind the body plane whatever they do, and an arm that swings forward is refused.
-    /// - In its place, a rigid torso is not its mirror image: neck ahead of the line of the shoulders. The
-    ///   distances alone leave both; a person whose front is known has but one.
-    /// - The standing knee bends by 22 degrees, so rule 5 calls a knee flexed from 25 on.
-    /// - Rule 4 may be tighter, 10 degrees: this walker's limbs do swing parallel to the moving direction.
+    /// - Rule 3 at the shoulder is omitted. With the lengths of Table A.1 the shoulders are 3.7 cm behind the neck,
+    ///   so both are always behind the body plane, and an arm that swings forward would be cut.
+    /// - Instead, a rigid torso is not its mirror image: the neck is in front of the shoulder line. The distances
+    ///   alone allow both; a person whose front is known has only one.
+    /// - The standing knee bends by 22 degrees, so a knee counts as flexed for rule 5 from 25 degrees.
+    /// - Rule 4 may be tighter, 10 degrees: this walker's limbs swing parallel to the moving direction.
     RigidTorso,
 }
 
 impl Reading {
-    /// Both.
+    /// Both readings.
     pub const ALL: [Self; 2] = [Self::AsPrinted, Self::RigidTorso];
 
-    /// Its name in tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::AsPrinted => "as_printed",
@@ -208,7 +210,7 @@ impl Reading {
         Self::ALL.into_iter().find(|reading| reading.name() == name)
     }
 
-    /// Its rules.
+    /// The rules of the reading.
     pub fn motion(self) -> MotionModel {
         match self {
             Self::AsPrinted => MotionModel::walking_paper(),
@@ -229,15 +231,15 @@ impl Reading {
     }
 }
 
-/// Rules 1 and 2 as they are used for the tables: a dead zone of 10 degrees; of 13 for the two legs, for in
-/// mid-stance of the gait curves both thighs are 12 degrees ahead.
+/// Rules 1 and 2 as used for the tables: a dead zone of 10 degrees, and of 13 for the two legs, because in
+/// mid-stance of the gait curves both thighs are 12 degrees forward.
 pub fn rules_1_2() -> MotionModel {
     MotionModel::walking_general_paper().with(Rule::LegsOpposed, Tolerance::from_deg(13.0))
 }
 
-/// Whether the neck lies behind the line of the shoulders, seen along the torso's forward axis y × z.
+/// True if the neck is behind the shoulder line, along the torso's forward axis y × z.
 ///
-/// False where a joint of the torso is unknown.
+/// False if a joint of the torso is unknown.
 pub fn torso_is_mirrored(figure: &StickFigure) -> bool {
     let [right, left] = Side::BOTH.map(|side| figure[side.shoulder()]);
     let forward = figure.segment(Joint::Pelvis).cross(left - right);
@@ -249,7 +251,7 @@ pub fn table_walker() -> StickWalker {
     StickWalker::lee_chen().in_rhythm(PHASE0, CADENCE_HZ)
 }
 
-/// One view of the walker, its truth, and the directions the camera knows.
+/// One view of the walker with its true posture, and the directions known to the camera.
 struct Scene {
     view: View,
     truth: Path,
@@ -262,7 +264,7 @@ impl Scene {
         let seen = camera.view(walker, frame);
         let neck = seen.figure[Joint::Neck];
         let view = View { merge_m, ..View::new(seen.rays, neck, *walker.lengths()) };
-        // x the way the face looks, y down, z to its left.
+        // x the direction the face looks, y down, z to its left.
         let head = camera.rotation * DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
         let bearings = Bearings { up: Some(-head.y_axis), heading: Some(head.x_axis), head: Some(head) };
         Self { view, truth: view.nearest_path(&seen.figure), bearings }
@@ -276,7 +278,7 @@ impl Scene {
         self.view.interpret(&self.options(motion))
     }
 
-    /// Ways to the leaves that a reading of rules 1 to 5 leaves.
+    /// Paths to the leaves that satisfy a reading of rules 1 to 5.
     fn survivors(&self, reading: Reading) -> Result<Vec<Path>, TreeError> {
         let left = self.interpret(Some(reading.motion()))?;
         let admitted = left.interpretations().filter(|leaf| reading.admits(&leaf.figure));
@@ -290,7 +292,7 @@ impl Scene {
 
 /// Counts the nodes of every level in frames 1, 3 and 5.
 ///
-/// Roots nearer than `merge_m` are one; [`MERGE_M`] or 0.
+/// Roots closer together than `merge_m` are merged; use [`MERGE_M`] or 0.
 pub fn count_table(sequence: Sequence, walker: &StickWalker, merge_m: f64) -> Result<CountTable, TreeError> {
     let none = [[0; 3]; JOINT_COUNT];
     let mut table = CountTable {
@@ -312,22 +314,22 @@ pub fn count_table(sequence: Sequence, walker: &StickWalker, merge_m: f64) -> Re
     Ok(table)
 }
 
-/// What rules 1 to 5 and grouping leave of one frame.
+/// Result of rules 1 to 5 and grouping for one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LastStage {
     /// Gait phase.
     pub phase: f64,
-    /// Postures left.
+    /// Number of remaining postures.
     pub postures: usize,
-    /// Groups of them, within 10 cm.
+    /// Number of their groups, within 10 cm.
     pub groups: usize,
-    /// Whether the true posture is left.
+    /// True if the true posture remains.
     pub truth_kept: bool,
     /// Rules that the true posture breaks.
     pub broken: Vec<Constraint>,
 }
 
-/// Rules 1 to 5 and grouping in frames 1, 3 and 5 from each of the given phases on.
+/// Rules 1 to 5 and grouping in frames 1, 3 and 5, starting from each of the given phases.
 pub fn last_stage(
     sequence: Sequence,
     reading: Reading,
@@ -359,17 +361,17 @@ pub fn last_stage(
 pub struct FrameSurvivors {
     /// The true posture, camera axes, metres.
     pub truth: StickFigure,
-    /// What the physical constraints and rules 1 and 2 leave, camera axes, metres.
+    /// Postures that satisfy the physical constraints and rules 1 and 2, camera axes, metres.
     pub figures: Vec<StickFigure>,
     /// Groups of these within [`FIGURE_GROUP_M`].
     pub groups: Vec<PostureGroup>,
-    /// Which figure takes the true roots.
+    /// Index of the figure with the true roots.
     pub true_one: Option<usize>,
-    /// For each figure, whether it passes rules 3 to 5 too, as [`Reading::RigidTorso`] reads them.
+    /// For each figure, true if it also satisfies rules 3 to 5 in the reading [`Reading::RigidTorso`].
     pub passes: Vec<bool>,
 }
 
-/// What is left of a frame, counted from 0; roots nearer than [`MERGE_M`] are one.
+/// Survivors of a frame, counted from 0; roots closer together than [`MERGE_M`] are merged.
 pub fn frame_survivors(
     sequence: Sequence,
     walker: &StickWalker,
@@ -399,7 +401,8 @@ mod tests {
         0.5 * (values[(n - 1) / 2] + values[n / 2]) as f64
     }
 
-    /// The printed tables obey the tree's own law: a level has at most twice the nodes of the one above.
+    /// The printed tables are consistent with a binary tree: a level has at most twice the nodes of the one
+    /// above.
     #[test]
     fn printed_counts_double_at_most() {
         for sequence in Sequence::ALL {
@@ -432,7 +435,7 @@ mod tests {
         }
     }
 
-    /// Frame 1 of SEQ1 at the chosen phase has the nodes of Table 3, level by level.
+    /// Frame 1 of SEQ1 at the chosen phase has the node counts of Table 3, level by level.
     #[test]
     fn frame_1_of_the_first_sequence_has_the_printed_counts() {
         let counts = count_table(Sequence::Seq1, &table_walker(), MERGE_M).unwrap().counts;
@@ -461,7 +464,7 @@ mod tests {
         assert!((f64::from(best) / 50.0 - PHASE0).abs() < 1e-12, "{best}");
     }
 
-    /// The phase was chosen; a little later the counts are other ones, though near.
+    /// The phase was chosen; a little later the counts differ, but are close.
     #[test]
     fn counts_near_the_chosen_phase_stay_near() {
         for phase0 in [0.95, 0.96, 0.97, 0.98] {
@@ -484,8 +487,8 @@ mod tests {
         }
     }
 
-    /// Why the true posture falls to the rules as printed: to the shoulder of rule 3 and to the bent standing
-    /// knee of rule 5, not to rule 4.
+    /// Why the rules as printed cut the true posture: because of the shoulder of rule 3 and the bent standing
+    /// knee of rule 5, not because of rule 4.
     #[test]
     fn the_rules_as_printed_refuse_an_arm_ahead_of_its_shoulder_and_a_bent_standing_knee() {
         for sequence in Sequence::ALL {
@@ -509,7 +512,7 @@ mod tests {
             assert_eq!(left.groups.iter().map(|g| g.members.len()).sum::<usize>(), left.figures.len());
             let true_one = left.true_one.unwrap();
             assert!(left.passes[true_one], "the true posture passes rules 3 to 5");
-            // Merging moves joints by up to half its distance a segment.
+            // Merging moves joints by up to half its distance per segment.
             let apart_m = figure_distance(&left.figures[true_one], &left.truth);
             assert!(apart_m < 0.06, "{apart_m}");
         }

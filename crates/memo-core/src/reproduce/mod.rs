@@ -1,6 +1,6 @@
-//! What the three papers print, computed again: their tables, figures and examples.
+//! Reproduction of the three papers: their tables, figures and examples, computed again.
 //!
-//! Nothing else needs it; it is compiled with the feature `reproduce`.
+//! No other module uses it; it is compiled with the feature `reproduce`.
 
 pub mod head_table;
 pub mod hoffman_flinchbaugh;

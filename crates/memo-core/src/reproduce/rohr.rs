@@ -1,9 +1,9 @@
-//! What Rohr (1994) states in numbers and equations, from the code that tracks: the printed constants of
-//! section 6, and how far the two sides of each equation differ when both are computed.
+//! The numbers and equations of Rohr (1994), checked with the code that tracks: the printed constants of section
+//! 6, and the difference of the two sides of each equation when both are computed.
 //!
-//! The two sides are computed by different ways: one as printed, with matrices written out, the other by what
-//! the tracker runs. Everything follows from the seed. What the paper shows of its image sequences is not here:
-//! they are not public.
+//! The two sides are computed in different ways: one as printed, with explicit matrices, the other with the code
+//! of the tracker. Results depend only on the seed. The paper's results on its image sequences are not
+//! reproduced: the sequences are not public.
 
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise};
 use crate::image::{Frame, fit_norms};
@@ -17,16 +17,16 @@ use crate::track::search::{Grid, Hypothesis};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix4, SMatrix, SVector, Vector4};
 
-/// Images a second of the paper's sequences.
+/// Frame rate of the paper's sequences, images per second.
 const RATE_HZ: f64 = 25.0;
 /// Duration of a walking cycle in section 6, seconds.
 const CYCLE_S: f64 = 1.0;
 /// Distance covered in a cycle in section 6, metres.
 const STRIDE_M: f64 = 1.6;
-/// Deviation from the average velocities in section 6.
+/// Relative deviation from the average velocities in section 6.
 const DEVIATION: f64 = 0.3;
 
-/// The constants of the paper as the code has them, by name; lengths in cm and times in images, as printed.
+/// The constants of the paper as used by the code, by name; lengths in cm and times in images, as printed.
 pub fn numbers() -> Vec<(&'static str, f64)> {
     let filter = FilterOptions::default();
     let per_image = |noise: &Noise| noise.velocity_variance_per_s / RATE_HZ.powi(3);
@@ -62,7 +62,7 @@ pub fn numbers() -> Vec<(&'static str, f64)> {
     ]
 }
 
-/// For each equation the largest difference of its two sides over problems drawn from the seed.
+/// For each equation the largest difference of its two sides over random problems.
 pub fn deviations(seed: u64) -> Vec<(&'static str, f64)> {
     let mut random = Random::new(seed);
     let [inverse, product] = transforms(&mut random);
@@ -135,7 +135,7 @@ fn window_projection() -> DMatrix<f64> {
     &x * inverse * x.transpose()
 }
 
-/// Eq. (1): 1/sqrt(n) |X beta_k - X beta_j| with two fits against what the change detection computes.
+/// Eq. (1): 1/sqrt(n) |X beta_k - X beta_j| with two fits, compared with the value of the change detection.
 fn change_test(random: &mut Random) -> f64 {
     let projection = window_projection();
     let mut worst = 0.0f64;
@@ -151,8 +151,8 @@ fn change_test(random: &mut Random) -> f64 {
     worst
 }
 
-/// Eq. (6): T* X* + b* over its largest term for people before random cameras, and the error of the position
-/// that solves it, metres. The paper's Y is the world's Z here.
+/// Eq. (6): T* X* + b* divided by its largest term, for people in front of random cameras, and the error of the
+/// solved position, metres. The paper's Y is the world's Z here.
 fn positions(random: &mut Random) -> [f64; 2] {
     let mut worst = [0.0f64; 2];
     for _ in 0..100 {
@@ -193,9 +193,9 @@ fn positions(random: &mut Random) -> [f64; 2] {
     worst
 }
 
-/// Of single lines and edges inside their windows: s_i of eq. (7) against the score's, eq. (8) against eq. (7),
-/// both over l; the change of the exponent when everything is three times as large; |1 - s(p)| of eq. (11) for
-/// lines that are edges.
+/// For single lines and edges inside their windows: s_i of eq. (7) compared with the score's, and eq. (8) with
+/// eq. (7), both divided by l; the change of the exponent if everything is three times as large; |1 - s(p)| of
+/// eq. (11) for lines that are edges.
 fn similarities(random: &mut Random) -> [f64; 4] {
     let options = SimilarityOptions::default();
     let [c_l, c_d, c_r, sigma_phi] =
@@ -203,7 +203,7 @@ fn similarities(random: &mut Random) -> [f64; 4] {
     let mut worst = [0.0f64; 4];
     for _ in 0..200 {
         let model = random.uniform(20.0, 80.0);
-        // An edge inside the window needs no cutting: l, d and the angle follow from its ends.
+        // An edge inside the window is not clipped: l, d and the angle follow from its ends.
         let reach = 0.8 * c_r * model;
         let (left, right) = (random.uniform(0.0, 0.3 * model), random.uniform(0.6 * model, model));
         let middle = random.uniform(-0.5 * reach, 0.5 * reach);
@@ -244,7 +244,7 @@ fn similarities(random: &mut Random) -> [f64; 4] {
     worst
 }
 
-/// By what factor eqs. (9) and (10) grow when everything is twice as large.
+/// Growth of eqs. (9) and (10) if everything is twice as large.
 fn scale_of_measures() -> [f64; 2] {
     let eq_9 = |l: f64, l_m: f64, d: f64, angle: f64| l * l_m * l_m / ((l_m - l) * d * angle);
     let eq_10 = |l_gw: f64, l_m: f64, d: f64, angle: f64| l_gw * l_gw / ((l_m - l_gw) * d * angle);
@@ -255,7 +255,8 @@ fn scale_of_measures() -> [f64; 2] {
     ]
 }
 
-/// The filter as printed, eight states and dense matrices, against the four small ones that run; fifty images.
+/// The filter as printed, eight states and dense matrices, compared with the four small filters of the tracker;
+/// fifty images.
 fn filters() -> f64 {
     let o = FilterOptions::default();
     let noises = [o.along, o.vertical, o.along, o.phase];
@@ -315,8 +316,8 @@ fn dense_step(
     (prior + k * (z - h * prior), (SMatrix::identity() - k * h) * prior_cov)
 }
 
-/// How far a spline through ten samples of a sine misses them, degrees for an amplitude of 60; how far the left
-/// side differs from the right half a cycle before, degrees.
+/// The largest difference between a sine and a spline through ten of its samples, degrees for an amplitude of 60;
+/// the difference between the left side and the right side half a cycle before, degrees.
 fn gait() -> [f64; 2] {
     let samples: Vec<f64> = (0..10).map(|i| 60.0 * (0.6 * f64::from(i)).sin()).collect();
     let spline = PeriodicCubic::spline(&samples);
@@ -336,7 +337,8 @@ fn gait() -> [f64; 2] {
     [missed, (0..100).map(|i| differs(f64::from(i) / 100.0)).fold(0.0, f64::max)]
 }
 
-/// The search window of a model contour (Fig. 17): its four corners, the contour's length by twice c_r of it.
+/// The search window of a model contour (Fig. 17): its four corners. It has the contour's length and twice c_r of
+/// it.
 pub fn search_window(start: DVec2, end: DVec2, c_r: f64) -> [DVec2; 4] {
     let across = c_r * (end - start).perp();
     [start - across, end - across, end + across, start + across]

@@ -1,13 +1,13 @@
-//! The synthetic walker of Lee and Chen (1985, section 4 and appendix), made anew as a stick figure.
+//! The synthetic walker of Lee and Chen (1985, section 4 and appendix), rebuilt as a stick figure.
 //!
-//! What is theirs: the 17 lengths (Table A.1), the head (Table A.2), the cameras, 0.2 s a frame. Their joint
-//! coordinates are not printed and the program that drew them (Cutting 1978) is not public, so the joint
-//! angles are the project's average gait curves, and the rotations of shoulders and pelvis are those stated
-//! at [`StickWalker`]. Numbers printed for single frames can therefore be approached, not met.
+//! From the paper: the 17 lengths (Table A.1), the head (Table A.2), the cameras, 0.2 s per frame. Their joint
+//! coordinates are not printed, and the program that generated them (Cutting 1978) is not public. So the joint
+//! angles are this project's average gait curves, and the rotations of shoulders and pelvis are those stated at
+//! [`StickWalker`]. Numbers printed for single frames can therefore be approximated, but not reproduced exactly.
 //!
-//! Axes are the paper's head-centred ones, in metres: x the moving direction, y up, z to the right of the
-//! walker. Trunk and limbs are upright and swing in planes parallel to the moving direction. The head does
-//! not nod, turn or bob.
+//! Axes are the paper's head-centred ones, in metres: x the moving direction, y up, z to the right of the walker.
+//! The trunk is upright, and limbs swing in planes parallel to the moving direction. The head does not nod, turn
+//! or bob.
 
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -26,7 +26,7 @@ pub const FRAME_S: f64 = 0.2;
 /// Distance from the lens to the image plane in the paper, centimetres.
 pub const FOCAL_CM: f64 = 5.0;
 
-/// Why a walker could not be made of segment lengths.
+/// Why no walker has the given segment lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[non_exhaustive]
 pub enum StickWalkerError {
@@ -54,31 +54,31 @@ pub enum StickWalkerError {
     },
 }
 
-/// A walker of given lengths. A field that is not finite gives joints that are NaN.
+/// A walker with given segment lengths. If a field is not finite, joints are NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StickWalker {
     /// Joint curves.
     pub gait: Gait,
-    /// How the walk deviates from the average.
+    /// Deviations of the walk from the average.
     pub style: GaitStyle,
-    /// Amplitude of the shoulders' turn about the line from neck to pelvis, radians: the right shoulder is
-    /// farthest ahead at the left heel strike, with the right arm. 4 degrees.
+    /// Amplitude of the shoulders' rotation about the line from neck to pelvis, radians: the right shoulder is
+    /// farthest forward at the left heel strike, with the right arm. 4 degrees.
     pub shoulder_turn_rad: f64,
-    /// Amplitude of the pelvis' turn about the same line, radians: the right hip is farthest ahead at the
+    /// Amplitude of the pelvis' rotation about the same line, radians: the right hip is farthest forward at the
     /// right heel strike, with the right leg. 6 degrees.
     pub pelvis_turn_rad: f64,
     /// Gait phase of frame 0.
     pub phase0: f64,
-    /// Gait cycles a second. 1: the paper does not say.
+    /// Gait cycles per second. 1: the paper does not state it.
     pub cadence_hz: f64,
-    /// Speed against the camera, metres a second. 0, as on a treadmill: the paper places the camera
-    /// of a whole sequence in the axes of the head.
+    /// Speed relative to the camera, m/s. 0, as on a treadmill: the paper gives the camera of a whole sequence in
+    /// the axes of the head.
     pub speed_mps: f64,
     lengths: SegmentLengths,
     trunk: Trunk,
 }
 
-/// The joints of torso and hip part without turn, pelvis below the neck, relative to the neck.
+/// The joints of torso and hip part without rotation, pelvis below the neck, relative to the neck.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Trunk {
     shoulders: [DVec3; 2],
@@ -94,7 +94,7 @@ impl StickWalker {
 
     /// An average walker of the given lengths.
     ///
-    /// Errors where torso or hip part are impossible.
+    /// An error if torso or hip part are not possible.
     pub fn new(lengths: &SegmentLengths) -> Result<Self, StickWalkerError> {
         Ok(Self {
             gait: Gait::dense(),
@@ -109,7 +109,7 @@ impl StickWalker {
         })
     }
 
-    /// The same walker with another phase in frame 0 and another cadence, cycles a second.
+    /// The same walker with another phase in frame 0 and another cadence, cycles per second.
     #[must_use]
     pub fn in_rhythm(self, phase0: f64, cadence_hz: f64) -> Self {
         Self { phase0, cadence_hz, ..self }
@@ -125,7 +125,7 @@ impl StickWalker {
         (self.phase0 + frame as f64 * FRAME_S * self.cadence_hz).rem_euclid(1.0)
     }
 
-    /// The neck in a frame, head axes of frame 0.
+    /// Position of the neck in a frame, head axes of frame 0.
     fn neck(&self, frame: usize) -> DVec3 {
         HeadModel::lee_chen().points_m[0] + self.speed_mps * FRAME_S * frame as f64 * DVec3::X
     }
@@ -142,9 +142,9 @@ impl StickWalker {
         self.posed(self.phase(frame), self.neck(frame))
     }
 
-    /// The joints at a gait phase, the neck at a place.
+    /// The joints at a gait phase, with the neck at a position.
     pub fn posed(&self, phase: f64, neck: DVec3) -> StickFigure {
-        // A turn to the left, about y up, brings the right side (z) ahead (x).
+        // A rotation to the left, about y up, moves the right side (z) forward (x).
         let ahead = (TAU * phase).cos();
         let torso = DMat3::from_rotation_y(-self.shoulder_turn_rad * ahead);
         let hip_part = DMat3::from_rotation_y(self.pelvis_turn_rad * ahead);
@@ -175,10 +175,10 @@ impl StickWalker {
 }
 
 impl Trunk {
-    /// Shoulders from three distances each, to neck, pelvis and each other, behind the neck; hips from
-    /// theirs, below the pelvis and level.
+    /// Shoulders from three distances each (to neck, pelvis and each other), behind the neck; hips from their
+    /// distances, below the pelvis and level.
     ///
-    /// Of Table A.1: shoulders 3.74 cm behind and 0.47 cm below the neck, hips 10.09 cm below the pelvis.
+    /// For Table A.1: shoulders 3.74 cm behind and 0.47 cm below the neck, hips 10.09 cm below the pelvis.
     fn new(lengths: &SegmentLengths) -> Result<Self, StickWalkerError> {
         let to = |joint: Joint| lengths.to[joint];
         let rigid = |distance: RigidDistance| lengths.rigid[distance as usize];
@@ -190,7 +190,7 @@ impl Trunk {
         let impossible =
             StickWalkerError::Torso { neck_pelvis_m, neck_shoulder_m, shoulder_pelvis_m, shoulders_m };
 
-        // A shoulder lies on a circle about the line from neck to pelvis: by depth below the neck and radius.
+        // A shoulder is on a circle about the line from neck to pelvis, given by depth below the neck and radius.
         let circle = |a: f64, b: f64| {
             let below = (a * a + neck_pelvis_m * neck_pelvis_m - b * b) / (2.0 * neck_pelvis_m);
             (below, ((a - below) * (a + below)).sqrt())
@@ -198,7 +198,7 @@ impl Trunk {
         let (right_below, right_radius) = circle(neck_shoulder_m[0], shoulder_pelvis_m[0]);
         let (left_below, left_radius) = circle(neck_shoulder_m[1], shoulder_pelvis_m[1]);
         let apart_sq = shoulders_m * shoulders_m - (right_below - left_below).powi(2);
-        // Half the angle between the two radii, each so far from straight behind.
+        // Half the angle between the two radii: the angle of each from straight behind.
         let cosine = (right_radius * right_radius + left_radius * left_radius - apart_sq)
             / (2.0 * right_radius * left_radius);
         let half = 0.5 * cosine.acos();
@@ -229,13 +229,14 @@ impl Trunk {
 /// A camera of the paper: level, aiming at the axis of the head's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StickCamera {
-    /// The lens, head axes, metres. The paper's camera position is the image plane's, [`FOCAL_CM`] before it.
+    /// Position of the lens, head axes, metres. The paper's camera position is that of the image plane,
+    /// [`FOCAL_CM`] in front of it.
     pub lens_in_head: DVec3,
     /// Rotation from head axes to the camera's (OpenCV: x right, y down, z forward).
     pub rotation: DMat3,
 }
 
-/// What a camera sees of the walker in a frame.
+/// The view of the walker in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StickView {
     /// The joints, camera axes, metres: the truth.
@@ -260,7 +261,7 @@ impl StickCamera {
         Self::aimed_from(3.0, 3.0)
     }
 
-    /// Image plane at (x, 0, z) in head axes, metres, looking at their origin.
+    /// A camera with its image plane at (x, 0, z) in head axes, metres, looking at their origin.
     fn aimed_from(x: f64, z: f64) -> Self {
         let plane = DVec3::new(x, 0.0, z);
         let back = plane.normalize_or(DVec3::X);
@@ -287,7 +288,7 @@ impl StickCamera {
         }
     }
 
-    /// The same view as a pixel camera of the world with axes x the moving direction, y to the left, z up
+    /// The same view as a pixel camera in world axes: x the moving direction, y to the left, z up
     /// ([`world_from_head`]).
     pub fn pixel_camera(&self, size: [u32; 2], focal_px: f64) -> Camera {
         let head_from_world = world_rotation().transpose();
@@ -303,7 +304,7 @@ impl StickCamera {
     }
 }
 
-/// A point of head axes in a world with z up: (x, y, z) to (x, -z, y). Same origin.
+/// A point of head axes in world axes with z up: (x, y, z) becomes (x, -z, y). Same origin.
 pub fn world_from_head(point_in_head: DVec3) -> DVec3 {
     world_rotation() * point_in_head
 }
@@ -351,12 +352,12 @@ mod tests {
         }
     }
 
-    /// The angles the project reads in the trunk's axes are those of the gait curves: the elbow and the knee
-    /// to rounding, for they lie between two segments, the swing up to the share of the trunk's turn.
+    /// Angles measured in the trunk's axes are those of the gait curves: elbow and knee to rounding, because they
+    /// are between two segments; the swing up to the effect of the trunk's rotation.
     #[test]
     fn the_angles_read_back_are_those_of_the_gait() {
         let walker = StickWalker::lee_chen();
-        // The anatomical sense of the axes (x forward, y down, z left) from the paper's (y up, z right).
+        // From the paper's axes (y up, z right) to anatomical axes (x forward, y down, z left).
         for k in 0..100 {
             let phase = f64::from(k) / 100.0;
             let figure = walker.posed(phase, DVec3::ONE);
@@ -385,7 +386,7 @@ mod tests {
         };
         let (right, left) = (ahead(0.0, Side::Right), ahead(0.0, Side::Left));
         assert!(right.0 < left.0 && right.1 > left.1);
-        // Shoulders behind the neck throughout, as the lengths of Table A.1 demand.
+        // The shoulders are always behind the neck, as required by the lengths of Table A.1.
         assert!((0..100).all(|k| ahead(f64::from(k) / 100.0, Side::Right).0 < -0.02));
         let at_mean = walker.posed(0.25, DVec3::ZERO);
         assert!((at_mean[Joint::RightShoulder] - DVec3::new(-0.0374, -0.0047, 0.2015)).length() < 1e-4);
@@ -404,7 +405,7 @@ mod tests {
             (-8.50501, 60.12647, 435.17526),
             (8.49499, 60.12663, 435.17639),
         ];
-        // The table is the result of a fit: 0.03 cm away from its own camera at (400, 0, 0).
+        // The table results from a fit: its camera differs by 0.03 cm from (400, 0, 0).
         for (point, (x, y, z)) in view.head.into_iter().zip(printed_cm) {
             let paper_cm = DVec3::new(100.0 * point.x, -100.0 * point.y, 100.0 * point.z - FOCAL_CM);
             assert!(paper_cm.distance(DVec3::new(x, y, z)) < 0.03, "{paper_cm}");
@@ -417,7 +418,7 @@ mod tests {
             (-0.09680, 0.68273),
             (0.09631, 0.68273),
         ];
-        // x' is printed with a common offset of 0.00025, that of the fit's camera.
+        // x' is printed with a common offset of 0.00025, that of the fitted camera.
         for (point, (x, y)) in view.head_image_cm.into_iter().zip(printed_image) {
             assert!((point - DVec2::new(x + 0.00025, y)).abs().max_element() < 1.5e-5, "{point}");
         }
@@ -466,7 +467,7 @@ mod tests {
     }
 
     proptest! {
-        /// A body that is not symmetric, too, is met in all lengths.
+        /// A body that is not symmetric also gets all lengths exactly.
         #[test]
         fn lengths_of_any_possible_body_are_exact(
             factors in proptest::array::uniform17(0.97..1.03_f64), phase in 0.0..1.0_f64,
@@ -475,7 +476,7 @@ mod tests {
             for (length, factor) in lengths.to.0[1..].iter_mut().chain(&mut lengths.rigid).zip(factors) {
                 *length *= factor;
             }
-            // The shoulders need reach: nearly collinear ones may not exist.
+            // Shoulders need some distance from the line; nearly collinear ones may not exist.
             if let Ok(walker) = StickWalker::new(&lengths) {
                 prop_assert!(worst_length(&walker.posed(phase, DVec3::ONE), &lengths) < 1e-9);
             }

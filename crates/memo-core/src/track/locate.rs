@@ -20,7 +20,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LocateError {
-    /// The rectangles do not fit a person standing on the ground before this camera.
+    /// The rectangles do not fit a person standing on the ground in front of this camera.
     #[error(transparent)]
     Position(#[from] PositionError),
     /// No camera could be made from the person.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 pub struct Path {
     /// The point of the ground plane where `along` is 0, metres.
     pub origin: DVec2,
-    /// Direction the body faces, radians about world Z; `along` grows in this direction.
+    /// Direction the body faces, radians about world Z; `along` increases in this direction.
     pub heading_rad: f64,
 }
 

@@ -1,43 +1,44 @@
-//! Exact cover: the best way of dividing points into pieces, and how sure each piece is.
+//! Exact cover: the division of points into pieces with the smallest cost, and the certainty of each piece.
 //!
-//! Every subset of the points is looked at once (dynamic programming over bit masks), so both the least cost
-//! and the sum over all covers are exact. Time and memory grow with 2^points.
+//! Every subset of the points is visited once (dynamic programming over bit masks), so the smallest cost and the
+//! sum over all covers are exact. Time and memory grow with 2^points.
 
-/// Most points that are covered.
+/// Maximum number of points to cover.
 pub const MOST_POINTS: usize = 16;
 
-/// A set of points that may stand together, and what that costs.
+/// A set of points that may form a group, with its cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// The points, bit by bit; not empty.
+    /// Bit mask of the points; not empty.
     pub mask: u32,
     /// Its cost, finite.
     pub cost: f64,
 }
 
-/// The cover of least cost, and what all covers say about each piece.
+/// The cover of the smallest cost, and the cost and weight of all covers for each piece.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cover {
-    /// Its pieces, by index, in the order of their lowest points.
+    /// Indices of its pieces, in the order of their lowest points.
     pub chosen: Vec<usize>,
     /// Sum of their costs.
     pub cost: f64,
-    /// For each piece, least cost of a cover that has it; infinite if none has.
+    /// For each piece, the smallest cost of a cover that contains it; infinite if there is none.
     pub cost_with: Vec<f64>,
-    /// For each piece, share of the weight exp(-cost / temperature) of all covers that have it.
+    /// For each piece, the share of the weight exp(-cost / temperature) of all covers that contain it.
     pub share: Vec<f64>,
 }
 
 /// The best cover of `points` points; `None` if the pieces cannot cover them.
 ///
-/// Pieces are laid in the order of the lowest point not covered, so that every cover is counted once. With
-/// B(S) the least cost of covering the set S and A(S) that of having covered all but S,
+/// Pieces are added in the order of the lowest point not covered, so that every cover is counted once. Let B(S)
+/// be the smallest cost of covering the set S, and A(S) that of having covered all but S. Then
 ///
 /// ```text
 /// B(S) = min over pieces p that hold the lowest point of S of  cost(p) + B(S \ p)
 /// ```
 ///
-/// and the least cost with p is min over S of A(S) + cost(p) + B(S \ p). Sums of weights go the same way.
+/// and the smallest cost with p is min over S of A(S) + cost(p) + B(S \ p). Sums of weights are computed in the
+/// same way.
 pub(super) fn best_cover(points: usize, pieces: &[Piece], temperature: f64) -> Option<Cover> {
     assert!((1..=MOST_POINTS).contains(&points), "between 1 and {MOST_POINTS} points can be covered");
     let by_lowest =
@@ -63,7 +64,7 @@ pub(super) fn best_cover(points: usize, pieces: &[Piece], temperature: f64) -> O
     if !least[full].is_finite() {
         return None;
     }
-    // Weights relative to the best way of covering the same set, so that nothing underflows that matters.
+    // Weights relative to the best cover of the same set, so that no significant weight underflows.
     let weight = |from: f64, to: f64, cost: f64| ((from - cost - to) / temperature).exp();
     let mut sum = vec![0.0; full + 1];
     sum[0] = 1.0;
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
     use crate::synth::Random;
 
-    /// Every cover, found by trying all pieces in all ways.
+    /// All covers, by trying all pieces in all ways.
     fn all_covers(left: u32, pieces: &[Piece]) -> Vec<Vec<usize>> {
         if left == 0 {
             return vec![vec![]];

@@ -1,22 +1,23 @@
-//! Depths over time: from the planar windows, and carried with known lengths through the others.
+//! Depths over time: from windows with planar motion, and carried through the others with known lengths.
 
 use super::{Chain, FigureWindow, Status};
 use crate::planar::Verdict;
 use glam::DVec2;
 
-/// Where the points of a frame in space come from.
+/// Source of the depths of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DepthSource {
     /// From a plane.
     Planar,
-    /// From lengths of an earlier or later planar period.
+    /// Carried with lengths from an earlier or later window with planar motion.
     Carried,
     /// Not known.
     Unknown,
 }
 
-/// Depths of all points over all frames: from the interpreted window whose middle is nearest, each chain's
-/// reflection following the window before; then, if asked, carried through the rest.
+/// Depths of all points over all frames. They come from the interpreted window with the nearest middle, and each
+/// chain's reflection follows the window before. Then, if requested, they are carried through the remaining
+/// frames.
 pub(super) fn depth_over_time(
     tracks: &[Vec<DVec2>],
     windows: &[FigureWindow],
@@ -57,8 +58,8 @@ fn same_chain(window: &FigureWindow, chain: &Chain) -> Option<usize> {
     window.figure.chains.iter().position(|other| other.points == chain.points)
 }
 
-/// For each chain of each window the sign that fits the same points in the window before where they overlap.
-/// What joint limits have told stays.
+/// For each chain of each window, the sign that fits the same points in the window before where they overlap.
+/// Signs from joint limits are kept.
 fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
     let mut signs: Vec<Vec<f64>> = Vec::with_capacity(windows.len());
     for (index, window) in windows.iter().enumerate() {
@@ -82,13 +83,14 @@ fn reflections(windows: &[&FigureWindow]) -> Vec<Vec<f64>> {
     signs
 }
 
-/// Goes on with the lengths of the chains that did not leave their planes through the frames before, between
-/// and after the windows.
+/// Carries the lengths of the chains that did not leave their planes through the frames before, between and after
+/// the windows.
 ///
-/// A link of length L and image vector d has |z| = sqrt(L^2 - |d|^2), or 0 where the image is too long. The
-/// signs are those of the path from the depths before to those after that accelerates least (sum of squared
-/// second differences). Where both ends are known they also choose the reflection after the gap, unless joint
-/// limits have. Where a link passes parallel to the image the two signs meet and the path may choose wrongly.
+/// A link of length L with image vector d has |z| = sqrt(L^2 - |d|^2), or 0 if the image is too long. The signs
+/// are those of the path from the depths before to those after with the smallest acceleration (sum of squared
+/// second differences). If both ends are known, they also determine the reflection after the gap, unless joint
+/// limits have done so. When a link becomes parallel to the image, the two signs give the same depth, and the
+/// path may continue with the wrong one.
 fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], depth: &mut [f64]) {
     let frames = tracks[0].len();
     for after in 0..=read.len() {
@@ -123,7 +125,7 @@ fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], 
             if turned.1 < kept.1 && next.reflection_margin_deg.is_none() {
                 for (later, signs) in read[after..].iter().zip(&mut signs[after..]) {
                     let Some(same) = same_chain(later, chain) else { continue };
-                    // What joint limits have settled stays.
+                    // Signs from joint limits are kept.
                     if later.figure.chains[same].reflection_margin_deg.is_some() {
                         break;
                     }
@@ -148,25 +150,25 @@ fn carry(tracks: &[Vec<DVec2>], read: &[&FigureWindow], signs: &mut [Vec<f64>], 
     }
 }
 
-/// Depths of a chain in a frame of its window, of one reflection; empty where there is none.
+/// Depths of a chain in a frame of its window, for one reflection; empty if the frame is not in the window.
 fn row(chain: &Chain, frame: Option<usize>, sign: f64) -> Vec<f64> {
     let depths = frame.and_then(|t| chain.depth.get(t));
     depths.map_or(Vec::new(), |depths| depths.iter().map(|z| sign * z).collect())
 }
 
-/// Frames without a plane, and a chain whose lengths are known.
+/// Frames without a plane, for a chain whose lengths are known.
 struct Gap<'a> {
     tracks: &'a [Vec<DVec2>],
     chain: &'a Chain,
     from: usize,
     to: usize,
-    /// Whether depths are known after it only.
+    /// True if depths are known only after the gap.
     is_backwards: bool,
 }
 
 impl Gap<'_> {
-    /// Paths of all links from two rows of depths to two others, if given, and what they cost. Backwards in
-    /// time the two rows are those after the gap, the later first.
+    /// Paths of all links from two rows of depths to two others, if given, and their costs. Backwards in time the
+    /// two first rows are those after the gap, the later one first.
     fn paths(&self, start: &[Vec<f64>; 2], end: Option<&[Vec<f64>; 2]>) -> (Vec<Vec<f64>>, f64) {
         let (mut paths, mut total) = (Vec::new(), 0.0);
         for (k, link) in self.chain.links.iter().enumerate() {
@@ -207,8 +209,8 @@ impl Gap<'_> {
     }
 }
 
-/// Signs of `sizes` for the least sum of squared second differences, after two known values and before two
-/// others, if given. Unknown sizes are passed over in a straight line and stay unknown.
+/// Signs of `sizes` for the smallest sum of squared second differences, after two known values and before two
+/// others, if given. Unknown sizes are bridged by a straight line and stay unknown.
 fn smoothest(sizes: &[f64], start: [f64; 2], end: Option<[f64; 2]>) -> (Vec<f64>, f64) {
     let mut choices: Vec<[f64; 2]> = start.iter().map(|&z| [z; 2]).collect();
     let known: Vec<usize> = (0..sizes.len()).filter(|&t| sizes[t].is_finite()).collect();
@@ -227,8 +229,7 @@ fn smoothest(sizes: &[f64], start: [f64; 2], end: Option<[f64; 2]>) -> (Vec<f64>
         choices.push([size, -size]);
     }
     choices.extend(end.into_iter().flatten().map(|z| [z; 2]));
-    // costs[i][j]: of the best path whose last two choices are i and j; came[t][i][j]: the choice before
-    // them.
+    // costs[i][j]: cost of the best path with last two choices i and j; came[t][i][j]: the choice before them.
     let mut costs = [[0.0f64; 2]; 2];
     let mut came: Vec<[[usize; 2]; 2]> = Vec::with_capacity(choices.len());
     for window in choices.windows(3) {
@@ -306,7 +307,7 @@ mod tests {
             for [a, b] in limbs() {
                 let depth = |z: &[f64]| z[t * 12 + b] - z[t * 12 + a];
                 let length = (tracks[b][t] - tracks[a][t]).extend(depth(&truth)).length();
-                // Up to the chain's reflection, which is that of the first frame.
+                // The chain's reflection is arbitrary; here it is that of the first frame.
                 let sign = (limb_depth(&found.depth, 0, [a, b]) * limb_depth(&truth, 0, [a, b])).signum();
                 errors.push((sign * depth(&found.depth) - depth(&truth)).abs() / length);
             }
@@ -335,7 +336,7 @@ mod tests {
         assert!(reach(1.0) < reach(-1.0));
     }
 
-    /// A window with one rod between points 0 and 1, at these depths; its reflection known or not.
+    /// A window with one rod between points 0 and 1, with these depths and a known or unknown reflection.
     fn window(start: usize, depths: &[f64], margin: Option<f64>) -> FigureWindow {
         use crate::planar::figure::{Figure, Link, Method};
         use crate::planar::{Evidence, FalseTargetRate, Plane};
@@ -370,13 +371,14 @@ mod tests {
         FigureWindow { start, end, status: Status::Interpreted, chains: [1, 0, 0], figure }
     }
 
-    /// What two windows share decides whether the later one is turned, and a turned one turns the next.
+    /// The overlap with the window before decides whether a window is reflected, and a reflected one affects the
+    /// next.
     #[test]
     fn the_sign_is_carried_from_window_to_window() {
         let depth = |t: usize| (0.5 * t as f64).sin();
         let part =
             |from: usize, to: usize, sign: f64| (from..to).map(|t| sign * depth(t)).collect::<Vec<_>>();
-        // Truth with the second, the third and the fifth window read the other way round.
+        // The truth, with the second, the third and the fifth window reflected.
         let windows = [
             window(0, &part(0, 10, 1.0), None),
             window(5, &part(5, 15, -1.0), None),
@@ -392,7 +394,7 @@ mod tests {
             assert!((found[2 * t + 1] - depth(t)).abs() < 1e-12, "frame {t}");
             assert_eq!((found[2 * t], sources[t]), (0.0, DepthSource::Planar));
         }
-        // A reflection that anatomy told stays, and is the start of what follows.
+        // A reflection from joint limits is kept, and the following windows depend on it.
         let told = [
             window(0, &part(0, 10, 1.0), None),
             window(5, &part(5, 15, -1.0), Some(9.0)),
@@ -402,18 +404,18 @@ mod tests {
         assert_eq!(reflections(&read), [[1.0], [1.0], [-1.0]]);
     }
 
-    /// Of two windows that hold a frame the one counts whose middle is nearer.
+    /// If two windows contain a frame, the one with the nearer middle is used.
     #[test]
     fn a_frame_is_read_by_the_window_around_it() {
         let windows = [window(0, &[1.0; 10], None), window(4, &[2.0; 10], None)];
         let tracks = vec![vec![DVec2::ZERO; 14]; 2];
         let (found, _) = depth_over_time(&tracks, &windows, false);
-        // Middles at frames 4.5 and 8.5: the first up to frame 6.
+        // Middles at frames 4.5 and 8.5: the first is used up to frame 6.
         let first: Vec<usize> = (0..14).filter(|&t| found[2 * t + 1] == 1.0).collect();
         assert_eq!(first, [0, 1, 2, 3, 4, 5, 6]);
     }
 
-    /// A rod that goes on through a gap tells how the window after it is to be read, and those that follow it.
+    /// A rod carried through a gap determines the reflection of the window after it and of those that follow.
     #[test]
     fn the_sign_is_carried_through_a_gap() {
         let depth = |t: usize| (0.15 * t as f64).sin();
@@ -436,14 +438,14 @@ mod tests {
                 [sources[10], sources[25], sources[35]],
                 [DepthSource::Planar, DepthSource::Carried, DepthSource::Planar]
             );
-            // Beyond the last window it goes on as it was.
+            // After the last window the depths are carried on.
             assert!((found[2 * 58 + 1] - depth(58)).abs() < 1e-6 && sources[58] == DepthSource::Carried);
         }
-        // Anatomy's word is kept, and what was before stays too.
+        // A reflection from joint limits is kept, and so are the depths before it.
         let windows = [window(0, &part(0, 20, 1.0), None), window(30, &part(30, 45, -1.0), Some(9.0))];
         let (found, _) = depth_over_time(&tracks, &windows, true);
         assert!((found[2 * 40 + 1] + depth(40)).abs() < 1e-6 && (found[2 * 10 + 1] - depth(10)).abs() < 1e-6);
-        // Before the first window it is carried backwards.
+        // Before the first window the depths are carried backwards.
         let (found, sources) = depth_over_time(&tracks, &[window(8, &part(8, 30, 1.0), None)], true);
         for t in 0..8 {
             assert!((found[2 * t + 1] - depth(t)).abs() < 1e-6, "frame {t}");

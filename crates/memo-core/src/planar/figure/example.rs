@@ -5,8 +5,8 @@ use crate::model::{Body, Gait, GaitStyle, Walker};
 use crate::synth::{Random, View, WalkOptions, limbs_of, sampled_walk};
 use glam::{DVec2, DVec3};
 
-/// The model walking for `frames` frames at 60 Hz, turned about its pelvis by `turn(time)`, seen 35 degrees
-/// off the side at 200 px/m: tracks and true depths (T x 12) of the 12 joints.
+/// The body model walking for `frames` frames at 60 Hz, rotated about its pelvis by `turn(time)`, seen 35 degrees
+/// from the side at 200 px/m: tracks and true depths (T x 12) of the 12 joints.
 pub(super) fn walker(
     frames: usize,
     turn: impl Fn(f64) -> f64,

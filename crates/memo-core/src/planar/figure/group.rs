@@ -1,5 +1,5 @@
-//! The groups of a window: all rods and hinges that may be part of the figure, what they cost, and the
-//! division into groups that costs least.
+//! The groups of a window: all rods and hinges that may be part of the figure, their costs, and the division into
+//! groups with the smallest cost.
 
 use super::FigureOptions;
 use super::cover::{MOST_POINTS, Piece, best_cover};
@@ -9,12 +9,12 @@ use crate::planar::{
 };
 use glam::{DVec2, DVec3};
 
-/// Fits of all rods of a window, and what they cost.
+/// Fits and distances of all rods of a window.
 struct Rods {
     points: usize,
-    /// Of i < j at i * points + j; `None` where they cannot be fitted.
+    /// For i < j at index i * points + j; `None` if they cannot be fitted.
     fits: Vec<Option<RodFit>>,
-    /// What sets two points apart, both ways, relative to the size.
+    /// Separation of two points, in both directions, relative to the size.
     apart: Vec<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Rods {
         self.apart[i * self.points + j]
     }
 
-    /// What sets a group apart from the nearest point outside it, by one of its ends.
+    /// Separation of a group from the nearest point outside it, measured at one of its ends.
     fn detachment(&self, ends: &[usize], group: &[usize], most: f64) -> f64 {
         let outside = |j: &usize| !group.contains(j);
         let nearest = |&end: &usize| (0..self.points).filter(outside).map(move |j| self.apart(end, j));
@@ -57,24 +57,24 @@ impl Rods {
     }
 }
 
-/// A residual without (a share of) what noise adds to it.
+/// A residual without (a share of) the contribution of noise.
 fn unexplained(residual_rms: f64, options: &FigureOptions) -> f64 {
     residual_rms - options.costs.noise * std::f64::consts::SQRT_2 * options.fit.noise_sd
 }
 
-/// RMS motion of an image vector without what noise adds to it: four coordinates.
+/// RMS motion of an image vector without the contribution of noise to its four coordinates.
 fn clean_motion(motion: f64, options: &FigureOptions) -> f64 {
     (motion * motion - 4.0 * options.fit.noise_sd.powi(2)).max(0.0).sqrt()
 }
 
 /// A hinge of the window that may be part of the figure.
 struct Candidate {
-    /// End, pivot, end; or end, end; or one point.
+    /// End, pivot, end; or end, end; or a single point.
     points: Vec<usize>,
     cost: f64,
 }
 
-/// The figure of least cost in one window.
+/// The figure with the smallest cost in one window.
 pub(super) fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOptions) -> Figure {
     let rods = Rods::fitted(tracks, size, options);
     if tracks.len() > options.most_covered.min(MOST_POINTS) {
@@ -88,7 +88,7 @@ pub(super) fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOption
     let cover = best_cover(tracks.len(), &pieces, options.costs.temperature)
         .expect("single points are among the pieces");
     let rival = |link: [usize; 2]| {
-        // Every cover has one piece that holds the link's first point.
+        // Every cover contains one piece with the link's first point.
         let holds = |c: &Candidate| c.points.contains(&link[0]) && !links_of(&c.points).any(|l| l == link);
         let others = candidates.iter().zip(&cover.cost_with).filter(|(c, _)| holds(c));
         others.map(|(_, &cost)| cost).fold(f64::INFINITY, f64::min)
@@ -107,7 +107,7 @@ pub(super) fn best_figure(tracks: &[&[DVec2]], size: f64, options: &FigureOption
     Figure { method: Method::Cover, chains, joints, alone, cost: cover.cost * size, size }
 }
 
-/// The links of a chain's points in order.
+/// The links of a chain, from its points in order.
 fn links_of(points: &[usize]) -> impl Iterator<Item = [usize; 2]> {
     points.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])])
 }
@@ -142,7 +142,7 @@ fn candidates(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptio
     found
 }
 
-/// How groups sit on each other: the least spanning forest over ends that stay together.
+/// Contacts between groups: the minimum spanning forest over ends that stay together.
 fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions) -> Vec<Contact> {
     let ends = |group: &[usize]| [group[0], group[group.len() - 1]];
     let mut pairs = Vec::new();
@@ -160,7 +160,7 @@ fn joints(groups: &[Vec<usize>], rods: &Rods, size: f64, options: &FigureOptions
     edges.into_iter().map(|(apart, points)| Contact { points, apart: apart * size }).collect()
 }
 
-/// Kruskal's forest over edges (weight, node, node, what), weights and whats returned, lightest first.
+/// Kruskal's forest over edges (weight, node, node, label). Returns weights and labels, smallest weight first.
 fn spanning_forest(nodes: usize, edges: &mut [(f64, usize, usize, [usize; 2])]) -> Vec<(f64, [usize; 2])> {
     edges.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.3.cmp(&y.3)));
     let mut tree: Vec<usize> = (0..nodes).collect();
@@ -175,7 +175,7 @@ fn spanning_forest(nodes: usize, edges: &mut [(f64, usize, usize, [usize; 2])]) 
     kept
 }
 
-/// A group of the figure with all that is known about it; `None` if its points cannot be fitted.
+/// A group of the figure with all its results; `None` if its points cannot be fitted.
 fn chain(
     group: &[usize],
     tracks: &[&[DVec2]],
@@ -201,7 +201,7 @@ fn chain(
     if let [a, b] = points[..] {
         let fit = rods.fit(a, b)?;
         let depth_of = |sign: f64| fit.depth.iter().map(|z| sign * z).collect::<Vec<_>>();
-        // The fit's pivot is the lower index.
+        // The pivot of the fit is the lower index.
         let depth = depth_of(if a < b { 1.0 } else { -1.0 });
         return Some(Chain {
             links: lengths(&[fit.length], &[fit.covariance.z_axis.z.sqrt()]),
@@ -231,17 +231,17 @@ fn chain(
     })
 }
 
-/// Angle at the pivot of a hinge in one frame, radians; NaN where unseen.
+/// Angle at the pivot of a hinge in one frame, radians; NaN if a point is not seen.
 fn angle(fit: &HingeFit, [a, pivot, b]: [DVec2; 3], frame: usize) -> f64 {
     let [first, second] = fit.depth[frame];
     let (u, v): (DVec3, DVec3) = ((a - pivot).extend(first), (b - pivot).extend(second));
     u.cross(v).length().atan2(u.dot(v))
 }
 
-/// Links by a minimum spanning tree over rods; each a chain of its own.
+/// Links by a minimum spanning tree over rods; each link is a chain of its own.
 ///
-/// A rod weighs its residual and twice the cover's cost of its length: rods alone leave more to the length
-/// than hinges do. (Residual times length loses a few limbs more at 0 px and many at 2 px.)
+/// The weight of a rod is its residual plus twice the cover's cost of its length: for rods alone, length is more
+/// important than for hinges. (Residual times length loses a few more limbs at 0 px and many at 2 px.)
 fn forest(tracks: &[&[DVec2]], rods: &Rods, size: f64, options: &FigureOptions) -> Figure {
     let points = tracks.len();
     let mut edges = Vec::new();
@@ -293,7 +293,7 @@ mod tests {
                 assert!((chain.angle_rad[t] - angle).abs() < 0.02);
             }
         }
-        // The four chains sit on each other by shoulders and hips.
+        // The four chains are in contact by shoulders and hips.
         assert_eq!(window.figure.joints.len(), 3);
         assert!(window.figure.joints.iter().all(|j| j.points.iter().all(|p| p % 3 == 0)));
     }
@@ -318,26 +318,26 @@ mod tests {
         FigureOptions { fit, ..FigureOptions::default() }
     }
 
-    /// Of a residual the share that noise explains is no cost, nor is the noise's part of a motion one.
+    /// The share of a residual that noise explains costs nothing, and neither does the noise's part of a motion.
     #[test]
     fn noise_costs_nothing() {
         let share = FigureOptions::default().costs.noise;
         assert!((unexplained(0.05, &options(0.02)) - (0.05 - share * 2f64.sqrt() * 0.02)).abs() < 1e-12);
         assert_eq!(unexplained(0.05, &options(0.0)), 0.05);
-        // Resting points show a motion of 2 standard deviations.
+        // Points at rest have an apparent motion of 2 standard deviations.
         assert!(clean_motion(0.04, &options(0.02)) < 1e-9);
         assert!((clean_motion(0.05, &options(0.02)) - 0.03).abs() < 1e-12);
     }
 
-    /// Two rods and a hinge that all turn about one point of a body, and a pair far from it.
+    /// Two rods and a hinge that all rotate about one point of a body, and a pair far from it.
     fn rods_of(tracks: &[Vec<DVec2>], size: f64) -> (Vec<&[DVec2]>, Rods) {
         let part: Vec<&[DVec2]> = tracks.iter().map(|track| &track[..]).collect();
         let rods = Rods::fitted(&part, size, &FigureOptions::default());
         (part, rods)
     }
 
-    /// A chain starts at the end that sits on another one, and depths are against its first point whatever the
-    /// numbers of its points are.
+    /// A chain starts at the end that is in contact with another one. Depths are relative to its first point,
+    /// whatever the indices of its points.
     #[test]
     fn a_chain_starts_where_it_sits_on_others() {
         let (tracks, _, truth) = walker(66, |_| 0.0, 0.0);
@@ -359,13 +359,13 @@ mod tests {
         let back = chain(&[6, 7], &part, &rods, &joints, &options, &judge).unwrap();
         assert_eq!((&forth.points, &back.points), (&vec![6, 7], &vec![7, 6]));
         for (t, (from, to)) in tracks[6].iter().zip(&tracks[7]).enumerate() {
-            // The same rod in the same plane from the other end: the opposite depth.
+            // The same rod in the same plane from the other end has the opposite depth.
             assert!((forth.depth[t][1] + back.depth[t][1]).abs() < 1e-9);
             let z = forth.plane.depth(*to - *from);
             assert!((forth.depth[t][1] - z).abs() < 1e-9);
             assert!(sign_of([6, 7], t, z) * sign_of([6, 7], 0, forth.depth[0][1]) >= 0.0);
         }
-        // Deviations of lengths are roots of the covariance.
+        // Standard deviations of lengths are square roots of the covariance.
         let hinge = fit_hinge(part[6], part[7], part[8], &options.fit).unwrap();
         let hinged = chain(&[6, 7, 8], &part, &rods, &[], &options, &judge).unwrap();
         for (k, link) in hinged.links.iter().enumerate() {
@@ -373,7 +373,7 @@ mod tests {
         }
     }
 
-    /// An angle beyond a right one is one, not its supplement.
+    /// An obtuse angle is reported as such, not as its supplement.
     #[test]
     fn angles_are_between_the_segments() {
         let (tracks, times_s, truth) = walker(66, |_| 0.0, 0.0);
@@ -391,8 +391,8 @@ mod tests {
         assert!(obtuse > 100);
     }
 
-    /// The cost of a cover is that of its pieces: what noise leaves of the residual and 2 % of the length, over
-    /// the figure's size; a pair pays for being one, a point for being alone.
+    /// The cost of a cover is that of its pieces: the residual without noise, plus 2 % of the length, divided by
+    /// the figure's size; in addition the cost of a rod or of a single point.
     #[test]
     fn pieces_cost_residual_length_and_what_they_are() {
         let (tracks, ..) = walker(66, |_| 0.0, 1.0);
@@ -417,11 +417,11 @@ mod tests {
         assert!((cost(&[6, 7, 8]) - own - apart(&[6, 8], &[6, 7, 8])).abs() < 1e-12);
     }
 
-    /// Chains that are farther from each other than a detached group costs do not sit on each other.
+    /// Chains are not in contact if their distance is larger than the cost of a detached group.
     #[test]
     fn only_what_is_near_sits_on_each_other() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
-        // Two walkers, the second one walking alike far away and out of step.
+        // Two walkers; the second one is far away, with the same gait and out of step.
         let (other, ..) = walker(120, |_| 0.0, 0.0);
         let mut both: Vec<Vec<DVec2>> = tracks[..6].to_vec();
         let wander = |t: usize| DVec2::new(900.0 + 3.0 * t as f64, 200.0 * (0.11 * t as f64).sin());
@@ -435,7 +435,7 @@ mod tests {
         assert!(figure.joints.iter().all(|j| (j.points[0] < 6) == (j.points[1] < 6)), "{:?}", figure.joints);
     }
 
-    /// A forest's edges are weighed by residual and length together: a near point that moves otherwise is
+    /// Edges of a forest are weighted by residual and length together: a near point that moves differently is
     /// farther than the next one of the limb.
     #[test]
     fn a_forest_spans_what_moves_together() {
@@ -444,11 +444,11 @@ mod tests {
         let found = interpret_figure(&tracks, &times_s, &options).unwrap();
         let (_, rods) = rods_of(&tracks, found.windows[0].figure.size);
         let weight = |i: usize, j: usize| rods.fit(i, j).map(|fit| fit.residual_rms + 0.04 * fit.length);
-        // No edge left out joins what an edge of more weight joins.
+        // No omitted edge joins points that are joined by an edge of larger weight.
         let links = sorted_links(&found.windows[0].figure);
         for i in 0..12 {
             for j in i + 1..12 {
-                // Two shoulders that do not move against each other are no rod.
+                // Two shoulders without relative motion are not a rod.
                 let Some(direct) = weight(i, j) else { continue };
                 let mut reached = vec![(i, 0.0f64)];
                 let mut at = 0;
@@ -474,7 +474,7 @@ mod tests {
         }
     }
 
-    /// The margin of a link is by how much the best figure without it costs more, and its size is the figure's.
+    /// The margin of a link is the extra cost of the best figure without it, scaled by the figure's size.
     #[test]
     fn the_margin_of_a_link_is_the_cost_of_its_rival() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 0.5);

@@ -1,21 +1,20 @@
-//! Positions that jump away from their track and back: wrong detections, taken out before groups are fitted.
+//! Jumps: positions that leave their track and return. They are wrong detections and are removed before the fits.
 //!
-//! A group's fit can leave views out as well
-//! ([`FitOptions::max_outlier_fraction`](crate::planar::FitOptions)), which costs it ten times the time; here
-//! order in time is known, and a track is looked at once.
+//! The fit of a group can also exclude views ([`FitOptions::max_outlier_fraction`](crate::planar::FitOptions)),
+//! but then takes ten times as long. Here the order in time is known, and each track is checked once.
 //!
-//! What it cannot do: tell a wrong position that stays for several frames.
+//! Limits: a wrong position that stays for several frames is not detected.
 
 use glam::DVec2;
 
-/// A position is a jump when it is this many times the usual distance from the middle of its neighbours.
+/// A position is a jump if its distance from the middle of its neighbours is this many times the usual one.
 const JUMP: f64 = 10.0;
 
-/// The same track without jumps; `noise_sd` of each coordinate.
+/// The same track without jumps; `noise_sd` is the standard deviation of each coordinate.
 ///
-/// The distance of p_t from (p_t-1 + p_t+1) / 2 is that of the acceleration, and noise. A foot that lands has
-/// a large one, but of at most half of |p_t+1 - p_t-1|: a jump is farther off than its neighbours are apart.
-/// A wrong position disturbs its neighbours' distances by half of its own, so the largest goes first.
+/// The distance of p_t from (p_t-1 + p_t+1) / 2 is due to acceleration and noise. It is large for a foot that
+/// lands, but at most half of |p_t+1 - p_t-1|: a jump is larger than the distance between its neighbours. A wrong
+/// position changes its neighbours' distances by half of its own, so the largest is removed first.
 pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     let mut clean = track.to_vec();
     let off = |track: &[DVec2], t: usize| {
@@ -31,9 +30,9 @@ pub(super) fn without_jumps(track: &[DVec2], noise_sd: f64) -> Vec<DVec2> {
     }
     let middle = distances.len() / 2;
     let usual = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // Noise alone makes a median distance of 1.44 standard deviations.
+    // Noise alone gives a median distance of 1.44 standard deviations.
     let limit = JUMP * usual.max(1.44 * noise_sd);
-    // Where more than a tenth would have to go, the track is rough, not wrong.
+    // If more than a tenth would be removed, the track is rough and not wrong.
     let most = (track.len() / 10).max(1);
     for _ in 0..=most {
         let turns_back = |t: usize, d: f64| d > clean[t - 1].distance(clean[t + 1]);
@@ -92,7 +91,7 @@ mod tests {
         }
     }
 
-    /// Noise that is stated makes jumps of ten times its size usual, where points hardly move otherwise.
+    /// If points hardly move, the stated noise is the usual distance, and jumps are ten times as large.
     #[test]
     fn a_jump_is_large_beside_the_noise_that_was_stated() {
         let mut track = vec![DVec2::ZERO; 40];
@@ -102,7 +101,7 @@ mod tests {
         track[20].y = 12.0;
         assert!(without_jumps(&track, 0.0)[20].is_nan());
         assert!(without_jumps(&track, 0.5)[20].is_nan());
-        // 14.4 px of a noise of 1 px.
+        // 14.4 px for a noise of 1 px.
         assert_eq!(without_jumps(&track, 1.0), track);
     }
 }

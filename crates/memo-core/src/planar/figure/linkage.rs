@@ -1,13 +1,13 @@
-//! A linkage found in moving points: links, chains, and how chains sit on each other.
+//! A linkage of moving points: links, chains, and contacts between chains.
 
 use crate::planar::{Evidence, Plane, Verdict};
 
-/// How the links were found.
+/// Method by which the links were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// The least costly exact cover.
+    /// The exact cover with the smallest cost.
     Cover,
-    /// A minimum spanning tree over rods: too many points for a cover.
+    /// A minimum spanning tree over rods, for more points than a cover allows.
     Forest,
 }
 
@@ -20,17 +20,16 @@ pub struct Link {
     pub length: f64,
     /// Its standard deviation (first order).
     pub length_sd: f64,
-    /// By how much the best figure without this link costs more, in the unit of the tracks; infinite if there
-    /// is none.
+    /// Extra cost of the best figure without this link, in the unit of the tracks; infinite if there is none.
     pub margin: f64,
-    /// Share of the weight of all figures that have this link, in [0, 1]; NaN for a forest.
+    /// Share of the weight of all figures that contain this link, in [0, 1]; NaN for a forest.
     pub confidence: f64,
 }
 
 /// One or two links in one plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    /// End and end (2), or end, pivot, end (3). The first is nearest to the rest of the body.
+    /// End and end (2), or end, pivot, end (3). The first is the nearest to the rest of the body.
     pub points: Vec<usize>,
     /// The links, in that order.
     pub links: Vec<Link>,
@@ -38,35 +37,35 @@ pub struct Chain {
     pub plane: Plane,
     /// RMS of the residuals, in the unit of the tracks.
     pub residual_rms: f64,
-    /// Whether its motion is evidence of a plane.
+    /// Evidence that its motion is planar.
     pub evidence: Evidence,
-    /// Depth of each point against the first, frame by frame in the order of `points`; NaN where unseen.
-    /// Or all with the other sign.
+    /// Depth of each point relative to the first, frame by frame in the order of `points`; NaN if not seen. All
+    /// signs may be opposite.
     pub depth: Vec<Vec<f64>>,
-    /// By how many degrees its joints keep their ranges better than those of its mirror; `None` where the
-    /// reflection is open. See [`interpret_named_figure`](super::interpret_named_figure).
+    /// Excess over the joint limits of the mirror less that of this reflection, degrees; `None` if the reflection
+    /// is not determined. See [`interpret_named_figure`](super::interpret_named_figure).
     pub reflection_margin_deg: Option<f64>,
-    /// Angle at the pivot frame by frame, radians, π = straight; empty for a rod. The mirror has the same.
+    /// Angle at the pivot frame by frame, radians, π = straight; empty for a rod. The mirror has the same angle.
     pub angle_rad: Vec<f64>,
 }
 
-/// Where two groups sit on each other: a pair of points that hardly moves apart.
+/// Contact of two groups: a pair of points with almost no relative motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// A point of each group.
     pub points: [usize; 2],
-    /// What sets them apart (residual and motion), in the unit of the tracks.
+    /// Separation of the two points (residual and motion), in the unit of the tracks.
     pub apart: f64,
 }
 
-/// A linkage found in one window.
+/// The linkage of one window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// How it was found.
+    /// Method by which it was found.
     pub method: Method,
     /// Its chains.
     pub chains: Vec<Chain>,
-    /// How chains and single points sit on each other, best first; points of no joint stand free.
+    /// Contacts of chains and single points, best first. Points without contact are not listed.
     pub joints: Vec<Contact>,
     /// Points in no chain.
     pub alone: Vec<usize>,
@@ -77,7 +76,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// All links.
+    /// The links of all chains.
     pub fn links(&self) -> impl Iterator<Item = &Link> {
         self.chains.iter().flat_map(|chain| &chain.links)
     }

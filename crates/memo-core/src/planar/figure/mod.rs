@@ -1,21 +1,22 @@
-//! From unnamed moving points to a linkage: which points are joined, in which planes they swing, how long the
-//! limbs are.
+//! A linkage from unnamed moving points: which points are linked, the planes in which they swing, and the lengths
+//! of the limbs.
 //!
-//! Hoffman and Flinchbaugh 1982, section 6: divide the points into groups of two and three, test each group
-//! for planar motion, combine. They leave "combine" open, and with real walking the test alone does not do:
-//! joints of one body are related, so several false groups fit as well as the true ones. Here the groups
-//! compete: the figure is the least costly division of all points into hinges (three points), rods (two) and
-//! points left alone (exact cover). A group costs what its plane leaves unexplained, a little for its length,
-//! and what sets it apart from the nearest rest of the body: the end of a limb sits on a trunk that hardly
-//! moves against other trunk points, whereas the pieces of a limb cut wrongly do not. Where there are too
-//! many points, a minimum spanning tree over rods (`Method::Forest`) takes its place: with little noise it
-//! finds nine limbs in ten, with false links among them, at 2 px eight in ten.
+//! Hoffman and Flinchbaugh 1982, section 6: divide the points into groups of two and three, test each group for
+//! planar motion, combine. They do not specify "combine", and for real walking the test alone is not sufficient:
+//! joints of one body are related, so several false groups fit as well as the true ones. Here the groups compete:
+//! the figure is the division of all points into hinges (three points), rods (two) and single points with the
+//! smallest cost (exact cover). The cost of a group is what its plane leaves unexplained, a small cost of its
+//! length, and its separation from the nearest part of the rest of the body: the end of a limb is attached to a
+//! trunk that hardly moves relative to other trunk points, whereas wrong parts of a limb are not attached. If
+//! there are too many points, a minimum spanning tree over rods (`Method::Forest`) is used instead: with little
+//! noise it finds nine limbs in ten, with false links among them; at 2 px eight in ten.
 //!
-//! Costs are in units of the figure's size and were chosen on four walks (see `tests/planar_figure.rs`).
+//! Costs are in units of the figure's size. They were chosen on four walks (see `tests/planar_figure.rs`).
 //!
-//! What it cannot do: tell a chain from its mirror; give the depth of one chain against another; read figures
-//! whose limbs leave their planes (turning, spinning): such windows are reported lost. A limb that hardly
-//! moves in the image is joined by its shortness alone; its links say so by their confidence.
+//! Limits: a chain cannot be distinguished from its mirror, the depth of one chain relative to another is not
+//! known, and figures whose limbs leave their planes (turning, spinning) cannot be interpreted; their windows are
+//! reported as lost. A limb that hardly moves in the image is linked only because it is short; its links have a
+//! low confidence.
 
 mod cover;
 mod depth;
@@ -44,97 +45,97 @@ use rayon::prelude::*;
 use reflection::reflect_by_anatomy;
 use thiserror::Error;
 
-/// More points than this are refused.
+/// Maximum number of points.
 pub const MOST_TRACKS: usize = 200;
 
-/// Why tracks could not be read as a figure.
+/// Why no figure was found.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FigureError {
     /// Fewer than two points, or too many.
     #[error("{}: between 2 and {MOST_TRACKS} can be linked", counted(*points, "point"))]
     Points {
-        /// Points given.
+        /// Number of points.
         points: usize,
     },
-    /// A track does not have one position a time.
+    /// A track has not as many positions as there are times.
     #[error("track {track} has {} for {}", counted(*positions, "position"), counted(*times, "time"))]
     Lengths {
-        /// The track.
+        /// Index of the track.
         track: usize,
-        /// Its positions.
+        /// Number of its positions.
         positions: usize,
-        /// Times given.
+        /// Number of times.
         times: usize,
     },
-    /// Not one name a track.
+    /// There are not as many names as tracks.
     #[error("{} for {}", counted(*names, "name"), counted(*tracks, "track"))]
     Names {
-        /// Names given.
+        /// Number of names.
         names: usize,
-        /// Tracks given.
+        /// Number of tracks.
         tracks: usize,
     },
-    /// Too few frames for any test.
+    /// There are too few frames for any test.
     #[error("too few frames: {frames}, at least {FEWEST_FRAMES} wanted")]
     Frames {
-        /// Frames given.
+        /// Number of frames.
         frames: usize,
     },
-    /// A position is infinite or absurd.
+    /// A position is infinite or too large.
     #[error("track {track} at frame {frame} is at ({u}, {v}): pixels wanted, NaN for unseen")]
     Position {
-        /// The track.
+        /// Index of the track.
         track: usize,
-        /// The frame.
+        /// Index of the frame.
         frame: usize,
-        /// Column given.
+        /// Column, u.
         u: f64,
-        /// Row given.
+        /// Row, v.
         v: f64,
     },
-    /// Times do not increase.
+    /// The times do not increase.
     #[error("times must be finite and increase, frame {frame} does not")]
     Times {
-        /// First such frame.
+        /// Index of the first such frame.
         frame: usize,
     },
-    /// All points are in one place, or none is ever seen.
+    /// All points have the same position, or none is ever seen.
     #[error("the points have no extent: nothing to link")]
     NoExtent,
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// Somebody wished it to end.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
-/// A pause in the tracks is longer than so many usual intervals and than this share of a window.
+/// A pause in the tracks is longer than this many usual intervals and than this share of a window.
 const MISSED_FRAMES: f64 = 5.0;
 const PAUSE_OF_WINDOW: f64 = 0.25;
 
-/// Sizes of a figure, in the unit of its positions: costs relative to them stay finite.
+/// Accepted sizes of a figure, in the unit of its positions: costs relative to them stay finite.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
-/// Fewest frames of a window.
+/// Minimum number of frames of a window.
 const FEWEST_FRAMES: usize = 8;
 
 /// Costs of the groups, in units of the figure's size (RMS distance of the points from their middle; about
 /// 0.42 m for a person).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Costs {
-    /// Of each unit of length, without a unit. 0.02: true links are shorter than false ones that fit as well;
-    /// anything from 0.01 to 0.03 does nearly as well.
+    /// Cost per unit of length, dimensionless. Default 0.02: true links are shorter than false ones that fit as
+    /// well. Values from 0.01 to 0.03 give nearly the same results.
     pub length: f64,
-    /// Of a rod, because limbs have two segments.
+    /// Cost of a rod, because limbs have two segments.
     pub rod: f64,
-    /// Of a point left alone, at most: one that stays close to another point costs what sets them apart.
+    /// Maximum cost of a single point; near another point the cost is their separation.
     pub alone: f64,
-    /// Of a group that sits on nothing, at most.
+    /// Maximum cost of a group that is not in contact with another.
     pub detached: f64,
-    /// Share of the noise's part of the residual that is not counted. Not all: false groups are noisy too.
+    /// Share of the noise's part of the residual that is not counted. Not all of it: false groups are noisy too.
     pub noise: f64,
-    /// Scale of the costs at which covers are weighed against each other for the confidence.
+    /// Scale of the costs for weighting covers, from which the confidence is computed.
     pub temperature: f64,
 }
 
@@ -144,26 +145,25 @@ impl Default for Costs {
     }
 }
 
-/// How tracks are read as a figure.
+/// Options of [`interpret_figure`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FigureOptions {
-    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are taken out of the
-    /// tracks before, so that by default no fit seeks outliers again.
+    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are removed from the
+    /// tracks first, so by default the fits do not look for outliers.
     pub fit: FitOptions,
-    /// Rate of false targets of the verdicts.
+    /// Options of the verdicts, with the false-target rate.
     pub evidence: EvidenceOptions,
     /// Costs of the groups.
     pub costs: Costs,
     /// Size of the figure in the unit of the tracks (RMS distance of its joints from their middle, about a
-    /// quarter of a person's height); `None` takes that of the points given.
+    /// quarter of a person's height); `None` uses that of the given points.
     pub size: Option<f64>,
-    /// Length of the windows in time, seconds. 1.2, about a stride; half a stride still does, less does not.
-    /// Tracks of up to one and a half windows are read as one.
+    /// Duration of the windows, seconds. Default 1.2, about a stride; half a stride is sufficient, less is not.
+    /// Tracks of up to one and a half windows are one window.
     pub window_s: f64,
-    /// Most points that are divided by exact cover, at most [`MOST_POINTS`]; more are linked by a spanning
-    /// tree.
+    /// Maximum number of points for the exact cover, at most [`MOST_POINTS`]; more are linked by a spanning tree.
     pub most_covered: usize,
-    /// Whether a figure's lengths are carried through windows in which it is lost.
+    /// True to carry a figure's lengths through windows in which it is lost.
     pub carries_structure: bool,
 }
 
@@ -181,51 +181,51 @@ impl Default for FigureOptions {
     }
 }
 
-/// Whether a window could be read.
+/// Status of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// More chains move in planes than leave them.
     Interpreted,
     /// As many chains leave their planes as move in them, or more.
     Lost,
-    /// Hardly anything moves: no chain speaks for or against planes.
+    /// Almost nothing moves: no chain is evidence for or against planes.
     Still,
     /// Too little was seen for any chain.
     Unseen,
 }
 
-/// One window in time.
+/// A window in time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FigureWindow {
-    /// First frame.
+    /// Index of the first frame.
     pub start: usize,
-    /// Frame after the last.
+    /// Index of the last frame plus one.
     pub end: usize,
     /// Whether it could be read.
     pub status: Status,
-    /// Chains that move in their plane, leave it, and say nothing.
+    /// Number of chains that move in their plane, that leave it, and without a verdict.
     pub chains: [usize; 3],
-    /// The best figure, also when lost.
+    /// The best figure, also if the status is lost.
     pub figure: Figure,
 }
 
-/// What was made of all tracks.
+/// Result for all tracks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interpretation {
     /// The windows, in order; they overlap by half.
     pub windows: Vec<FigureWindow>,
-    /// Depth of each point against the first point of its chain, T x K, in the unit of the tracks; NaN where
-    /// not known. The sign follows from window to window while these overlap; each chain may be reflected.
+    /// Depth of each point relative to the first point of its chain, T x K, in the unit of the tracks; NaN if not
+    /// known. The sign is consistent between overlapping windows; each chain may be reflected.
     pub depth: Vec<f64>,
-    /// By frame.
+    /// Source of the depths of each frame.
     pub sources: Vec<DepthSource>,
 }
 
-/// Reads unnamed tracks (K tracks of T image positions, NaN where unseen) as a figure, window by window.
+/// Finds a linkage in unnamed tracks (K tracks of T image positions, NaN for points not seen), window by window.
 ///
 /// # Errors
-/// Fewer than two tracks, too many, differing lengths, too few frames, infinite positions, times that do not
-/// increase, senseless options.
+/// Fewer than two tracks, too many, different lengths, too few frames, infinite positions, times that do not
+/// increase, invalid options.
 pub fn interpret_figure(
     tracks: &[Vec<DVec2>],
     times_s: &[f64],
@@ -234,8 +234,8 @@ pub fn interpret_figure(
     interpret_with_progress(tracks, None, times_s, options, &Progress::new())
 }
 
-/// [`interpret_figure`] of points of which some are known joints: where limbs are found among them, joint
-/// limits tell each limb from its mirror ([`Chain::reflection_margin_deg`]).
+/// [`interpret_figure`] for points of which some are known joints: if limbs consist of them, joint limits
+/// distinguish each limb from its mirror ([`Chain::reflection_margin_deg`]).
 ///
 /// # Errors
 /// Those of [`interpret_figure`]; not as many names as tracks.
@@ -248,10 +248,11 @@ pub fn interpret_named_figure(
     interpret_with_progress(tracks, Some(joints), times_s, options, &Progress::new())
 }
 
-/// [`interpret_figure`], or with joints [`interpret_named_figure`], counting windows in `progress`.
+/// [`interpret_figure`], or [`interpret_named_figure`] if joints are given, with progress and cancellation; the
+/// units are windows.
 ///
 /// # Errors
-/// Theirs, and [`FigureError::Stopped`].
+/// Those of these functions, and [`FigureError::Stopped`].
 pub fn interpret_with_progress(
     tracks: &[Vec<DVec2>],
     joints: Option<&[Option<Joint>]>,
@@ -269,12 +270,12 @@ pub fn interpret_with_progress(
     if !SIZES.contains(&size) {
         return Err(FigureError::NoExtent);
     }
-    // 1. The tracks without single wrong positions, in windows.
+    // 1. Remove single wrong positions, and divide the tracks into windows.
     let clean: Vec<Vec<DVec2>> =
         tracks.iter().map(|track| without_jumps(track, options.fit.noise_sd)).collect();
     let ranges = windows(times_s, options.window_s);
     progress.expect(ranges.len());
-    // 2. The best figure of each.
+    // 2. The best figure of each window.
     let read = |(start, end)| {
         let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
         let figure = best_figure(&part, size, options);
@@ -282,7 +283,7 @@ pub fn interpret_with_progress(
         Ok(FigureWindow::judged(start, end, figure))
     };
     let mut windows = ranges.into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
-    // 3. Limbs told from their mirrors, and everything followed over time.
+    // 3. Reflections from joint limits, and depths over time.
     if let Some(joints) = joints {
         reflect_by_anatomy(&mut windows, tracks, joints);
     }
@@ -291,7 +292,7 @@ pub fn interpret_with_progress(
 }
 
 impl FigureWindow {
-    /// The window of a figure, with the status that its chains give it.
+    /// The window of a figure, with the status from its chains.
     fn judged(start: usize, end: usize, figure: Figure) -> Self {
         let planar = figure.count(|v| v == Verdict::Planar);
         let refuted = figure.count(|v| v == Verdict::NotPlanar);
@@ -373,14 +374,14 @@ fn size_of(tracks: &[Vec<DVec2>]) -> f64 {
     if number > 0.0 { (squares / number).sqrt() } else { 0.0 }
 }
 
-/// Windows of a length in time that overlap by half; the last ends with the tracks.
+/// Windows of a given duration that overlap by half; the last one ends with the tracks.
 fn windows(times_s: &[f64], window_s: f64) -> Vec<(usize, usize)> {
     let frames = times_s.len();
     let mut intervals_s: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = intervals_s.len() / 2;
     let usual_s = *intervals_s.select_nth_unstable_by(middle, f64::total_cmp).1;
     let long = ((window_s / usual_s).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
-    // No window spans a pause.
+    // No window contains a pause.
     let pause_s = (MISSED_FRAMES * usual_s).max(PAUSE_OF_WINDOW * window_s);
     let after_pause = (1..frames).filter(|&t| times_s[t] - times_s[t - 1] > pause_s);
     let bounds: Vec<usize> = std::iter::once(0).chain(after_pause).chain([frames]).collect();
@@ -477,7 +478,7 @@ mod tests {
                 FigureOptions { fit: FitOptions { noise_sd: bad, ..FitOptions::default() }, ..fresh() };
             assert!(matches!(refused(&tracks, &times_s, options), FigureError::Option(_)));
         }
-        // With noise beside so small a size, costs would be infinite.
+        // With noise and so small a size, costs would be infinite.
         let fit = FitOptions { noise_sd: 3.0, ..FitOptions::default() };
         for size in [5e-324, 1e-300, 1e-10, 0.0, -1.0, 1e300, f64::NAN, f64::INFINITY] {
             let options = FigureOptions { size: Some(size), fit, ..fresh() };
@@ -490,7 +491,7 @@ mod tests {
         assert_eq!(refused(&tiny, &times_s, FigureOptions { fit, ..fresh() }), FigureError::NoExtent);
     }
 
-    /// Windows are as long as asked and overlap by half or more; what is shorter than one and a half is one.
+    /// Windows have the requested duration and overlap by half or more; up to one and a half windows are one.
     #[test]
     fn windows_cover_a_stretch_and_overlap_by_half() {
         for (frames, long) in [(30, 20), (31, 20), (40, 20), (59, 20), (61, 20), (200, 24)] {
@@ -504,12 +505,12 @@ mod tests {
             for pair in found.windows(2) {
                 assert!(pair[0].0 < pair[1].0 && 2 * (pair[0].1 - pair[1].0) >= long, "{found:?}");
             }
-            // No more of them than half-overlaps need.
+            // No more windows than half-overlaps need.
             assert!((found.len() - 2) * long < 2 * (frames - long), "{found:?}");
         }
     }
 
-    /// More planar chains than refuted ones give another answer than chains without evidence alone.
+    /// The status is different for more planar than refuted chains and for chains without evidence.
     #[test]
     fn a_window_is_judged_by_its_chains() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
@@ -534,7 +535,7 @@ mod tests {
         assert_eq!(FigureWindow::judged(0, 66, alone).status, Status::Unseen);
     }
 
-    /// Points at (±3, ±4) about a wandering middle are 5 from it; what is not seen does not count.
+    /// Points at (±3, ±4) about a moving middle are at distance 5 from it; points not seen do not count.
     #[test]
     fn the_size_is_the_distance_from_the_middle() {
         let corner = |x: f64, y: f64| -> Vec<DVec2> {

@@ -1,14 +1,14 @@
-//! Which of its two reflections each limb has, where the points are known by name.
+//! The reflection of each limb, for points with known names.
 //!
-//! Hoffman and Flinchbaugh 1982 leave every limb's reflection about the image plane open. A body does not:
-//! knees bend backwards, elbows forwards, thighs and upper arms keep to their ranges (Lee and Chen 1985,
-//! Table 1, as in [`crate::posture::limits`]). That needs to know where the body faces, which the same points
-//! tell: a body that faces away from the camera shows its right hip and shoulder on the right. Among the
-//! facings on that side the one is taken in which the limbs, each in its better reflection, keep their ranges
-//! best and, among equals, swing nearest to the sagittal plane.
+//! Hoffman and Flinchbaugh 1982 leave every limb's reflection about the image plane undetermined. The limits of
+//! the body determine it: knees bend backward, elbows forward, thighs and upper arms stay in their ranges (Lee
+//! and Chen 1985, Table 1, as in [`crate::posture::limits`]). This requires the facing direction of the body,
+//! which the same points show: a body that faces away from the camera has its right hip and shoulder on the
+//! right. Among the facing directions on that side, the one is chosen in which the limbs, each in its better
+//! reflection, exceed their ranges least and, among equal ones, swing nearest to the sagittal plane.
 //!
-//! What it cannot do: seen from the side the reflections of a sagittal plane are one, and from the front hips
-//! do not tell which way; the margins say so. The image's v axis is taken for the vertical of an upright
+//! Limits: seen from the side, both reflections of a sagittal plane are equal; from the front, the hips do not
+//! show the facing direction. The margins show this. The image's v axis is taken as the vertical of an upright
 //! trunk.
 
 use super::{Figure, FigureWindow, Verdict};
@@ -17,14 +17,14 @@ use crate::model::limits::Limits;
 use crate::model::skeleton::{Joint, Side};
 use glam::{DMat3, DVec2, DVec3};
 
-/// Facings tried, all round.
+/// Number of facing directions tried, over the full circle.
 const FACINGS: usize = 48;
 
-/// Weight of the angle out of the sagittal plane beside the excess over a range: it only decides where no
-/// range does.
+/// Weight of the angle out of the sagittal plane relative to the excess over a range: it decides only if no range
+/// does.
 const SAGITTAL: f64 = 0.3;
 
-/// The joint of a name, as `right_knee` or `RKN`; none for other points.
+/// The joint with a name such as `right_knee` or `RKN`; `None` for other points.
 pub fn joint_of(name: &str) -> Option<Joint> {
     let short = |joint: &Joint| {
         let (side, part) = joint.name().split_once('_')?;
@@ -42,12 +42,12 @@ pub fn joint_of(name: &str) -> Option<Joint> {
     Joint::from_name(name).or_else(|| Joint::ALL.into_iter().find(|j| short(j).is_some_and(|s| s == name)))
 }
 
-/// What is known of a limb from its joints' names.
+/// A limb, identified by the names of its joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Limb {
     side: Side,
     is_leg: bool,
-    /// Whether the chain starts at the trunk.
+    /// True if the chain starts at the trunk.
     from_trunk: bool,
 }
 
@@ -65,8 +65,8 @@ impl Limb {
         find([a, b, c], true).or_else(|| find([c, b, a], false))
     }
 
-    /// Mean cost of a reflection, degrees squared, for a body of these axes; the chain's points in space by
-    /// frame.
+    /// Mean cost of a reflection, degrees squared, for a body with these axes; `frames` are the chain's points in
+    /// space by frame.
     fn cost(&self, frames: &[[DVec3; 3]], sign: f64, axes: &DMat3, limits: &Limits) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for points in frames {
@@ -81,8 +81,8 @@ impl Limb {
                 (limits.shoulder_swing, limits.elbow.excess(elbow_rad(axes, u, v)))
             };
             let sideways = if self.is_leg { limits.hip_abduction } else { limits.shoulder_abduction };
-            // The fold's full angle where it goes the wrong way: as far as it leaves the sagittal plane it
-            // does not.
+            // For a bend in the wrong direction, the full angle of the bend. A bend out of the sagittal plane
+            // counts less.
             let excess = [
                 swing.excess(swing_rad(axes, u)),
                 sideways.excess(abduction_rad(axes, u, self.side)),
@@ -97,13 +97,13 @@ impl Limb {
     }
 }
 
-/// Axes of an upright trunk that faces an angle from the image's right away from the camera.
+/// Axes of an upright trunk that faces this angle from the image's right, away from the camera.
 fn upright(facing_rad: f64) -> DMat3 {
     let forward = DVec3::new(facing_rad.cos(), 0.0, facing_rad.sin());
     DMat3::from_cols(forward, DVec3::Y, forward.cross(DVec3::Y))
 }
 
-/// Mean of u of the right less the left of shoulders and hips, over frames; none where neither pair is known.
+/// Mean difference of u between right and left shoulders and hips, over frames; `None` if neither pair is known.
 fn right_of_left(tracks: &[&[DVec2]], joints: &[Option<Joint>]) -> Option<f64> {
     let at = |joint: Joint| joints.iter().position(|j| *j == Some(joint)).map(|k| tracks[k]);
     let pairs = [[Joint::RightShoulder, Joint::LeftShoulder], [Joint::RightHip, Joint::LeftHip]];
@@ -115,8 +115,8 @@ fn right_of_left(tracks: &[&[DVec2]], joints: &[Option<Joint>]) -> Option<f64> {
     (!apart.is_empty()).then(|| apart.iter().sum::<f64>() / apart.len() as f64)
 }
 
-/// Takes of every named limb of a window the reflection that a body can do; its margin into the chain. Limbs
-/// that leave their planes stay open.
+/// Chooses for every named limb of a window the reflection within the limits of the body, and stores the margin
+/// in the chain. Limbs that leave their planes stay undetermined.
 fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], limits: &Limits) {
     let Some(apart) = right_of_left(tracks, joints) else { return };
     let mut limbs: Vec<(usize, Limb, Vec<[DVec3; 3]>)> = Vec::new();
@@ -130,7 +130,7 @@ fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], l
         let frames = (0..chain.depth.len()).map(|t| [0, 1, 2].map(|k| point(t, k)));
         limbs.push((index, limb, frames.filter(|f| f.iter().all(|p| p.is_finite())).collect()));
     }
-    // sin of the facing has the sign of `apart`: away from the camera shows the right on the right.
+    // sin of the facing angle has the sign of `apart`: a body facing away has its right side on the right.
     let facings = (0..=FACINGS / 2).map(|i| std::f64::consts::TAU * i as f64 / FACINGS as f64);
     let costs_at = |facing_rad: f64| -> Vec<[f64; 2]> {
         let axes = upright(facing_rad.copysign(apart));
@@ -155,8 +155,8 @@ fn reflect(figure: &mut Figure, tracks: &[&[DVec2]], joints: &[Option<Joint>], l
     }
 }
 
-/// Takes of every limb the reflection that a body can do, given which joint each point is. A chain whose
-/// margin is `None` stays open.
+/// Chooses for every limb the reflection within the limits of the body, given the joint of each point. If the
+/// margin of a chain is `None`, its reflection is undetermined.
 pub(super) fn reflect_by_anatomy(
     windows: &mut [FigureWindow],
     tracks: &[Vec<DVec2>],
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_knee_bends_backwards_and_an_elbow_forwards() {
-        // Facing the camera: the knee towards it (z < 0), the ankle back; arms the other way round.
+        // Facing the camera: the knee is nearer to it (z < 0), the ankle behind; for arms the opposite.
         let leg = vec![[DVec3::ZERO, DVec3::new(2.0, 80.0, -30.0), DVec3::new(3.0, 160.0, 10.0)]; 5];
         let axes = upright(-std::f64::consts::FRAC_PI_2);
         let cost = |is_leg: bool, sign: f64| {
@@ -198,15 +198,15 @@ mod tests {
 
     const FREE: DMat3 = DMat3::IDENTITY;
 
-    /// A limb of one frame in the axes of somebody who faces along x, y down, z to the left.
+    /// A limb of one frame in the axes of a person who faces along x, y down, z to the left.
     fn cost(limb: &Limb, segments: [DVec3; 2]) -> f64 {
         let points = [DVec3::ZERO, segments[0], segments[0] + segments[1]];
         let points = if limb.from_trunk { points } else { [points[2], points[1], points[0]] };
         limb.cost(&[points], 1.0, &FREE, &Limits::measured())
     }
 
-    /// Squares of the degrees by which a limb leaves each limit, and of 0.3 of its angles out of the sagittal
-    /// plane: upper and lower segment apart.
+    /// Squares of the degrees by which a limb exceeds each limit, and of 0.3 of its angles out of the sagittal
+    /// plane, for the upper and the lower segment separately.
     #[test]
     fn a_limb_costs_what_it_leaves_its_limits_and_its_plane_by() {
         let swung = |deg: f64| DVec3::new(deg.to_radians().sin(), deg.to_radians().cos(), 0.0);
@@ -221,7 +221,8 @@ mod tests {
                 // Knee bent forward by 20, 12 beyond; elbow bent back by 20, 15 beyond.
                 (&leg, [DVec3::Y, swung(20.0)], 144.0),
                 (&arm, [DVec3::Y, swung(-20.0)], 225.0),
-                // Shank 30 degrees aside: 9 of 30. The thigh too: each its 9, and a leg spread by 40 is allowed.
+                // Shank 30 degrees to the side: 9 of 30. The thigh as well: 9 for each, and a leg spread by 40 is
+                // allowed.
                 (&leg, [DVec3::Y, aside(30.0)], 81.0),
                 (&leg, [aside(30.0), aside(30.0)], 162.0),
                 // Across the other leg by 45 degrees: 10 beyond 35, and 13.5 squared twice.
@@ -237,8 +238,8 @@ mod tests {
         }
     }
 
-    /// Somebody who walks to the right of the picture, seen 30 degrees from behind or from the front: which
-    /// side is nearer tells the reflection, and so does which shoulder is to the right.
+    /// A person who walks to the right of the image, seen 30 degrees from behind or from the front: the nearer
+    /// side determines the reflection, and so does the shoulder that is on the right.
     #[test]
     fn anatomy_finds_the_reflection_of_a_walk() {
         use crate::planar::figure::example::walker;
@@ -249,7 +250,7 @@ mod tests {
             let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
             let joints: Vec<Option<Joint>> =
                 WALKER_NAMES.iter().take(12).map(|name| joint_of(name)).collect();
-            // From either reading of every chain.
+            // Starting from either reflection of every chain.
             for mirrored in [false, true] {
                 let mut windows = found.windows.clone();
                 for chain in &mut windows[0].figure.chains {
@@ -276,7 +277,7 @@ mod tests {
         }
     }
 
-    /// The margin is the difference of the root mean squares of both readings, degrees.
+    /// The margin is the difference of the root mean squares of both reflections, degrees.
     #[test]
     fn the_margin_is_in_degrees() {
         use crate::planar::figure::example::walker;
@@ -304,7 +305,7 @@ mod tests {
                 })
                 .collect()
         };
-        // Of the facings that show the right side as it is seen, the one that all limbs together like best.
+        // Among the facing directions with the right side as seen, the one with the smallest cost over all limbs.
         let facing = |i: i32| (f64::from(i) * std::f64::consts::TAU / 48.0).copysign(apart);
         let total = |costs: &[[f64; 2]]| costs.iter().map(|[a, b]| a.min(*b)).sum::<f64>();
         let best = (0..=24)

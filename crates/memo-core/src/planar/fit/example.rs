@@ -7,8 +7,8 @@ pub(super) fn normal(random: &mut Random) -> DVec2 {
     DVec2::from_array(random.normal_pair().map(f64::from))
 }
 
-/// First end, pivot and second end of a hinge of lengths 0.4 and 0.45 that swings in the plane and is
-/// carried about.
+/// First end, pivot and second end of a hinge of lengths 0.4 and 0.45 that swings in the plane while its pivot
+/// moves.
 pub(super) fn swinging(slope: DVec2, views: usize, sd: f64, random: &mut Random) -> [Vec<DVec2>; 3] {
     let along = slope.try_normalize().unwrap_or(DVec2::X);
     let cos_tilt = 1.0 / (1.0 + slope.length_squared()).sqrt();

@@ -1,11 +1,11 @@
-//! The sums that a refinement step needs, over several views at a time.
+//! The sums of a refinement step, over several views at a time.
 
 use super::{Solution, View};
 use nalgebra::{Matrix4, Vector4};
 use pulp::Simd;
 use std::ops::{Add, Mul, Sub};
 
-/// Numbers of as many views as a vector of the processor holds.
+/// One number per view, as many as a vector of the processor holds.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd>(S, S::f64s);
 
@@ -42,7 +42,7 @@ impl<S: Simd> Lanes<S> {
         Self(simd, simd.splat_f64s(value))
     }
 
-    /// Self times another plus a third.
+    /// Self times `by` plus `plus`.
     #[inline(always)]
     fn times_plus(self, by: Self, plus: Self) -> Self {
         Self(self.0, self.0.mul_add_e_f64s(self.1, by.1, plus.1))
@@ -61,10 +61,10 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// A multiple of every vector's length.
+/// A multiple of every vector length.
 const PADDING: usize = 8;
 
-/// Image vectors of one rod, coordinate by coordinate, padded; weight 0 where missing, else 1.
+/// Image vectors of one rod, one array per coordinate, padded; weight 0 if missing, else 1.
 #[derive(Debug, Clone)]
 struct Column {
     x: Vec<f64>,
@@ -72,16 +72,16 @@ struct Column {
     weight: Vec<f64>,
 }
 
-/// The views of K rods, column by column.
+/// The views of K rods, one column per rod.
 #[derive(Debug, Clone)]
 pub(super) struct Columns<const K: usize>([Column; K]);
 
-/// Cost, normal matrix and right side of the least squares, in the order (p, q, c of the first rod, of the
+/// Cost, normal matrix and right-hand side of the least squares, in the order (p, q, c of the first rod, of the
 /// second).
 pub(super) type NormalEquations = (f64, Matrix4<f64>, Vector4<f64>);
 
 impl<const K: usize> Columns<K> {
-    /// Views as columns; `size` is the length of a harmless vector.
+    /// Views as columns; `size` is the length of the vector used for missing views.
     pub(super) fn new(views: &[View<K>], size: f64) -> Self {
         let long = views.len().next_multiple_of(PADDING);
         Self(std::array::from_fn(|k| {
@@ -107,7 +107,8 @@ struct Sums<'a, const K: usize> {
     floor_sq: f64,
 }
 
-/// One rod in some views: residual, its derivatives by p, q and c, and M d; see [`Problem`](super::Problem).
+/// Terms of one rod in some views: residual, its derivatives by p, q and c, and M d; see
+/// [`Problem`](super::Problem).
 #[derive(Clone, Copy)]
 struct Terms<S: Simd> {
     r: Lanes<S>,
@@ -118,7 +119,7 @@ struct Terms<S: Simd> {
     m_y: Lanes<S>,
 }
 
-/// The slope, and constants, in every lane.
+/// The slope and constants, in every lane.
 struct At<S: Simd> {
     p: Lanes<S>,
     q: Lanes<S>,
@@ -130,7 +131,7 @@ struct At<S: Simd> {
 }
 
 impl<S: Simd> At<S> {
-    /// Of image vectors (x, y) with a weight and a squared length c.
+    /// Terms of image vectors (x, y) with a weight and a squared length c.
     #[inline(always)]
     fn terms(&self, [x, y, weight]: [Lanes<S>; 3], c: Lanes<S>) -> Terms<S> {
         let (p, q) = (self.p, self.q);
@@ -146,7 +147,7 @@ impl<S: Simd> At<S> {
     }
 }
 
-/// The sums so far.
+/// The accumulated sums.
 struct Total<S: Simd> {
     cost: Lanes<S>,
     right: [Lanes<S>; 4],

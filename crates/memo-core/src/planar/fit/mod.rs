@@ -1,23 +1,24 @@
-//! Least squares for one plane shared by one or two rods, over any number of views.
+//! Least squares for one plane common to one or two rods, over any number of views.
 //!
-//! Hoffman and Flinchbaugh 1982 prove what the fewest views determine; this is the same constraint with more
-//! views and noise. A rod's image vector d_i = (x_i, y_i), from its pivot, has depth g . d_i with g = (p, q),
-//! so
+//! Hoffman and Flinchbaugh 1982 prove what the minimum number of views determines. This fit uses the same
+//! constraint with more views and noise. A rod's image vector d_i = (x_i, y_i), from its pivot, has depth g . d_i
+//! with g = (p, q), so
 //!
 //! ```text
 //! h_i(g) = |d_i|^2 + (g . d_i)^2 = d_i' M d_i = c,    M = I + g g',  c = length^2
 //! ```
 //!
-//! The residual is the error of h_i over the length of its gradient in the image, 2 |M d_i|: a distance in
-//! the image (Sampson). Two rods share g and each has its c. The pivot's noise is in both of a hinge's rods:
-//! their residuals correlate by (M a . M b) / (2 |M a| |M b|), which the fit takes into account.
+//! The residual is the error of h_i divided by the length of its gradient in the image, 2 |M d_i|: a distance in
+//! the image (Sampson). Two rods have the same g, and each has its own c. In a hinge the pivot's noise enters
+//! both rods: their residuals are correlated by (M a . M b) / (2 |M a| |M b|), which the fit takes into account.
 //!
-//! Starts come from moments of (x^2, 2 x y, y^2), in which the cost of a plane takes a constant time: a
+//! Starting values come from moments of (x^2, 2 x y, y^2), for which the cost of a plane takes constant time: a
 //! coarse grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
 //!
-//! What it cannot do: tell a rod from its mirror; see depth from a plane parallel to the image (the slope's
-//! variance grows without bound there) or directions within a plane seen edge-on (hence the tilt limit). Far
-//! from planar the cost has several minima, and a second best may be returned (1 of 30 draws, 12 % dearer).
+//! Limits: a rod cannot be distinguished from its mirror. Depth is not determined for a plane parallel to the
+//! image (the slope's variance grows without bound), and neither are directions within a plane seen edge-on
+//! (hence the tilt limit). For motion far from planar the cost has several minima, and the second best may be
+//! returned (1 of 30 samples, with 12 % higher cost).
 
 #[cfg(test)]
 mod example;
@@ -35,13 +36,13 @@ use lanes::{Columns, NormalEquations};
 use moments::Moments;
 use nalgebra::{Matrix4, Vector4};
 
-/// Slopes beyond this part of the limit count as at the limit: 79.8 of 80 degrees.
+/// Slopes beyond this share of the limit are at the limit: 79.8 of 80 degrees.
 const AT_LIMIT: f64 = 0.98;
 
-/// One view of K rods that share a pivot: image vectors, NaN where missing.
+/// One view of K rods with a common pivot: image vectors, NaN if missing.
 pub(super) type View<const K: usize> = [DVec2; K];
 
-/// What a fit of K rods found.
+/// Result of a fit of K rods.
 #[derive(Debug, Clone)]
 pub(super) struct Fit<const K: usize> {
     pub plane: Plane,
@@ -56,7 +57,7 @@ pub(super) struct Fit<const K: usize> {
     pub at_tilt_limit: bool,
 }
 
-/// Image vectors from the pivot, checked.
+/// Checked image vectors from the pivot.
 pub(super) fn views<const K: usize>(pivot: &[DVec2], ends: [&[DVec2]; K]) -> Result<Vec<View<K>>, FitError> {
     for end in ends {
         if end.len() != pivot.len() {
@@ -78,7 +79,7 @@ pub(super) fn views<const K: usize>(pivot: &[DVec2], ends: [&[DVec2]; K]) -> Res
     Ok((0..pivot.len()).map(difference).collect())
 }
 
-/// Fits one plane to K rods: moments, starts, refinement, then outliers left out.
+/// Fits one plane to K rods: moments, starting values, refinement, then without outliers.
 pub(super) fn fit<const K: usize>(views: &[View<K>], options: &FitOptions) -> Result<Fit<K>, FitError> {
     options.check()?;
     let needed = if K == 1 { 3 } else { 2 };
@@ -103,12 +104,12 @@ pub(super) fn fit<const K: usize>(views: &[View<K>], options: &FitOptions) -> Re
     Ok(all.report(solution, outliers, motion))
 }
 
-/// Views that show rod k.
+/// Number of views that show rod k.
 fn count<const K: usize>(views: &[View<K>], k: usize) -> usize {
     views.iter().filter(|v| !v[k].x.is_nan()).count()
 }
 
-/// Longest image vector.
+/// Length of the longest image vector.
 fn largest<const K: usize>(views: &[View<K>]) -> f64 {
     views.iter().flatten().filter(|d| !d.x.is_nan()).fold(0.0, |most, d| d.length().max(most))
 }
@@ -123,7 +124,7 @@ fn motion_of<const K: usize>(views: &[View<K>]) -> [f64; K] {
     })
 }
 
-/// Slope and squared lengths under way.
+/// Slope and squared lengths during the iteration.
 #[derive(Debug, Clone, Copy)]
 struct Solution<const K: usize> {
     g: DVec2,
@@ -131,7 +132,7 @@ struct Solution<const K: usize> {
     cost: f64,
 }
 
-/// A solution under way with the equations of the next step from it.
+/// A solution during the iteration, with the equations of the next step.
 #[derive(Debug, Clone, Copy)]
 struct Stand<const K: usize> {
     at: Solution<K>,
@@ -139,15 +140,15 @@ struct Stand<const K: usize> {
     right: Vector4<f64>,
 }
 
-/// Views, and what all steps of a fit to them need.
+/// Views, with values that all steps of a fit need.
 struct Problem<'a, const K: usize> {
     views: &'a [View<K>],
     columns: Columns<K>,
     options: &'a FitOptions,
     size: f64,
-    /// Variance of an image coordinate of a rod's vector: both ends are noisy.
+    /// Variance of an image coordinate of a rod's vector: both ends have noise.
     noise_sq: f64,
-    /// Added to |M d|^2: a vector of no length in the image has no gradient.
+    /// Added to |M d|^2, because an image vector of length 0 has no gradient.
     floor_sq: f64,
     slope_limit: f64,
 }
@@ -174,7 +175,7 @@ impl<'a, const K: usize> Problem<'a, K> {
         Problem { views, columns: Columns::new(views, self.size), ..*self }
     }
 
-    /// r = (h - c) / w, w^2 = 4 (|M d|^2 + floor); NaN where missing.
+    /// r = (h - c) / w, w^2 = 4 (|M d|^2 + floor); NaN if missing.
     fn residuals(&self, view: &View<K>, s: &Solution<K>) -> [f64; K] {
         std::array::from_fn(|k| {
             let depth = s.g.dot(view[k]);
@@ -184,10 +185,10 @@ impl<'a, const K: usize> Problem<'a, K> {
         })
     }
 
-    /// Cost, normal matrix and right side at a solution; residuals of a hinge whitened.
+    /// Cost, normal matrix and right-hand side at a solution; residuals of a hinge whitened.
     ///
-    /// With w the gradient's length, dw/dp = 4 (M d) . (x g + depth e_x) / w. Residuals of a hinge's rods
-    /// correlate through the noise of the pivot, by 2 (M a . M b) da/dc db/dc in [-1/2, 1/2].
+    /// With w the length of the gradient, dw/dp = 4 (M d) . (x g + depth e_x) / w. Residuals of a hinge's rods
+    /// are correlated through the noise of the pivot, by 2 (M a . M b) da/dc db/dc in [-1/2, 1/2].
     fn normal_equations(&self, s: &Solution<K>) -> NormalEquations {
         self.columns.normal_equations(s, self.floor_sq)
     }
@@ -197,7 +198,7 @@ impl<'a, const K: usize> Problem<'a, K> {
         Stand { at: Solution { cost, ..at }, normal, right }
     }
 
-    /// A slope within the limit with the squared lengths that fit it best, rod by rod.
+    /// A slope within the limit, with the best squared lengths for it, rod by rod.
     fn at_slope(&self, g: DVec2) -> Stand<K> {
         let g = g.clamp_length_max(0.9999 * self.slope_limit);
         let c = std::array::from_fn(|k| {
@@ -213,7 +214,7 @@ impl<'a, const K: usize> Problem<'a, K> {
         self.stand(Solution { g, c, cost: 0.0 })
     }
 
-    /// Refines the starts a little and the best of them until it stands.
+    /// Refines the starting values for a few steps, and the best of them to convergence.
     fn solve(&self) -> Solution<K> {
         let starts = Moments::new(self.views).starts(self.slope_limit);
         let refined = starts.into_iter().flatten().map(|g| self.refine(self.at_slope(g), 3));
@@ -222,10 +223,11 @@ impl<'a, const K: usize> Problem<'a, K> {
         if best.at.g.length() < AT_LIMIT * self.slope_limit {
             return best.at;
         }
-        // The moments' cost favours the limit more than the exact one does: look inside as well.
+        // The cost from moments favours the limit more than the exact cost does, so slopes inside are tried as
+        // well.
         let [rival, other] = [0.55, 0.15].map(|part| self.refine(self.at_slope(part * best.at.g), 4));
         let rival = if other.at.cost < rival.at.cost { other } else { rival };
-        // What is still far off after some steps does not overtake.
+        // A candidate that is still much worse after some steps is dropped.
         let rival = if rival.at.cost < 1.5 * best.at.cost { self.refine(rival, 8) } else { rival };
         if rival.at.cost < best.at.cost { rival.at } else { best.at }
     }
@@ -279,7 +281,7 @@ impl<'a, const K: usize> Problem<'a, K> {
                 }
             } else {
                 damping *= 10.0;
-                // The step is lost in rounding, or smaller than it would matter.
+                // The step is lost in rounding, or too small to matter.
                 if damping > 1e3 || step.rows(0, 2).norm() <= 1e-13 * (1.0 + u.length()) {
                     break;
                 }
@@ -290,7 +292,7 @@ impl<'a, const K: usize> Problem<'a, K> {
 
     /// Lengths, covariance and residuals at a solution; `self` holds all views.
     ///
-    /// The noise adds noise^2 trace(M) to every h, so c is too large by that.
+    /// The noise adds noise^2 trace(M) to every h, so c is too large by this.
     fn report(&self, s: Solution<K>, outliers: Vec<bool>, motion: [f64; K]) -> Fit<K> {
         let residuals: Vec<[f64; K]> = self.views.iter().map(|v| self.residuals(v, &s)).collect();
         let kept: Vec<View<K>> =

@@ -1,4 +1,4 @@
-//! Where the fit starts: moments in which the cost of a plane takes a constant time.
+//! Starting values of the fit: moments for which the cost of a plane takes constant time.
 
 use super::View;
 use glam::{DMat3, DVec2, DVec3};
@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 const DIRECTIONS: usize = 12;
 const TILTS: usize = 7;
 
-/// Slopes in all directions, up to the mirror, and of all tilts.
+/// Slopes in all directions, up to the mirror, with all tilts.
 pub(super) fn grid(slope_limit: f64) -> [[DVec2; TILTS]; DIRECTIONS] {
     let tilts: [f64; TILTS] =
         std::array::from_fn(|tilt| (slope_limit.atan() * (tilt as f64 + 0.7) / TILTS as f64).tan());
@@ -36,7 +36,7 @@ impl Moments {
                 let u = powers(d) - mean;
                 s += DMat3::from_cols(u.x * u, u.y * u, u.z * u);
             }
-            // |M d|^2 summed, as a quadratic form in v.
+            // The sum of |M d|^2 as a quadratic form in v.
             let (xx, xy, yy) = (total.x, 0.5 * total.y, total.z);
             n += DMat3::from_cols(
                 DVec3::new(xx, xy, 0.0),
@@ -52,8 +52,8 @@ impl Moments {
         v.dot(self.s * v) / v.dot(self.n * v)
     }
 
-    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v'
-    /// N v and near a minimum so is the Hessian.
+    /// Newton steps on the cost: with A = v' S v and T = A / (v' N v), the gradient of T is that of A - T v' N v,
+    /// and near a minimum the same holds for the Hessian.
     fn descend(&self, mut g: DVec2, slope_limit: f64) -> (f64, DVec2) {
         let mut cost = self.cost(g);
         for _ in 0..10 {
@@ -63,7 +63,7 @@ impl Moments {
             let (d_v, d_p, d_q) = (d * v, d * v_p, d * v_q);
             let gradient = DVec2::new(d_v.dot(v_p), d_v.dot(v_q));
             let (pp, pq, qq) = (v_p.dot(d_p) + 2.0 * d_v.x, v_p.dot(d_q) + d_v.y, v_q.dot(d_q) + 2.0 * d_v.z);
-            // Made positive definite where it is not.
+            // Made positive definite if it is not.
             let least = 0.5 * (pp + qq) - (0.25 * (pp - qq) * (pp - qq) + pq * pq).sqrt();
             let add = if least > 0.0 { 0.0 } else { -2.0 * least + 1e-3 * (pp.abs() + qq.abs()) };
             let (pp, qq) = (pp + add, qq + add);
@@ -86,7 +86,7 @@ impl Moments {
         (cost, g)
     }
 
-    /// Slopes to refine: the ellipse fit if it is a plane within the limit, and the two best minima of a
+    /// Slopes to refine: the ellipse fit, if it gives a plane within the limit, and the two best minima of a
     /// grid.
     pub(super) fn starts(&self, slope_limit: f64) -> [Option<DVec2>; 2] {
         let grid = grid(slope_limit);
@@ -112,20 +112,20 @@ impl Moments {
         let fallback = DVec2::new(0.5, 0.5).clamp_length_max(0.5 * slope_limit);
         let [first, second] = best.map(|b| b.map(|(_, g)| self.descend(g, slope_limit)));
         let first = first.unwrap_or((self.cost(fallback), fallback));
-        // A second minimum may win with the exact weights unless it is far worse with these.
+        // A second minimum may be better with the exact weights, unless it is far worse with these.
         let is_rival = |rival: DVec2, cost: f64| {
             cost < 4.0 * first.0 && (rival - first.1).length().min((rival + first.1).length()) > 0.1
         };
         let second = second.filter(|(cost, g)| is_rival(*g, *cost)).map(|(_, g)| g);
         let ellipse = self.ellipse(form(first.1), slope_limit);
-        // The exact ellipse replaces a minimum that it equals; the data may have no noise.
+        // The exact ellipse replaces a minimum equal to it; the data may have no noise.
         match ellipse {
             Some(g) if self.cost(g) <= first.0 => [Some(g), second],
             _ => [Some(first.1), second],
         }
     }
 
-    /// The ellipse of least v' S v / v' N v by inverse iteration; none if it is no rod's.
+    /// The ellipse with the smallest v' S v / v' N v, by inverse iteration; `None` if it is not that of a rod.
     fn ellipse(&self, start: DVec3, slope_limit: f64) -> Option<DVec2> {
         let trace = self.s.x_axis.x + self.s.y_axis.y + self.s.z_axis.z;
         let norm = self.n.x_axis.x + self.n.y_axis.y + self.n.z_axis.z;
@@ -143,14 +143,14 @@ pub(in crate::planar) fn form(g: DVec2) -> DVec3 {
     DVec3::new(1.0 + g.x * g.x, g.x * g.y, 1.0 + g.y * g.y)
 }
 
-/// Slope of a quadratic form (A, B, C) proportional to that of a plane; p >= 0. None if indefinite.
+/// Slope of a quadratic form (A, B, C) proportional to that of a plane; p >= 0. `None` if the form is indefinite.
 ///
-/// The determinant A C - B^2 is asked for as its differences may cancel.
+/// The determinant A C - B^2 is an argument, because its differences may cancel.
 pub(in crate::planar) fn slope_from_form(v: DVec3, determinant: f64) -> Option<DVec2> {
     let half_difference = 0.5 * (v.x - v.z);
     let spread = half_difference.hypot(v.y);
     let mean = 0.5 * (v.x + v.z);
-    // Sign of the form is free; the smaller eigenvalue belongs to the rod's full length.
+    // The sign of the form is arbitrary; the smaller eigenvalue belongs to the full length of the rod.
     let (mean, half_difference, b) =
         if mean < 0.0 { (-mean, -half_difference, -v.y) } else { (mean, half_difference, v.y) };
     let least = determinant / (mean + spread);

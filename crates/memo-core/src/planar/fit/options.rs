@@ -1,4 +1,4 @@
-//! Options of the fits, and why points cannot be fitted.
+//! Options of the fits, and their errors.
 
 use crate::option_error::OptionError;
 use thiserror::Error;
@@ -7,21 +7,21 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// Every point needs one position a view.
+    /// The points have different numbers of views.
     #[error("the points must have as many views as each other, got {pivot} and {end}")]
     Lengths {
-        /// Views of the pivot.
+        /// Number of views of the pivot.
         pivot: usize,
-        /// Views of the other point.
+        /// Number of views of the other point.
         end: usize,
     },
     /// A position is infinite.
     #[error("a position in view {view} is infinite; mark missing points with NaN")]
     Infinite {
-        /// First such view.
+        /// Index of the first such view.
         view: usize,
     },
-    /// The points lie so far apart or so near each other that fourth powers leave the range of numbers.
+    /// The points are so far apart or so close together that fourth powers overflow or underflow.
     #[error("the longest image vector is {largest}; use a unit in which it is nearer to 1")]
     Size {
         /// Length of the longest image vector.
@@ -30,15 +30,15 @@ pub enum FitError {
     /// Too few views show a rod.
     #[error("{needed} views of a rod's points are needed, got {found}")]
     TooFewViews {
-        /// Views found.
+        /// Number of views found.
         found: usize,
-        /// Views needed.
+        /// Number of views needed.
         needed: usize,
     },
-    /// The points do not move relative to each other: every plane fits.
+    /// The points do not move relative to each other, so every plane fits.
     #[error("the points do not move relative to each other (motion {motion})")]
     NoMotion {
-        /// RMS motion of the least moving rod.
+        /// RMS motion of the rod that moves least.
         motion: f64,
     },
     /// An option is outside its range.
@@ -49,15 +49,17 @@ pub enum FitError {
 /// Options of the fits over many views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitOptions {
-    /// Standard deviation of each image coordinate of each point, in the unit of the points. 0 is allowed:
-    /// the covariance then comes from the residuals alone.
+    /// Standard deviation of each image coordinate of each point, in the unit of the points. With 0 the
+    /// covariance comes from the residuals alone.
     pub noise_sd: f64,
-    /// Largest tilt of the plane against the image, degrees. 80: nearer to edge-on the slope is noise.
+    /// Largest tilt of the plane from the image plane, degrees. Default 80: nearer to edge-on the slope is only
+    /// noise.
     pub max_tilt_deg: f64,
-    /// A view is an outlier when a residual exceeds this many robust standard deviations (1.4826 median
-    /// |residual|, at least that of the noise), first about the plane of least median residual.
+    /// A view is an outlier if a residual exceeds this many robust standard deviations (1.4826 median |residual|,
+    /// at least that of the noise), first about the plane of the smallest median residual.
     pub outlier_sd: f64,
-    /// Largest fraction of the views that may be left out as outliers; with more, none is. 0 = keep all.
+    /// Largest fraction of the views that may be excluded as outliers; if there are more, none is excluded. 0 =
+    /// keep all.
     pub max_outlier_fraction: f64,
 }
 

@@ -1,22 +1,22 @@
-//! Views that do not belong: left out if they are few.
+//! Outlier views, which are excluded if they are few.
 
 use super::moments::grid;
 use super::{Problem, Solution, View, count};
 use crate::estimate::median::median;
 use glam::DVec2;
 
-/// The median of what is known; NaN of none.
+/// The median of the known values; NaN if there are none.
 fn known_median(values: &mut Vec<f64>) -> f64 {
     values.retain(|x| !x.is_nan());
     median(values).unwrap_or(f64::NAN)
 }
 
 impl<const K: usize> Problem<'_, K> {
-    /// The fit without outliers and which they are; none if there are none, or too many to tell.
+    /// The fit without outliers, and the outliers; `None` if there are none, or too many.
     ///
-    /// A fit to all views that shows no outlier and a spread like the noise's stands. Else it may be the work
-    /// of outliers: the search starts from the plane of least median residual, and leaves out and fits until
-    /// nothing changes.
+    /// A fit to all views is kept if it shows no outlier and its residuals have the size of the noise. Otherwise
+    /// it may be distorted by outliers: the search starts from the plane of the smallest median residual, and
+    /// repeats excluding and fitting until nothing changes.
     pub(super) fn without_outliers(&self, needed: usize) -> Option<(Solution<K>, Vec<bool>)> {
         if self.options.max_outlier_fraction * (self.views.len() as f64) < 1.0 {
             return None;
@@ -31,7 +31,7 @@ impl<const K: usize> Problem<'_, K> {
         for _ in 0..8 {
             let (_, found) = self.outliers(&solution);
             if found == outliers {
-                // Without any from the start the first fit stands.
+                // If there are no outliers from the start, the first fit is kept.
                 return if found.contains(&true) {
                     self.few(solution, outliers)
                 } else {
@@ -49,14 +49,14 @@ impl<const K: usize> Problem<'_, K> {
         self.few(solution, outliers)
     }
 
-    /// The fit and its outliers if they are few enough.
+    /// The fit and its outliers, if they are few enough.
     fn few(&self, solution: Solution<K>, outliers: Vec<bool>) -> Option<(Solution<K>, Vec<bool>)> {
         let most = self.options.max_outlier_fraction * self.views.len() as f64;
         (outliers.iter().filter(|o| **o).count() as f64 <= most).then_some((solution, outliers))
     }
 
-    /// [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the views
-    /// with a residual beyond.
+    /// The limit of [`FitOptions::outlier_sd`](super::FitOptions::outlier_sd) robust standard deviations, and the
+    /// views with a larger residual.
     fn outliers(&self, solution: &Solution<K>) -> (f64, Vec<bool>) {
         let residuals: Vec<[f64; K]> =
             self.views.iter().map(|v| self.residuals(v, solution).map(f64::abs)).collect();
@@ -65,7 +65,7 @@ impl<const K: usize> Problem<'_, K> {
         (limit, residuals.iter().map(|r| r.iter().any(|r| *r > limit)).collect())
     }
 
-    /// The plane of a grid with the least median of |residual|, each rod's length the median of its own.
+    /// The plane of a grid with the smallest median of |residual|; each rod's length is the median of its own.
     fn least_median(&self) -> Solution<K> {
         let grid = grid(self.slope_limit);
         let mut values = Vec::with_capacity(K * self.views.len());
@@ -109,7 +109,7 @@ mod tests {
             let options = FitOptions { noise_sd: sd, ..FitOptions::default() };
             let fit = fit_hinge(&a, &o, &b, &options).unwrap();
             assert!(fit.depth[7][0].is_nan() && !fit.depth[7][1].is_nan() && fit.depth[20][1].is_nan());
-            // An outlier along the rod's own ellipse is none: ask for those that are far off it.
+            // An outlier along the rod's own ellipse is not detectable, so outliers far off the ellipse are used.
             let limit = options.outlier_sd * 2.0 * sd;
             for view in wrong {
                 let far = fit.residuals[view][0].abs() > 2.0 * limit;
@@ -124,8 +124,8 @@ mod tests {
         assert!(false_alarms < 20, "{false_alarms}");
     }
 
-    /// The limit is `outlier_sd` standard deviations of the residuals: 1.4826 times their median size, the same
-    /// for normal ones; at least those of the noise that was stated.
+    /// The limit is `outlier_sd` standard deviations of the residuals: 1.4826 times the median of their absolute
+    /// values, which is equal for normal residuals; at least those of the stated noise.
     #[test]
     fn the_limit_of_outliers_is_in_standard_deviations() {
         let mut random = Random::new(3);
@@ -135,14 +135,15 @@ mod tests {
             let options = FitOptions { noise_sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
             let problem = Problem::new(&views, 0.4, &options);
             let (limit, outliers) = problem.outliers(&problem.solve());
-            // Of the difference of two points.
+            // The standard deviation of the difference of two points.
             let expected = 4.5 * f64::max(sd, noise_sd) * 2f64.sqrt();
             assert!((limit / expected - 1.0).abs() < 0.05, "{limit} {expected}");
             assert!(outliers.iter().filter(|o| **o).count() <= 1);
         }
     }
 
-    /// More outliers than allowed are none: then the points do not fit, and that is what the residuals say.
+    /// If there are more outliers than allowed, none is excluded: the points do not fit, and the residuals show
+    /// it.
     #[test]
     fn only_few_views_may_be_left_out() {
         let mut random = Random::new(5);

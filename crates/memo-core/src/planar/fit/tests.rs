@@ -57,7 +57,7 @@ fn the_fewest_views_give_the_closed_forms() {
     }
 }
 
-/// The cost on its own: residuals by a numerical gradient, noise of the three points propagated.
+/// An independent cost: residuals by a numerical gradient, noise of the three points propagated.
 fn independent_cost(points: &[Vec<DVec2>; 3], sd: f64, g: DVec2, c: [f64; 2]) -> f64 {
     let h = |end: DVec2, o: DVec2| (end - o).length_squared() + g.dot(end - o).powi(2);
     let cost = |i: usize| {
@@ -88,12 +88,12 @@ fn no_plane_on_a_grid_is_better_than_the_fit() {
         let slope = random.uniform(0.0, 4.0) * DVec2::from_angle(random.uniform(0.0, 6.3));
         let mut points = swinging(slope, 16, sd, &mut random);
         if draw % 2 == 0 {
-            // Off the plane: the cost has several minima.
+            // Not planar: the cost has several minima.
             points[2].iter_mut().for_each(|p| *p += 0.06 * normal(&mut random));
         }
         let options = FitOptions { noise_sd: sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
         let fit = fit_hinge(&points[0], &points[1], &points[2], &options).unwrap();
-        // c as fitted: lengths less the noise's share.
+        // c of the fit: squared lengths plus the contribution of noise, which the lengths do not contain.
         let c_of = |g: DVec2| {
             let share = 2.0 * sd * sd * (2.0 + g.length_squared());
             [0, 1].map(|k| fit.lengths[k].powi(2) + share)
@@ -120,7 +120,7 @@ fn no_plane_on_a_grid_is_better_than_the_fit() {
                 best = best.min(other);
             }
         }
-        // Off the plane a second minimum may be taken that is hardly worse: 10 % of the residual.
+        // For motion that is not planar, a second minimum that is hardly worse is allowed: 10 % of the residual.
         let allowed = if draw % 2 == 0 { 1.21 * best } else { best + 1.0 };
         missed += usize::from(found > allowed);
     }
@@ -178,7 +178,8 @@ fn a_plane_parallel_to_the_image_keeps_its_lengths() {
     assert!(fit.covariance.iter().all(|x| !x.is_nan()));
 }
 
-/// Noise lengthens, by that of both points and of their depths: in the true plane nothing of it is left.
+/// Noise lengthens rods, by that of both points and of their depths: in the true plane this is removed
+/// completely.
 #[test]
 fn lengths_are_without_the_noise_s_share() {
     let mut random = Random::new(21);
@@ -195,12 +196,12 @@ fn lengths_are_without_the_noise_s_share() {
         let fit = problem.report(Solution { g: slope, c, cost: 0.0 }, vec![false; 60], [1.0; 2]);
         (0..2).for_each(|k| mean[k] += fit.lengths[k] / f64::from(draws));
     }
-    // With the share in them they would be 7 mm longer.
+    // With the contribution of noise they would be 7 mm longer.
     assert!((mean[0] - 0.4).abs() < 0.001 && (mean[1] - 0.45).abs() < 0.001, "{mean:?}");
 }
 
-/// The covariance of exact points whose noise is stated is the spread of fits to noisy ones; without a
-/// stated noise it is that of the residuals.
+/// With stated noise, the covariance for exact points is the spread of fits to noisy ones; without, it is that of
+/// the residuals.
 #[test]
 fn covariance_has_the_stated_noise_or_that_of_the_residuals() {
     let slope = 0.9 * DVec2::from_angle(0.4);
@@ -239,7 +240,7 @@ fn covariance_has_the_stated_noise_or_that_of_the_residuals() {
     }
 }
 
-/// Views that are left out as outliers are not in the covariance: it is that of the others alone.
+/// Excluded views do not enter the covariance: it is that of the others alone.
 #[test]
 fn outliers_say_nothing_about_how_sure_a_fit_is() {
     let mut random = Random::new(27);

@@ -8,8 +8,8 @@ use crate::image::Rectangle;
 use crate::synth::Random;
 use glam::DVec2;
 
-/// A walk at 1.2 m/s and 0.9 Hz along a path, one hypothesis a frame; where there is none the filter coasts.
-/// The measured phase is wrapped, the state's is not.
+/// A walk at 1.2 m/s and 0.9 Hz along a path, one hypothesis per frame; for frames without one the filter only
+/// predicts. The measured phase is wrapped, the state's is not.
 fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptions) -> TrackedWalk {
     let (first_s, first) = (frames[0].0, frames[0].1.expect("a walk begins where something is seen"));
     let beginning = Beginning {
@@ -63,7 +63,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
 
 const ACROSS: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
 
-/// Where the walker is: in the middle of the picture after a second.
+/// The true state of the walker, who is in the middle of the image after one second.
 fn truth(time_s: f64) -> Hypothesis {
     Hypothesis { along_m: 1.2 * (time_s - 1.0), height_m: 1.15, phase: 0.3 + 0.9 * time_s }
 }
@@ -78,7 +78,7 @@ fn uneven_s(count: usize) -> Vec<f64> {
     (0..count).map(next).collect()
 }
 
-/// The truth measured with `scatter` times the filter's standard deviations, some frames not at all.
+/// The truth measured with `scatter` times the filter's standard deviations; some frames have no measurement.
 fn scattered(scatter: f64, count: usize, filter: &FilterOptions) -> Vec<(f64, Option<Hypothesis>)> {
     let mut random = Random::new(11);
     let mut normal = |variance: f64| scatter * variance.sqrt() * f64::from(random.normal_pair()[0]);
@@ -183,14 +183,14 @@ fn a_perfect_fit_leaves_the_errors_common_to_all_frames() {
 
 #[test]
 fn an_uncertain_distance_shows_across_the_path_and_far_from_the_camera_along_it() {
-    // The camera stands at (0, -6): the path crosses its axis at along 0, 6 m away.
+    // The camera is at (0, -6): the path crosses its axis at along 0, 6 m away.
     let mut walk = followed(ACROSS, &exact(&[0.0, 0.5, 1.0, 2.0]), WalkOptions::default());
     walk.depth_sd_m = 0.3;
     for row in walk.rows() {
         let along = (0.3 / 6.0 * row.hypothesis.along_m).hypot(0.015);
         assert!((row.sd[0] - along).abs() < 1e-6 && (row.sd[1] - 0.3).abs() < 1e-9, "{row:?}");
     }
-    // Turned by 30 degrees about (0, 0): 6 cos 30 away, nearest at 6 sin 30 behind the origin.
+    // Rotated by 30 degrees about (0, 0): 6 cos 30 away, nearest at 6 sin 30 behind the origin.
     let turned = Path { heading_rad: 30f64.to_radians(), ..ACROSS };
     let mut walk = followed(turned, &exact(&[0.0, 0.5, 1.0, 2.0]), WalkOptions::default());
     walk.depth_sd_m = 0.3;

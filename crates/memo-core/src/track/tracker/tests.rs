@@ -24,7 +24,7 @@ fn tracker() -> Tracker {
     Tracker::new(options()).unwrap()
 }
 
-/// An upright box with its lower left corner at a place.
+/// An upright box with its lower left corner at this position.
 fn boxed(left: usize, bottom: usize, width: usize, height: usize) -> Rectangle {
     Rectangle { left, top: bottom + 1 - height, right: left + width - 1, bottom }
 }
@@ -244,7 +244,7 @@ const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
 const BEGINNING: Beginning =
     Beginning { time_s: 0.0, along_m: 0.0, phase: 0.2, speed_mps: 1.2, rate_hz: 0.9 };
 
-/// A step of a walk that goes well, at x metres along the path.
+/// A step of a good walk, at x metres along the path.
 fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
     let time_s = 0.04 * frame as f64;
     let height_m = walker().level_torso_height_m();
@@ -258,7 +258,7 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
     Step { frame, time_s, state, measured: Some(best), similarity: 0.5, look }
 }
 
-/// A tracker that has followed somebody through `count` frames and now sees him at x metres.
+/// A tracker that has followed a person through `count` frames; the person is now at x metres.
 fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     let mut tracker = tracker();
     let mut walk = Walk::new(walker(), PATH, BEGINNING);
@@ -298,7 +298,7 @@ fn a_long_walk_is_handed_out_and_followed_on_as_a_new_one() {
     assert_eq!(LONGEST_WALK, 20_000);
 }
 
-/// A tracker that has followed somebody for 60 frames, who stood still in the last 15 of them.
+/// A tracker that has followed a person for 60 frames; in the last 15 the person stood still.
 fn following_to_a_stop() -> Tracker {
     let mut tracker = following(60, 0.0, 1.2);
     for twin in &mut tracker.walking.as_mut().unwrap().walk.twins {
@@ -345,7 +345,7 @@ fn frames_are_kept_until_there_are_enough_for_the_fit() {
     }
 }
 
-/// The share of the body's box outside the picture, across and upright, at x metres with the torso at z.
+/// The share of the body's box outside the image, horizontally and vertically, at x metres with the torso at z.
 fn outside(along_m: f64, height_m: f64) -> [f64; 2] {
     let (walker, camera) = (walker(), camera());
     let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
@@ -372,7 +372,7 @@ fn a_walk_ends_where_four_tenths_of_the_body_are_outside() {
         active.walk.twins[0].steps[0].state.height.position = height_m;
         tracker.predicted_window(&evidence(1, &[])).is_some()
     };
-    // Sideways on both sides, and through the top.
+    // Horizontally at both sides, and at the top.
     let right = (0..400).map(|k| 0.01 * f64::from(k)).map(|x| ((x, height_m), outside(x, height_m)[0]));
     let left = (0..400).map(|k| -0.01 * f64::from(k)).map(|x| ((x, height_m), outside(x, height_m)[0]));
     let up = (0..400).map(|k| height_m + 0.01 * f64::from(k)).map(|z| ((0.0, z), outside(0.0, z)[1]));
@@ -414,7 +414,8 @@ fn the_window_is_the_body_s_box_with_a_margin_that_grows_with_the_uncertainty() 
     }
     let lowest = pixels.iter().map(|p| p.y).fold(0.0, f64::max);
     assert!((sure.bottom as f64) < lowest + 60.0, "no more than a foot and the margin below the ankle");
-    // 6 m away 5 cm are some 5.5 pixels; beyond 20 cm along and 10 cm in height the margin stays.
+    // At a distance of 6 m, 5 cm are some 5.5 pixels; beyond 20 cm along and 10 cm in height the margin is
+    // constant.
     let focal_px = camera.focal_px.x;
     let near =
         |grown: usize, m: f64| (grown as f64 - m * focal_px / 6.0).abs() < 2.5 + 0.05 * m * focal_px / 6.0;
@@ -457,7 +458,7 @@ fn the_current_estimate_is_the_last_step_of_the_better_twin() {
     assert!(now.p_swapped < 0.01);
 }
 
-/// Five sightings of somebody at a speed with the contours of a walker there; `drop_px` moves the rectangles down.
+/// Five sightings of a person at this speed, with the contours of a walker; `drop_px` moves the rectangles down.
 fn seen_walking(speed_mps: f64, drop_px: f64) -> Vec<(Sighting, FrameEdges)> {
     let (walker, camera) = (walker(), camera());
     let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
@@ -507,7 +508,7 @@ fn nobody_walks_slower_than_a_quarter_metre_a_second_or_faster_than_three() {
 
 #[test]
 fn what_has_no_legs_or_feet_is_not_started() {
-    // Two upright lines that slide along fit every phase alike.
+    // Two upright lines that slide along fit all phases equally.
     let mut slides = seen_walking(1.3, 0.0);
     for (sighting, frame) in &mut slides {
         let r = sighting.rectangle;
