@@ -141,7 +141,7 @@ def test_rows_of_all_years(tmp_path, row, expected):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no row in it"),
+        ("", "has no rows"),
         ("1,2,3\n", "line 1: 3 numbers; MOTChallenge rows have 6, 7, 9 or 10"),
         ("1,2,3,4,5,6\n1,2,3,4,5,six\n", "line 2: 'six' is not a number"),
         ("1,2,3,4,5,nan\n", "'nan' is not a number"),
