@@ -332,8 +332,8 @@ def test_what_is_wrong_in_a_table_is_said_with_its_column(tmp_path):
     path = tmp_path / "bad.csv"
     for text, says in (
         ("time_s,a_x_m,a_y_m\n0,1,2\n", "point a has no column a_z_m"),
-        ("time_s,a_x_m,a_y_m,a_z_m\n0,1,2,far\n", "row 0, column a_z_m: far is no number"),
-        ("time_s,knee_deg,a_x_m,a_y_m,a_z_m\n0,x,1,2,3\n", "row 0, column knee_deg: x is no number"),
+        ("time_s,a_x_m,a_y_m,a_z_m\n0,1,2,far\n", "row 0, column a_z_m: far is not a number"),
+        ("time_s,knee_deg,a_x_m,a_y_m,a_z_m\n0,x,1,2,3\n", "row 0, column knee_deg: x is not a number"),
         ("a_x_m,a_y_m,a_z_m\n1,2,3\n", "no column time_s and no frame rate"),
         ("time_s,b\n0,1\n", "no columns NAME_x_m"),
     ):

@@ -164,7 +164,7 @@ def test_what_is_no_run_is_refused(tmp_path, scene, track):
     with pytest.raises(FormatError, match="cannot be read"):
         read_motchallenge(tmp_path / "nowhere.txt")
     folder = saved(tmp_path / "run", scene, track, {**track.columns, "walk": np.full(len(track), 1)})
-    with pytest.raises(RunError, match=r"run\.json: has 1 walk, the table a walk 1"):
+    with pytest.raises(RunError, match=r"run\.json: has 1 walk, the table has a walk 1"):
         write_motchallenge(tmp_path / "a.txt", folder)
     (folder / "run.json").unlink()
     with pytest.raises(RunError, match=r"holds no run\.json, so it is not the folder of a memo track"):
