@@ -802,7 +802,7 @@ def test_memo_as_the_child(clip, tmp_path):
     result = batch.run(rows, tmp_path / "out")
     assert [record.state for record in result.records] == ["nobody", "failed", "failed"]
     assert "not a video" in result.records[1].message
-    assert "frame 50 was asked for" in result.records[2].message
+    assert "frame 50 was requested" in result.records[2].message
     assert (tmp_path / "out" / "clip" / "track.csv").is_file()
     alone = tmp_path / "alone"
     subprocess.run([sys.executable, "-m", "memo.cli", "track", str(clip), "--out", str(alone), "--quiet"])

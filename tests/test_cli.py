@@ -190,7 +190,7 @@ def test_camera_is_chosen_by_name(memo_command, video, tmp_path):
         (["--frames", "5"], "--frames 5 is not A:B"),
         (["--frames", "9:3"], "--frames 9:3 is not A:B"),
         (["--frames", "a:b"], "--frames a:b is not A:B"),
-        (["--frames", "100:"], "frame 100 was asked for, it has 20 frames"),
+        (["--frames", "100:"], "frame 100 was requested, but it has 20 frames"),
         (["--fps", "0"], "frame rate must be positive"),
         (["--out", __file__], "cannot be written to"),
     ],

@@ -156,12 +156,12 @@ def edited(run, tmp_path, **changes):
 
 def test_a_video_that_was_moved_is_told_and_can_be_given(run, tmp_path):
     gone = edited(run, tmp_path, video="/nowhere/walk.mp4")
-    with pytest.raises(RunError, match=r"not at /nowhere/walk\.mp4 any more; give its place as video="):
+    with pytest.raises(RunError, match=r"no longer at /nowhere/walk\.mp4; give its path as video="):
         explain(gone)
     moved = shutil.copy(read_run(run)["video"], tmp_path / "moved.mp4")
     (why,) = explain(gone, [30], video=moved)
     assert why.frame == 30
-    with pytest.raises(RunError, match="came from no video"):
+    with pytest.raises(RunError, match="did not come from a video"):
         explain(edited(run, tmp_path, video=None))
 
 
@@ -184,7 +184,7 @@ def test_another_video_is_noticed(run, tmp_path, write_video):
     [
         (None, "holds no run.json"),
         ("{", "not JSON"),
-        ("[1]", "an object was wanted, got list"),
+        ("[1]", "must be an object, got list"),
         ("{}", "memo is missing"),
     ],
 )

@@ -46,8 +46,8 @@ def test_pybvh_finds_every_joint_where_it_was(tmp_path, up):
     assert file.fps == 50 and file.frame_count == 80
     assert notes == [
         "A BVH file begins at 0 s; this motion began at 0.4 s.",
-        "A BVH file has no place for events: left out.",
-        "A BVH file has no place for joint angles as such: left out.",
+        "A BVH file cannot store events: left out.",
+        "A BVH file cannot store joint angles as such: left out.",
     ]
     read = read_motion(path)
     assert read.metadata["up"] == up and read.metadata["unit_m"] == 0.01
@@ -80,7 +80,7 @@ def test_limbs_that_change_their_length_are_told(tmp_path):
     points[:, wrist] += np.outer(np.linspace(-0.05, 0.05, 40), [0, 0, 1.0])
     path = tmp_path / "elastic.bvh"
     notes = write_motion(path, Motion(JOINTS, times_s, points))
-    assert len(notes) == 1 and "RightHand comes to lie up to" in notes[0]
+    assert len(notes) == 1 and "RightHand is up to" in notes[0]
     _, names, read = by_pybvh(path)
     off = np.linalg.norm(read[:, names.index("RightHand")] - points[:, wrist], axis=1)
     assert f"{100 * off.max():.1f} cm" in notes[0]
@@ -110,7 +110,7 @@ def test_a_real_file_is_read_as_pybvh_reads_it(tmp_path):
         off_m[bone] = np.linalg.norm(difference, axis=1).max()
     assert max(off_m[bone] for bone in BONES.values() if bone.endswith(("Leg", "Foot"))) < 1e-6
     worst = max(off_m, key=off_m.get)
-    assert f"Hand comes to lie up to {100 * off_m[worst]:.1f} cm from where it was" in notes[1]
+    assert f"Hand is up to {100 * off_m[worst]:.1f} cm from its given position" in notes[1]
     assert off_m[worst] < 0.05
 
 
@@ -126,7 +126,7 @@ def test_what_is_known_of_a_skeleton_is_written(tmp_path):
     _, names, _ = by_pybvh(tmp_path / "legs.bvh")
     assert names == ["Hips", "RightUpLeg", "RightLeg", "LeftUpLeg", "LeftLeg"]
     no_hips = Motion(("a", "b"), times_s, points[:, :2])
-    with pytest.raises(FormatError, match="hangs on right_hip and left_hip; the motion has a, b"):
+    with pytest.raises(FormatError, match="needs right_hip and left_hip; the motion has a, b"):
         write_motion(tmp_path / "no.bvh", no_hips)
     points[3:6, 2] = np.nan
     with pytest.raises(FormatError, match=r"right_wrist is missing in 3 frames, the first at 0.06 s"):
@@ -140,7 +140,7 @@ def test_empty_frames_at_the_ends_are_left_out(tmp_path):
     points[25, 2] = np.nan
     notes = write_motion(tmp_path / "cut.bvh", Motion(JOINTS, times_s, points))
     assert notes == [
-        "Left out: 9 frames at the ends, in which a joint is missing.",
+        "Left out: 9 frames at the ends, where a joint is missing.",
         "A BVH file begins at 0 s; this motion began at 0.08 s.",
     ]
     _, names, read = by_pybvh(tmp_path / "cut.bvh")
@@ -194,27 +194,27 @@ def test_hand_written_grammar_and_rotation_order(tmp_path):
 @pytest.mark.parametrize(
     ("was", "becomes", "says"),
     [
-        ("HIERARCHY", "", "line 1: no BVH file"),
+        ("HIERARCHY", "", "line 1: not a BVH file"),
         ("ROOT Hips", "ROOT", "line 2: ROOT without a name"),
         ("ROOT Hips\n{", "ROOT Hips", "line 3: wanted { after the name of a joint, got 'OFFSET'"),
-        ("ROOT", "JOINT", "line 2: JOINT does not stand here"),
-        ("JOINT", "ROOT", "line 6: ROOT does not stand here"),
-        ("1 2 3", "1 2 nan", "line 4: OFFSET 1 2 nan is beyond reason"),
+        ("ROOT", "JOINT", "line 2: JOINT is not allowed here"),
+        ("JOINT", "ROOT", "line 6: ROOT is not allowed here"),
+        ("1 2 3", "1 2 nan", "line 4: OFFSET 1 2 nan is implausibly large"),
         ("  OFFSET 1 2 3\n", "", "joint Hips: no OFFSET"),
-        ("1 2 3", "1 2 1e300", "line 4: OFFSET 1 2 1e300 is beyond reason"),
+        ("1 2 3", "1 2 1e300", "line 4: OFFSET 1 2 1e300 is implausibly large"),
         ("1 2 3", "1 2", "line 4: OFFSET has 2 numbers"),
         ("CHANNELS 6", "CHANNELS 7", "line 5, CHANNELS: wanted a whole number from 0 to 6, got '7'"),
         ("CHANNELS 1 Xrotation", "CHANNELS 1 Wrotation", "line 6: CHANNELS 1 Wrotation: wanted 1 of Xpos"),
         ("      OFFSET 0 -40 0\n", "      JOINT x {", "line 9: JOINT inside an End Site"),
         ("}\nMOTION", "MOTION", "line 12: MOTION, but 1 joint still open"),
-        ("MOTION", "motion", "line 13: 'motion' is not part of a hierarchy"),
+        ("MOTION", "motion", "line 13: 'motion' does not belong in a hierarchy"),
         ("Frames: 2", "Frames: 3", "Frames: 3, but there are 2 lines of 7 numbers"),
         ("Frames: 2", "Frames: 1e12", "line 14, Frames: wanted a whole number"),
         ("0.04", "0", "line 15: Frame Time 0 s"),
         ("Frame Time: 0.04\n", "", "line 14: wanted Frames: and Frame Time: after MOTION"),
         ("0 100 0 90 0 0 90", "0 100 0 90 0 0", "line 17: 6 numbers, the joints have 7 channels"),
-        ("0 100 0 90 0 0 90", "0 100 0 90 0 0 x", "line 17, column 7: 'x' is no finite number"),
-        ("0 100 0 90 0 0 90", "0 100 0 90 0 0 nan", "line 17: a channel is no number"),
+        ("0 100 0 90 0 0 90", "0 100 0 90 0 0 x", "line 17, column 7: 'x' is not a finite number"),
+        ("0 100 0 90 0 0 90", "0 100 0 90 0 0 nan", "line 17: a channel is not a number"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_line(tmp_path, was, becomes, says):

@@ -109,7 +109,10 @@ def test_a_real_file_is_read_as_ezc3d_reads_it():
         event["TIMES"]["value"][1], event["LABELS"]["value"], event["CONTEXTS"]["value"], strict=True
     )
     assert [*motion.events] == sorted((s, kinds[label], side.lower()) for s, label, side in columns)
-    assert motion.notes == ("Left out: 54 forces, moments or powers.", "Left out: 380 analog values a frame.")
+    assert motion.notes == (
+        "Left out: 54 forces, moments or powers.",
+        "Left out: 380 analog values per frame.",
+    )
 
 
 @pytest.mark.parametrize("ending", [".c3d", ".trc", ".csv", ".mot"])
@@ -213,8 +216,8 @@ def wrong(data, at, replacement):
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (lambda data: b"", "byte 1: no C3D file"),
-        (lambda data: wrong(data, 1, b"Q"), "byte 1: no C3D file"),
+        (lambda data: b"", "byte 1: not a C3D file"),
+        (lambda data: wrong(data, 1, b"Q"), "byte 1: not a C3D file"),
         (lambda data: wrong(data, 0, b"\xff"), "byte 0: the parameters begin at block 255"),
         (lambda data: wrong(data, 515, b"\x57"), "byte 515: processor 87"),
         (lambda data: wrong(data, 2, b"\xff\xff"), "65535 points in the header, parameter POINT:USED has 15"),
@@ -257,6 +260,6 @@ def test_without_y_screen_up_is_the_axis_along_which_the_figure_stands(tmp_path,
     write_motion(path, motion, up)
     path.write_bytes(path.read_bytes().replace(b"Y_SCREEN", b"Q_SCREEN"))
     read = read_motion(path)
-    said = f"The file does not say which axis is up: {up.upper()} was taken, as the figure stands."
+    said = f"The file does not say which axis is up: {up.upper()} was assumed, from the figure's posture."
     assert read.notes == (said,)
     assert np.allclose(read.points, motion.points, atol=1e-6, equal_nan=True)

@@ -128,7 +128,7 @@ def test_bvh_takes_one_walk_or_says_why_not(tmp_path, memo_command):
     assert code == 1 and not target.exists()
     assert "is missing in 10 frames, the first at 1.6 s" in err and "--walk" in err
     code, out, _ = memo_command("convert", tmp_path / "run" / "track.csv", target, "--walk", 0)
-    assert code == 0 and "A BVH file has no place for events: left out." in out
+    assert code == 0 and "A BVH file cannot store events: left out." in out
     read = read_motion(target)
     foot = read.points[:, read.names.index("LeftFoot")]
     assert np.abs(foot - points[10:40, JOINTS.index("left_ankle")]).max() < 3e-4
@@ -184,7 +184,7 @@ def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
     (tmp_path / "empty").mkdir()
     before = a.read_bytes()
     for arguments, says in (
-        ((a, a), "a.trc: is what was read; write to another place"),
+        ((a, a), "a.trc: is the input; write to another place"),
         ((a, tmp_path / "b.xls"), "b.xls: the ending must be one of .bvh, .c3d, .csv, .json, .mot"),
         ((a, tmp_path / "empty.xls"), "the ending must be one of"),
         ((tmp_path / "none.trc", b), "none.trc: no such file or folder"),
@@ -192,9 +192,9 @@ def test_mistakes_are_told_in_one_line_before_any_work(tmp_path, memo_command):
         ((a, b, "--rate", 0), "--rate 0 must be positive and finite"),
         ((a, b, "--rate", "1e12"), "at 1e+12 Hz are more than"),
         ((a, b, "--unit", "feet"), "--unit feet is neither m, cm, mm nor a number of metres"),
-        ((a, b, "--fps", 50), "the file says it itself: leave out a frame rate (--fps)"),
-        ((a, b, "--unit", "mm"), "the file says it itself: leave out a unit (--unit)"),
-        ((a, b, "--walk", 0), "only track.csv counts walks"),
+        ((a, b, "--fps", 50), "the file has its own: leave out a frame rate (--fps)"),
+        ((a, b, "--unit", "mm"), "the file has its own: leave out a unit (--unit)"),
+        ((a, b, "--walk", 0), "a walk can be chosen only for track.csv"),
         ((a, tmp_path / "a.mot"), "holds joint angles, and there are none"),
         ((a, a / "b.c3d"), "cannot be written to"),
     ):

@@ -18,8 +18,8 @@ def test_a_stranger_reads_the_trc_that_is_written(tmp_path):
     motion, path = walk(start_s=0.4), tmp_path / "walk.trc"
     left_out = write_motion(path, motion)
     assert left_out == [
-        "A TRC file has no place for events: left out.",
-        "A TRC file has no place for joint angles: left out.",
+        "A TRC file cannot store events: left out.",
+        "A TRC file cannot store joint angles: left out.",
     ]
     table = by_pandas(path, 6, header=None).to_numpy()
     assert table.shape == (20, 2 + 36) and table[:, 0].tolist() == [*range(1, 21)]
@@ -70,8 +70,8 @@ def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
         left_out = write_motion(tmp_path / name, motion)
         assert left_out == [
             "Left out: 1 instant at which an angle or the pelvis is missing.",
-            "A MOT or STO file has no place for events: left out.",
-            "A MOT or STO file has no place for points but the pelvis: left out.",
+            "A MOT or STO file cannot store events: left out.",
+            "A MOT or STO file cannot store points except the pelvis: left out.",
         ]
         lines = (tmp_path / name).read_text().split("\n")
         assert lines[1:7] == ["version=1", "nRows=19", "nColumns=10", "inDegrees=yes", "up=Y", "endheader"]
@@ -126,7 +126,7 @@ def test_the_legs_hang_from_the_pelvis_of_a_mot_as_they_do_in_the_motion(tmp_pat
     knee_alone = {"left_knee": motion.angles["left_knee"]}
     for angles in (knee_alone, knee_alone | {"right_hip": np.full(20, np.nan)}):
         no_hip = Motion(JOINTS, motion.times_s, motion.points, angles=angles)
-        assert "place needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
+        assert "position needs both hips, a knee and the flexion of that hip" in write_motion(path, no_hip)[0]
         assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
 
 
@@ -160,7 +160,7 @@ def test_the_states_file_of_a_simulation_is_read(tmp_path):
         "right_hip": [pytest.approx(np.rad2deg(0.5))]
     }
     assert (
-        motion.notes[-1] == "Left out, no angles: 2 columns, the first /jointset/hip_r/hip_flexion_r/speed."
+        motion.notes[-1] == "Left out, not angles: 2 columns, the first /jointset/hip_r/hip_flexion_r/speed."
     )
 
 
@@ -173,7 +173,7 @@ def test_knees_with_the_sign_of_gait2392_are_turned(tmp_path):
     motion = read_motion(path)
     assert motion.angles["right_knee"].tolist() == [0, 60, 120]
     assert motion.angles["left_knee"].tolist() == [3, 2, 1]
-    assert motion.notes == ("Knees bend towards negative angles, as in gait2392: their sign was turned.",)
+    assert motion.notes == ("Knees bend towards negative angles, as in gait2392: their sign was reversed.",)
 
 
 @pytest.mark.parametrize("up", ["z", "y"])
@@ -200,7 +200,9 @@ def test_the_trc_of_pose2sim_is_read_as_pandas_reads_it():
     assert np.array_equal(motion.points, np.stack([x, -z, y], axis=-1))
     assert np.array_equal(motion.times_s, table[:, 1])
     assert motion.names[:3] == ("RHip", "RKnee", "RAnkle") and motion.names[-1] == "LWrist"
-    assert motion.notes == ("The file does not say which axis is up: Y was taken, as the figure stands.",)
+    assert motion.notes == (
+        "The file does not say which axis is up: Y was assumed, from the figure's posture.",
+    )
     assert motion.at_constant_rate()[0] == 60
     assert np.array_equal(read_motion(path, up="z").points, np.stack([x, y, z], axis=-1))
 
@@ -248,7 +250,7 @@ def test_the_older_header_radians_and_forces_of_mot(tmp_path):
     )
     motion = read_motion(path)
     assert motion.angles["lumbar"] == pytest.approx([180 / np.pi])
-    assert motion.notes == ("Left out, no angles: 1 column, the first ground_force_vx.",)
+    assert motion.notes == ("Left out, not angles: 1 column, the first ground_force_vx.",)
 
 
 def edited(text, line, edit):
@@ -260,7 +262,7 @@ def edited(text, line, edit):
 @pytest.mark.parametrize(
     ("line", "edit", "says"),
     [
-        (1, lambda line: "time,x", "line 1: no TRC file"),
+        (1, lambda line: "time,x", "line 1: not a TRC file"),
         (1, lambda line: line.replace("X/Y/Z", "X/Z/Y"), r"line 1: coordinates in the order '\(X/Z/Y\)'"),
         (1, lambda line: line.replace("up=Y", "up=X"), "the up axis is 'x'"),
         (
@@ -282,7 +284,7 @@ def edited(text, line, edit):
         (
             9,
             lambda line: line.replace("NaN", "1e400"),
-            "line 10|line 9, column right_.*: '1e400' is no finite",
+            "line 10|line 9, column right_.*: '1e400' is not a finite",
         ),
         (
             10,
@@ -314,7 +316,7 @@ def test_what_is_wrong_in_a_trc_is_said_with_its_line(tmp_path, line, edit, says
         ("toes_ty", "toes_tx", "line 6: column toes_tx occurs twice"),
         ("0.1 20", "0.0 20", "line 8, column time: 0.0 does not come after 0"),
         ("20 1 2 3", "20 1 2", "line 8: 4 cells, wanted 5"),
-        ("20 1 2 3", "20 1 2,5 3", "line 8, column toes_ty: '2,5' is no finite number"),
+        ("20 1 2 3", "20 1 2,5 3", "line 8, column toes_ty: '2,5' is not a finite number"),
         ("old", "inDegrees=maybe", "field inDegrees: 'maybe', wanted yes or no"),
         ("old", "DataType=Vec3", "field DataType: tables of vec3 are not read"),
     ],
@@ -330,8 +332,8 @@ def test_what_is_wrong_in_a_table_is_said_with_its_column(tmp_path):
     path = tmp_path / "bad.csv"
     for text, says in (
         ("time_s,a_x_m,a_y_m\n0,1,2\n", "point a has no column a_z_m"),
-        ("time_s,a_x_m,a_y_m,a_z_m\n0,1,2,far\n", "row 0, column a_z_m: far is no number"),
-        ("time_s,knee_deg,a_x_m,a_y_m,a_z_m\n0,x,1,2,3\n", "row 0, column knee_deg: x is no number"),
+        ("time_s,a_x_m,a_y_m,a_z_m\n0,1,2,far\n", "row 0, column a_z_m: far is not a number"),
+        ("time_s,knee_deg,a_x_m,a_y_m,a_z_m\n0,x,1,2,3\n", "row 0, column knee_deg: x is not a number"),
         ("a_x_m,a_y_m,a_z_m\n1,2,3\n", "no column time_s and no frame rate"),
         ("time_s,b\n0,1\n", "no columns NAME_x_m"),
     ):
@@ -350,14 +352,14 @@ def test_what_a_format_has_no_place_for_at_all_is_refused(tmp_path):
         ("x.mot", points, "holds joint angles, and there are none"),
         ("x.trc", angles, "holds points, and there are none"),
         ("x.csv", angles, "holds points, and there are none"),
-        ("x.trc", broken, "no label for a TRC file"),
-        ("x.xyz", points, "no motion is written to .xyz: wanted .bvh, .c3d"),
+        ("x.trc", broken, "not a valid label for a TRC file"),
+        ("x.xyz", points, "cannot write a motion to .xyz: wanted .bvh, .c3d"),
     ):
         with pytest.raises(FormatError, match=says):
             write_motion(tmp_path / name, motion)
     assert [*tmp_path.iterdir()] == []
     (tmp_path / "x.xyz").touch()
-    with pytest.raises(FormatError, match=r"no motion is read from .xyz"):
+    with pytest.raises(FormatError, match=r"cannot read a motion from .xyz"):
         read_motion(tmp_path / "x.xyz")
 
 
@@ -385,8 +387,8 @@ def test_tables_without_a_unit_are_read_in_the_one_that_fits(tmp_path, unit, uni
     read = read_motion(path, rate_hz=50)
     assert np.allclose(read.points, motion.points, equal_nan=True)
     assert read.notes == (
-        "The file does not say which axis is up: Z was taken, as the figure stands.",
-        f"The file names no unit: {unit} was taken, which makes the legs 0.87 m long.",
+        "The file does not say which axis is up: Z was assumed, from the figure's posture.",
+        f"The file names no unit: {unit} was assumed, which makes the legs 0.87 m long.",
     )
     found = read_motion(path, rate_hz=50, unit_m=2 * unit_m, up="z")
     assert np.allclose(found.points, 2 * motion.points, equal_nan=True) and found.notes == ()
@@ -417,7 +419,7 @@ def test_the_up_axis_of_a_trc_that_does_not_say_it_is_the_one_along_which_the_fi
     write_motion(path, motion, up)
     path.write_text(path.read_text().replace(f"\tup={up.upper()}\n", "\n", 1))
     read = read_motion(path)
-    said = f"The file does not say which axis is up: {up.upper()} was taken, as the figure stands."
+    said = f"The file does not say which axis is up: {up.upper()} was assumed, from the figure's posture."
     assert read.notes == (said,) and read.metadata["up"] == up
     assert np.allclose(read.points, motion.points, atol=1e-6, equal_nan=True)
     lying = Motion(JOINTS, motion.times_s, motion.points[..., [2, 0, 1]])

@@ -284,9 +284,9 @@ def test_a_track_goes_to_openpose(tmp_path):
         ((3, 17, 2), {"fps": None, "times_s": [0, 2, 1]}, "increasing times_s"),
         ((3, 17, 2), {"frames": [0, 1, 1]}, "increasing frame numbers"),
         ((3, 17, 2), {"frames": [0, 1.5, 2]}, "increasing frame numbers"),
-        ((3, 17, 2), {"frames": [0, 1, 10**8]}, "only 3 of them are there"),
+        ((3, 17, 2), {"frames": [0, 1, 10**8]}, "only 3 of them exist"),
         ((3, 17, 2), {"names": "COCO_71"}, "did you mean"),
-        ((3, 17, 2), {"names": ["C7"] * 17}, "names of different joints"),
+        ((3, 17, 2), {"names": ["C7"] * 17}, "names of different known joints"),
         ((3, 17, 2), {"scores": np.full((3, 17), np.nan)}, "scores finite"),
     ],
 )
@@ -360,7 +360,7 @@ def test_trc_in_pixels_is_read_and_written(tmp_path, end):
     [
         (lambda text: text.replace("_px_", "_m_"), "unit m: image points are needed"),
         (lambda text: text.replace("\t0.000\t", "\t0.500\t"), "points in space"),
-        (lambda text: text.replace("LHip", "RHip"), "right_hip stands there twice"),
+        (lambda text: text.replace("LHip", "RHip"), "right_hip appears twice"),
         (lambda text: text.replace("RKnee", "right_kne"), "did you mean"),
         (lambda text: text[:200], "header has 5"),
         (lambda text: text.replace("\n1\t", "\n0\t"), "at two times"),
@@ -384,7 +384,7 @@ def test_broken_trc_is_refused(tmp_path, change, message):
 
 
 def test_trc_of_points_in_space_is_refused():
-    with pytest.raises(KeypointsError, match="image points are needed"):
+    with pytest.raises(KeypointsError, match="not image points"):
         read_keypoints(next(pose2sim_sample().glob("*.trc")))
 
 

@@ -241,10 +241,10 @@ def test_folders_that_are_no_sequence_are_refused(tmp_path):
     mixed.mkdir()
     for name in ("cam1.001.json", "cam2.001.json"):
         (mixed / name).write_text(frame)
-    with pytest.raises(KeypointsError, match="both frame 1; one camera a folder"):
+    with pytest.raises(KeypointsError, match="both frame 1; one camera per folder"):
         read_keypoints(mixed, fps=25)
     (mixed / "cam2.001.json").rename(mixed / "cam2.900000000.json")
-    with pytest.raises(KeypointsError, match="only 2 of them are there"):
+    with pytest.raises(KeypointsError, match="only 2 of them exist"):
         read_keypoints(mixed, fps=25)
     with pytest.raises(KeypointsError, match="no such file"):
         read_keypoints(tmp_path / "nowhere", fps=25)
@@ -326,7 +326,7 @@ def test_coco_annotations_keep_their_visibility(tmp_path):
         ('[{"image_id": 1}]', "entry 0: needs image_id and keypoints"),
         ('[{"image_id": "a.png", "keypoints": [1, 2, 3]}]', "image_id a.png has no frame number"),
         ('[{"image_id": 1e99, "keypoints": [1, 2, 3]}]', "no frame number"),
-        ('[{"image_id": -1, "keypoints": [1, 2, 3]}]', "not the number of a frame"),
+        ('[{"image_id": -1, "keypoints": [1, 2, 3]}]', "not a frame number"),
         (
             '[{"image_id": 1, "keypoints": [1, 2, 3]}, {"image_id": 2, "keypoints": [1, 2, 3, 4, 5, 6]}]',
             "different numbers of points",
@@ -406,7 +406,7 @@ def test_tables_of_several_people(tmp_path):
     np.testing.assert_array_equal(found.points[:, 0, 0], 100 + np.arange(10))
     assert read_keypoints(path, fps=10, person=0).points[3, 0, 0] == 897
     path.write_text("\n".join(rows).replace("person", "someone"))
-    with pytest.raises(KeypointsError, match="frame 0 stands there twice and no column `person`"):
+    with pytest.raises(KeypointsError, match="frame 0 appears twice and there is no column `person`"):
         read_keypoints(path, fps=10)
 
 
@@ -418,17 +418,17 @@ def test_tables_of_several_people(tmp_path):
         ("frame,left_nkee_x,left_nkee_y\n1,2,3\n", "did you mean `left_knee`"),
         ("frame,left_knee_x\n1,2\n", "column left_knee_x without left_knee_y"),
         ("frame,left_knee_x,left_knee_y,left_knee_z\n1,2,3,4\n", "points in space"),
-        ("frame,left_knee_x,left_knee_y,LKN_x,LKN_y\n1,2,3,4,5\n", "left_knee stands there twice"),
+        ("frame,left_knee_x,left_knee_y,LKN_x,LKN_y\n1,2,3,4,5\n", "left_knee appears twice"),
         ("frame,left_knee_x,left_knee_y\n1,2\n", "row 2 has 2 cells, the header 3"),
         ("frame,left_knee_x,left_knee_y\n1,two,3\n", "row 2: two is not a number"),
         ("frame,left_knee_x,left_knee_y\n1,inf,3\n", "row 2: inf is not finite"),
         ("frame,left_knee_x,left_knee_y\n1,2e9,3\n", "row 2: coordinates beyond"),
-        ("frame,left_knee_x,left_knee_y\n1.5,2,3\n", "row 2: frame 1.5 is not the number of a frame"),
+        ("frame,left_knee_x,left_knee_y\n1.5,2,3\n", "row 2: frame 1.5 is not a frame number"),
         ("frame,left_knee_x,left_knee_y\n,2,3\n", "row 2: frame  is not"),
-        ("frame,left_knee_x,left_knee_y\n1,2,3\n1,2,3\n", "frame 1 stands there twice"),
+        ("frame,left_knee_x,left_knee_y\n1,2,3\n1,2,3\n", "frame 1 appears twice"),
         ("frame,time_s,left_knee_x,left_knee_y\n1,1,2,3\n2,1,2,3\n", "time_s must increase"),
         ("frame,time_s,left_knee_x,left_knee_y\n1,,2,3\n", "row 2: no time_s"),
-        ("frame,joint,x,y\n1,LKN,2,3\n1,left_knee,2,3\n", "row 3: left_knee stands twice in frame 1"),
+        ("frame,joint,x,y\n1,LKN,2,3\n1,left_knee,2,3\n", "row 3: left_knee appears twice in frame 1"),
         ("frame,left_knee_x,left_knee_y\n", "no person in any frame"),
         ("frame,left_knee_x,left_knee_y\n1,2,3\n900000000,2,3\n", "only 2 of them"),
         ("\x00,\x01", "needs a column"),

@@ -167,7 +167,7 @@ def test_closed_forms_lift_planted_rods_and_hinges():
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("time_s,a_u_px,a_v_px\n0,1,x\n", "column a_v_px: x is no number"),
+        ("time_s,a_u_px,a_v_px\n0,1,x\n", "column a_v_px: x is not a number"),
         ("time_s,a_u_px,a_v_px\n0,1,2\n0,1,2\n", "column time_s: times must increase"),
         ("time_s,a_u_px,b_v_px\n0,1,2\n", "point a has no column a_v_px"),
         ("time_s,a_u_px,a_v_px\n0,1\n", "row 0 has 2 cells"),
@@ -229,7 +229,7 @@ def test_frames_without_points_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("text", "rate_hz", "part"),
     [
-        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 25.0, "time_s has 50 frames a second, not 25"),
+        ("time_s,a_u,a_v\n0,1,2\n0.02,1,2\n", 25.0, "time_s has 50 frames per second, not 25"),
         ("a_u,a_v\n1,2\n", 0.0, "positive and finite, got 0"),
         ("time_s,a_u,a_v\n0,1,2\n", float("nan"), "positive and finite, got nan"),
         ("# filtered at 6 Hz, 100 Hz\na_u,a_v\n1,2\n", None, r"several rates \(6, 100 Hz\): give --fps"),

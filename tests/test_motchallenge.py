@@ -141,7 +141,7 @@ def test_rows_of_all_years(tmp_path, row, expected):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no row in it"),
+        ("", "has no rows"),
         ("1,2,3\n", "line 1: 3 numbers; MOTChallenge rows have 6, 7, 9 or 10"),
         ("1,2,3,4,5,6\n1,2,3,4,5,six\n", "line 2: 'six' is not a number"),
         ("1,2,3,4,5,nan\n", "'nan' is not a number"),
@@ -164,7 +164,7 @@ def test_what_is_no_run_is_refused(tmp_path, scene, track):
     with pytest.raises(FormatError, match="cannot be read"):
         read_motchallenge(tmp_path / "nowhere.txt")
     folder = saved(tmp_path / "run", scene, track, {**track.columns, "walk": np.full(len(track), 1)})
-    with pytest.raises(RunError, match=r"run\.json: has 1 walk, the table a walk 1"):
+    with pytest.raises(RunError, match=r"run\.json: has 1 walk, the table has a walk 1"):
         write_motchallenge(tmp_path / "a.txt", folder)
     (folder / "run.json").unlink()
     with pytest.raises(RunError, match=r"holds no run\.json, so it is not the folder of a memo track"):

@@ -187,7 +187,7 @@ def test_what_cannot_be_read_is_refused(tmp_path):
     with pytest.raises(FormatError, match=r"column a: list<.*> is neither number, text nor truth value"):
         read_parquet(path)
     pq.write_table(pa.table([pa.array([1]), pa.array([2])], names=["a", "a"]), path)
-    with pytest.raises(FormatError, match="stands there twice"):
+    with pytest.raises(FormatError, match="appears twice"):
         read_parquet(path)
     pq.write_table(pa.table({"a": pa.array([2**63], pa.uint64())}), path)
     with pytest.raises(FormatError, match="not Parquet that can be read"):
@@ -198,7 +198,7 @@ def test_what_cannot_be_written_is_refused_and_leaves_nothing(tmp_path):
     for columns, message in [
         ({"a": [1, 2], "b": [1]}, "columns of one length"),
         ({}, "columns of one length"),
-        ({"a": np.ones((2, 2))}, r"column a: wanted one value a row, got shape \(2, 2\)"),
+        ({"a": np.ones((2, 2))}, r"column a: wanted one value per row, got shape \(2, 2\)"),
         ({"a": np.ones(2, complex)}, "column a"),
     ]:
         with pytest.raises(FormatError, match=message):

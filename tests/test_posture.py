@@ -702,7 +702,7 @@ def test_sides_exchanged_in_all_frames_face_against_the_way(scene, tmp_path):
 def test_help_says_whose_times_are_taken(memo_posture, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     code, said, _ = memo_posture("--help")
-    assert code == 0 and "taken instead of" in said
+    assert code == 0 and "used in place of" in said
 
 
 def test_keypoints_read_before_are_taken_too(scene):

@@ -171,7 +171,7 @@ def test_of_many_frames_some_are_left_out(run_folder, monkeypatch):
     monkeypatch.setattr("memo.report.track._MOST_EXPLAINED", 5)
     written, data, _ = page_of(folder)
     assert [why["frame"] for why in data["why"]] == [0, 4, 8, 12, 16] and len(data["pictures"]["uri"]) == 20
-    assert "Of the tracked frames in it, every 4th is explained." in written
+    assert "Every 4th tracked frame in it is explained." in written
     monkeypatch.setattr("memo.report.track._PICTURES_BYTES", 4_000)
     written, data, report = page_of(folder)
     every = report.contents["every"]
@@ -373,7 +373,7 @@ def test_unknown_numbers_are_dashes(run_folder):
         ("track.csv", "frame,time_s\n1,2\n", "track.csv: columns missing"),
         ("track.csv", None, "track.csv"),
         ("run.json", "{", "run.json: "),
-        ("run.json", "[1]", "run.json: an object was wanted"),
+        ("run.json", "[1]", "run.json: must be an object"),
         ("run.json", '{"memo": 1}', "run.json: memo must be str"),
         ("run.json", '{"memo": "1"}', "run.json: command is missing"),
         ("run.json", "[" * 100_000, "run.json: "),

@@ -205,7 +205,7 @@ def test_rohrs_numbers_are_those_of_the_text(papers, quantity, printed):
 
 def test_the_grid_has_4851_hypotheses(papers):
     row = row_of(papers["rohr"], "points n_X = [ΔX], n_Y = [ΔY], n_pose = [100 Δpose], odd")
-    assert row.ours == "21 11 21, 4851 hypotheses an image"
+    assert row.ours == "21 11 21, 4851 hypotheses per image"
     numbers = dict(_memo.rohr_numbers())
     assert numbers["hypotheses"] == 21 * 11 * 21 and numbers["hypotheses_start"] == 21 * 11 * 50
 

@@ -81,7 +81,7 @@ def test_an_exchange_that_is_a_guess_is_called_one(confused, tmp_path, memo_unsw
     assert repair.p_global["legs"] == pytest.approx(0.5, abs=0.1)
     code, out, _ = memo_unswap(path, "--fps", 25, "--out", tmp_path / "out")
     assert code == 0 and "legs in 0" in out and "by the best guess: legs in 30" in out
-    assert "most frames say" in out
+    assert "most frames are labelled correctly" in out
 
 
 def test_the_majority_is_what_is_taken_for_right(confused):
@@ -93,7 +93,7 @@ def test_the_majority_is_what_is_taken_for_right(confused):
 def test_help_says_what_cannot_be_seen(memo_unswap, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     code, out, _ = memo_unswap("--help")
-    assert code == 0 and "in all frames, or most, cannot be seen" in out and "instead of" in out
+    assert code == 0 and "in all frames, or in most, cannot be detected" in out and "in place of" in out
 
 
 def test_keypoints_without_pairs_are_refused(tmp_path):
@@ -179,7 +179,7 @@ def test_a_file_is_read_as_for_posture_and_mistakes_are_told(tmp_path):
     read = memo.read_keypoints(tmp_path / "points.csv", fps=25)
     assert memo.unswap(tmp_path / "points.csv", fps=25).flips == memo.unswap(read).flips
     for options, reason in (
-        ({"fps": 25}, "still to be read"),
+        ({"fps": 25}, "read from a file only"),
         ({"groups": "legs"}, "a list of legs and arms"),
     ):
         with pytest.raises(ValueError, match=reason):

@@ -141,7 +141,7 @@ def test_frames_are_chosen_like_a_slice(write_video, luma_frames):
     assert [frame.index for frame in frames] == [3, 4, 5] and reader.frame_count == 3
     np.testing.assert_allclose([frame.time_s for frame in frames], [0.12, 0.16, 0.2], atol=1e-4)
     np.testing.assert_array_equal([frame.luma for frame in frames], luma[3:6])
-    with pytest.raises(VideoError, match="frame 10 was asked for, it has 10 frames"):
+    with pytest.raises(VideoError, match="frame 10 was requested, but it has 10 frames"):
         read(path, start=10)
 
 
@@ -286,5 +286,5 @@ def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames)
 def test_frames_that_change_size_are_refused(tmp_path, luma_frames):
     write_image(tmp_path / "a1.png", luma_frames(count=1)[0])
     write_image(tmp_path / "a2.png", luma_frames(count=1, size=(40, 30))[0])
-    with pytest.raises(VideoError, match="frame 1 is 40x30, those before it 50x36"):
+    with pytest.raises(VideoError, match="frame 1 is 40x30, the previous ones 50x36"):
         read(tmp_path, rate_hz=10)

@@ -3,7 +3,7 @@
 Frames are numpy arrays (H, W) uint8; metres and seconds throughout; world Z up; gait phase in [0, 1) with
 0 at the right heel strike.
 
-What happens is told to the logger "memo", which is silent unless your program sets up logging.
+Progress is logged to the logger "memo", which is silent unless your program sets up logging.
 """
 
 import logging as _logging

@@ -1,4 +1,4 @@
-"""What the exit codes of `memo` mean."""
+"""The meaning of the exit codes of `memo`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ __all__ = ["Exit"]
 
 
 class Exit(IntEnum):
-    """What the exit codes mean."""
+    """The meaning of the exit codes."""
 
     TRACKED = 0
-    DONE = 0  # where nobody is to be tracked
+    DONE = 0  # for commands that track nobody
     BAD_INPUT = 1
-    NOBODY = 3  # or no posture of anybody
+    NOBODY = 3  # or no posture is left
     NO_EXTRA = 4
-    SOME_FAILED = 5  # of many videos
+    SOME_FAILED = 5  # some of many videos failed
     IMPOSSIBLE = 6  # every posture of a motion breaks a constraint
     INTERRUPTED = 130
-    PIPE_CLOSED = 141  # nobody reads what is printed any more, as a shell says it
+    PIPE_CLOSED = 141  # the reader of the output has ended; the code that a shell uses

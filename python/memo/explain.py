@@ -1,11 +1,11 @@
-"""Why memo saw a frame as it did: the evidence of a finished run, computed again from its video.
+"""Explains frames of a finished run: computes the evidence again from its video.
 
-A run's folder keeps where the tracker looked in every frame and with which person and camera (`run.json`).
-With the video, the change mask, the edges, the model's contours, the terms of Rohr's eqs. (7)-(11) and the
-similarity over the whole gait cycle come out again as they were: by the same code, at the best point of the
-tracker's grid. The phase in `track.csv` lies near that point, not on it: it is refined between grid points
-and smoothed over all frames. The similarity is the one in `track.csv`. Pixels and lengths in pixels are those
-of the video, also where the tracker was given pictures averaged down.
+A run's folder stores the search region of the tracker in every frame, the person and the camera
+(`run.json`). With the video, the change mask, the edges, the model's contours, the terms of Rohr's
+eqs. (7)-(11) and the similarity over the whole gait cycle are reproduced exactly: by the same code, at the
+best point of the tracker's grid. The phase in `track.csv` is near that point, not equal to it: it is refined
+between grid points and smoothed over all frames. The similarity is the one in `track.csv`. Pixels and
+lengths in pixels are those of the video, even if the tracker was given pictures averaged down.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ __all__ = ["Why", "explain"]
 
 Floats = npt.NDArray[np.float64]
 
-# The video given is another one when the similarity of a frame comes out this far from the tracker's.
+# The video is another one if the similarity of a frame differs by this from the tracker's.
 _SAME_SIMILARITY = 0.01
 
 
 @dataclass(frozen=True)
 class Why:
-    """The evidence of one frame and how the model fits it, in pixels of the video."""
+    """The evidence of one frame and the fit of the model to it, in pixels of the video."""
 
     frame: int
     """Number of the frame in the video."""
@@ -48,9 +48,9 @@ class Why:
     luma: npt.NDArray[np.uint8]
     """(H, W) grey values."""
     change_mask: npt.NDArray[np.bool_]
-    """(H, W) pixels that change against the frame before and the frame after, cleaned: eq. (1)."""
+    """(H, W) pixels that differ from both the previous and the next frame, cleaned: eq. (1)."""
     window_px: tuple[int, int, int, int]
-    """Left, top, right and bottom of the part in which edges were looked for."""
+    """Left, top, right and bottom of the region searched for edges."""
     edge_points: Floats
     """(N, 2) edge points, pixels."""
     segments: Floats
@@ -62,38 +62,38 @@ class Why:
     model_px: Floats
     """(K,) their lengths l_M, undistorted pixels; lines below 1 px (`shrink` px) are left out of the sums."""
     model_edge: npt.NDArray[np.int64]
-    """(K,) the image edge of `segments` that answers each, -1 where none does."""
+    """(K,) the image edge of `segments` matched to each, -1 if there is none."""
     overlap_px: Floats
-    """(K,) l: length of that edge within the line's window, undistorted pixels; NaN where none."""
+    """(K,) l: length of that edge within the line's window, undistorted pixels; NaN if there is none."""
     distance_px: Floats
-    """(K,) d: distance of its midpoint from the line; NaN where none."""
+    """(K,) d: distance of its midpoint from the line; NaN if there is none."""
     angle_rad: Floats
-    """(K,) angle between edge and line; NaN where none."""
+    """(K,) angle between edge and line; NaN if there is none."""
     similarity_px: Floats
     """(K,) s_i of eq. (7), weighted; their sum over that of `model_px` is the similarity of the frame."""
     matched: Floats
-    """(K,) s_i / l_M: how well each line is supported by an image edge, 0 to 1."""
+    """(K,) s_i / l_M: support of each line by an image edge, 0 to 1."""
     matched_edges: Floats
-    """(J, 2, 2) the image edges that answer a line, each once, pixels."""
+    """(J, 2, 2) the image edges matched to a line, each once, pixels."""
     phase_grid: Floats
     """(P,) phases in [0, 1), ascending, `phase` among them."""
     similarity: Floats
-    """(P,) similarity at these phases with the trunk where it was found (eq. 11, Fig. 19)."""
+    """(P,) similarity at these phases with the trunk at its estimated position (eq. 11, Fig. 19)."""
     phase: float
     """The phase chosen: of the tracker's grid, in [0, 1)."""
     chosen_similarity: float
-    """Similarity there, that of `track.csv`."""
+    """Similarity at the chosen phase, as in `track.csv`."""
     shrink: int = 1
-    """How many pixels of the video, each way, made one of the picture in which all this was found."""
+    """Pixels of the video per pixel of the picture that was tracked, along each axis."""
 
     @property
     def twin_phase(self) -> float:
-        """Half a cycle on, where left and right are interchanged."""
+        """The phase half a cycle later, at which left and right are interchanged."""
         return (self.phase + 0.5) % 1.0
 
     @property
     def twin_similarity(self) -> float:
-        """Similarity there."""
+        """Similarity at that phase."""
         off = np.abs((self.phase_grid - self.twin_phase + 0.5) % 1.0 - 0.5)
         return float(self.similarity[np.argmin(off)])
 
@@ -105,10 +105,10 @@ def explain(
     *,
     video: str | PathLike[str] | None = None,
 ) -> Iterator[Why]:
-    """Explains frames of a run of `memo track`, one after the other in their order in the video.
+    """Explains frames of a run of `memo track`, one after another in their order in the video.
 
-    `frames`: numbers in the video, all tracked ones by default. `progress` is called with the number of
-    frames read and that of all to be read. `video`: where the video is now, if it was moved. Memory does not
+    `frames`: numbers in the video, by default all tracked ones. `progress` is called with the number of
+    frames read and the total. `video`: the path of the video, if it was moved. Memory does not
     grow with the number of frames. Needs the `app` extra for reading the video.
     """
     try:
@@ -133,7 +133,7 @@ def explain(
     except (TypeError, ValueError, OverflowError) as error:
         raise RunError(f"{file}: {error}") from None
     first, count = run["frames"][0], run["frames_read"]
-    # A frame's changes need the one after it.
+    # The change mask of a frame needs the next frame.
     stop = min(first + count, max(wanted, default=first - 2) + 2)
     if stop <= first:
         return iter(())
@@ -145,10 +145,10 @@ def _video(run: dict[str, Any], file: Path, given: str | PathLike[str] | None) -
     if given is not None:
         return Path(given)
     if run["video"] is None:
-        raise RunError(f"{file}: the frames came from no video, so they cannot be explained")
+        raise RunError(f"{file}: the frames did not come from a video, so they cannot be explained")
     path = Path(run["video"])
     if not path.exists():
-        raise RunError(f"{file}: the video is not at {path} any more; give its place as video=")
+        raise RunError(f"{file}: the video is no longer at {path}; give its path as video=")
     return path
 
 
@@ -180,7 +180,7 @@ def _explained(
             left.discard(why.frame)
             yield why
     if left:
-        raise RunError(f"{video}: ends before frame {min(left)}, which {file} says was tracked")
+        raise RunError(f"{video}: ends before frame {min(left)}, which was tracked according to {file}")
 
 
 def _found(
@@ -190,14 +190,14 @@ def _found(
     total: int,
     progress: Callable[[int, int], object] | None,
 ) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.uint8]]]:
-    """What was found in the pictures, averaged as the tracker had them, each with its frame of the video."""
+    """The evidence in the pictures, averaged as for the tracker, each with its frame of the video."""
     before = np.empty((0, 0), np.uint8)
     for done, frame in enumerate(reader, 1):
         whole = frame.luma if shrink == 1 else np.array(frame.luma)
         found = explainer.update(whole if shrink == 1 else averaged(whole, shrink), frame.time_s)
         if progress is not None:
             progress(done, total)
-        if found is not None:  # of the frame before
+        if found is not None:  # from the previous frame
             yield found, found["luma"] if shrink == 1 else before
         before = whole
     found = explainer.finish()

@@ -1,7 +1,7 @@
-"""What a part of memo needs beside numpy, and the command that installs it.
+"""The packages that a part of memo needs besides numpy, and the command that installs them.
 
-The command names the packages themselves, as memo's metadata list them: it is right in a clone and wherever
-memo was installed from.
+The command names the packages themselves, from memo's metadata: it is valid in a clone and for any source
+of memo.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _DISTRIBUTION = "memo-motion"
 
 
 def packages_of(extra: str) -> list[str]:
-    """The packages of an extra with their least versions: `av>=14`."""
+    """The packages of an extra with their minimum versions: `av>=14`."""
     try:
         requirements = metadata.requires(_DISTRIBUTION) or []
     except metadata.PackageNotFoundError:  # not installed, but on the path
@@ -26,6 +26,6 @@ def packages_of(extra: str) -> list[str]:
 
 
 def install(extra: str, *absent: str) -> str:
-    """The command that installs the packages of an extra; only those `absent` where memo has no metadata."""
+    """The command that installs the packages of an extra; only those `absent` if memo has no metadata."""
     packages = packages_of(extra) or absent
     return " ".join(["pip install", *(f'"{package}"' for package in packages)])

@@ -1,8 +1,8 @@
-"""The files of results, among them `track.csv`, `events.csv` and `flips.csv`.
+"""Result files, among them `track.csv`, `events.csv` and `flips.csv`.
 
-The tables are comma separated with one header row; metres, radians where the name says `_rad`, degrees where
-it says `_deg`; an empty cell for a value that is not known. A file appears under its name only when complete,
-and its texts are no formulas to a spreadsheet (`memo.spreadsheet`).
+The tables are comma separated with one header row; metres, radians if the name ends in `_rad`, degrees if
+it ends in `_deg`; an unknown value is an empty cell. A file appears under its name only when complete,
+and a spreadsheet does not read its texts as formulas (`memo.spreadsheet`).
 """
 
 from __future__ import annotations
@@ -62,12 +62,12 @@ TRACK_COLUMNS = (
 """Columns of `track.csv`, in order; `walk` counts the walks of a video from 0."""
 
 EVENT_COLUMNS = ("time_s", "frame", "event", "side")
-"""Columns of `events.csv`, in order; `frame` has a fraction where the event falls between two frames."""
+"""Columns of `events.csv`, in order; `frame` has a fraction if the event is between two frames."""
 
 FLIP_COLUMNS = ("frame", "time_s", "last_frame", "group", "levels", "verdict", "probability", "reason")
 """Columns of `flips.csv`, in order: exchanges of right and left, and runs of frames without a decision."""
 
-# Digits after the point: well below what a single camera resolves, so that rounding never shows.
+# Digits after the point: well below the resolution of a single camera, so that rounding has no effect.
 _DIGITS = {
     "frame": 2,
     "_m": 4,
@@ -106,18 +106,18 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
 
 
 def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
-    """Writes columns of one length in their order; the end of a name says how many digits are written."""
+    """Writes columns of one length in their order; the end of a name determines the number of digits."""
     texts = [_texts(name, np.asarray(values)) for name, values in columns.items()]
     write_table(path, columns, zip(*texts, strict=True))
 
 
 def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads any table written here: a column is int64, float64 with NaN for empty cells, or texts."""
+    """Reads any table of memo: a column is int64, float64 with NaN for empty cells, or texts."""
     return {name: _column(cells) for name, cells in read_text_columns(path).items()}
 
 
 def _column(cells: Sequence[str]) -> Column:
-    """Cells as whole numbers, numbers or texts, whichever all of them are."""
+    """Cells as whole numbers, numbers or texts, the first type that fits all of them."""
     for kind, texts in ((np.int64, cells), (np.float64, [cell or "nan" for cell in cells])):
         try:
             return np.array(texts, dtype=object).astype(kind)
@@ -127,13 +127,13 @@ def _column(cells: Sequence[str]) -> Column:
 
 
 def write_json(path: str | PathLike[str], value: Any) -> None:
-    """Writes a value as JSON, null for what is not finite."""
+    """Writes a value as JSON, null if it is not finite."""
     with complete_file(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
         json.dump(plain(value), file, separators=(",", ":"))
 
 
 def plain(value: Any) -> Any:
-    """The value as JSON knows it: no numpy types, and null for what is not finite."""
+    """The value in JSON types: no numpy types, and null for values that are not finite."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -144,17 +144,17 @@ def plain(value: Any) -> Any:
 
 
 def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
-    """Reads what `write_track_csv` wrote: `frame` and `walk` as int64, others as float64, empty cells NaN.
+    """Reads a file of `write_track_csv`: `frame` and `walk` as int64, others as float64, empty cells NaN.
 
-    Pixels are those of the video, also where an older version of memo wrote those of shrunk pictures and
-    `run.json` beside the table says so.
+    Pixels are those of the video, even if an older version of memo wrote those of shrunk pictures and
+    `run.json` beside the table records this.
     """
     columns = read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
     return columns_of_video(columns, shrink_of_table(path))
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
-    """The columns of `track.csv` or `track.parquet`, or of the one in a folder, as `read_track_csv` has them.
+    """The columns of `track.csv` or `track.parquet`, or of the one in a folder, as in `read_track_csv`.
 
     Parquet needs the extra `parquet`.
     """
@@ -185,13 +185,13 @@ def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, An
 
 
 def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]]) -> None:
-    """Writes what was done to right and left: dicts with the keys of `FLIP_COLUMNS`."""
+    """Writes the changes of right and left: dicts with the keys of `FLIP_COLUMNS`."""
     rows = ([_texts(name, np.asarray([flip[name]]))[0] for name in FLIP_COLUMNS] for flip in flips)
     write_table(path, FLIP_COLUMNS, rows)
 
 
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
-    """Reads what `write_events_csv` wrote."""
+    """Reads a file of `write_events_csv`."""
     columns = read_typed_columns(path, EVENT_COLUMNS, texts=("event", "side"))
     if np.isnan([columns["time_s"], columns["frame"]]).any():
         raise ValueError(f"{path}: an event without its time or frame")
@@ -202,7 +202,7 @@ def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
 def read_typed_columns(
     path: str | PathLike[str], names: Sequence[str], *, whole: Sequence[str] = (), texts: Sequence[str] = ()
 ) -> dict[str, Column]:
-    """These columns of a table: int64 for `whole`, objects for `texts`, else float64 with NaN where empty."""
+    """These columns of a table: int64 for `whole`, objects for `texts`, else float64 with NaN if empty."""
     columns: dict[str, Column] = {}
     for name, cells in read_text_columns(path, names).items():
         kind = np.int64 if name in whole else np.float64
@@ -217,9 +217,9 @@ def read_typed_columns(
 
 
 def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> dict[str, list[str]]:
-    """The columns of a table that has at least these (all of it by default), cell by cell as written.
+    """The columns of a table that has at least these (default: all), cell by cell as written.
 
-    Every table written here is read by this; ValueError names the file and the row.
+    It reads every table of memo; ValueError names the file and the row.
     """
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
@@ -230,7 +230,7 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
     if absent:
         raise ValueError(f"{path}: columns missing: {sorted(absent)}")
     if not header or len(set(header)) < len(header):
-        raise ValueError(f"{path}: a header with different names is needed, got {header[:8]}")
+        raise ValueError(f"{path}: the names in the header must be different, got {header[:8]}")
     for line, row in enumerate(rows, start=2):
         if row and len(row) != len(header):
             raise ValueError(f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(header)}")
@@ -241,7 +241,7 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
 def read_text(
     path: str | PathLike[str], error: type[ValueError] = ValueError, most_bytes: int = MAX_TEXT_BYTES
 ) -> str:
-    """A text in UTF-8, with or without a byte order mark; `error` where it is none or longer than that."""
+    """A text in UTF-8, with or without a byte order mark; raises `error` if it is not, or is too long."""
     path = Path(path)
     size = path.stat().st_size
     if size > most_bytes:

@@ -29,7 +29,7 @@ COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4
 
 
 def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *, names: bool = True) -> Axes:
-    """The points about the middle of a window, where most are seen, with trails, links and confidence."""
+    """The points in the middle of a window, where most are visible, with trails, links and confidence."""
     part = figure.windows[window]
     tracks = points.positions[part["start"] : part["end"]]
     middle = tracks[_fullest(tracks)]
@@ -58,7 +58,7 @@ def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *,
 
 
 def telling_window(figure: PlanarFigure) -> int:
-    """The first interpreted window, or the first at all."""
+    """The first interpreted window, or else the first window."""
     states = [window["status"] for window in figure.windows]
     return states.index("interpreted") if "interpreted" in states else 0
 
@@ -66,7 +66,7 @@ def telling_window(figure: PlanarFigure) -> int:
 def write_linkage_png(
     path: str | PathLike[str], points: Points, figure: PlanarFigure, *, names: bool = True
 ) -> None:
-    """The first interpreted window, or the first at all, as a picture."""
+    """The first interpreted window, or else the first window, as a picture."""
     window = telling_window(figure)
     drawing = Figure(figsize=(7, 8), layout="constrained")
     FigureCanvasAgg(drawing)
@@ -83,10 +83,11 @@ def write_turned_video(
     turn_deg: float = 50.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> None:
-    """The display left, and right the limbs found in it seen from `turn_deg` to the side.
+    """The display on the left, and on the right its limbs seen from `turn_deg` to the side.
 
-    Each chain's first point is drawn at depth 0: depths of chains against each other are not known, and
-    each open chain may be reflected. `progress` is called with the frames drawn and in all.
+    Each chain's first point is drawn at depth 0: the depth of one chain relative to another is
+    undetermined, and each undecided chain may be reflected. `progress` is called with the frames drawn
+    and the total.
     """
     flat, turned = _turned(points, figure, turn_deg)
     links_at = _links_by_frame(figure, len(flat))
@@ -115,14 +116,14 @@ def write_turned_video(
             right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
             canvas.draw()
             if frame == 0:
-                drawing.set_layout_engine("none")  # the same for all frames, and dear
+                drawing.set_layout_engine("none")  # the same for all frames, and slow
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
             if progress is not None:
                 progress(frame + 1, len(flat))
 
 
 def _centre(tracks: Any) -> Any:
-    """Mean of the points seen in each frame (T, 1, 2), NaN where there is none."""
+    """Mean of the visible points in each frame (T, 1, 2), NaN if there is none."""
     seen = np.isfinite(tracks).all(axis=2, keepdims=True)
     count = seen.sum(axis=1, keepdims=True)
     total = np.where(seen, tracks, 0).sum(axis=1, keepdims=True)
@@ -130,14 +131,14 @@ def _centre(tracks: Any) -> Any:
 
 
 def _fullest(tracks: Any) -> int:
-    """Of the frames with most points, the one nearest to the middle."""
+    """The frame nearest to the middle among those with most points."""
     seen = np.isfinite(tracks).all(axis=2).sum(axis=1)
     fullest = np.flatnonzero(seen == seen.max())
     return int(fullest[np.argmin(np.abs(fullest - len(tracks) // 2))])
 
 
 def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any, Any]:
-    """The points held in place horizontally (T, K, 2), as seen and turned about the vertical."""
+    """The points held in place horizontally (T, K, 2), as seen and rotated about the vertical."""
     tracks, depth = points.at_one_scale().positions, figure.depth
     centre = _centre(tracks)
     flat = tracks - centre + _centre(centre.swapaxes(0, 1)) * [0, 1]
@@ -148,7 +149,7 @@ def _turned(points: Points, figure: PlanarFigure, turn_deg: float) -> tuple[Any,
 def write_turned_png(
     path: str | PathLike[str], points: Points, figure: PlanarFigure, *, turn_deg: float = 50.0
 ) -> None:
-    """Five instants of the first interpreted window: above as seen, below the limbs from `turn_deg` aside."""
+    """Five instants of the first interpreted window: as seen above, the limbs from `turn_deg` aside below."""
     flat, turned = _turned(points, figure, turn_deg)
     window = figure.interpreted[0]
     links_at = _links_by_frame(figure, len(flat))
@@ -171,7 +172,7 @@ def write_turned_png(
 
 
 def _links_by_frame(figure: PlanarFigure, frames: int) -> list[list[tuple[int, int, int]]]:
-    """Of each frame, (chain, point, point) of the interpreted window whose middle is nearest."""
+    """For each frame, (chain, point, point) of the interpreted window whose middle is nearest."""
     read = figure.interpreted
 
     def links(frame: int) -> list[tuple[int, int, int]]:

@@ -1,4 +1,4 @@
-"""The tracked model drawn over the video it was found in.
+"""Draws the tracked model over its video.
 
 Lines are rasterised with numpy: a pixel is covered by clamp(w / 2 + 1/2 - distance to the segment, 0, 1),
 which is anti-aliased to one pixel and exact along straight stretches. No image library is needed.
@@ -31,7 +31,7 @@ Rgb = npt.NDArray[np.uint8]
 Segments = npt.NDArray[np.float64]
 Colour = tuple[int, int, int]
 
-# From the palette of Okabe and Ito, told apart with any colour vision and on any grey.
+# From the palette of Okabe and Ito, distinguishable with any colour vision and on any grey.
 CONTOUR: Colour = (240, 228, 66)
 RIGHT: Colour = (230, 110, 0)
 LEFT: Colour = (86, 180, 233)
@@ -39,7 +39,7 @@ WHITE: Colour = (255, 255, 255)
 
 _CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
 _LEGIBLE_HEIGHT_PX = 480
-_PIECE_PX = 8.0  # about as long as the segments of a contour
+_PIECE_PX = 8.0  # about the length of the segments of a contour
 _TRAIL_S = 1.0  # about one stride
 # The fastest preset: half the time of "veryfast" for 2.7 times the size, 3.7 Mbit/s of a walk in 720p.
 _ENCODER = {"preset": "ultrafast", "crf": "20"}
@@ -54,10 +54,10 @@ def write_overlay(
     rate_hz: float = 25.0,
     shrink: int = 1,
 ) -> int:
-    """Writes an H.264 MP4 of `frames`, the track drawn on those it covers; returns how many frames it has.
+    """Writes an H.264 MP4 of `frames`, with the track drawn on its frames; returns the number of frames.
 
-    The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate. `shrink`: how many pixels
-    of the track, each way, are one of the frames; the overlay is as large as the frames.
+    The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate. `shrink`: pixels of the
+    track per pixel of the frames, along each axis; the overlay is as large as the frames.
     """
     rows = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
     written = 0
@@ -78,8 +78,8 @@ def write_overlay(
 def draw_row(luma: Luma, track: Any, row: int, *, shrink: int = 1) -> Rgb:
     """The frame of one row of the track with model contours, limbs, ankle trails and legend on it.
 
-    A small frame comes out enlarged by a whole number, so that lines and letters stay fine. `shrink`: how
-    many pixels of the track, each way, are one of `luma`.
+    A small frame is enlarged by a whole number, so that lines and letters stay thin. `shrink`: pixels of the
+    track per pixel of `luma`, along each axis.
     """
     scale = _scale(luma)
     rgb = _enlarged(luma, scale)
@@ -126,7 +126,7 @@ def draw_segments(
 
 
 def draw_text(rgb: Rgb, text: str, colour: Colour = WHITE, *, line: int = 0) -> None:
-    """Writes a line of text into the upper left corner, on a darkened ground; cut off at the image's edge."""
+    """Writes a line of text into the upper left corner, on a dark background; clipped at the image's edge."""
     height_px = max(11, rgb.shape[0] // 40)
     ink = np.concatenate([_ink(character, height_px) for character in text], axis=1)
     top = 4 + line * ink.shape[0]
@@ -146,9 +146,9 @@ def _enlarged(luma: Luma, scale: int) -> Rgb:
 
 
 def _clipped(segments: Segments, size: npt.NDArray[np.int_], margin_px: float) -> Segments:
-    """What lies in the image of (width, height) or at most `margin_px` beside it."""
+    """The parts inside the image of (width, height) or at most `margin_px` outside it."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    divisor = np.where(along == 0, 1e-12, along)  # parallel to a side: it is met far outside the segment
+    divisor = np.where(along == 0, 1e-12, along)  # parallel to a side: it crosses far outside the segment
     meets = np.stack([(-margin_px - start) / divisor, (size + margin_px - start) / divisor])
     enters = np.maximum(meets.min(axis=0).max(axis=1), 0)
     leaves = np.minimum(meets.max(axis=0).min(axis=1), 1)
@@ -158,7 +158,7 @@ def _clipped(segments: Segments, size: npt.NDArray[np.int_], margin_px: float) -
 
 
 def _pieces(segments: Segments) -> Segments:
-    """The segments cut into pieces no longer than `_PIECE_PX`, which all fit squares of one size."""
+    """The segments cut into pieces no longer than `_PIECE_PX`, which all fit into squares of one size."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     counts = np.maximum(np.ceil(np.hypot(*along.T) / _PIECE_PX), 1).astype(int)
     number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -170,7 +170,7 @@ def _pieces(segments: Segments) -> Segments:
 def _distances(
     segments: Segments, u: npt.NDArray[np.int_], v: npt.NDArray[np.int_]
 ) -> npt.NDArray[np.float64]:
-    """Distances of the pixels (u, v) from the segments, segment by segment."""
+    """Distances of the pixels (u, v) from the segments, one segment after another."""
     start, along = segments[:, 0, :, None, None], (segments[:, 1] - segments[:, 0])[:, :, None, None]
     from_u, from_v = u - start[:, 0], v - start[:, 1]
     along_u, along_v = along[:, 0], along[:, 1]
@@ -187,7 +187,7 @@ def _blended(rgb: Rgb, coverage: npt.NDArray[np.floating], colour: Colour) -> Rg
 
 @lru_cache(maxsize=256)
 def _ink(character: str, height_px: int) -> npt.NDArray[np.float32]:
-    """Coverage of a character in its cell; matplotlib brings the font, in which all are equally wide."""
+    """Coverage of a character in its cell; the font comes from matplotlib, with equal widths."""
     dpi = 72.0
     figure = Figure(figsize=(round(0.6 * height_px) / dpi, round(1.4 * height_px) / dpi), dpi=dpi)
     canvas = FigureCanvasAgg(figure)
@@ -203,7 +203,7 @@ def _limbs(columns: dict[str, Any], side: str, row: int) -> Segments:
 
 
 def _trail(columns: dict[str, Any], side: str, row: int) -> Segments:
-    """Where the ankle of one side was in the last second."""
+    """Positions of the ankle of one side during the last second."""
     time_s = columns["time_s"]
     first = int(np.searchsorted(time_s, time_s[row] - _TRAIL_S))
     return _segments(_joint(columns, side, "ankle")[first : row + 1])
@@ -214,14 +214,14 @@ def _joint(columns: dict[str, Any], side: str, joint: str) -> npt.NDArray[np.flo
 
 
 def _segments(points: npt.ArrayLike) -> Segments:
-    """The stretches between consecutive points."""
+    """The segments between consecutive points."""
     points = np.asarray(points, np.float64)
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
 @contextmanager
 def _behind(write: Callable[..., None]) -> Iterator[Callable[..., None]]:
-    """Gives `write` as a call that returns at once and lets it work beside the caller, one call at a time."""
+    """Yields `write` as a call that returns at once; it works in the background, one call at a time."""
     with ThreadPoolExecutor(1) as thread:
         pending: list[Future[None]] = []
 
@@ -239,7 +239,7 @@ def _behind(write: Callable[..., None]) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _h264(path: str, rate_hz: float) -> Iterator[Any]:
-    """Gives a function (rgb, time_s) that appends a frame; the video is complete when the block ends."""
+    """Yields a function (rgb, time_s) that appends a frame; the video is complete when the block ends."""
     with av.open(str(Path(path).absolute()), "w", format="mp4") as container:
         rate = Fraction(rate_hz).limit_denominator(1001)
         stream = container.add_stream("libx264", rate=rate, options=_ENCODER)

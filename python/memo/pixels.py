@@ -1,10 +1,10 @@
-"""Pixels of pictures that were averaged down, as pixels of the video they were made of.
+"""Converts pixels of pictures that were averaged down to pixels of their video.
 
-Centres of pixels are whole numbers, so that n pixels averaged to one have theirs at
+Pixel centres are whole numbers, so that n pixels averaged to one have their centre at
 
     u_video = n (u + 1/2) - 1/2
 
-whatever was left over at the right and at the bottom.
+independent of any rest at the right and at the bottom.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def of_averaged(pixels: npt.ArrayLike, n: int) -> Array:
 
 
 def columns_of_video(columns: Mapping[str, npt.NDArray[Any]], n: int) -> dict[str, npt.NDArray[Any]]:
-    """Columns of a track, those in pixels (`_u_px`, `_v_px`) as pixels of the video."""
+    """Columns of a track, with those in pixels (`_u_px`, `_v_px`) converted to pixels of the video."""
     return {
         name: of_video(values, n) if n > 1 and name.endswith(("_u_px", "_v_px")) else values
         for name, values in columns.items()
@@ -44,9 +44,9 @@ def columns_of_video(columns: Mapping[str, npt.NDArray[Any]], n: int) -> dict[st
 def camera_of_video(
     parameters: Mapping[str, Any], n: int, size: Sequence[int] | None = None
 ) -> dict[str, Any]:
-    """`Camera.parameters()` of pictures averaged n by n as those of the video, which has that `size`, pixels.
+    """`Camera.parameters()` of pictures averaged n by n, converted to the video with that `size`, pixels.
 
-    Without a size it is n times that of the pictures.
+    Without a size, it is n times that of the pictures.
     """
     found = dict(parameters)
     found["size"] = [n * side for side in parameters["size"]] if size is None else list(size)
@@ -58,7 +58,7 @@ def camera_of_video(
 
 
 def averaged(luma: npt.NDArray[np.uint8], n: int) -> npt.NDArray[np.uint8]:
-    """Means of n by n grey values, rounded; what is left at the right and at the bottom is left out."""
+    """Means of n by n grey values, rounded; a rest at the right and at the bottom is left out."""
     height, width = luma.shape[0] // n, luma.shape[1] // n
     total = np.zeros((height, width), np.uint32 if n > 16 else np.uint16)
     for row in range(n):
@@ -68,9 +68,9 @@ def averaged(luma: npt.NDArray[np.uint8], n: int) -> npt.NDArray[np.uint8]:
 
 
 def shrink_of_table(path: str | PathLike[str]) -> int:
-    """How many pixels of the video, each way, are one of a `track.csv` (or of the one in a folder).
+    """Pixels of the video per pixel of a `track.csv` (or of the one in a folder), along each axis.
 
-    It is 1, but for tables of older versions of memo, which held pixels of the pictures that were tracked.
+    It is 1, except for tables of older versions of memo, which held pixels of the pictures that were tracked.
     Their `run.json` has no `pixels_of`.
     """
     path = Path(path)

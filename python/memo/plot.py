@@ -1,6 +1,6 @@
 """Plots of a tracked walk, after the figures of Rohr (1994).
 
-Every function draws into the Axes it is given and returns them; nothing is shown. `write_plots` saves
+Every function draws into the given Axes and returns them; nothing is shown. `write_plots` saves
 all of them as PNG files.
 """
 
@@ -39,7 +39,7 @@ MEASURED: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 4,
 
 
 def new_axes() -> Axes:
-    """Axes of a new figure of pyplot's, which notebooks show by themselves."""
+    """Axes of a new pyplot figure, which notebooks show automatically."""
     from matplotlib import pyplot
 
     return pyplot.subplots(layout="constrained")[1]
@@ -60,7 +60,8 @@ def plot_similarity(ax: Axes, track: Any, start_row: int = 0) -> Axes:
 
 
 def plot_start(ax: Axes, track: Any) -> Axes:
-    """Best phase of each frame of the start, with the tracked line and that half a cycle away (Fig. 23)."""
+    """Best phase of each frame of the starting phase, with the tracked line and the line half a cycle away
+    (Fig. 23)."""
     frames, phases = np.asarray(track.start["frame"]), np.asarray(track.start["phase"])
     ax.plot(frames, phases, **{**MEASURED, "markersize": 7, "label": "best in the frame"})
     line = _phase_line(track.columns)
@@ -142,7 +143,7 @@ def plot_over_time(ax: Axes, track: Any, what: str) -> Axes:
 
 
 def plot_keypoints(ax: Axes, keypoints: Any) -> Axes:
-    """The ways of the points through the picture: right orange, left blue, others grey; dots in one frame."""
+    """The paths of the points in the picture: right orange, left blue, others grey; dots in one frame."""
     colours = {"right": RIGHT, "left": LEFT}
     seen = np.isfinite(keypoints.points).all(axis=2)
     row = int(seen.sum(axis=1).argmax())
@@ -157,7 +158,7 @@ def plot_keypoints(ax: Axes, keypoints: Any) -> Axes:
 
 
 def plot_exchanges(ax: Axes, repair: Any) -> Axes:
-    """Where right and left were exchanged in keypoints, as a bar over time a group; grey where undecided."""
+    """Where right and left were exchanged in keypoints, one bar over time per group; grey if undecided."""
     keypoints = repair.keypoints
     frame_s = float(np.median(np.diff(keypoints.times_s))) if len(keypoints.times_s) > 1 else 1.0
     at_s = dict(zip(keypoints.frames.tolist(), keypoints.times_s.tolist(), strict=True))
@@ -179,7 +180,7 @@ def plot_exchanges(ax: Axes, repair: Any) -> Axes:
 
 
 def write_plots(track: Any, out_dir: str | PathLike[str]) -> list[Path]:
-    """Writes motion.png and angles.png, and similarity.png and start.png where the track has a start."""
+    """Writes motion.png and angles.png, and similarity.png and start.png if the track has a start."""
     plots: dict[str, tuple[tuple[int, int], tuple[float, float], Callable[[Any], object]]] = {
         "motion": ((3, 2), (8, 6), lambda axes: plot_motion(axes, track)),
         "angles": ((2, 1), (6, 5), lambda axes: plot_angles(axes[:, 0], track)),
@@ -207,7 +208,7 @@ def _save(
 
 
 def _phase_line(columns: dict[str, Any]) -> Callable[[npt.NDArray[np.float64]], Any] | None:
-    """The straight line through the tracked phases, which the start is drawn against."""
+    """The straight line through the tracked phases, for comparison with the starting phase."""
     frames, phases = columns["frame"], columns["phase"]
     if len(frames) < 2:
         return None
@@ -215,7 +216,7 @@ def _phase_line(columns: dict[str, Any]) -> Callable[[npt.NDArray[np.float64]], 
 
 
 def _cut_at_wraps(phases: npt.ArrayLike, *others: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
-    """Phases in [0, 1), and the others, with a NaN between where they start anew: no line is drawn across."""
+    """Phases in [0, 1), and the others, with a NaN at each wrap: no line is drawn across it."""
     wrapped = np.mod(phases, 1.0)
     anew = 1 + np.flatnonzero(np.abs(np.diff(wrapped)) > 0.5)
     return [np.insert(np.asarray(values, np.float64), anew, np.nan) for values in (wrapped, *others)]

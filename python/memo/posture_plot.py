@@ -1,7 +1,7 @@
-"""Plots of postures: what one view leaves of a frame, and the motion over time.
+"""Plots of postures: the postures left in a frame, and the motion over time.
 
-Every function draws into the Axes it is given and returns them; nothing is shown. `write_posture_plot` saves
-them in one PNG file. Right limbs are solid, left dashed.
+Every function draws into the given Axes and returns them; nothing is shown. `write_posture_plot` saves
+them in one PNG file. Right limbs are solid, left limbs dashed.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def draw_figure(ax: Axes, joints: Array, *, width: float = 1.0, alpha: float = 1
 
 
 def plot_from_the_side(ax: Axes, postures: Postures, row: int) -> Axes:
-    """All groups of a frame, thin, and its posture in the motion, strong: away from the camera and up."""
+    """All groups of a frame, thin, and its posture in the motion, thick: away from the camera and up."""
     camera, away, _ = _view(postures, postures.smoothed_m[row], postures.groups_m[row])
 
     def plane(points: Array) -> Array:
@@ -92,7 +92,7 @@ def plot_strip(ax: Axes, postures: Postures) -> Axes:
     _draw_ground(ax, postures)
     ax.set_xticks(_STRIP_STEP_M * np.arange(len(rows)), [f"{postures.times_s[row]:.2f}" for row in rows])
     ax.set(xlabel="time, s", ylabel="height, m")
-    ax.set_title(f"the motion from the side; rightwards: {name}", loc="left", fontsize=9)
+    ax.set_title(f"the motion from the side; to the right: {name}", loc="left", fontsize=9)
     ax.set_aspect("equal")
     return ax
 
@@ -125,7 +125,7 @@ def _headline(postures: Postures, row: int) -> str:
     if not postures.all_groups_given[row]:
         groups = f"the largest {groups}"
     left = f"{counted(survivors, 'posture')} left, {groups} drawn thin" if survivors else "no posture left"
-    return f"frame {postures.frames[row]}, {postures.times_s[row]:.2f} s: {left}; strong: the motion"
+    return f"frame {postures.frames[row]}, {postures.times_s[row]:.2f} s: {left}; thick: the motion"
 
 
 def _draw_choice(ax: Axes, postures: Postures, row: int, plane: Callable[[Array], Array]) -> None:
@@ -138,7 +138,7 @@ def _draw_choice(ax: Axes, postures: Postures, row: int, plane: Callable[[Array]
 
 
 def _draw_ground(ax: Axes, postures: Postures) -> None:
-    """The line z = 0, where somebody stands near it (some worlds have their origin elsewhere)."""
+    """The line z = 0, if the person stands near it (some worlds have another origin)."""
     if abs(np.nanmin(postures.smoothed_m[..., 2])) < _NEAR_GROUND_M:
         ax.axhline(0, color=NEUTRAL, linewidth=0.6, linestyle=":")
 
@@ -155,11 +155,11 @@ def _view(postures: Postures, *shown: Array) -> tuple[Array, Array, Array]:
 
 
 def _strip_direction(postures: Postures, known: npt.NDArray[np.intp]) -> tuple[Array, str]:
-    """The way somebody goes; for somebody who stays, away from the camera."""
+    """The direction of walking; for a person who stays in place, away from the camera."""
     middles = np.nanmean(postures.smoothed_m[known], axis=1) * (1, 1, 0)
     quarter = max(len(known) // 4, 1)
     travel = middles[-quarter:].mean(axis=0) - middles[:quarter].mean(axis=0)
     length = np.linalg.norm(travel)
     if postures.heading_source != "travel" or length < 1e-6:
         return _view(postures, postures.smoothed_m[known])[1], "away from the camera"
-    return travel / length, "the way over the ground"
+    return travel / length, "the direction of walking"

@@ -192,7 +192,7 @@ class Postures:
 
     @property
     def all_groups_given(self) -> npt.NDArray[np.bool_]:
-        """(T,) whether all groups are given."""
+        """(T,) whether all groups are in `groups_m`, not only the largest."""
         given = [len(sizes) for sizes in self.group_sizes]
         return np.array([own == count for own, count in zip(given, self.group_counts, strict=True)], np.bool_)
 

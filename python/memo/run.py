@@ -1,18 +1,18 @@
-"""`run.json`: what `memo track` was given and found, so that its folder can be read, reported and explained.
+"""`run.json`: the input and the findings of `memo track`, so that its folder can be read and explained.
 
 Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
-stop], stop null for the end), `frames_read`, `interrupted` (whether frames that were asked for were left
-unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `shrink` (how many pixels of the video,
-each way, made one of the pictures that were tracked), `pixels_of` ("video": to what the pixels of `track.csv`
-and of `camera` belong), `camera_given`, `camera` (of the video: the camera given, or the one guessed for the
-longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` beside the distortions nearest to
-it; null where nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of
-`Track`), `walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and what
-`memo.explain` and `contours_of_run` need: pixels there are those of the pictures that were tracked, frames
+stop], stop null for the end), `frames_read`, `interrupted` (whether requested frames were left
+unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `shrink` (pixels of the video, along
+each axis, per pixel of the pictures that were tracked), `pixels_of` ("video": the unit of the pixels of
+`track.csv` and of `camera`), `camera_given`, `camera` (of the video: the camera given, or the one assumed for
+the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` with the distortions nearest
+to it; null if nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of
+`Track`), `walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and the input of
+`memo.explain` and `contours_of_run`: pixels there are those of the pictures that were tracked, and frames
 are counted from the first one read).
 
-Without `pixels_of`, as older versions of memo wrote it, table and camera are those of the pictures that were
-tracked; `read_run`, `read_track_csv` and `read_keypoints` make them those of the video.
+Without `pixels_of`, as in folders of older versions, table and camera are those of the pictures that were
+tracked; `read_run`, `read_track_csv` and `read_keypoints` convert them to the video.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ NAME = "run.json"
 
 
 class RunError(ValueError):
-    """A folder that is not that of a `memo track`, or whose video is gone; the message says which."""
+    """A folder without a run of `memo track`, or whose video is missing; the message says which."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where the frames of a run came from."""
+    """The source of the frames of a run."""
 
     video: Path | None
-    """The video as it was given, `None` for drawn frames."""
+    """The video as given, `None` for drawn frames."""
     frames: tuple[int, int | None]
-    """First frame and the one after the last; `None` for the end of the video."""
+    """First frame and one past the last; `None` for the end of the video."""
     rate_hz: float
     """Average frame rate."""
     fps_given: float | None = None
@@ -57,9 +57,9 @@ class Source:
     camera_given: bool = False
     """Whether a calibration was given."""
     shrink: int = 1
-    """How many pixels of the video, each way, made one of a frame."""
+    """Pixels of the video per pixel of a frame, along each axis."""
     size: tuple[int, int] | None = None
-    """Width and height of the video, pixels, where it is known."""
+    """Width and height of the video, pixels, if known."""
 
 
 def write_run(
@@ -77,7 +77,7 @@ def write_run(
     path = Path(folder) / NAME
     if track.shrink != source.shrink:
         raise RunError(
-            f"the pictures were shrunk by {source.shrink}, the pixels of the track are those of pictures "
+            f"the pictures were shrunk by {source.shrink}, but the pixels of the track are those of pictures "
             f"shrunk by {track.shrink}: give track.of_video({source.shrink})"
         )
     camera = None if track.camera is None else {"name": "camera", **track.camera.parameters()}
@@ -126,10 +126,10 @@ _KINDS: dict[str, tuple[type, ...]] = {
 
 
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
-    """Reads `run.json` of a folder; its keys are all there and of their kind.
+    """Reads `run.json` of a folder; checks that all keys exist and have the right type.
 
     `interrupted`, `shrink` and `pixels_of` may be missing, as in older folders; they are then `False`, 1 and
-    "video", with the camera made that of the video.
+    "video", and the camera is converted to that of the video.
     """
     path = Path(folder) / NAME
     try:
@@ -141,7 +141,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise RunError(f"{path}: not JSON: {error}") from None
     if not isinstance(run, dict):
-        raise RunError(f"{path}: an object was wanted, got {type(run).__name__}")
+        raise RunError(f"{path}: must be an object, got {type(run).__name__}")
     run.setdefault("interrupted", False)
     run.setdefault("shrink", 1)
     of_pictures = "pixels_of" not in run
@@ -165,7 +165,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         try:
             run["camera"] = camera_of_video(run["camera"], run["shrink"])
         except (KeyError, TypeError, ValueError):
-            raise RunError(f"{path}: camera is none of a run") from None
+            raise RunError(f"{path}: camera is not that of a run") from None
     return run
 
 
@@ -175,7 +175,7 @@ def contours_of_run(
     """Visible contours of the model, (n, 2, 2) pixels of the video, for each row of a track.
 
     They are those of `Track.contours`. `path` is the folder of a run or a table in it, `columns` are those of
-    the table. A row whose place or phase is not known has none.
+    the table. A row with an unknown position or phase has none.
     """
     folder = Path(path) if Path(path).is_dir() else Path(path).parent
     run = read_run(folder)
@@ -185,7 +185,7 @@ def contours_of_run(
     for walk in np.unique(columns["walk"]).tolist():
         if not 0 <= walk < len(run["walks"]):
             raise RunError(
-                f"{folder / NAME}: has {counted(len(run['walks']), 'walk')}, the table a walk {walk}"
+                f"{folder / NAME}: has {counted(len(run['walks']), 'walk')}, the table has a walk {walk}"
             )
         rows = np.flatnonzero(columns["walk"] == walk)
         try:

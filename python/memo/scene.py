@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DemoScene", "demo_scene", "model_scene"]
 
-#: Called with the number of frames drawn and of all.
+#: Called with the number of frames drawn and the total.
 Progress = Callable[[int, int], object]
 Columns = dict[str, npt.NDArray[Any]]
 
@@ -60,16 +60,16 @@ def demo_scene(
     mover: Literal["walker", "rider", "waver", "trolley"] = "walker",
     progress: Progress | None = None,
 ) -> DemoScene:
-    """Draws a person in clothes who walks through a room, 25 frames a second.
+    """Draws a person in clothes who walks through a room, 25 frames per second.
 
-    Body, gait and picture share nothing with the model that tracks: round limbs in clothes, joint curves with
-    deviations of 5 to 10 degrees from the average, uneven sides, a textured wall and a contact shadow.
-    Proportions, clothes, gait, heading, camera, room and all that is None follow from the seed.
+    Body, gait and picture share nothing with the model used in tracking: round limbs in clothes, joint curves
+    with deviations of 5 to 10 degrees from the average, unequal sides, a textured wall and a contact shadow.
+    Proportions, clothes, gait, heading, camera, room and all options that are None follow from the seed.
 
     `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
-    by which the left foot strikes late (-0.1 to 0.1). Other movers than a walker are there to be refused: a
-    `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`; they have no
-    truth. `progress` is called with the number of frames drawn and of all.
+    by which the left foot strikes late (-0.1 to 0.1). Movers other than a walker must be refused by the
+    tracker: a `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`;
+    they have no truth. `progress` is called with the number of frames drawn and the total.
     """
     scene = _memo.ClothedScene(
         seed, frames=frames, noise_sd=noise_sd, leftward=leftward, late_left=late_left, mover=mover
@@ -95,7 +95,7 @@ def model_scene(
 ) -> DemoScene:
     """Draws the model itself as a walker before a wall, as in Rohr 1994 (Figs. 23, 26, 27).
 
-    What tracking reaches here is bounded by the method alone, not by how people differ from the model.
+    The errors of tracking here come from the method alone, not from differences between people and the model.
     Options as for `demo_scene`.
     """
     scene = _memo.Scene(seed, frames=frames, noise_sd=noise_sd, leftward=leftward)
@@ -120,7 +120,7 @@ def _truth(
     scene: _memo.Scene | _memo.ClothedScene,
     rows: list[tuple[int, tuple[float, float, float], float, npt.NDArray[np.float64], list[float]]],
 ) -> Columns:
-    """Columns of rows of frame, torso centre, phase, joints (2, 6, 3) and angles in degrees."""
+    """Columns from rows of frame, torso centre, phase, joints (2, 6, 3) and angles in degrees."""
     joints = np.array([points for _, _, _, points, _ in rows]).reshape(-1, 12, 3)
     pixels = np.array([scene.camera.project(np.ascontiguousarray(points)) for points in joints]).reshape(
         -1, 12, 2

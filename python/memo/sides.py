@@ -1,6 +1,6 @@
-"""Right and left put right in keypoints: which pairs change sides together, and a row for every change.
+"""Corrects right and left in keypoints: the pairs that change sides together, and a row for every change.
 
-The decision itself is the core's; this file hands it the pairs of legs and arms and tells what it found.
+The core decides; this module passes it the pairs of legs and arms and reports the result.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SideRepair", "unswap"]
 
-#: What moves with which joint: heel and toes with the ankle, fingers with the wrist.
+#: Points that move with each joint: heel and toes with the ankle, fingers with the wrist.
 _LEVELS = {
     "legs": {"hip": "hip", "knee": "knee", "ankle": "ankle heel big_toe small_toe"},
     "arms": {"shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist pinky index thumb"},
@@ -33,29 +33,29 @@ _LEVELS = {
 
 @dataclass(frozen=True, repr=False, eq=False)
 class SideRepair:
-    """Keypoints with right and left where they belong, and what was done."""
+    """Keypoints with corrected right and left, and the changes."""
 
     keypoints: Keypoints
     """As read, with entries of right and left exchanged where they had been confused."""
     flips: list[dict[str, Any]]
     """Rows of `flips.csv`: one for every frame in which a group was exchanged, one for every run of frames in
-    which it could not be decided; `probability` is that of having come exchanged."""
+    which it is undecided; `probability` is the probability that the labels were exchanged in the input."""
     exchanged: dict[str, int]
-    """How many frames were exchanged and are sure, by group."""
+    """Number of frames exchanged with certainty, by group."""
     guessed: dict[str, int]
-    """How many frames were exchanged as the best guess only, by group."""
+    """Number of frames exchanged only by the best guess, by group."""
     undecided: dict[str, int]
-    """In how many frames the labels are only the best guess, exchanged or not, by group."""
+    """Number of frames in which the labels are only the best guess, exchanged or not, by group."""
     p_global: dict[str, float]
-    """Probability, by group, that the side most labels name is right, as far as their majority tells."""
+    """Probability, by group, that the majority of the labels is right, from the majority alone."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows of `flips.csv` as a `pandas.DataFrame`."""
         return data_frame({name: [row[name] for row in self.flips] for name in FLIP_COLUMNS})
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws, over time, where each group was exchanged and where it could not be decided, into `ax`, or
-        Axes of its own, and returns them. Needs matplotlib."""
+        """Draws, over time, where each group was exchanged and where it is undecided, into `ax`, or
+        new Axes, and returns them. Needs matplotlib."""
         from memo.plot import new_axes, plot_exchanges
 
         return plot_exchanges(new_axes() if ax is None else ax, self)
@@ -76,11 +76,11 @@ def unswap(
     layout: str | None = None,
     person: int | None = None,
 ) -> SideRepair:
-    """Exchanges right and left, in legs and arms apart, where the motion shows that they were confused.
+    """Exchanges right and left, separately in legs and arms, where the motion shows that they were confused.
 
-    `keypoints`: as `read_keypoints` gives them, or a file or folder for it, with `fps`, `layout`, `person`.
-    It mends changes over time only: which leg is the left one is what most frames say, so labels exchanged in
-    all frames, or most, cannot be seen by it. Nothing is moved, made up or removed.
+    `keypoints`: the result of `read_keypoints`, or a file or folder for it, with `fps`, `layout`, `person`.
+    It corrects only changes over time: the left leg is the one that most frames call left, so labels
+    exchanged in all frames, or in most, cannot be detected. Nothing is moved, invented or removed.
     """
     unknown = [group for group in groups if group not in _LEVELS]
     if isinstance(groups, str) or unknown:
@@ -88,14 +88,14 @@ def unswap(
     if not isinstance(keypoints, Keypoints):
         keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
     elif not fps is layout is person is None:
-        raise ValueError("fps, layout and person are for keypoints that are still to be read")
+        raise ValueError("fps, layout and person apply to keypoints read from a file only")
     pairs = {group: levels for group in groups if (levels := _levels(keypoints.names, group))}
     if not pairs:
         raise KeypointsError(
             f"{keypoints.source.path}: no pair of right and left joints of {' or '.join(groups)}; "
             f"it has {', '.join(keypoints.names)}"
         )
-    # AlphaPose's older scores go to 6; the core weights within 0 to 1.
+    # Older AlphaPose scores go up to 6; the core takes weights from 0 to 1.
     weights = np.clip(keypoints.scores, 0, 1)
     found = _memo.unswap(keypoints.times_s, keypoints.points, weights, groups=pairs)
     points, scores = keypoints.points.copy(), keypoints.scores.copy()
@@ -119,7 +119,7 @@ def unswap(
 
 
 def _levels(names: Sequence[str], group: str) -> dict[str, list[tuple[int, int]]]:
-    """The (left, right) pairs of a group's levels that are there."""
+    """The (left, right) pairs of a group's levels that exist."""
     at = {part: (left, right) for own, part, right, left in _memo.side_pairs(names) if own == group}
     levels = {
         level: [at[part] for part in parts.split() if part in at] for level, parts in _LEVELS[group].items()

@@ -1,12 +1,12 @@
-"""Rows of CSV files: text stays text in a spreadsheet, and memo reads it back as it was.
+"""Rows of CSV files: text stays text in a spreadsheet, and memo reads it back unchanged.
 
 Names of markers, people, videos and joints come from files and users. A spreadsheet evaluates a cell that
 begins with `=`, `+`, `-`, `@`, a tab or a carriage return as a formula, which may run programs or send data
-away (OWASP, "CSV Injection"). `write_rows` puts an apostrophe before such text, also where such text begins a
-cell for a program that splits lines at semicolons or tabs. Numbers are left alone, negative ones too.
-`CsvRows` takes the apostrophe away again. Every CSV file of memo is read and written here.
+away (OWASP, "CSV Injection"). `write_rows` puts an apostrophe before such text, also if such text begins a
+cell for a program that splits lines at semicolons or tabs. Numbers are not changed, negative ones neither.
+`CsvRows` removes the apostrophe again. Every CSV file of memo is read and written here.
 
-Readers that do not know of the apostrophe, such as pandas, see it; in cells of that kind alone.
+Readers that do not know the apostrophe, such as pandas, show it, in such cells only.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ __all__ = ["CsvRows", "Error", "as_given", "harmless", "write_rows"]
 
 Error = csv.Error
 
-# Where a program may begin a cell; what it evaluates there, with the wide characters that East Asian editions
-# take for the same, and behind spaces, which some drop. Apostrophes of the text's own are stepped over.
+# Where a program may begin a cell; the characters that start a formula there, with the wide characters that
+# East Asian editions accept too, and after spaces, which some drop. The text's own apostrophes are skipped.
 _BEGIN = r"(?:^|(?<=[;\t\r\n]))"
 _FORMULA = r"(?='*(?:[\t\r\n]|[^\S\t\r\n]*[=+\-@\uFF1D\uFF0B\uFF0D\uFF20]))"
 _UNMARKED = re.compile(_BEGIN + _FORMULA)
@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*", re.ASCI
 
 
 def harmless(cell: str) -> str:
-    """The cell as it is written: with an apostrophe where a spreadsheet would begin a formula."""
+    """The cell as written: with an apostrophe where a spreadsheet would begin a formula."""
     return cell if _NUMBER.fullmatch(cell) else _UNMARKED.sub("'", cell)
 
 
@@ -44,7 +44,7 @@ def write_rows(
     file: TextIO, rows: Iterable[Iterable[Any]], *, delimiter: str = ",", line_end: str = "\n"
 ) -> None:
     """Writes rows of text and numbers to a file opened with `newline=""`."""
-    # Before Python 3.13 `csv` quotes no line ends but those it writes itself.
+    # Before Python 3.13 `csv` quotes only the line ends that it writes itself.
     line = io.StringIO(newline="")
     table = csv.writer(line, delimiter=delimiter, lineterminator="\r\n")
     for row in rows:
@@ -55,7 +55,7 @@ def write_rows(
 
 
 class CsvRows(Iterator[list[str]]):
-    """The rows of a CSV file, cells as `write_rows` had them; `strip` first drops spaces around them."""
+    """The rows of a CSV file, with the cells given to `write_rows`; `strip` first removes outer spaces."""
 
     def __init__(
         self, lines: Iterable[str], *, delimiter: str = ",", strict: bool = False, strip: bool = False
@@ -65,7 +65,7 @@ class CsvRows(Iterator[list[str]]):
 
     @property
     def line_num(self) -> int:
-        """How many lines were read."""
+        """Number of lines read."""
         return self._rows.line_num
 
     def __next__(self) -> list[str]:

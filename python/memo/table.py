@@ -1,4 +1,4 @@
-"""Tables: those of numbers read from CSV, units of columns, results for pandas, where that is installed."""
+"""Tables: reads tables of numbers from CSV, finds units of columns, converts results for pandas."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ _UNITS = {
 
 
 def column_unit(name: str) -> str | None:
-    """The unit that the end of a column's name says, None for counts, names and numbers of frames."""
+    """The unit at the end of a column's name, None for counts, names and frame numbers."""
     return next((unit for end, unit in _UNITS.items() if name.endswith(end)), None)
 
 
 def data_frame(columns: Mapping[str, Any]) -> pandas.DataFrame:
     """Columns of one length as a `pandas.DataFrame`; `attrs["units"]` has the units of those that have one.
 
-    Raises ImportError, with what to install, where there is no pandas.
+    Raises ImportError, with the command to install it, if there is no pandas.
     """
     try:
         import pandas
@@ -68,13 +68,13 @@ class NumberTable:
 
     path: str | PathLike[str]
     column: dict[str, int]
-    """Place of each column, by its name."""
+    """Index of each column, by its name."""
     numbers: Array
     """(rows, columns), NaN for empty cells."""
     comments: list[str]
 
     def points(self, dimensions: int) -> tuple[list[str], Array]:
-        """Names and positions (T, K, 2) or (T, K, 3) of the points, as `read_points_csv` finds them."""
+        """Names and positions (T, K, 2) or (T, K, 3) of the points, as in `read_points_csv`."""
         known = {2: (("u_px", "v_px"), ("u", "v")), 3: (("x_m", "y_m", "z_m"), ("x", "y", "z"))}[dimensions]
         for axes in known:
             names = list(
@@ -97,7 +97,7 @@ class NumberTable:
         raise ValueError(f"{self.path}: no columns {wanted}; it has {', '.join([*self.column][:6])}")
 
     def times_s(self, rate_hz: float | None) -> Array:
-        """The column time_s, which a given rate may not contradict; else from the rate given or stated."""
+        """The column time_s, which must agree with a given rate; else from the rate given or stated."""
         return _times(self.path, self.column, self.numbers, self.comments, rate_hz)
 
 
@@ -109,9 +109,9 @@ def read_number_table(path: str | PathLike[str]) -> NumberTable:
         told = (line for line in lines if line.strip() and not line.startswith("#"))
         rows = list(CsvRows(told, strip=True))
     except Error as error:
-        raise ValueError(f"{path}: no CSV file: {error}") from None
+        raise ValueError(f"{path}: not a CSV file: {error}") from None
     if len(rows) < 2:
-        raise ValueError(f"{path}: no header and rows of numbers")
+        raise ValueError(f"{path}: has no header and rows of numbers")
     header, body = rows[0], rows[1:]
     twice = next((name for name, count in Counter(header).items() if count > 1), None)
     if twice is not None:
@@ -129,7 +129,7 @@ def read_number_table(path: str | PathLike[str]) -> NumberTable:
 
 
 def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> float:
-    """A cell's number, NaN where it is empty; words only where no point is."""
+    """A cell's number, NaN if it is empty; words are allowed only outside the columns of points."""
     if not cell.strip():
         return np.nan
     try:
@@ -137,7 +137,7 @@ def _number(path: str | PathLike[str], row: int, column: str, cell: str) -> floa
     except ValueError:
         if column.rpartition("_")[2] not in ("u", "v", "px", "x", "y", "z", "m", "s", "deg", "scale"):
             return np.nan
-        raise ValueError(f"{path}: row {row}, column {column}: {cell} is no number") from None
+        raise ValueError(f"{path}: row {row}, column {column}: {cell} is not a number") from None
     if np.isinf(value):
         raise ValueError(f"{path}: row {row}, column {column}: infinite; leave unseen points empty")
     return value
@@ -150,7 +150,7 @@ def _times(
     comments: list[str],
     rate_hz: float | None,
 ) -> Array:
-    """The column time_s, which a given rate may not contradict; else from the rate given or in a comment."""
+    """The column time_s, which must agree with a given rate; else from the rate given or in a comment."""
     if rate_hz is not None and not (rate_hz > 0 and np.isfinite(rate_hz)):
         raise ValueError(f"a frame rate must be positive and finite, got {rate_hz:g}")
     if "time_s" not in column:
@@ -162,16 +162,16 @@ def _times(
     if rate_hz is not None and len(times_s) > 1:
         timed_hz = 1 / float(np.median(np.diff(times_s)))
         if abs(timed_hz / rate_hz - 1) > 0.02:
-            raise ValueError(f"{path}: column time_s has {timed_hz:.4g} frames a second, not {rate_hz:g}")
+            raise ValueError(f"{path}: column time_s has {timed_hz:.4g} frames per second, not {rate_hz:g}")
     return times_s
 
 
 def _stated_rate(path: str | PathLike[str], comments: list[str]) -> float:
-    """The frame rate in the comments, where just one number stands before "Hz"."""
+    """The frame rate in the comments, if exactly one number is before "Hz"."""
     stated = {float(rate) for rate in re.findall(r"(?<![\w.,-])(\d+(?:\.\d*)?) *Hz\b", "\n".join(comments))}
     if len(stated) > 1:
         rates = ", ".join(f"{rate:g}" for rate in sorted(stated))
-        raise ValueError(f"{path}: the comments hold several rates ({rates} Hz): give --fps")
+        raise ValueError(f"{path}: the comments have several rates ({rates} Hz): give --fps")
     if not stated or 0 in stated:
         raise ValueError(f"{path}: no column time_s and no frame rate in a comment: give --fps")
     return stated.pop()

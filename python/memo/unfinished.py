@@ -1,8 +1,9 @@
 """Files and folders that appear under their names complete or not at all.
 
-Until then they lie beside their place under a name of `.memo-` and sixteen random digits, so that nobody can
-put a file or a link there beforehand, and none that is there is opened (O_EXCL). Permissions are those of any
-new file. What a killed process leaves behind is known by its name; `memo batch --resume` removes it.
+Until then they are in the same folder under a name of `.memo-` and sixteen random digits, so that nobody can
+place a file or a link there beforehand, and an existing one is never opened (O_EXCL). Permissions are those
+of any new file. Files left by a killed process are recognised by their name; `memo batch --resume` removes
+them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _NAME = re.compile(rf"{re.escape(_PREFIX)}[0-9a-f]{{{_DIGITS}}}")
 
 
 def is_unfinished(name: str) -> bool:
-    """Whether a file or folder of this name is one that was never completed."""
+    """Whether a file or folder of this name was never completed."""
     return _NAME.fullmatch(name) is not None
 
 
@@ -45,7 +46,7 @@ def new_folder(folder: str | PathLike[str]) -> Path:
 
 @contextmanager
 def complete_file(path: str | PathLike[str], *, within: str | PathLike[str] | None = None) -> Iterator[Path]:
-    """Gives the path of a new file beside `path`, or `within` a folder; on success it takes that name."""
+    """Yields the path of a new file beside `path`, or `within` a folder; on success it becomes `path`."""
     path = Path(path)
     with _named_in_errors(path):
         temporary = new_file(path.parent if within is None else within)
@@ -59,7 +60,7 @@ def complete_file(path: str | PathLike[str], *, within: str | PathLike[str] | No
 
 @contextmanager
 def complete_folder(path: str | PathLike[str]) -> Iterator[Path]:
-    """Gives the path of a new folder beside `path`; on success it takes the place of `path`."""
+    """Yields the path of a new folder beside `path`; on success it replaces `path`."""
     path = Path(path)
     with _named_in_errors(path):
         temporary = new_folder(path.parent)
@@ -90,7 +91,7 @@ def _nameless(folder: str | PathLike[str]) -> Path:
 
 @contextmanager
 def _named_in_errors(path: Path) -> Iterator[None]:
-    """Errors name the file that is wanted, not the one beside it."""
+    """Errors name the requested file, not the temporary one."""
     try:
         yield
     except OSError as error:

@@ -1,10 +1,10 @@
-"""Frames out of a video file or a folder of images: luma, time stamps, upright.
+"""Reads frames from a video file or a folder of images: luma and time stamps, upright.
 
-What it delivers is the luma plane as the camera stored it (no colour conversion: a conversion to
-`gray` differs from it by several grey levels), turned upright by the display matrix, with the video's
-own time stamps. Frames come one at a time, so memory does not grow with the length of the video.
+It returns the luma plane as the camera stored it (without colour conversion: a conversion to
+`gray` differs from it by several grey levels), rotated upright by the display matrix, with the video's
+own time stamps. Frames are read one at a time, so memory does not grow with the length of the video.
 
-What it cannot do: no seeking (a start frame is reached by decoding), no deinterlacing, no variable size.
+Limits: no seeking (a start frame is reached by decoding), no deinterlacing, no change of size in a video.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 Luma = npt.NDArray[np.uint8]
 
 _IMAGE_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff"}
-# From twice this many pixels on a walk loses the way it faces: contours are matched within a few pixels.
+# In pictures of a walk twice as large, the facing direction was wrong: the contour search spans a few pixels.
 _LONGEST_PX = 1280
-# Fewer missing frames than this are edit lists and rounding, not a recording that was cut off.
+# Fewer missing frames come from edit lists and rounding, not from a recording that was cut off.
 _MISSING_FRAMES_TOLERATED = 2
 
 
 class VideoError(ValueError):
-    """A video that cannot be read; the message says which and why, in one line."""
+    """A video that cannot be read; the message names the video and the reason, in one line."""
 
 
 class VideoDamageWarning(UserWarning):
@@ -60,12 +60,12 @@ class Frame:
 class VideoReader:
     """Iterates over the frames of a video file or of a folder of images; use it in a `with` statement.
 
-    `start` and `stop` choose frames like a slice. `rate_hz` replaces the time stamps: needed for a
-    folder of images, and for slow-motion video that was stored at another rate than it was recorded.
+    `start` and `stop` select frames like a slice. `rate_hz` replaces the time stamps: it is needed for a
+    folder of images, and for slow-motion video stored at another rate than it was recorded.
 
     `shrink=n` averages n by n pixels to one, and leaves out columns at the right and rows at the bottom that
-    do not fill one; `None` takes the least n that makes the picture at most 1280 pixels long and high, as
-    `memo track` does.
+    do not fill one; `None` selects the smallest n that makes the picture at most 1280 pixels long and high,
+    as in `memo track`.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class VideoReader:
             raise VideoError(f"the frame rate must be positive, got {rate_hz}")
         self.path: Path = Path(path)
         self.damage: str | None = None
-        """After iteration: what could not be read, `None` if everything was."""
+        """After iteration: what could not be read, `None` if everything was read."""
         self._start, self._stop, self._rate_hz = start, stop, rate_hz
         self._source = _open_source(self.path, rate_hz)
         self._decoded = self._source.decoded()
@@ -93,7 +93,7 @@ class VideoReader:
                 raise VideoError(f"{self.path}: no frame of it can be decoded")
             height, width = _upright(_luma(self._first), self._first).shape
             self.shrink: int = -(-max(width, height) // _LONGEST_PX) if shrink is None else shrink
-            """How many pixels of the video, each way, make one of a frame."""
+            """Pixels of the video per pixel of a frame, along each axis."""
             if not 1 <= self.shrink <= min(width, height):
                 raise VideoError(f"{self.path}: {width}x{height} pixels cannot be shrunk by {self.shrink}")
         except BaseException:
@@ -116,7 +116,7 @@ class VideoReader:
 
     @property
     def frame_count(self) -> int | None:
-        """How many frames iteration will give, as the container announces it; `None` if it does not."""
+        """Number of frames in the iteration, from the container's header; `None` if it is unknown."""
         announced = self._source.announced
         if announced is None:
             return None if self._stop is None else self._stop - self._start
@@ -141,12 +141,12 @@ class VideoReader:
                 yield Frame(index, time_s, self._checked(index, decoded))
         if index < self._start:
             raise VideoError(
-                f"{self.path}: frame {self._start} was asked for, it has {counted(index + 1, 'frame')}"
+                f"{self.path}: frame {self._start} was requested, but it has {counted(index + 1, 'frame')}"
             )
         self._report_damage(index + 1)
 
     def _timed(self) -> Iterator[tuple[float, av.VideoFrame]]:
-        """Decoded frames with their time; where a stamp is missing or does not increase, the rate decides."""
+        """Decoded frames with their time; the rate is used if a stamp is missing or does not increase."""
         first, self._first = self._first, None
         if first is None:
             raise VideoError(f"{self.path}: its frames can be read once; open it again")
@@ -167,7 +167,7 @@ class VideoReader:
         if luma.shape != self.full_size[::-1]:
             (width, height), (now_height, now_width) = self.full_size, luma.shape
             raise VideoError(
-                f"{self.path}: frame {index} is {now_width}x{now_height}, those before it {width}x{height}"
+                f"{self.path}: frame {index} is {now_width}x{now_height}, the previous ones {width}x{height}"
             )
         return luma if self.shrink == 1 else averaged(luma, self.shrink)
 
@@ -179,7 +179,7 @@ class VideoReader:
                 f"{counted(undecodable, 'piece')} could not be decoded; {counted(read, 'frame')} could"
             )
         elif self._source.counted and missing > _MISSING_FRAMES_TOLERATED:
-            self.damage = f"cut off: it announces {counted(announced or 0, 'frame')}, {read} could be read"
+            self.damage = f"cut off: its header says {counted(announced or 0, 'frame')}, {read} could be read"
         if self.damage:
             warnings.warn(f"{self.path}: {self.damage}", VideoDamageWarning, stacklevel=3)
 
@@ -189,7 +189,7 @@ class _File:
 
     def __init__(self, path: Path) -> None:
         try:
-            # A relative path with a colon in it would be taken for a protocol.
+            # A relative path with a colon in it would be read as a protocol.
             self._container = av.open(str(path.absolute()), metadata_errors="replace")
         except av.error.InvalidDataError:
             raise VideoError(f"{path}: not a video, or its index is missing (recording cut off)") from None
@@ -285,7 +285,7 @@ def _natural_order(path: Path) -> list[tuple[int, str]]:
 
 
 def _luma(decoded: av.VideoFrame) -> Luma:
-    """The luma plane itself where there is one of 8 bits; else the nearest thing to it."""
+    """The luma plane itself if there is one of 8 bits; else the nearest equivalent."""
     kind = decoded.format
     if kind.is_rgb or kind.has_palette:
         return _bt601(np.asarray(decoded.to_ndarray(format="rgb24"), np.uint8))
@@ -307,7 +307,7 @@ def _bt601(rgb: Luma) -> Luma:
 
 
 def _upright(luma: Luma, decoded: av.VideoFrame) -> Luma:
-    """Applies the display matrix (x' = a x + c y, y' = b x + d y): quarter turns and mirrorings, as views."""
+    """Applies the display matrix (x' = a x + c y, y' = b x + d y): quarter turns and reflections as views."""
     matrix = _display_matrix(decoded)
     if matrix is None:
         return luma

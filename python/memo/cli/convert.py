@@ -169,7 +169,7 @@ def _convert_picture(
         try:
             rows = write_motchallenge(target, source, up="z" if up is None else up.value)
         except UnicodeDecodeError:
-            raise InputError(f"{source}: not a track of `memo track` (not UTF-8 text)") from None
+            raise InputError(f"{source}: not a track of `memo track` (not text in UTF-8)") from None
         summary: dict[str, Any] = {"rows": rows, "notes": []}
         told = f"{counted(summary['rows'], 'row')} of the track"
     else:

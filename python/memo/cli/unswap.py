@@ -139,4 +139,4 @@ def _by_group(frames: dict[str, int]) -> str:
 def _majority(repair: memo.SideRepair) -> str:
     """What the repair assumes."""
     sure = " and ".join(f"{group} {p:.0%}" for group, p in repair.p_global.items())
-    return f"the side is right that most frames say (probability by the majority alone: {sure})"
+    return f"assumed: most frames are labelled correctly (probability from the majority alone: {sure})"

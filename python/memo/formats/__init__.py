@@ -1,10 +1,10 @@
 """Motion files, read and written: TRC, MOT and STO, C3D, BVH and tables of joints (CSV, Parquet).
 
 `read_motion` and `write_motion` choose the format by the ending of the file's name; `READERS` and
-`WRITERS` hold what each ending is done by, and a new format is one entry in each. What was assumed in
-reading is in `Motion.notes`; what a format has no place for is returned by `write_motion`. A file appears
-complete or not at all, and whatever is wrong with one is a `FormatError` that names the file and the
-line, byte or field.
+`WRITERS` hold the function for each ending, and a new format is one entry in each. Assumptions made in
+reading are in `Motion.notes`; `write_motion` returns what a format cannot store. A file appears complete
+or not at all, and any problem with a file is a `FormatError` that names the file and the line, byte or
+field.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ __all__ = [
 ]
 
 Reader = Callable[[Path, Given], Motion]
-"""Reads a file; raises `FormatError` without the name of the file, which `read_motion` puts before it."""
+"""Reads a file; raises `FormatError` without the name of the file, which `read_motion` prepends."""
 
 Writer = Callable[[Path, Motion, Up], list[str]]
-"""Writes a file whole; returns what was left out, in sentences."""
+"""Writes a whole file; returns what was left out, in sentences."""
 
 READERS: dict[str, Reader] = {
     ".bvh": read_bvh,
@@ -50,7 +50,7 @@ READERS: dict[str, Reader] = {
     ".sto": read_mot,
     ".trc": read_trc,
 }
-"""What reads the files of each ending."""
+"""The reader for each ending."""
 
 WRITERS: dict[str, Writer] = {
     ".bvh": write_bvh,
@@ -61,10 +61,10 @@ WRITERS: dict[str, Writer] = {
     ".sto": write_mot,
     ".trc": write_trc,
 }
-"""What writes the files of each ending."""
+"""The writer for each ending."""
 
 USUAL_UP: dict[str, Up] = {".bvh": "y", ".mot": "y", ".sto": "y", ".trc": "y"}
-"""The up axis that programs expect in the files of an ending; Z in all others."""
+"""The up axis that programs expect for an ending; Z for all others."""
 
 
 def read_motion(
@@ -77,7 +77,7 @@ def read_motion(
 ) -> Motion:
     """Reads a motion file, or the folder of `memo track` or `memo posture`.
 
-    `up`: the file's up axis, whatever it says itself. `rate_hz`: frame rate of a table without times.
+    `up`: the file's up axis, in place of the one it names. `rate_hz`: frame rate of a table without times.
     `unit_m`: metres in one unit of a BVH file, or of a table that names none. `walk`: one walk of a track,
     from 0; all of them otherwise.
     """
@@ -93,11 +93,11 @@ def read_motion(
         if path.name == "track.csv":
             return read_run_folder(path, given, walk)
         if walk is not None:
-            raise FormatError("only track.csv counts walks")
+            raise FormatError("a walk can be chosen only for track.csv")
         reader = READERS.get(path.suffix.lower())
         if reader is None:
             raise FormatError(
-                f"no motion is read from {path.suffix or 'a file without ending'}: {endings(READERS)}"
+                f"cannot read a motion from {path.suffix or 'a file without ending'}: {endings(READERS)}"
             )
         return reader(path, given)
     except FormatError as error:
@@ -107,16 +107,16 @@ def read_motion(
 
 
 def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None) -> list[str]:
-    """Writes a motion in the format of the ending; returns what it has no place for, in sentences.
+    """Writes a motion in the format of the ending; returns what the format cannot store, in sentences.
 
-    `up`: "z" or "y"; without it the format's usual one, Y for TRC, MOT, STO and BVH, else Z.
+    `up`: "z" or "y"; by default the format's usual one, Y for TRC, MOT, STO and BVH, else Z.
     """
     path = Path(path)
     check_up(up)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
         raise FormatError(
-            f"{path}: no motion is written to {path.suffix or 'a file without ending'}: {endings(WRITERS)}"
+            f"{path}: cannot write a motion to {path.suffix or 'a file without ending'}: {endings(WRITERS)}"
         )
     try:
         return writer(path, motion, up or usual_up(path))
@@ -125,7 +125,7 @@ def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None
 
 
 def usual_up(path: Path) -> Up:
-    """The up axis of a file when none is asked for."""
+    """The default up axis of a file."""
     return USUAL_UP.get(path.suffix.lower(), "z")
 
 

@@ -1,17 +1,17 @@
 """BVH (Biovision): a skeleton of fixed limbs and its joints' rotations over time, as text.
 
-Reading is forward kinematics: with R_j the product of a joint's rotation channels in the order they
-stand, `R_world(j) = R_world(parent) R_j` and `p(j) = p(parent) + R_world(parent) offset_j`. Position
-channels stand in the place of the offset, as in Blender; below the root some programs add the two, so
-positions there that are nearer to 0 than to the offset are added to it. Points are the joints and, under
-`NAME_end`, the ends of the last bones where these have a length.
+Reading is forward kinematics: with R_j the product of a joint's rotation channels in their order in the
+file, `R_world(j) = R_world(parent) R_j` and `p(j) = p(parent) + R_world(parent) offset_j`. Position
+channels replace the offset, as in Blender; below the root some programs add the two, so
+positions there that are nearer to 0 than to the offset are added to it. Points are the joints and, as
+`NAME_end`, the ends of the last bones if these have a length.
 
 The format names neither unit nor up axis. The up axis is the one along which the resting skeleton is
 tallest between feet and head; the unit is the one that gives the legs a human length: metres,
-centimetres, millimetres, or that of the CMU recordings (0.05644 m). What was found is told. Without legs
+centimetres, millimetres, or that of the CMU recordings (0.05644 m). The choice is reported. Without legs
 to measure, Y up and centimetres are assumed.
 
-Written are centimetres. The skeleton, as far as the joints are known:
+The unit written is the centimetre. The skeleton, as far as the joints are known:
 
     Hips (between the hips) - RightUpLeg - RightLeg - RightFoot, the same left
                             - LowerBack (same place) - Chest (between the shoulders)
@@ -21,9 +21,9 @@ Written are centimetres. The skeleton, as far as the joints are known:
 At rest the figure stands upright with all limbs straight down, facing +Z with Y up and -Y with Z up, +X
 to its left. Channels are Y X Z (Y up) or Z X Y (Z up) for Hips, LowerBack and Chest, so that the heading
 comes first, and X Z Y or X Y Z for the rest, so that the first is flexion. Rotation of a limb about
-itself cannot be known from joints; the least is taken. Lengths are medians over time, so that joints
-whose distances vary move: by how much is told. Frames at the ends in which a joint is missing are left out;
-between them every joint must be known in every frame.
+its own axis cannot be computed from joints; the smallest is used. Lengths are medians over time, so joints
+with varying distances move: the largest shift is reported. Frames at the ends in which a joint is missing
+are left out; between them every joint must be known in every frame.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class _Node:
     channels: list[str] = field(default_factory=list)
     is_end: bool = False
     column: int = 0
-    """Of its first channel among those of a frame."""
+    """Index of its first channel in a frame."""
 
 
 # Reading.
@@ -81,14 +81,14 @@ def read_bvh(path: Path, given: Given) -> Motion:
         raise FormatError(f"joint {twice[0]} occurs twice")
     if len(values) * len(kept) > MAX_POINTS:
         raise FormatError(
-            f"{counted(len(values), 'frame')} of {counted(len(kept), 'joint')} are more than is read"
+            f"{counted(len(values), 'frame')} of {counted(len(kept), 'joint')} are more than memo reads"
         )
     up, unit_m, notes = _conventions(nodes, given)
     moving = [node.name for node in nodes if node.parent >= 0 and _has_place(node)]
     if moving:
         notes.append(
-            f"Positions below the root, of {counted(len(moving), 'joint')}, the first {moving[0]}: they stand"
-            " in the place of the offsets, but are added where they are near 0."
+            f"Positions below the root, of {counted(len(moving), 'joint')}, the first {moving[0]}: they"
+            " replace the offsets, but are added to them where they are near 0."
         )
     with np.errstate(over="ignore", invalid="ignore"):
         points = unit_m * np.stack([*_positions(nodes, values, kept)], axis=1)
@@ -114,7 +114,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
     awaits_brace = False
     column = 0
     if not lines or lines[0].split()[:1] != ["HIERARCHY"]:
-        raise FormatError("line 1: no BVH file (it begins with HIERARCHY)")
+        raise FormatError("line 1: not a BVH file (which begins with HIERARCHY)")
     for index, line in enumerate(lines[1:], 1):
         words = line.replace("{", " { ").replace("}", " } ").split()
         where = f"line {index + 1}"
@@ -131,7 +131,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                 return nodes, index
             if word in ("ROOT", "JOINT", "End"):
                 if (word == "ROOT") == bool(open_nodes) or (word == "ROOT" and nodes):
-                    raise FormatError(f"{where}: {word} does not stand here; one ROOT, all else inside it")
+                    raise FormatError(f"{where}: {word} is not allowed here; all joints must be in one ROOT")
                 if len(nodes) >= _MOST_NODES:
                     raise FormatError(f"{where}: more than {_MOST_NODES} joints")
                 if open_nodes and nodes[open_nodes[-1]].is_end:
@@ -159,7 +159,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                     raise FormatError(f"{where}: OFFSET has {counted(len(cells), 'number')}, wanted 3")
                 place = [number(cell, f"{where}, OFFSET") for cell in cells]
                 if not all(abs(x) < 1e9 for x in place):
-                    raise FormatError(f"{where}: OFFSET {' '.join(cells)[:60]} is beyond reason")
+                    raise FormatError(f"{where}: OFFSET {' '.join(cells)[:60]} is implausibly large")
                 nodes[open_nodes[-1]].offset = np.array(place)
             elif word == "CHANNELS" and open_nodes:
                 node = nodes[open_nodes[-1]]
@@ -170,16 +170,16 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                     got = f"{count} {' '.join(channels)[:80]}"
                     raise FormatError(f"{where}: CHANNELS {got}: wanted {count} of Xposition ... Zrotation")
                 if node.channels or node.is_end:
-                    raise FormatError(f"{where}: CHANNELS of {node.name} do not stand here")
+                    raise FormatError(f"{where}: CHANNELS of {node.name} are not allowed here")
                 node.channels, node.column = channels, column
                 column += count
             else:
-                raise FormatError(f"{where}: {word[:40]!r} is not part of a hierarchy")
+                raise FormatError(f"{where}: {word[:40]!r} does not belong in a hierarchy")
     raise FormatError(f"line {len(lines)}: no line MOTION")
 
 
 def _until_brace(words: list[str]) -> list[str]:
-    """Takes the words of a name, up to the brace."""
+    """Consumes the words of a name, up to the brace."""
     end = words.index("{") if "{" in words else len(words)
     name = words[:end]
     del words[:end]
@@ -217,7 +217,7 @@ def _frames(lines: list[str], motion: int, channels: int) -> tuple[Array, float]
             )
         row = numbers(cells, line_index, columns)
         if any(x != x or abs(x) > 1e12 for x in row):
-            raise FormatError(f"line {line_index}: a channel is no number or beyond reason")
+            raise FormatError(f"line {line_index}: a channel is not a number or implausibly large")
         rows.append(row)
     if len(rows) != frames or not rows or not channels:
         raise FormatError(
@@ -255,7 +255,7 @@ def _positions(nodes: list[_Node], values: Array, kept: list[int]) -> Iterable[A
             places.append(places[node.parent] + np.einsum("tij,tj->ti", above, offset))
             turns.append(above @ turn if k in last_use else None)
             if last_use[node.parent] == k:
-                turns[node.parent] = None  # no more needed
+                turns[node.parent] = None  # no longer needed
         if k in wanted:
             yield places[k]
 
@@ -265,7 +265,7 @@ def _has_place(node: _Node) -> bool:
 
 
 def _is_added(moved: Array, offset: Array) -> bool:
-    """Whether positions (T, 3) of a joint below the root are meant besides its offset, not in its place."""
+    """Whether positions (T, 3) of a joint below the root are added to its offset, not used in its place."""
     return bool(np.abs(moved).sum() < np.abs(moved - offset).sum())
 
 
@@ -281,7 +281,7 @@ def _about(axis: int, angle_rad: Array) -> Array:
 
 
 def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]]:
-    """Up axis and metres in a unit, as given or as the resting skeleton shows, and what is to be told."""
+    """Up axis and metres per unit, as given or from the resting skeleton, and notes on the choice."""
     rest = np.zeros((len(nodes), 3))
     for k, node in enumerate(nodes):
         rest[k] = node.offset + (rest[node.parent] if node.parent >= 0 else 0)
@@ -293,8 +293,8 @@ def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]
         high = [rest[found[joint]] for joint in ("head", "neck", "right_shoulder") if joint in found]
         tall = np.abs(high[0] - low[0]) if low and high else np.array([0.0, 1.0, 0.0])
         up = "z" if tall[2] > tall[1] else "y"
-        why = "as the figure stands at rest" if low and high else "as most files have"
-        notes.append(f"The file does not say which axis is up: {up.upper()} was taken, {why}.")
+        why = "from the figure at rest" if low and high else "as most files have"
+        notes.append(f"The file does not say which axis is up: {up.upper()} was assumed, {why}.")
     if given.unit_m is not None:
         return up, given.unit_m, notes
     legs = [
@@ -317,32 +317,32 @@ _CM = 100.0
 
 @dataclass
 class _Bone:
-    """A joint of the skeleton that is written; T frames."""
+    """A joint of the written skeleton; T frames."""
 
     name: str
     parent: int
     points: Array
-    """(T, 3) where it is to be."""
+    """(T, 3) its given position."""
     offset: Array
     """(3,) from its parent, at rest."""
     turn: Array
     """(T, 3, 3) its rotation in the world."""
     place: Array
-    """(T, 3) where it comes to be."""
+    """(T, 3) its resulting position."""
 
 
 def write_bvh(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes skeleton and rotations; returns what was left out, in sentences."""
     rate_hz, motion = motion.at_constant_rate()
     joints, notes = _complete_joints(motion)
-    # All is done in figure axes, X to the left, Y up, Z forward, and brought to those of the file at the end.
+    # All computations use figure axes, X left, Y up, Z forward, and convert to those of the file at the end.
     bones = _skeleton({name: from_z_up(points, "y") for name, points in joints.items()})
     off_m = {bone.name: float(np.linalg.norm(bone.place - bone.points, axis=1).max()) for bone in bones}
     worst = max(off_m, key=lambda name: off_m[name])
     if off_m[worst] > 1e-3:
         notes.append(
-            f"Limbs in a BVH file have one length each: {worst} comes to lie up to"
-            f" {off_m[worst] * 100:.1f} cm from where it was, the others less."
+            f"Limbs in a BVH file have one length each: {worst} is up to"
+            f" {off_m[worst] * 100:.1f} cm from its given position, the others less."
         )
     text = ["HIERARCHY", *_hierarchy_lines(bones, up), "MOTION"]
     frames = len(bones[0].points)
@@ -357,7 +357,7 @@ def write_bvh(path: Path, motion: Motion, up: Up) -> list[str]:
         for row in table.tolist():
             file.write(" ".join(f"{x:.6f}" for x in row) + "\n")
     left_out = ["events"] * bool(motion.events) + ["joint angles as such"] * bool(motion.angles)
-    return notes + [f"A BVH file has no place for {what}: left out." for what in left_out]
+    return notes + [f"A BVH file cannot store {what}: left out." for what in left_out]
 
 
 def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
@@ -366,11 +366,11 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
     known = {
         joint: motion.points[:, k] for joint, k in found.items() if np.isfinite(motion.points[:, k]).any()
     }
-    for joint in ("pelvis", "neck"):  # the skeleton has these between the hips and between the shoulders
+    for joint in ("pelvis", "neck"):  # in the skeleton these are between the hips and between the shoulders
         known.pop(joint, None)
     if not {"right_hip", "left_hip"} <= known.keys():
         raise FormatError(
-            f"a BVH skeleton hangs on right_hip and left_hip; the motion has {listed(motion.names)}"
+            f"a BVH skeleton needs right_hip and left_hip; the motion has {listed(motion.names)}"
         )
     for side in ("right", "left"):
         for chain in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
@@ -389,12 +389,12 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
             time_s = motion.times_s[first + missing[0]]
             raise FormatError(
                 f"{joint} is missing in {counted(len(missing), 'frame')}, the first at {time_s:g} s, and BVH"
-                " has no place for missing joints: give --fill, --walk, or another format"
+                " cannot store missing joints: give --fill, --walk, or another format"
             )
     notes = []
     if last - first + 1 < len(there):
         cut = len(there) - (last - first + 1)
-        notes.append(f"Left out: {counted(cut, 'frame')} at the ends, in which a joint is missing.")
+        notes.append(f"Left out: {counted(cut, 'frame')} at the ends, where a joint is missing.")
     if motion.times_s[first] > 0:
         notes.append(f"A BVH file begins at 0 s; this motion began at {motion.times_s[first]:g} s.")
     places = {found[joint] for joint in known}
@@ -405,7 +405,7 @@ def _complete_joints(motion: Motion) -> tuple[dict[str, Array], list[str]]:
 
 
 def _skeleton(joints: dict[str, Array]) -> list[_Bone]:
-    """The bones, parents first, with lengths, rotations and the places that result; figure axes, metres."""
+    """The bones, parents first, with lengths, rotations and resulting positions; figure axes, metres."""
     left, up = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     hips = (joints["right_hip"] + joints["left_hip"]) / 2
     has_chest = "right_shoulder" in joints
@@ -414,7 +414,7 @@ def _skeleton(joints: dict[str, Array]) -> list[_Bone]:
     bones = [_Bone("Hips", -1, hips, np.zeros(3), pelvis_turn, hips)]
 
     def add(name: str, parent: int, points: Array, rest: Array, turn: Array) -> int:
-        """A bone that rests in a direction from its parent, at the median distance; returns its number."""
+        """A bone in a resting direction from its parent, at the median distance; returns its number."""
         above = bones[parent]
         offset = float(np.median(np.linalg.norm(points - above.points, axis=1))) * rest
         place = above.place + np.einsum("tij,j->ti", above.turn, offset)
@@ -453,7 +453,7 @@ def _frame(leftwards: Array, upwards: Array) -> Array:
 
 
 def _least_turn(above: Array, rest: Array, towards: Array) -> Array:
-    """(T, 3, 3) the rotation nearest to `above` that brings `rest` to the direction `towards`."""
+    """(T, 3, 3) the rotation nearest to `above` that turns `rest` to the direction `towards`."""
     start = np.einsum("tij,j->ti", above, rest)
     end = _unit(towards, start)
     axis = np.cross(start, end)
@@ -485,7 +485,7 @@ def _order(name: str, up: Up) -> str:
 
 
 def _angles_deg(turns: Array, name: str, up: Up) -> Array:
-    """(T, 3) angles of the channels of a joint, in their order; without jumps of a whole circle.
+    """(T, 3) angles of the channels of a joint, in their order; without jumps of a full turn.
 
     With R = R_i(a) R_j(b) R_k(c) and e = 1 for i, j, k cyclic, else -1:
     sin b = e R_ik, tan a = -e R_jk / R_kk, tan c = -e R_ij / R_ii.

@@ -1,22 +1,22 @@
 """C3D (c3d.org): points, joint angles and events in the binary format of motion laboratories.
 
-A file is blocks of 512 bytes: a header of 256 words, a section of parameters in groups, then a frame
-after the other: X, Y, Z and a fourth word of every point, whose sign says whether the point is valid.
-Read are integers and floats of all three processors (Intel, DEC, MIPS); written are floats in Intel's
-order, millimetres, residual 0 or -1.
+A file is blocks of 512 bytes: a header of 256 words, a section of parameters in groups, then the frames one
+after another: X, Y, Z and a fourth word of every point, whose sign tells whether the point is valid.
+The reader accepts integers and floats of all three processors (Intel, DEC, MIPS); the writer uses floats in
+Intel's order, millimetres, residual 0 or -1.
 
 The reader is memo's own. Of 150 damaged files, the C++ library ezc3d 1.7 crashed the process on 15, and
 the Python library c3d 0.6 let struct errors and assertions through on 27; here every size in a file is
-held against the bytes that are there before anything is made of it, and a damaged file is read, where its
-sizes still agree, or ends in one `FormatError`.
+checked against the bytes present before it is used, and a damaged file is read, if its sizes still agree,
+or ends in one `FormatError`.
 
 Conventions: the time of the first frame is (its number - 1) / rate, as Vicon counts, and events (group
 EVENT, labels `Foot Strike` and `Foot Off`, contexts `Right` and `Left`) are on the same clock; of other
-events it is told how many there are. Points that POINT:ANGLES names are joint angles in degrees,
+events only the number is reported. Points that POINT:ANGLES names are joint angles in degrees,
 `RKneeAngles` with flexion in X; those that FORCES, MOMENTS, POWERS and SCALARS name, and analog channels,
-are left out. POINT:Y_SCREEN names the up axis; without it, it is the one along which the figure stands.
-Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD, labels and events beyond 255 go on in LABELS2,
-TIMES2 and so forth.
+are left out. POINT:Y_SCREEN names the up axis; without it, it is the axis along which the figure stands.
+Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD; labels and events beyond 255 continue in LABELS2,
+TIMES2 and so on.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = ["read_c3d", "write_c3d"]
 _BLOCK = 512
 _MOST_BYTES = 2 << 30
 _MOST_POINTS = 10_000
-_FARTHEST = 1e12  # of a coordinate, in the file's unit; what is larger is damage
+_FARTHEST = 1e12  # largest coordinate, in the file's unit; a larger one is damage
 _KEY = 0x50
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _OTHER_KINDS = ("FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
@@ -74,7 +74,7 @@ def read_c3d(path: Path, given: Given) -> Motion:
     given.check_used()
     size = path.stat().st_size
     if size > _MOST_BYTES:
-        raise FormatError(f"{size >> 20} MiB are more than the {_MOST_BYTES >> 20} MiB that are read")
+        raise FormatError(f"{size >> 20} MiB are more than the {_MOST_BYTES >> 20} MiB that memo reads")
     data = path.read_bytes()
     file = _open(data)
     labels = _labels(file)
@@ -98,15 +98,19 @@ def read_c3d(path: Path, given: Given) -> Motion:
     events, other_events = _events(file)
     notes += [
         *up_note,
-        *(["Labels that were empty or occurred twice were numbered."] if renamed else []),
+        *(["Empty and repeated labels were numbered."] if renamed else []),
         *(
             [f"Left out: {counted(len(others), 'force, moment or power', 'forces, moments or powers')}."]
             if others
             else []
         ),
-        *([f"Left out: {counted(file.analog_words, 'analog value')} a frame."] if file.analog_words else []),
         *(
-            [f"Left out: {counted(other_events, 'event')}, neither heel strike nor toe off."]
+            [f"Left out: {counted(file.analog_words, 'analog value')} per frame."]
+            if file.analog_words
+            else []
+        ),
+        *(
+            [f"Left out: {counted(other_events, 'event')}, neither heel strike nor toe-off."]
             if other_events
             else []
         ),
@@ -117,7 +121,7 @@ def read_c3d(path: Path, given: Given) -> Motion:
 
 @dataclass
 class _File:
-    """Header and parameters of a file, with sizes that were held against its length."""
+    """Header and parameters of a file, with sizes checked against its length."""
 
     order: str
     processor: int
@@ -135,7 +139,7 @@ class _File:
         return (group, name) in self.parameters
 
     def texts(self, group: str, name: str) -> list[str]:
-        """All the texts of a parameter, with those of NAME2, NAME3, ... where there are more than 255."""
+        """All texts of a parameter, with those of NAME2, NAME3, ... if there are more than 255."""
         found: list[str] = []
         for suffix in ("", *range(2, 100)):
             value = self.parameters.get((group, f"{name}{suffix}"))
@@ -159,7 +163,7 @@ class _File:
 
 def _open(data: bytes) -> _File:
     if len(data) < 2 * _BLOCK or data[1] != _KEY:
-        raise FormatError("byte 1: no C3D file (its second byte is 0x50, and it has two blocks of 512 bytes)")
+        raise FormatError("byte 1: not a C3D file (its second byte must be 0x50, in two blocks of 512 bytes)")
     start = (data[0] - 1) * _BLOCK
     if data[0] < 2 or start + 4 > len(data):
         raise FormatError(
@@ -173,7 +177,7 @@ def _open(data: bytes) -> _File:
     order = ">" if processor == _MIPS else "<"
     file = _File(order, processor, {})
     blocks = data[start + 2]
-    # Some programs leave the number of blocks at 0: the data then tell where the parameters end.
+    # Some programs leave the number of blocks at 0: the parameters then end where the data begin.
     (data_block,) = struct.unpack_from(order + "H", data, 16)
     stop = start + blocks * _BLOCK if blocks else (data_block - 1) * _BLOCK
     file.parameters = _parameters(data, start + 4, min(stop, len(data)), file)
@@ -193,12 +197,12 @@ def _parameters(data: bytes, at: int, stop: int, file: _File) -> dict[tuple[str,
         where = f"byte {at}"
         after_name = at + 2 + length
         if after_name + 2 > stop:
-            raise FormatError(f"{where}: the name of a parameter runs beyond the parameter section")
+            raise FormatError(f"{where}: the name of a parameter ends outside the parameter section")
         name = data[at + 2 : after_name].decode("latin-1").strip().upper()
         (offset,) = struct.unpack_from(file.order + "h", data, after_name)
         if offset < 0 or (offset and after_name + offset > stop):
             raise FormatError(
-                f"{where}, parameter {name}: the next one is {counted(offset, 'byte')} on,"
+                f"{where}, parameter {name}: the next one is {counted(offset, 'byte')} further,"
                 " outside the section"
             )
         if group < 0:
@@ -226,7 +230,7 @@ def _value(data: bytes, at: int, stop: int, file: _File, where: str) -> list[str
     count = math.prod(shape)
     begin = at + 2 + rank
     if begin + count * abs(kind) > stop:
-        raise FormatError(f"{where}: elements of shape {shape} run beyond the parameter section")
+        raise FormatError(f"{where}: elements of shape {shape} end outside the parameter section")
     raw = data[begin : begin + count * abs(kind)]
     if kind == -1:
         width = shape[0] if shape else 1
@@ -251,7 +255,7 @@ def _floats(raw: np.ndarray, file: _File) -> np.ndarray:
 
 
 def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
-    """Points, frames, rate, scale and the start of the data, where header and parameters agree."""
+    """Points, frames, rate, scale and the start of the data, if header and parameters agree."""
     points, analog, first, last = struct.unpack_from(file.order + "4H", data, 2)
     scale, rate_hz = (float(x) for x in _floats(np.frombuffer(data[12:16] + data[20:24], np.uint8), file))
     used = file.number("POINT", "USED")
@@ -265,11 +269,11 @@ def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
     named = file.number("POINT", "SCALE")
     file.scale = scale if named is None else named
     if not (math.isfinite(file.scale) and 0 < abs(file.scale) < 1e6):
-        raise FormatError(f"parameter POINT:SCALE: {file.scale:g} is no scale")
+        raise FormatError(f"parameter POINT:SCALE: {file.scale:g} is not a scale")
     named = file.number("POINT", "RATE")
     file.rate_hz = rate_hz if named is None else named
     if not 1e-3 <= file.rate_hz <= 1e6:
-        raise FormatError(f"parameter POINT:RATE: {file.rate_hz:g} is no rate in Hz")
+        raise FormatError(f"parameter POINT:RATE: {file.rate_hz:g} is not a rate in Hz")
     file.first, file.frames = _frame_range(file, first, last)
     file.analog_words = analog
     begin = file.number("POINT", "DATA_START")
@@ -279,7 +283,7 @@ def _sizes(data: bytes, file: _File, header_data_block: int) -> None:
     if room < file.frames:
         raise FormatError(
             f"byte {max(file.start, 0)}: room for {counted(file.frames, 'frame')} of"
-            f" {counted(frame_bytes, 'byte')} is wanted from here on,"
+            f" {counted(frame_bytes, 'byte')} is needed from here on,"
             f" the file ends at byte {len(data)}, after {room}"
         )
 
@@ -304,7 +308,7 @@ def _frame_range(file: _File, first: int, last: int) -> tuple[int, int]:
 
 
 def _labels(file: _File) -> list[str]:
-    """A label for every point, empty where the file has none."""
+    """A label for every point, empty if the file has none."""
     labels = [label.strip() for label in file.texts("POINT", "LABELS")]
     return (labels + [""] * file.points)[: file.points]
 
@@ -327,7 +331,7 @@ def _frames(data: bytes, file: _File) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unique(labels: list[str]) -> tuple[list[str], bool]:
-    """The labels, numbered where they are empty or occur again, and whether any was changed."""
+    """The labels, numbered if they are empty or repeated, and whether any was changed."""
     taken: set[str] = set(labels)
     seen: set[str] = set()
     names, changed, count = [], False, 0
@@ -347,7 +351,7 @@ def _unique(labels: list[str]) -> tuple[list[str], bool]:
 def _angles(
     values: np.ndarray, valid: np.ndarray, labels: list[str], is_angle: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Flexions by memo's names; other angles, and turns about other axes, as LABEL_x, LABEL_y, LABEL_z."""
+    """Flexions by memo's names; other angles, and other rotation axes, as LABEL_x, LABEL_y, LABEL_z."""
     angles: dict[str, np.ndarray] = {}
     for point in np.flatnonzero(is_angle):
         columns = np.where(valid[:, point, None], values[:, point], np.nan)
@@ -362,7 +366,7 @@ def _angles(
 
 
 def _events(file: _File) -> tuple[list[GaitEvent], int]:
-    """The gait events, and how many others there are; those in the header where there is no group EVENT."""
+    """The gait events, and the number of others; those in the header if there is no group EVENT."""
     times = _joined(file, "EVENT", "TIMES")
     labels, contexts = file.texts("EVENT", "LABELS"), file.texts("EVENT", "CONTEXTS")
     given = [
@@ -389,7 +393,7 @@ def _joined(file: _File, group: str, name: str) -> np.ndarray:
 
 
 def _header_events(data: bytes, file: _File) -> tuple[tuple[str, float], ...]:
-    """The up to 18 events of the header: labels of four characters, seconds from the first frame."""
+    """The events of the header, at most 18: labels of four characters, seconds from the first frame."""
     key, count = struct.unpack_from(file.order + "2H", data, 298)
     if key != 12345 or count > 18:
         return ()
@@ -432,7 +436,7 @@ def write_c3d(path: Path, motion: Motion, up: Up) -> list[str]:
         file.write(header)
         file.write(parameters)
         file.write(words.tobytes())
-        if frames <= 65535:  # of longer files others take every frame up to the end of the file
+        if frames <= 65535:  # for longer files, other programs read all frames up to the end of the file
             file.write(bytes(-words.nbytes % _BLOCK))
     return []
 
@@ -526,7 +530,7 @@ def _parameter_section(
             f"labels and events fill {counted(blocks, 'block')}, the parameters of a C3D file at most 255"
         )
     content = bytearray(struct.pack("<BBBB", 1, _KEY, blocks, _INTEL)) + content
-    # Where the data begin is known only now.
+    # The start of the data is known only now.
     content = content.replace(data_start[2:], _integers("DATA_START", [2 + blocks], ())[2:], 1)
     return bytes(content + bytes(blocks * _BLOCK - len(content)))
 
@@ -553,7 +557,7 @@ def _event_parameters(motion: Motion, first: int, rate_hz: float) -> list[bytes]
 
 
 def _chunks(name: str, count: int) -> Iterable[tuple[str, int, int]]:
-    """NAME, NAME2, ... for 255 elements each, as more are not counted by one byte."""
+    """NAME, NAME2, ... for 255 elements each, the most that one byte can count."""
     for number, a in enumerate(range(0, count, 255), 1):
         yield (name if number == 1 else f"{name}{number}"), a, min(a + 255, count)
 

@@ -1,28 +1,28 @@
 """MOT and STO (OpenSim, SIMM): joint angles over time, as text.
 
-A header of `key=value` lines up to `endheader`, a row of labels that begins with `time`, a row an
-instant; `nColumns` counts the time. Both endings hold the same here. The older header of SIMM
+A header of `key=value` lines up to `endheader`, a row of labels that begins with `time`, one row per
+instant; `nColumns` counts the time. Both endings have the same format here. The older header of SIMM
 (`datacolumns`, `datarows`) is read too.
 
 Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`, flexion positive as in
 the model of Rajagopal 2016; in gait2392 and gait2354 the knee has the other sign) and are written in
-degrees. Where both hips, a knee and the flexion of that hip are known, the place of the pelvis is written
-too, Y up unless asked otherwise; the header says which. The pelvis of OpenSim has X forward, Y up, Z to
-the right, and
+degrees. If both hips, a knee and the flexion of that hip are known, the position of the pelvis is written
+too, Y up unless another axis is requested; the header names it. The pelvis of OpenSim has X forward, Y up, Z
+to the right, and
 
     R = R_z(pelvis_tilt) R_x(pelvis_list) R_y(pelvis_rotation).
 
 Its Z is the line from the left hip to the right one, and it is tilted such that the thigh, at its
-`hip_flexion`, points to the knee: of `memo track` the trunk, which is upright. `pelvis_tx`, `pelvis_ty`,
-`pelvis_tz` are its origin, midway between the anterior superior iliac spines, as far from the hips as in
-the unscaled model of Rajagopal 2016. Instants at which a value is missing are left out, since OpenSim stops
-reading there.
+`hip_flexion`, points to the knee: for `memo track` it is the trunk, which is upright. `pelvis_tx`,
+`pelvis_ty`, `pelvis_tz` are its origin, midway between the anterior superior iliac spines, as far from the
+hips as in the unscaled model of Rajagopal 2016. Instants with a missing value are left out, since OpenSim
+stops reading there.
 
 In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
-left out, and those of a states file that are no value of a coordinate; `/jointset/hip_r/hip_flexion_r/value`
-is `hip_flexion_r`. All other columns are taken to be angles, as the format does not say. A knee that bends
-further backwards than knees do has the sign of gait2392, and is turned. Tables of vectors
-(`DataType=Vec3`) are not read.
+left out, as are columns of a states file that are not the value of a coordinate;
+`/jointset/hip_r/hip_flexion_r/value` is `hip_flexion_r`. All other columns are assumed to be angles, as the
+format does not tell. A knee that bends further backwards than knees can has the sign of gait2392, and is
+reversed. Tables of vectors (`DataType=Vec3`) are not read.
 """
 
 from __future__ import annotations
@@ -65,12 +65,12 @@ _PLUG_IN_GAIT = {
         ("Ankle", "x", "ankle_angle"),
     )
 }
-"""OpenSim's coordinate for angles of a C3D file that mean the same, with the same sign."""
+"""OpenSim's coordinate for angles of a C3D file with the same meaning and sign."""
 
 _OURS = {name: joint for joint, name in OPENSIM.items()}
 _NO_ANGLES = ("/", "force", "moment", "torque", "ground_", "activation", "power", "emg")
 _MOST_HEADER_LINES = 1000
-_BACKWARDS_DEG = 30.0  # further than any knee
+_BACKWARDS_DEG = 30.0  # farther than any knee bends backwards
 
 
 def read_mot(path: Path, given: Given) -> Motion:
@@ -112,11 +112,11 @@ def read_mot(path: Path, given: Given) -> Motion:
     for name in turned:
         angles[name] = -angles[name]
     if turned:
-        notes.append("Knees bend towards negative angles, as in gait2392: their sign was turned.")
+        notes.append("Knees bend towards negative angles, as in gait2392: their sign was reversed.")
     if in_degrees is None:
-        notes.append("The file does not say whether angles are in degrees: they were taken to be.")
+        notes.append("The file does not say whether angles are in degrees: degrees were assumed.")
     if others:
-        notes.append(f"Left out, no angles: {counted(len(others), 'column')}, the first {others[0]}.")
+        notes.append(f"Left out, not angles: {counted(len(others), 'column')}, the first {others[0]}.")
     if not names and not angles:
         raise FormatError(f"line {start + 1}: no column of an angle or a position")
     metadata = {"format": "mot", "up": up}
@@ -124,7 +124,7 @@ def read_mot(path: Path, given: Given) -> Motion:
 
 
 def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
-    """Writes the angles and the place of the pelvis; returns what was left out, in sentences."""
+    """Writes the angles and the position of the pelvis; returns what was left out, in sentences."""
     if not motion.angles:
         raise FormatError(
             "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
@@ -168,14 +168,14 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
     if pelvis_angles and up != "y":
         notes.append("OpenSim's pelvis angles are those of a world with Y up: left out.")
     if origin is None and motion.names:
-        notes.append("The pelvis' place needs both hips, a knee and the flexion of that hip: left out.")
+        notes.append("The pelvis position needs both hips, a knee and the flexion of that hip: left out.")
     left_out = ["events"] * bool(motion.events)
-    left_out += ["points but the pelvis"] * (len(motion.names) > 1)
-    return notes + [f"A MOT or STO file has no place for {what}: left out." for what in left_out]
+    left_out += ["points except the pelvis"] * (len(motion.names) > 1)
+    return notes + [f"A MOT or STO file cannot store {what}: left out." for what in left_out]
 
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int]:
-    """Keys (small letters) with their values, and the index of the line after `endheader`."""
+    """Keys (lower case) with their values, and the index of the line after `endheader`."""
     header: dict[str, str] = {}
     for index, line in enumerate(lines[:_MOST_HEADER_LINES]):
         text = line.strip()
@@ -189,7 +189,7 @@ def _header(lines: list[str]) -> tuple[dict[str, str], int]:
 
 
 def _coordinate(label: str) -> str:
-    """The coordinate whose value a column of an OpenSim states file holds; other labels as they are."""
+    """The coordinate whose value a column of an OpenSim states file holds; other labels are unchanged."""
     parts = label.split("/")
     return parts[-2] if label.startswith("/jointset/") and parts[-1] == "value" else label
 
@@ -217,7 +217,7 @@ def _rows(lines: list[str], start: int, labels: list[str]) -> np.ndarray:
 def _points(
     column: dict[str, np.ndarray], up: Up, up_note: tuple[str, ...]
 ) -> tuple[list[str], np.ndarray, tuple[str, ...]]:
-    """Names and (T, K, 3) of the points given by translations; without any, the up axis needs no note."""
+    """Names and (T, K, 3) of the points given by translations; without points, the up axis needs no note."""
     names = [
         name.removesuffix("_tx")
         for name in column
@@ -230,13 +230,13 @@ def _points(
 
 
 def _is_turned(knee_deg: np.ndarray) -> bool:
-    """Whether a knee's flexion is negative: it bends further to that side, and further than knees can."""
+    """Whether a knee's flexion is negative: it bends more to that side, and more than knees can."""
     known = knee_deg[np.isfinite(knee_deg)]
     return bool(len(known)) and known.min() < -_BACKWARDS_DEG and -known.min() > known.max()
 
 
 def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-    """The pelvis' angles (T,) in degrees, and (T, 3) its origin; that of a file that has one stays."""
+    """The pelvis' angles (T,) in degrees, and (T, 3) its origin; the origin in a file is kept."""
     found = joints_found(motion.names)
     hips = [f"{side}_hip" for side in ("right", "left")]
     sides = [side for side in ("right", "left") if f"{side}_knee" in found and f"{side}_hip" in motion.angles]
@@ -250,7 +250,7 @@ def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
 def _pelvis_of_legs(
     motion: Motion, found: dict[str, int], sides: list[str]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """The angles and the origin of the pelvis from which the thighs of the sides hang as they do."""
+    """The angles and the origin of the pelvis that give the directions of the thighs on these sides."""
     points = {name: from_z_up(motion.points[:, k], "y") for name, k in found.items()}
     right = _unit(points["right_hip"] - points["left_hip"])
     ups = []
@@ -272,7 +272,7 @@ def _pelvis_of_legs(
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """(T, 3) of length one; NaN where there is no direction."""
+    """(T, 3) of length one; NaN if there is no direction."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     unit: np.ndarray = vectors / np.where(lengths > 1e-9, lengths, np.nan)
     return unit

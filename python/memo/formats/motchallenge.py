@@ -1,13 +1,13 @@
 """MOTChallenge rows: `frame, id, bb_left, bb_top, bb_width, bb_height, conf, x, y, z`.
 
 (Leal-Taixe et al., *MOTChallenge 2015: Towards a Benchmark for Multi-Target Tracking*, section 2.3: frames,
-numbers of people and pixels count from 1; x, y, z is where the feet stand, in metres, -1 where unknown.)
+people and pixels are counted from 1; x, y, z is the position of the feet, in metres, -1 if unknown.)
 
-What is written of a track: a row a frame and walk, `id` 1 for the first walk; the box of the model's visible
-contours; the point of the ground below the torso; the track's similarity as `conf`. Of a folder of
-`memo track` the contours are drawn again, with the person and camera in `run.json`.
+Of a track, one row per frame and walk is written: `id` 1 for the first walk; the box of the model's visible
+contours; the point on the ground below the torso; the track's similarity as `conf`. For a folder of
+`memo track` the contours are computed again, with the person and camera in `run.json`.
 
-What it cannot do: clip boxes to the picture (no field says its size); say how sure x and y are.
+Limits: boxes are not clipped to the picture (no field has its size); x and y have no uncertainty.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _WORLD = ("x_m", "y_m", "z_m")
 def write_motchallenge(
     path: str | PathLike[str], track: Track | str | PathLike[str], *, up: str = "z"
 ) -> int:
-    """Writes a track, or that of a folder of `memo track`; returns the number of rows.
+    """Writes a track, or the track of a folder of `memo track`; returns the number of rows.
 
     Frames without a box in the picture have no row. `up="y"`: the ground is the plane of x and z, `x, y, z`
     of the world are `x, z, -y` of the file.
@@ -82,7 +82,7 @@ def read_motchallenge(path: str | PathLike[str], *, up: str = "z") -> dict[str, 
     """Reads results, detections or ground truth: columns `frame`, `id`, `left_px`, `top_px`, `width_px`,
     `height_px`, `conf`, `x_m`, `y_m`, `z_m` in the order of the file; frames and pixels from 0.
 
-    Rows of 6, 7, 9 (class and visibility last, as of 2016) or 10 numbers, between commas or spaces; NaN where
+    Rows of 6, 7, 9 (class and visibility last, as of 2016) or 10 numbers, between commas or spaces; NaN if
     a row has no world coordinates. `up` is the file's up axis; the result has Z up.
     """
     _check_up(up)
@@ -90,7 +90,7 @@ def read_motchallenge(path: str | PathLike[str], *, up: str = "z") -> dict[str, 
     rows = (_row(line, f"{path}: line {number}") for number, line in _lines(path))
     values: Array = np.fromiter(rows, np.dtype((np.float64, 10)))  # type: ignore[assignment]
     if not len(values):
-        raise FormatError(f"{path}: no row in it")
+        raise FormatError(f"{path}: has no rows")
     columns: dict[str, npt.NDArray[Any]] = {
         "frame": values[:, 0].astype(np.int64) - 1,
         "id": values[:, 1].astype(np.int64),
@@ -117,7 +117,7 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _row(line: str, where: str) -> list[float]:
-    """The ten numbers of a row, NaN for those it has not."""
+    """The ten numbers of a row, NaN for missing ones."""
     cells = line.split(",") if "," in line else line.split()
     if len(cells) not in (6, 7, 9, 10):
         raise FormatError(f"{where}: {counted(len(cells), 'number')}; MOTChallenge rows have 6, 7, 9 or 10")
@@ -131,7 +131,7 @@ def _row(line: str, where: str) -> list[float]:
             raise FormatError(f"{where}: {cell.strip()[:40]!r} is not a number")
         values.append(value)
     if values[0] != int(values[0]) or values[0] < 1 or values[1] != int(values[1]):
-        raise FormatError(f"{where}: the number of a frame, from 1, and that of a person are needed")
+        raise FormatError(f"{where}: the number of a frame, from 1, and the number of a person are needed")
     if values[4] < 0 or values[5] < 0:
         raise FormatError(f"{where}: a box of {values[4]:g} by {values[5]:g} pixels")
     world = values[7:] if len(values) == 10 and values[7:] != [-1, -1, -1] else 3 * [math.nan]
@@ -142,7 +142,7 @@ def _row(line: str, where: str) -> list[float]:
 
 
 def boxes_from_contours(contours: Iterable[Array]) -> Array:
-    """(N, 4) left, top, right, bottom in pixels of contours (n, 2, 2) a row; NaN where a row has none."""
+    """(N, 4) left, top, right, bottom in pixels, for N lists of contours (n, 2, 2); NaN for empty lists."""
     points = [row.reshape(-1, 2) for row in contours]
     boxes = [[*row.min(axis=0), *row.max(axis=0)] if len(row) else 4 * [math.nan] for row in points]
     return np.array(boxes, np.float64).reshape(-1, 4)

@@ -1,10 +1,10 @@
-"""The one value that every motion file is read into and written from, and its clock.
+"""The common type of all motion files, and its clock.
 
-World right-handed, Z up, metres, seconds, degrees for joint angles. A file whose up axis is Y is turned
-about X: `x, y, z` of the world are `x, -z, y` of the file, so what points forwards along X still does.
+World right-handed, Z up, metres, seconds, degrees for joint angles. A file whose up axis is Y is rotated
+about X: `x, y, z` of the world are `x, -z, y` of the file, so that X is unchanged.
 
-Formats with a frame rate instead of time stamps need a constant one: `Motion.at_constant_rate` finds it
-and puts empty frames where frames are absent, and refuses stamps that fit no rate. Nothing is
+Formats with a frame rate instead of time stamps need a constant rate: `Motion.at_constant_rate` finds it,
+inserts empty frames for missing frames, and refuses time stamps that fit no rate. Nothing is
 interpolated unless `resampled` or `filled` is called, and nothing is ever extrapolated.
 """
 
@@ -32,22 +32,22 @@ SIDES = ("right", "left")
 
 MAX_FRAMES = 10_000_000
 MAX_POINTS = 30_000_000  # frames times points
-_STAMP_ERROR_S = 1.1e-3  # containers round stamps to milliseconds; two rounded stamps make a grid
+_STAMP_ERROR_S = 1.1e-3  # containers round time stamps to milliseconds; two rounded ones define the grid
 _LATEST_S = 1e9
-_LONGEST_GAP = 20  # times as many empty frames as frames
+_LONGEST_GAP = 20  # largest ratio of empty frames to frames
 
 
 class FormatError(ValueError):
-    """A file that cannot be read or written; one line says which, where in it, and why."""
+    """A file that cannot be read or written; one line names the file, the place in it, and the reason."""
 
     def __init__(self, message: str) -> None:
-        # Names and cells of damaged files may hold anything, and libraries' messages go over several lines.
+        # Names and cells of damaged files may contain anything, and messages of libraries have several lines.
         line = " ".join(message.split())[:600]
         super().__init__("".join(c if c.isprintable() else "?" for c in line))
 
 
 class GaitEvent(NamedTuple):
-    """A foot that comes to the ground or leaves it."""
+    """A heel strike or toe-off."""
 
     time_s: float
     """Seconds on the clock of `Motion.times_s`."""
@@ -62,19 +62,19 @@ class Motion:
     """Points in space over T frames. World: right-handed, Z up, metres."""
 
     names: tuple[str, ...]
-    """The K points, as the file spells them."""
+    """The K points, in the spelling of the file."""
     times_s: Array
     """(T,) seconds, increasing."""
     points: Array
-    """(T, K, 3) metres; NaN where a point is missing, all three of it."""
+    """(T, K, 3) metres; NaN if a point is missing, in all three coordinates."""
     events: tuple[GaitEvent, ...] = ()
     """In order of time."""
     angles: Mapping[str, Array] = field(default_factory=dict)
     """Joint angles (T,) in degrees, NaN where missing: `right_knee` is flexion, as in `track.csv`."""
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    """What the file says besides: `format`, `up`, `unit`, `rate_hz`."""
+    """Other facts in the file: `format`, `up`, `unit`, `rate_hz`."""
     notes: tuple[str, ...] = ()
-    """What was assumed and what was left out in reading, in sentences."""
+    """Assumptions and omissions in reading, in sentences."""
 
     def __post_init__(self) -> None:
         times_s = np.asarray(self.times_s, np.float64)
@@ -103,15 +103,15 @@ class Motion:
         points[np.isnan(points).any(axis=2)] = np.nan
         for event in self.events:
             if event.kind not in EVENT_KINDS or event.side not in SIDES or not math.isfinite(event.time_s):
-                raise FormatError(f"no gait event: {tuple(event)}")
+                raise FormatError(f"not a gait event: {tuple(event)}")
         for name, value in (("times_s", times_s), ("points", points), ("angles", angles)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "events", tuple(sorted(self.events)))
 
     def at_constant_rate(self) -> tuple[float, Motion]:
-        """The frame rate in Hz and the motion on its grid, empty frames where frames are absent.
+        """The frame rate in Hz and the motion on its grid, with empty frames for missing frames.
 
-        Raises `FormatError` where the time stamps fit no constant rate within a millisecond.
+        Raises `FormatError` if the time stamps fit no constant rate within a millisecond.
         """
         steps, rate_hz = self._steps()
         count = int(steps[-1]) + 1
@@ -126,10 +126,10 @@ class Motion:
         return rate_hz, replace(self, times_s=times_s, points=points, angles=angles)
 
     def resampled(self, rate_hz: float) -> Motion:
-        """The motion at another rate, each value linear between the two frames around it.
+        """The motion at another rate, each value interpolated linearly between the two frames around it.
 
-        The new frames begin at the first time stamp and end before the last. A value is missing where one of
-        the two is, or where they are more than three usual intervals apart.
+        The new frames begin at the first time stamp and end before the last. A value is missing if one of the
+        two is, or if they are more than three usual intervals apart.
         """
         if not (math.isfinite(rate_hz) and rate_hz > 0):
             raise FormatError(f"a rate must be positive and finite, got {rate_hz:g}")
@@ -151,7 +151,7 @@ class Motion:
         weight[np.abs(weight) < 1e-9], weight[np.abs(weight - 1) < 1e-9] = 0, 1
         weight[(intervals[after - 1] > gap_s) & (weight > 0) & (weight < 1)] = np.nan
         points = np.empty((count, len(self.names), 3))
-        for k in range(len(self.names)):  # point by point, to hold the whole only once
+        for k in range(len(self.names)):  # one point at a time, to keep only one copy of the whole
             points[:, k] = _between(self.points[after - 1, k], self.points[after, k], weight[:, None])
         return replace(
             self,
@@ -165,10 +165,10 @@ class Motion:
         )
 
     def filled(self, longest_s: float) -> tuple[Motion, int]:
-        """The motion with gaps up to `longest_s` bridged by straight lines, and the number of values filled.
+        """The motion with gaps up to `longest_s` interpolated linearly, and the number of values filled.
 
-        A gap is as long as the time between the frames at its two ends. What is missing at the beginning or
-        at the end of a point's or an angle's track stays missing, and frames that are absent stay absent.
+        A gap is as long as the time between the frames at its two ends. Values missing at the beginning or
+        at the end of a point's or an angle's track stay missing, and missing frames stay missing.
         """
         points, filled = self.points.copy(), 0
         for k in range(len(self.names)):
@@ -179,7 +179,7 @@ class Motion:
         return replace(self, points=points, angles=angles), filled
 
     def _bridge(self, track: Array, longest_s: float, *, are_angles: bool = False) -> int:
-        """Fills the gaps of a track (T, D) in place; returns how many frames it filled."""
+        """Fills the gaps of a track (T, D) in place; returns the number of frames filled."""
         filled = 0
         known = np.flatnonzero(np.isfinite(track[:, 0]))
         wide = np.diff(known) > 1
@@ -202,7 +202,7 @@ class Motion:
         intervals = np.diff(self.times_s)
         period_s = float(np.median(intervals))
         if period_s < 1e-6:
-            raise FormatError(f"frames {period_s:g} s apart: more than a million a second")
+            raise FormatError(f"frames {period_s:g} s apart: more than a million per second")
         ratios = np.round(intervals / period_s)
         if ratios.sum() >= _LONGEST_GAP * len(self.times_s) + 1000:
             raise FormatError(
@@ -238,7 +238,7 @@ def from_z_up(points: npt.ArrayLike, up: Up) -> Array:
 def _check_clock(times_s: Array) -> None:
     bad = np.flatnonzero(~(np.abs(times_s) < _LATEST_S))
     if len(bad):
-        raise FormatError(f"frame {bad[0]}: the time {times_s[bad[0]]:g} s is no time of a motion")
+        raise FormatError(f"frame {bad[0]}: the time {times_s[bad[0]]:g} s is not a valid time")
     late = np.flatnonzero(~(np.diff(times_s) > 0))
     if len(late):
         a, b = times_s[late[0]], times_s[late[0] + 1]
@@ -246,7 +246,7 @@ def _check_clock(times_s: Array) -> None:
 
 
 def _nominal(rate_hz: float, steps: float, said_hz: float | None) -> float:
-    """The rate that the file says, a whole one, or one of NTSC, if the stamps cannot tell it from theirs."""
+    """The rate in the file, a whole number or an NTSC rate, if the stamps cannot tell it from their own."""
     wholes = [rate for rate in (round(rate_hz), round(rate_hz * 1.001) / 1.001) if rate > 0]
     near = [rate for rate in wholes if abs(rate / rate_hz - 1) < 1e-4]
     for nominal in ([] if said_hz is None else [float(said_hz)]) + near:
@@ -256,11 +256,11 @@ def _nominal(rate_hz: float, steps: float, said_hz: float | None) -> float:
 
 
 def _between(a: Array, b: Array, weight: Array) -> Array:
-    """a at weight 0, b at 1, linear between; a missing neighbour counts only where it has weight."""
+    """a at weight 0, b at 1, linear between; a missing neighbour matters only if it has weight."""
     mixed = (1 - weight) * a + weight * b
     return np.where(weight == 0, a, np.where(weight == 1, b, mixed))
 
 
 def _turn_deg(difference: Array) -> Array:
-    """The same turn by at most half a circle."""
+    """The same rotation by at most half a turn."""
     return difference - 360 * np.round(difference / 360)

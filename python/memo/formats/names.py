@@ -1,9 +1,9 @@
-"""Which point of a file is which joint: the twelve of memo, by the names in use.
+"""Maps the points of a file to the twelve joints of memo, by the names in use.
 
 A file is read by one naming scheme, the one in which most of the joints are found, since the same word
 means different joints in different schemes: `RightShoulder` is the shoulder in a list of keypoints, and
 the inner end of the collar bone in a BVH file, where the shoulder is called `RightArm`. Plug-in Gait's
-skin markers are no joints and are not taken for them; its virtual points are (`RFEP`, the proximal end of
+skin markers are not joints and are not used as joints; its virtual points are (`RFEP`, the proximal end of
 the femur, is the hip).
 """
 
@@ -63,7 +63,7 @@ _SCHEMES: tuple[dict[str, tuple[str, ...]], ...] = (
         ankle="ankle {s}an {s}ajc",
     )
     | _MIDDLE,
-    # Motion capture skeletons: the joint is called after the bone that begins there.
+    # Motion capture skeletons: a joint has the name of the bone that begins there.
     _sided(
         shoulder="arm upperarm uparm",
         elbow="forearm lowerarm loarm",
@@ -80,7 +80,7 @@ _SCHEMES: tuple[dict[str, tuple[str, ...]], ...] = (
 
 
 def joints_found(names: Sequence[str]) -> dict[str, int]:
-    """Where memo's joints are among the names: the twelve, and head, neck and pelvis where there are."""
+    """Indices of memo's joints among the names: the twelve, and head, neck and pelvis if they exist."""
     plain: dict[str, int] = {}
     for index, name in enumerate(names):
         plain.setdefault(_letters(name), index)
@@ -92,7 +92,7 @@ def joints_found(names: Sequence[str]) -> dict[str, int]:
 
 
 def standing_up(names: Sequence[str], points: npt.NDArray[np.float64]) -> Up | None:
-    """The axis along which shoulders and head are above the ankles; None where no figure stands.
+    """The axis along which shoulders and head are above the ankles; None if no figure is upright.
 
     `points` (T, K, 3) in the axes of a file. Upright is twice as high as wide, in the median frame.
     """
@@ -112,9 +112,9 @@ def standing_up(names: Sequence[str], points: npt.NDArray[np.float64]) -> Up | N
 
 
 def joint_points(motion: Motion) -> Motion:
-    """The motion of the twelve joints alone, in memo's order, and of the head where it is known.
+    """The motion of only the twelve joints, in memo's order, and of the head if it is known.
 
-    They have memo's short names (`RSH`, `HEAD`), by which point-light displays know limbs.
+    They have memo's short names (`RSH`, `HEAD`), by which point-light displays identify limbs.
     """
     found = joints_found(motion.names)
     absent = [joint for joint in JOINTS if joint not in found]
@@ -126,16 +126,16 @@ def joint_points(motion: Motion) -> Motion:
 
 
 def listed(names: Sequence[str], most: int = 40) -> str:
-    """Names in a message, not too many of them."""
+    """Names for a message, limited in number."""
     shown = ", ".join(names[:most]) or "none"
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _letters(name: str) -> str:
-    """A name in small letters and digits, without its subject's ("Anna:RKNE") or FreeMoCap's `body_`."""
+    """A name in lower-case letters and digits, without its subject's ("Anna:RKNE") or FreeMoCap's `body_`."""
     return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower().removeprefix("body_"))
 
 
 def _those(spelled: Sequence[str], plain: dict[str, int]) -> list[str]:
-    """The spellings that are there."""
+    """The spellings that exist."""
     return [name for name in spelled if name in plain]

@@ -1,10 +1,10 @@
 """Tables as Parquet, the unit of every column in its metadata. Needs the extra `parquet` (pyarrow).
 
-Columns and their names are those of the CSV files. A value that is not known is null: NaN and the empty texts
-of columns that otherwise hold numbers. The unit stands under `unit` in the metadata of a column (`cycle` for
-`phase`, `1` for a pure number), the version that wrote the file under `memo` in that of the table.
+Columns and their names are those of the CSV files. An unknown value is null: NaN and the empty texts
+of columns that otherwise hold numbers. The unit is stored under `unit` in the metadata of a column (`cycle`
+for `phase`, `1` for a pure number), the version that wrote the file under `memo` in that of the table.
 
-What it cannot do: nested columns, and tables beyond 100 million cells.
+Limits: no nested columns, and no tables beyond 100 million cells.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def write_parquet(
 ) -> None:
     """Writes columns of one length: numbers, texts or truth values.
 
-    `units` are those of columns whose names do not end on them; `about` goes into the table's metadata.
+    `units` are those of columns whose names do not end in a unit; `about` is stored in the table's metadata.
     """
     pa, pq = _arrow()
     arrays = {name: _array(pa, name, np.asarray(values)) for name, values in columns.items()}
@@ -63,7 +63,7 @@ def write_parquet(
 def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
     """Reads any flat table: whole numbers as int64 (float64 where some are null), texts and dates as objects.
 
-    Decimals, as DuckDB makes of `0.04 * frame`, become float64, and null NaN, or an empty text among texts.
+    Decimals, which DuckDB makes of `0.04 * frame`, become float64; null becomes NaN, or an empty text.
     """
     path = Path(path)
     pa, pq = _arrow()
@@ -84,7 +84,7 @@ def read_parquet(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
 
 
 def read_parquet_motion(path: Path, given: Given) -> Motion:
-    """The points and angles of a table, as `memo.formats.table` reads them; its up axis is in `about`."""
+    """The points and angles of a table, like `memo.formats.table`; its up axis is in `about`."""
     given.check_used("rate_hz", "unit_m")
     try:
         columns = read_parquet(path)
@@ -92,7 +92,7 @@ def read_parquet_motion(path: Path, given: Given) -> Motion:
         raise FormatError(str(error).removeprefix(f"{path}: ")) from None
     known = [name for name, values in columns.items() if values.dtype.kind in "fi"]
     if not known:
-        raise FormatError("no column of numbers in it")
+        raise FormatError("has no column of numbers")
     numbers = np.column_stack([columns[name].astype(np.float64) for name in known])
     up = _about(path).get("up")
     comments = [] if up is None else [f"# {up} up"]
@@ -106,7 +106,7 @@ def read_parquet_motion(path: Path, given: Given) -> Motion:
 def write_parquet_motion(path: Path, motion: Motion, up: Up) -> list[str]:
     """Writes points and angles, the up axis in the table's metadata; returns what was left out."""
     write_parquet(path, motion_columns(motion, up), about={"up": up})
-    return ["A table of joints has no place for events: left out."] if motion.events else []
+    return ["A table of joints cannot store events: left out."] if motion.events else []
 
 
 def _about(path: Path) -> dict[str, str]:
@@ -124,9 +124,9 @@ def _arrow() -> tuple[ModuleType, ModuleType]:
 
 
 def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
-    """A column of Arrow's, null where not known."""
+    """A column for Arrow, null if unknown."""
     if values.ndim != 1:
-        raise FormatError(f"column {name}: wanted one value a row, got shape {values.shape}")
+        raise FormatError(f"column {name}: wanted one value per row, got shape {values.shape}")
     if values.dtype.kind not in "fiubUO":
         raise FormatError(f"column {name}: {values.dtype} is neither number, text nor truth value")
     if values.dtype.kind == "f":
@@ -140,7 +140,7 @@ def _array(pa: ModuleType, name: str, values: npt.NDArray[Any]) -> Any:
 
 def _check_flat(pa: ModuleType, path: Path, schema: Any) -> None:
     if len(set(schema.names)) < len(schema.names):
-        raise FormatError(f"{path}: a name of a column stands there twice")
+        raise FormatError(f"{path}: a column name appears twice")
     types = pa.types
     for name, kind in zip(schema.names, schema.types, strict=True):
         own = kind.value_type if types.is_dictionary(kind) else kind

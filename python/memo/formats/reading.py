@@ -1,4 +1,4 @@
-"""What the caller tells a reader that a file may not say: up axis, frame rate, unit."""
+"""Values that the caller gives a reader if a file may not have them: up axis, frame rate, unit."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ UNITS_M = {
 }
 
 METRIC_M = {unit: UNITS_M[unit] for unit in ("m", "cm", "mm")}
-_LEG_M = (0.45, 1.3)  # thigh and shank, from children to giants
+_LEG_M = (0.45, 1.3)  # thigh and shank, from children to very tall adults
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the caller said; None where a reader is to find out."""
+    """The caller's values; None if the reader is to find them."""
 
     up: Up | None = None
-    """Overrules what the file says."""
+    """Overrides the up axis of the file."""
     rate_hz: float | None = None
     """Frame rate of a table without times."""
     unit_m: float | None = None
     """Metres in one unit of length, for BVH and for tables that name none."""
 
     def check_used(self, *used: str) -> None:
-        """Refuses what was given besides what a reader uses."""
+        """Refuses values that the reader does not use."""
         for name, what in (("rate_hz", "a frame rate (--fps)"), ("unit_m", "a unit (--unit)")):
             if name not in used and getattr(self, name) is not None:
-                raise FormatError(f"the file says it itself: leave out {what}")
+                raise FormatError(f"the file has its own: leave out {what}")
 
 
 def unit_of(text: str, where: str) -> tuple[str, float]:
@@ -46,25 +46,25 @@ def unit_of(text: str, where: str) -> tuple[str, float]:
 
 
 def unit_of_legs(leg: float | None, units_m: Mapping[str, float], usual: str) -> tuple[float, str]:
-    """Metres in the first unit that makes legs, thigh and shank, a human length; a sentence that says so.
+    """Metres in the first unit that gives the legs, thigh and shank, a human length; and a sentence on it.
 
-    `leg`: their length in the file's unit, None where there are none to measure: `usual` then.
+    `leg`: their length in the file's unit, None if there are no legs to measure; the unit is then `usual`.
     """
     if leg is None:
         return units_m[usual], f"The file names no unit, and has no legs to measure: {usual} was assumed."
     for unit, unit_m in units_m.items():
         if _LEG_M[0] <= leg * unit_m <= _LEG_M[1]:
             made = f"which makes the legs {leg * unit_m:.2f} m long"
-            return unit_m, f"The file names no unit: {unit} was taken, {made}."
+            return unit_m, f"The file names no unit: {unit} was assumed, {made}."
     raise FormatError(f"no unit is named, and legs of {leg:g} fit none: give --unit, the metres in one unit")
 
 
 def chosen_up(
     given: Given, said: str | None, usual: Up, because: str, stands: Up | None = None
 ) -> tuple[Up, tuple[str, ...]]:
-    """The up axis: as given, else as the file says, else as the figure stands, else the usual one.
+    """The up axis: as given, else from the file, else from the figure's posture, else the usual one.
 
-    The last two are told.
+    The last two are reported.
     """
     if given.up is not None:
         return given.up, ()
@@ -75,5 +75,5 @@ def chosen_up(
         return up, ()
     silent = "The file does not say which axis is up:"
     if stands is not None:
-        return stands, (f"{silent} {stands.upper()} was taken, as the figure stands.",)
+        return stands, (f"{silent} {stands.upper()} was assumed, from the figure's posture.",)
     return usual, (f"{silent} {usual.upper()} was assumed, as {because}.",)

@@ -1,7 +1,7 @@
 """The folders that `memo track` and `memo posture` write, as motions.
 
-Several walks of one `track.csv` are one motion; between them nobody was tracked and no frame is there.
-Where a format wants a frame at every instant, those frames are empty.
+Several walks of one `track.csv` are one motion; between them nobody was tracked and there are no frames.
+For formats that need a frame at every instant, those frames are empty.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ def sources(path: Path) -> list[Path]:
 
 
 def read_run_folder(path: Path, given: Given, walk: int | None) -> Motion:
-    """Reads `track.csv` with `events.csv`, or `postures.csv`; of a track one walk, or all."""
+    """Reads `track.csv` with `events.csv`, or `postures.csv`; from a track one walk, or all."""
     given.check_used()
     table, *others = sources(path)
     if not table.is_file():
         raise FormatError("holds neither track.csv of `memo track` nor postures.csv of `memo posture`")
     if given.up == "y":
-        raise FormatError(f"{table.name} has Z up")
+        raise FormatError(f"{table.name} always has Z up")
     if table.name == "track.csv":
         return _track(table, others[0], walk)
     if walk is not None:
-        raise FormatError("only track.csv counts walks")
+        raise FormatError("a walk can be chosen only for track.csv")
     return read_table(table, given)
 
 

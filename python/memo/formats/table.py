@@ -1,12 +1,12 @@
 """Tables of joints: CSV with one header row, `<joint>_x_m`, `<joint>_y_m`, `<joint>_z_m` and `<angle>_deg`.
 
-Times are the column `time_s`, or follow from a rate in a comment ("# metres, Z up, 100 Hz") or from the
-caller. Z is up, as in all tables of memo, unless a comment before the header says `Y up`; with Y up such
-a comment is written, with Z up none, so that any program reads the file. Empty cells are missing.
+Times are in the column `time_s`, or follow from a rate in a comment ("# metres, Z up, 100 Hz") or from
+the caller. Z is up, as in all tables of memo, unless a comment before the header says `Y up`. This comment
+is written only with Y up, so that any program can read files with Z up. Empty cells are missing.
 
-Tables of others (FreeMoCap, anipose) name their columns `<joint>_x`, without a unit: it is the one that
-gives the legs a human length, metres where there are none. Up is the axis along which the figure stands,
-else Z. Both are told.
+Tables of other programs (FreeMoCap, anipose) name their columns `<joint>_x`, without a unit: it is the one
+that gives the legs a human length, metres if there are none. Up is the axis along which the figure stands,
+else Z. Both are reported.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 
 
 def read_table(path: Path, given: Given) -> Motion:
-    """Reads points and angles of a table; other columns are passed over."""
+    """Reads points and angles of a table; other columns are ignored."""
     given.check_used("rate_hz", "unit_m")
     try:
         return motion_of_table(read_number_table(path), given)
@@ -38,7 +38,7 @@ def read_table(path: Path, given: Given) -> Motion:
 
 
 def motion_of_table(table: NumberTable, given: Given) -> Motion:
-    """The motion in a table of columns as `motion_columns` names them, from whatever file it came."""
+    """The motion in a table of columns as named by `motion_columns`, from any kind of file."""
     angles = {
         name.removesuffix("_deg"): table.numbers[:, index]
         for name, index in table.column.items()
@@ -70,7 +70,7 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
 
 
 def _leg(names: list[str], points: npt.NDArray[np.float64]) -> float | None:
-    """Length of thigh and shank in the file's unit, the median over time; None where they are not known."""
+    """Length of thigh and shank in the file's unit, the median over time; None if unknown."""
     found = joints_found(names)
     for side in ("right", "left"):
         chain = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
@@ -83,14 +83,14 @@ def _leg(names: list[str], points: npt.NDArray[np.float64]) -> float | None:
 
 
 def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
-    """Writes points and angles with six digits after the point; returns what was left out, in sentences."""
+    """Writes points and angles with six decimals; returns what was left out, in sentences."""
     if not motion.names:
         raise FormatError(
             "a table of joints holds points, and there are none: write angles to a .mot or .sto file"
         )
     for name in (*motion.names, *motion.angles):
         if not name.isprintable():
-            raise FormatError(f"{name!r} is no name for a column")
+            raise FormatError(f"{name!r} is not a valid column name")
     columns = motion_columns(motion, up)
     table = np.column_stack([columns[name] for name in columns if name != "time_s"])
     with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
@@ -101,11 +101,11 @@ def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
             for frame, row in enumerate(table.tolist())
         )
         write_rows(file, chain([["frame", *columns]], rows))
-    return ["A table of joints has no place for events: left out."] if motion.events else []
+    return ["A table of joints cannot store events: left out."] if motion.events else []
 
 
 def motion_columns(motion: Motion, up: Up) -> dict[str, npt.NDArray[np.float64]]:
-    """The columns of a table of the motion, (T,) each, `time_s` first: what any tabular format writes."""
+    """The columns of a table of the motion, (T,) each, `time_s` first, for all tabular formats."""
     columns = {"time_s": motion.times_s} | {f"{name}_deg": values for name, values in motion.angles.items()}
     turned = from_z_up(motion.points, up)
     for k, name in enumerate(motion.names):

@@ -1,12 +1,12 @@
 """TRC (Motion Analysis; OpenSim, Pose2Sim): marker positions as tab-separated text.
 
-Three header rows (path; names and values of eight fields), two rows of labels, a blank row, then a row a
-frame: number, time, X Y Z of every marker. Missing is written as `NaN`, which OpenSim and programs that
-split at white space read; empty cells are read too.
+Three header rows (path; names and values of eight fields), two rows of labels, a blank row, then one row per
+frame: number, time, X Y Z of every marker. Missing values are written as `NaN`, which OpenSim and programs
+that split at white space can read; empty cells are read too.
 
-The format has no field for the up axis. OpenSim's convention is Y up, which is the default in writing. In
-reading it is the axis along which the figure stands, where its joints are known by name, else Y. Files
-written here say `up=Y` in a fifth cell of the first row, which other readers skip.
+The format has no field for the up axis. OpenSim's convention is Y up, the default in writing. In
+reading it is the axis along which the figure stands, if its joints are known by name, else Y. Files
+written here have `up=Y` in a fifth cell of the first row, which other readers skip.
 
 Units are those of the field `Units` (m, cm, mm). The rate must agree with the column of times.
 """
@@ -43,7 +43,7 @@ def read_trc(path: Path, given: Given) -> Motion:
     given.check_used()
     lines = read_lines(path)
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
-        raise FormatError("line 1: no TRC file (it begins with PathFileType and has five rows of header)")
+        raise FormatError("line 1: not a TRC file (these begin with PathFileType and five rows of header)")
     first = lines[0].split("\t")
     order = "".join(c for c in (first[2] if len(first) > 2 else "XYZ").upper() if c.isalpha())
     if order != "XYZ":
@@ -70,7 +70,7 @@ def write_trc(path: Path, motion: Motion, up: Up) -> list[str]:
     rate_hz, motion = motion.at_constant_rate()
     for name in motion.names:
         if not name.isprintable() or name != name.strip():
-            raise FormatError(f"point {name!r}: no label for a TRC file")
+            raise FormatError(f"point {name!r}: not a valid label for a TRC file")
     frames, markers = motion.points.shape[:2]
     rate = f"{rate_hz:.10g}"
     values = [rate, rate, str(frames), str(markers), "m", rate, "1", str(frames)]
@@ -89,7 +89,7 @@ def write_trc(path: Path, motion: Motion, up: Up) -> list[str]:
         for number_, (time_s, row) in enumerate(zip(motion.times_s, turned, strict=True), 1):
             cells = ("NaN" if x != x else f"{x:.7f}" for x in row.tolist())
             file.write(f"{number_}\t{time_s:.7f}\t" + "\t".join(cells) + "\n")
-    return [f"A TRC file has no place for {what}: left out." for what in _without_place(motion)]
+    return [f"A TRC file cannot store {what}: left out." for what in _without_place(motion)]
 
 
 def _without_place(motion: Motion) -> list[str]:
@@ -152,10 +152,10 @@ def _checked_rate(fields: dict[str, str], times_s: np.ndarray) -> float | None:
         return None
     rate_hz = number(fields["DataRate"], "line 3, field DataRate")
     if not rate_hz > 0:
-        raise FormatError(f"line 3, field DataRate: {fields['DataRate']} is no rate")
+        raise FormatError(f"line 3, field DataRate: {fields['DataRate']} is not a rate")
     if len(times_s) > 1:
         timed_hz = 1 / float(np.median(np.diff(times_s)))
-        # Times with three digits after the point are off by up to a millisecond from frame to frame.
+        # Times with three decimals are off by up to a millisecond from frame to frame.
         if abs(1 / timed_hz - 1 / rate_hz) > 0.01 / rate_hz + 1e-3:
             raise FormatError(
                 f"line 3, field DataRate: {rate_hz:g} Hz, but the column Time has {timed_hz:.4g} Hz"

@@ -1,8 +1,8 @@
-"""Keypoints of a detector: read from what it wrote, written back there or in another format.
+"""Keypoints of a detector: read from its files, written back in the same or in another format.
 
-Formats, told apart by their content:
+Formats, recognised by their content:
 
-- OpenPose: a folder of JSON files, one a frame; the last number in a file's name is the number of its frame.
+- OpenPose: a folder with one JSON file per frame; the last number in a file's name is its frame number.
 - COCO results, also AlphaPose (COCO-17, Halpe-26): one JSON list of `{image_id, keypoints, score}`.
 - AlphaPose in the forms of OpenPose and CMU: one JSON object of frames by the name of their image.
 - COCO annotations: one JSON object with `annotations`; visibility 0, 1, 2 becomes the score 0, 0.5, 1.
@@ -11,11 +11,11 @@ Formats, told apart by their content:
   projected joints of `track.csv` are such a table; a folder that holds one may be given. The same as Parquet.
 - TRC in pixels, as Sports2D writes it (`*_px_*.trc`).
 
-A point at (0, 0) or without coordinates is missing: NaN here. Missing frames inside the sequence are missing
-points. `Keypoints.write` changes the points that differ from what was read, and nothing else in the file;
-`write_openpose`, `write_coco`, `write_csv` write this one person and what the format has a place for.
+A point at (0, 0) or without coordinates is missing: NaN here. Missing frames inside the sequence become
+missing points. `Keypoints.write` changes the points that differ from the input, and nothing else in the file;
+`write_openpose`, `write_coco`, `write_csv` write only this person and what the format can store.
 
-What it cannot do: follow a person through a crowd (see `read_keypoints`), read 3D points, guess a frame rate.
+Limits: it does not follow a person through a crowd (see `read_keypoints`), read 3D points or guess a rate.
 """
 
 from memo.keypoints.coco import write_coco

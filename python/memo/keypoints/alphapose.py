@@ -1,8 +1,8 @@
-"""AlphaPose, where it differs from COCO and OpenPose.
+"""The differences of AlphaPose from COCO and OpenPose.
 
-Its usual results are COCO's list with names of images in place of numbers (read by `coco`). With
-`--format open` or `cmu` they are one object, OpenPose's frames by the name of the image:
-`{"7.jpg": {"people": [...]}}`. Scores beyond 1, which older versions wrote, stay as they are.
+Its usual results are a COCO list with names of images instead of numbers (read by `coco`). With
+`--format open` or `cmu` they are one object of OpenPose frames by the name of the image:
+`{"7.jpg": {"people": [...]}}`. Scores above 1, from older versions, are kept.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ __all__ = ["image_number", "is_by_image", "read_by_image"]
 
 
 def image_number(image_id: Any, where: str) -> int:
-    """The number of a frame from an image's number or, as AlphaPose has it, name."""
+    """The frame number from the number of an image or, in AlphaPose, its name."""
     number = last_number(Path(image_id).stem) if isinstance(image_id, str) else image_id
     if isinstance(number, bool) or not isinstance(number, int):
         raise KeypointsError(f"{where}: image_id {short(image_id)} has no frame number")
     if not 0 <= number <= MAX_FRAME:
-        raise KeypointsError(f"{where}: image_id {short(image_id)} is not the number of a frame")
+        raise KeypointsError(f"{where}: image_id {short(image_id)} is not a frame number")
     return number
 
 
@@ -35,7 +35,7 @@ def is_by_image(data: Any) -> bool:
 
 
 def read_by_image(path: Path, data: dict[str, Any]) -> Found:
-    """Everybody in an object of frames by the name of their image."""
+    """All people in an object of frames by the name of their image."""
     people = []
     names: dict[int, str] = {}
     for image, frame_data in data.items():
@@ -43,7 +43,7 @@ def read_by_image(path: Path, data: dict[str, Any]) -> Found:
         frame = image_number(image, where)
         if frame in names:
             raise KeypointsError(
-                f"{path}: {short(names[frame])} and {short(image)} are both frame {frame}; one camera a file"
+                f"{path}: {short(names[frame])} and {short(image)}: both frame {frame}; one camera per file"
             )
         names[frame] = image
         for place, values in frame_people(frame_data, where):

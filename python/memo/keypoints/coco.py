@@ -1,8 +1,8 @@
 """COCO: results, a list of `{image_id, keypoints, score}`, and annotations, an object with `annotations`.
 
 The visibility 0, 1, 2 of annotations becomes the score 0, 0.5, 1. The number of an image, or the last number
-in its name, is that of its frame. Written files are results with the 17 points of COCO, whatever the points
-came from; rates of frames are not in them.
+in its name, is the frame number. Written files are results with the 17 COCO points, whatever the source of
+the points; they hold no frame rate.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _PERSON = 1  # COCO's category
 
 
 def read_coco(path: Path, data: Any) -> Found:
-    """Everybody in a file of results or annotations."""
+    """All people in a file of results or annotations."""
     if is_by_image(data):
         return read_by_image(path, data)
     if isinstance(data, dict) and ("people" in data or "bodies" in data):
@@ -56,7 +56,7 @@ def read_coco(path: Path, data: Any) -> Found:
 def write_coco(path: str | PathLike[str], keypoints: Keypoints) -> tuple[str, ...]:
     """Writes results: an entry for every frame with a point; its score is the mean of its points' scores.
 
-    Returns the joints that COCO has no place for, which are left out.
+    Returns the joints that COCO cannot store, which are left out.
     """
     values, left_out = in_layout(keypoints, "COCO_17")
     entries = []
@@ -83,7 +83,7 @@ def _entries(path: Path, data: Any) -> list[Any]:
 
 
 def _image_size(images: Any) -> tuple[int, int] | None:
-    """Width and height, if all images have the same."""
+    """Width and height, if all images have the same size."""
     if not isinstance(images, list) or not all(isinstance(image, dict) for image in images):
         return None
     sizes = [(image.get("width"), image.get("height")) for image in images]

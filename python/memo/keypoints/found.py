@@ -1,4 +1,4 @@
-"""What a file of keypoints holds before one person is chosen, and numbers x, y, score as all have them."""
+"""The content of a file of keypoints before one person is chosen, and the common numbers x, y, score."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Person:
 
 @dataclass(frozen=True)
 class Found:
-    """Everybody in a file."""
+    """All people in a file."""
 
     source: Source
     people: list[Person]
     names: tuple[str, ...] | None = None
     times_s: dict[int, float] | None = None
     image_size: tuple[int, int] | None = None
-    #: Frames that are there, though perhaps without anybody.
+    #: Frames in the file, some perhaps without people.
     frames: tuple[int, ...] = ()
 
 
@@ -68,7 +68,7 @@ def with_missing(values: Array, where: str) -> Array:
 def with_points(
     numbers: Any, keypoints: Keypoints, row: int, where: str, factor: int = 1
 ) -> list[Any] | None:
-    """The numbers with the points of a row; those that are the same keep their digits; None if all are."""
+    """The numbers with the points of a row; unchanged numbers keep their digits; None if nothing changed."""
     before = triples(numbers, where)
     before[:, 2] /= factor
     after = np.column_stack([keypoints.points[row], keypoints.scores[row]])
@@ -86,14 +86,14 @@ def with_points(
 
 
 def different(before: Array, after: Array) -> list[int]:
-    """Joints that differ; a missing point has no score that could."""
+    """Joints that differ; the score of a missing point is not compared."""
     missing = np.isnan(before[:, :2]).any(axis=1) & np.isnan(after[:, :2]).any(axis=1)
     same = missing | (before == after).all(axis=1)
     return [int(joint) for joint in np.flatnonzero(~same)]
 
 
 def check_all_placed(keypoints: Keypoints) -> None:
-    """Refuses points for which the file that was read has no place."""
+    """Refuses points that the file read has no person for."""
     for row, place in enumerate(keypoints.source.places):
         if place is None and not np.isnan(keypoints.points[row]).all():
             raise KeypointsError(

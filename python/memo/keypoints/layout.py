@@ -13,10 +13,10 @@ _MIDDLES = {"neck": ("right_shoulder", "left_shoulder"), "mid_hip": ("right_hip"
 
 
 def in_layout(keypoints: Keypoints, layout: str) -> tuple[Array, tuple[str, ...]]:
-    """(T, K, 3) x, y, score in the order of a layout, 0, 0, 0 where missing; the joints it has no place for.
+    """(T, K, 3) x, y, score in the order of a layout, 0, 0, 0 if missing; and the joints it cannot store.
 
-    Where the keypoints have no neck or middle of the hips, the middle of the shoulders or hips stands in, as
-    in the data BODY_25 was trained on, with the lesser of the two scores. Nothing else is made up.
+    If the keypoints have no neck or middle of the hips, it is the middle of the shoulders or hips, as in the
+    training data of BODY_25, with the smaller of the two scores. No other point is made up.
     """
     check_finite(keypoints)
     values = np.dstack([keypoints.points, keypoints.scores])

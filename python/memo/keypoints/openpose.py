@@ -1,7 +1,7 @@
-"""OpenPose: a folder of JSON files, one a frame; the last number in a file's name is the number of its frame.
+"""OpenPose: a folder with one JSON file per frame; the last number in a file's name is its frame number.
 
-Written files have BODY_25's 25 points, whatever the keypoints came from. Rates of frames are not in them.
-AlphaPose's `sep-json` in CMU's form is the same with `bodies` and `joints`.
+Written files have the 25 points of BODY_25, whatever the source of the keypoints; they hold no frame rate.
+The `sep-json` of AlphaPose in CMU's form is the same with `bodies` and `joints`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["frame_people", "read_openpose", "write_openpose"]
 _MAX_FRAME_FILES = 1_000_000
 _LISTS = ("people", "bodies")
 _POSE_KEYS = ("pose_keypoints_2d", "pose_keypoints", "joints")
-#: What OpenPose writes of a person beside the body, here empty.
+#: The other fields that OpenPose writes for a person, here empty.
 _OTHER_KEYS = (
     *("face_keypoints_2d", "hand_left_keypoints_2d", "hand_right_keypoints_2d"),
     *("pose_keypoints_3d", "face_keypoints_3d", "hand_left_keypoints_3d", "hand_right_keypoints_3d"),
@@ -32,7 +32,7 @@ _OTHER_KEYS = (
 
 
 def read_openpose(folder: Path) -> Found:
-    """Everybody in a folder of frames."""
+    """All people in a folder of frames."""
     files = _numbered_files(folder)
     people = []
     for frame, file in files.items():
@@ -46,10 +46,10 @@ def read_openpose(folder: Path) -> Found:
 def write_openpose(
     folder: str | PathLike[str], keypoints: Keypoints, *, name: str | None = None
 ) -> tuple[str, ...]:
-    """Writes `NAME_000000000007_keypoints.json` for every frame, BODY_25; NAME is else that of the folder.
+    """Writes `NAME_000000000007_keypoints.json` for every frame, BODY_25; default NAME: that of the folder.
 
-    Returns the joints that BODY_25 has no place for, which are left out. Neck and middle of the hips are the
-    middles of shoulders and hips where the keypoints have none. A frame without any point has no people.
+    Returns the joints that BODY_25 cannot store, which are left out. Neck and middle of the hips are the
+    middles of shoulders and hips if the keypoints have none. A frame without any point has no people.
     """
     out = Path(folder)
     if not len(keypoints.frames):
@@ -86,7 +86,7 @@ def frame_people(data: Any, where: str) -> Iterator[tuple[int, Array]]:
 
 
 def change_person(data: Any, place: int, keypoints: Keypoints, row: int, where: str) -> bool:
-    """Puts the points of a row into a person of a frame; False where they are there already."""
+    """Puts the points of a row into a person of a frame; False if they are there already."""
     people = _people(data)
     person = people[place] if people is not None and place < len(people) else None
     key = _pose_key(person)
@@ -119,7 +119,7 @@ def _numbered_files(folder: Path) -> dict[int, Path]:
         if frame in numbered:
             other = numbered[frame].name
             raise KeypointsError(
-                f"{folder}: {other} and {file.name} are both frame {frame}; one camera a folder"
+                f"{folder}: {other} and {file.name} are both frame {frame}; one camera per folder"
             )
         numbered[frame] = file
         if len(numbered) > _MAX_FRAME_FILES:
@@ -164,7 +164,7 @@ def _check_replaceable(out: Path, names: Any) -> None:
     if not out.exists():
         return
     if not out.is_dir():
-        raise KeypointsError(f"{out}: is a file; a folder is to be written")
+        raise KeypointsError(f"{out}: is a file; the output is a folder")
     others = sorted(entry.name for entry in out.iterdir() if entry.name not in names or not entry.is_file())
     if others:
         raise KeypointsError(f"{out}: holds other files ({others[0]}); choose an empty or new folder")

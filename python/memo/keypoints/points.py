@@ -1,7 +1,7 @@
-"""One person's image points over time: the value that every format gives and takes.
+"""One person's image points over time: the common type of all formats.
 
-A point at (0, 0) or without coordinates is missing, NaN here. Frames are numbered without gaps: frames that
-are missing are missing points.
+A point at (0, 0) or without coordinates is missing, NaN here. Frames are numbered without gaps: missing
+frames become missing points.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["Array", "Keypoints", "KeypointsError", "Source", "layouts"]
 Array = npt.NDArray[np.float64]
 
 MAX_FRAME = 10**9
-# A sequence may have gaps, but frame numbers that are mostly gaps are not those of a video.
+# A sequence may have gaps, but a video's frame numbers are not mostly gaps.
 _MAX_FRAMES_PER_SEEN = 20
 _MAX_GAP = 1000
 _LARGEST_PART = 1.5  # of width or height; points may lie a little outside the picture
@@ -39,23 +39,23 @@ class KeypointsError(ValueError):
     """Keypoints that cannot be read or written; the message says which file and why, in one line."""
 
     def __init__(self, message: str) -> None:
-        # Names and cells of damaged files may hold anything.
+        # Names and cells of damaged files may contain any characters.
         super().__init__("".join(character if character.isprintable() else "?" for character in message))
 
 
 def layouts() -> dict[str, tuple[str, ...]]:
-    """The orders of points known: the names of the joints of each layout."""
+    """The known orders of points: the names of the joints of each layout."""
     return {name: tuple(_memo.keypoint_layout(name)[1]) for name in _memo.keypoint_layouts()}
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where points came from, and how they are written back there."""
+    """The source of points, and how they are written back."""
 
     path: Path
-    #: Writes a file or folder like the one read, with other points; None where there is none to be like.
+    #: Writes a file or folder like the one read, with other points; None if there was no file.
     write_like: Callable[[Path, Keypoints], None] | None
-    #: For each frame what tells the person's place in the file, or None.
+    #: For each frame the person's place in the file, or None.
     places: tuple[Any, ...] = ()
     #: For a folder: all its files.
     files: tuple[Path, ...] = ()
@@ -68,19 +68,19 @@ class Keypoints:
     points: Array
     """(T, K, 2) pixels, u right and v down; NaN where missing."""
     scores: Array
-    """(T, K) the detector's confidence; 0 where missing."""
+    """(T, K) the detector's confidence; 0 if missing."""
     names: tuple[str, ...]
-    """The K joints, in this project's spelling."""
+    """The K joints, in the spelling of memo."""
     times_s: Array
     """(T,) seconds."""
     frames: npt.NDArray[np.int64]
     """(T,) frame numbers, without gaps."""
     layout: str | None
-    """Name of the detector's order of points; `None` for a table, which names its points itself."""
+    """Name of the detector's order of points; `None` for a table, which names its points."""
     image_size: tuple[int, int] | None
-    """Width and height of the images, pixels, where the file tells."""
+    """Width and height of the images, pixels, if the file gives them."""
     people: npt.NDArray[np.int64]
-    """(T,) how many people the file has in each frame."""
+    """(T,) number of people in the file in each frame."""
     source: Source
     """What is needed to write back."""
 
@@ -133,7 +133,7 @@ class Keypoints:
         )
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row a frame, with the columns that `write_csv` writes, as a `pandas.DataFrame`."""
+        """One row per frame, with the columns of `write_csv`, as a `pandas.DataFrame`."""
         columns: dict[str, npt.NDArray[Any]] = {"frame": self.frames, "time_s": self.times_s}
         for index, name in enumerate(self.names):
             columns[f"{name}_u_px"], columns[f"{name}_v_px"] = self.points[:, index].T
@@ -141,7 +141,7 @@ class Keypoints:
         return data_frame(columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the ways of the points through the picture into `ax`, or Axes of its own, and returns them.
+        """Draws the paths of the points in the picture into `ax`, or new Axes, and returns them.
         Needs matplotlib."""
         from memo.plot import new_axes, plot_keypoints
 
@@ -156,17 +156,17 @@ class Keypoints:
         )
 
     def check_pixels(self) -> None:
-        """Refuses coordinates that are parts of the picture's width and height, 0 to 1 or -1 to 1."""
+        """Refuses coordinates that are fractions of the picture's width and height, 0 to 1 or -1 to 1."""
         there = np.isfinite(self.points).all(axis=2)
         largest = float(np.abs(self.points[there]).max(initial=0))
         if there.sum() > 1 and largest <= _LARGEST_PART:
             raise KeypointsError(
-                f"{self.source.path}: coordinates up to {largest:.3g}: these are parts of the picture's "
+                f"{self.source.path}: coordinates up to {largest:.3g}: these are fractions of the picture's "
                 "width and height, and pixels are needed: multiply by them"
             )
 
     def replaced(self, points: npt.ArrayLike, scores: npt.ArrayLike) -> Keypoints:
-        """The same with other points and scores of the same shapes."""
+        """The same keypoints with other points and scores of the same shapes."""
         new_points = np.array(points, np.float64)
         new_scores = np.array(scores, np.float64)
         for name, new, own in (("points", new_points, self.points), ("scores", new_scores, self.scores)):
@@ -175,38 +175,38 @@ class Keypoints:
         return replace(self, points=new_points, scores=new_scores)
 
     def write(self, path: str | PathLike[str]) -> None:
-        """Writes a file or folder like the one that was read, with these points in it.
+        """Writes a file or folder like the one read, with these points in it.
 
-        All else stays as it was: other people, other fields, other columns. The result appears complete or
-        not at all. The input is never overwritten, nor a folder that holds anything but an earlier result.
+        Everything else is unchanged: other people, other fields, other columns. The result appears complete
+        or not at all. The input is never overwritten, nor a folder that holds anything but an earlier result.
         `write_keypoints` writes a format of your choice.
         """
         out = Path(path)
         source = self.source.path
         if self.source.write_like is None:
-            raise KeypointsError(f"{source}: no file to write one like; use write_keypoints")
+            raise KeypointsError(f"{source}: no file was read; use write_keypoints")
         if out.resolve() == source.resolve() or (out.exists() and source.exists() and out.samefile(source)):
-            raise KeypointsError(f"{out}: is what was read; write to another place")
+            raise KeypointsError(f"{out}: is the input; write to another place")
         self.source.write_like(out, self)
 
 
 def frame_range(where: object, seen: set[int]) -> range:
-    """The frames from the first to the last seen; refused where nearly all of them would be gaps."""
+    """The frames from the first to the last seen; refused if nearly all of them would be gaps."""
     first, last = min(seen), max(seen)
     span = last - first + 1
     if span > _MAX_FRAMES_PER_SEEN * len(seen) + _MAX_GAP:
-        raise KeypointsError(f"{where}: frames {first} to {last}, but only {len(seen)} of them are there")
+        raise KeypointsError(f"{where}: frames {first} to {last}, but only {len(seen)} of them exist")
     return range(first, last + 1)
 
 
 def check_finite(keypoints: Keypoints) -> None:
-    """Refuses what no format can hold."""
+    """Refuses values that no format can store."""
     if np.isinf(keypoints.points).any() or not np.isfinite(keypoints.scores).all():
         raise KeypointsError("points must be finite or NaN, scores finite")
 
 
 def _named(names: Sequence[str] | str) -> tuple[str | None, tuple[str, ...]]:
-    """The layout, if one is named, and the joints in this project's spelling."""
+    """The layout, if one is named, and the joints in the spelling of memo."""
     try:
         if isinstance(names, str):
             layout, joints = _memo.keypoint_layout(names)
@@ -216,7 +216,7 @@ def _named(names: Sequence[str] | str) -> tuple[str | None, tuple[str, ...]]:
         raise KeypointsError(str(error)) from None
     unknown = [name for name, joint in zip(names, spelt, strict=True) if joint is None]
     if unknown or len(set(spelt)) < len(spelt):
-        raise KeypointsError(f"names of different joints are needed, got {', '.join(unknown or names)}")
+        raise KeypointsError(f"names of different known joints are needed, got {', '.join(unknown or names)}")
     return None, tuple(joint for joint in spelt if joint is not None)
 
 

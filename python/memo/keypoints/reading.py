@@ -1,4 +1,4 @@
-"""One person's keypoints out of a file or folder, whatever detector wrote it."""
+"""Reads one person's keypoints from a file or folder of any known detector."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ def read_keypoints(
     fps: float | None = None,
     layout: str | None = None,
 ) -> Keypoints:
-    """Reads one person's keypoints; the format is seen from the content.
+    """Reads one person's keypoints; the format is recognised by the content.
 
-    `person` is the place in each frame's list of people. Without it, where a frame has several: the person
-    with the greatest product of size and mean score in all frames, and from there, forwards and backwards,
-    the nearest in each next frame, if within 0.3 of the person's size (more after a gap). `fps` is needed
-    unless a table has `time_s`, which it replaces. `layout` names the order of points where the file does
-    not: without it their number decides, and between BODY_25 and BODY_25B (both 25) whether the points that
-    would be neck and middle of the hips lie there. Of a run of `memo track` (a folder with `track.csv` or
-    `track.parquet`) the projected joints are read.
+    `person` is the index in each frame's list of people. Without it, if a frame has several people: the
+    person with the greatest product of size and mean score over all frames, and from there, forwards and
+    backwards, the nearest in each next frame, if within 0.3 of the person's size (more after a gap). `fps` is
+    needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the file does
+    not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether the
+    points that would be neck and middle of the hips lie there. For a run of `memo track` (a folder with
+    `track.csv` or `track.parquet`) the projected joints are read.
     """
     path = Path(path)
     if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
         raise KeypointsError(f"the frame rate must be positive, got {fps}")
     if person is not None and (isinstance(person, bool) or not isinstance(person, int) or person < 0):
-        raise KeypointsError(f"person {person!r} is not a place in the list of people: 0, 1, ...")
+        raise KeypointsError(f"person {person!r} is not an index in the list of people: 0, 1, ...")
     try:
         if not path.exists():
             raise KeypointsError(nothing_at(path, "file or folder"))
@@ -119,7 +119,7 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
     path = found.source.path
     if found.names is not None:
         if layout is not None:
-            raise KeypointsError(f"{path}: a table names its joints itself; leave the layout {layout} out")
+            raise KeypointsError(f"{path}: a table names its joints; leave the layout {layout} out")
         return None, found.names
     try:
         name, names = _memo.keypoint_layout(_memo.guess_layout(points) if layout is None else layout)
@@ -127,7 +127,7 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
         raise KeypointsError(f"{path}: {error}") from None
     if len(names) != points.shape[1]:
         raise KeypointsError(
-            f"{path}: has {counted(points.shape[1], 'point')} a person, {name} has {len(names)}"
+            f"{path}: has {counted(points.shape[1], 'point')} per person, {name} has {len(names)}"
         )
     return name, tuple(names)
 

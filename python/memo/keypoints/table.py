@@ -59,7 +59,7 @@ def write_csv(path: str | PathLike[str], keypoints: Keypoints) -> tuple[str, ...
 
 @dataclass(frozen=True)
 class Columns:
-    """Where a table has what."""
+    """The columns of a table."""
 
     frame: int | None
     time_s: int | None
@@ -72,13 +72,13 @@ class Columns:
 
 
 def read_csv(path: Path, content: str) -> Found:
-    """Everybody in a table."""
+    """All people in a table."""
     rows, _ = _rows(path, content)
     return _everybody(path, rows, Source(path, _write_like))
 
 
 def read_parquet_table(path: Path) -> Found:
-    """Everybody in a table of Parquet, which is read like CSV but not written like one."""
+    """All people in a Parquet table, which is read like CSV but cannot be written back."""
     from memo.formats.motion import FormatError
     from memo.formats.parquet import read_parquet
 
@@ -103,7 +103,7 @@ def _everybody(path: Path, rows: list[list[str]], source: Source) -> Found:
     ):
         if columns.person is None and people[one].frame == people[other].frame:
             raise KeypointsError(
-                f"{path}: frame {people[one].frame} stands there twice and no column `person`"
+                f"{path}: frame {people[one].frame} appears twice and there is no column `person`"
             )
     return Found(source, people, columns.names, times_s, frames=tuple(frames.values()))
 
@@ -156,18 +156,18 @@ def _wide_columns(path: Path, header: list[str]) -> tuple[tuple[str, ...], list[
             if stem == cell or (name := joint_of(path, stem)) is None:
                 continue
             if stem + "_z" in places:
-                raise KeypointsError(f"{path}: {stem}_z: these are points in space, image points are needed")
+                raise KeypointsError(f"{path}: {stem}_z: these are points in space, not image points")
             if stem + y_suffix not in places:
                 raise KeypointsError(f"{path}: column {cell} without {stem}{y_suffix}")
             if name in found:
-                raise KeypointsError(f"{path}: column {cell}: {name} stands there twice")
+                raise KeypointsError(f"{path}: column {cell}: {name} appears twice")
             score = next((places[stem + end] for end in _SCORE_SUFFIXES if stem + end in places), None)
             found[name] = (index, places[stem + y_suffix], score)
     return tuple(found), list(found.values())
 
 
 def joint_of(path: Path, text: str) -> str | None:
-    """The joint a table names, None for what is none; a misspelt one is refused."""
+    """The joint that a table names, None if it is not a joint; a misspelt joint is refused."""
     if len(text) > LONGEST_NAME:
         return None
     try:
@@ -195,9 +195,7 @@ def row_frames(
         else:
             number = number_of(row[columns.frame], f"{where}, frame")
             if not (0 <= number <= MAX_FRAME and number == int(number)):
-                raise KeypointsError(
-                    f"{where}: frame {short(row[columns.frame])} is not the number of a frame"
-                )
+                raise KeypointsError(f"{where}: frame {short(row[columns.frame])} is not a frame number")
             frame = int(number)
         frames[line] = frame
         if times_s.setdefault(frame, time_s) != time_s and columns.time_s is not None:
@@ -223,7 +221,7 @@ def _long_people(path: Path, rows: list[list[str]], columns: Columns, frames: di
         who = "" if columns.person is None else rows[line][columns.person].strip()
         joints = lines.setdefault((frame, who), {})
         if numbers[name] in joints:
-            raise KeypointsError(f"{path}: row {line + 1}: {name} stands twice in frame {frame}")
+            raise KeypointsError(f"{path}: row {line + 1}: {name} appears twice in frame {frame}")
         joints[numbers[name]] = line
     people = []
     for (frame, _), joints in lines.items():
@@ -235,7 +233,7 @@ def _long_people(path: Path, rows: list[list[str]], columns: Columns, frames: di
 
 
 def _cells(path: Path, cells: Iterable[tuple[int, list[str], tuple[int, int, int | None]]]) -> Array:
-    """x, y, score out of the rows and columns named; the score is 1 where the table has none."""
+    """x, y, score from the rows and columns given; the score is 1 if the table has none."""
     values = []
     for line, row, (x, y, score) in cells:
         where = f"{path}: row {line + 1}"
@@ -246,7 +244,7 @@ def _cells(path: Path, cells: Iterable[tuple[int, list[str], tuple[int, int, int
 
 
 def number_of(text: str, where: str) -> float:
-    """A cell's number; NaN where it is empty."""
+    """A cell's number; NaN if it is empty."""
     try:
         number = float(text) if text.strip() else math.nan
     except ValueError:
@@ -282,7 +280,7 @@ def set_cells(
     place: Any,
     added: dict[int, list[list[str]]],
 ) -> None:
-    """Changes the cells of the joints that differ; a long table gets rows for joints it did not have."""
+    """Changes the cells of the joints that differ; a long table gets rows for new joints."""
     wide = columns.joint is None
     lines = dict.fromkeys(range(len(columns.names)), place) if wide else place
     path = keypoints.source.path

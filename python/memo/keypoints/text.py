@@ -1,4 +1,4 @@
-"""Text and JSON of keypoint files: read with bounds, written complete or not at all."""
+"""Text and JSON of keypoint files: read within a size limit, written complete or not at all."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONGEST_NAME = 60
 
 
 def content_of(path: Path, most: int = MAX_FILE_BYTES) -> str:
-    """The text of a file in UTF-8 of at most so many bytes."""
+    """The text of a file in UTF-8 of at most this many bytes."""
     try:
         return read_text(path, KeypointsError, most)
     except OSError as error:
@@ -37,7 +37,7 @@ def parsed(path: Path, content: str) -> Any:
 
 
 def json_text(data: Any, like: str) -> str:
-    """The data as JSON, with or without spaces as in the text it came from."""
+    """The data as JSON, with or without spaces as in the original text."""
     compact = re.search(r'"\s*:\s', like) is None
     surrogates = re.search(r"\\u[dD][89a-fA-F]", like) is not None
     return json.dumps(data, ensure_ascii=surrogates, separators=(",", ":") if compact else None)
@@ -53,14 +53,14 @@ def write_text(out: Path, text: str) -> None:
 
 
 def last_number(text: str) -> int | None:
-    """The last number in a name, which is that of its frame."""
+    """The last number in a name: the frame number."""
     digits = re.findall(r"[0-9]{1,18}", text)
     number = int(digits[-1]) if digits else None
     return number if number is not None and number <= MAX_FRAME else None
 
 
 def short(value: Any) -> str:
-    """A value as it goes into a message."""
+    """A value as text for a message."""
     text = (
         value
         if isinstance(value, str)

@@ -14,15 +14,15 @@ __all__ = ["keypoints_of_track"]
 
 
 def keypoints_of_track(columns: Mapping[str, npt.ArrayLike]) -> Keypoints:
-    """The twelve joints of `Track.columns` in the picture, with scores of 1: these are no detections.
+    """The twelve joints of `Track.columns` in the picture, with scores of 1: they are not detections.
 
-    Frames between walks have none. Two walks in one frame are refused: take the rows of one.
+    Frames between walks have none. Two walks in one frame are refused: select the rows of one.
     """
     frames = np.asarray(columns["frame"], np.int64)
     if not len(frames):
         raise KeypointsError("a track without rows")
     if len(set(frames.tolist())) < len(frames):
-        raise KeypointsError("two walks in one frame: take the rows of one `walk`")
+        raise KeypointsError("two walks in one frame: select the rows of one `walk`")
     points = np.stack(
         [np.column_stack([columns[f"{joint}_u_px"], columns[f"{joint}_v_px"]]) for joint in JOINTS], axis=1
     )

@@ -1,7 +1,7 @@
 """TRC with image points in pixels and depths of zero, as Sports2D writes it (`*_px_*.trc`).
 
-Sports2D writes `m` as the unit of pixels too: there the name of the file, outside or in its first line, says
-what they are. TRC of points in space is refused here.
+Sports2D writes `m` as the unit of pixels too: in this case the file's name, or the name in its first line,
+shows that they are pixels. A TRC file of points in space is refused here.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ _HEADER_LINES = 5
 
 
 def is_trc(content: str) -> bool:
-    """Whether this is a TRC, in pixels or not."""
+    """Whether this is a TRC file, in pixels or not."""
     return content.startswith("PathFileType")
 
 
 def read_trc(path: Path, content: str) -> Found:
-    """The one person of a TRC in pixels."""
+    """The one person of a TRC file in pixels."""
     rows, columns = _table(path, content)
     frames, times_s = row_frames(path, rows, columns)
     people = wide_people(path, rows, columns, frames)
     if len(set(frames.values())) < len(frames):
-        raise KeypointsError(f"{path}: a frame stands there twice")
+        raise KeypointsError(f"{path}: a frame appears twice")
     return Found(Source(path, _write_like), people, columns.names, times_s, frames=tuple(frames.values()))
 
 
 def _table(path: Path, content: str) -> tuple[list[list[str]], Columns]:
-    """The rows by line, empty where the header is, and where what is; refused if not image points."""
+    """The rows by line, the header lines empty, and the columns; refused if they are not image points."""
     lines = [line.rstrip("\r").split("\t") for line in content.split("\n")]
     if len(lines) < _HEADER_LINES:
         raise KeypointsError(
-            f"{path}: a TRC of {counted(len(lines), 'line')}; its header has {_HEADER_LINES}"
+            f"{path}: a TRC file of {counted(len(lines), 'line')}; its header alone has {_HEADER_LINES}"
         )
     facts = {name.strip(): value.strip() for name, value in zip(lines[1], lines[2], strict=False)}
     markers = lines[3][2::3]
@@ -62,7 +62,7 @@ def _table(path: Path, content: str) -> tuple[list[list[str]], Columns]:
             )
         depths = {number_of(cell, where) for cell in cells[4:width:3] if cell.strip()}
         if depths - {0.0} and not all(map(math.isnan, depths - {0.0})):
-            raise KeypointsError(f"{where}: these are points in space, image points are needed")
+            raise KeypointsError(f"{where}: these are points in space, not image points")
         rows.append(cells)
     return rows, columns
 
@@ -72,7 +72,7 @@ def _columns(path: Path, markers: list[str]) -> Columns:
     for index, marker in enumerate(markers):
         name = joint_of(path, marker.strip()) if marker.strip() else None
         if name in found:
-            raise KeypointsError(f"{path}: {short(marker)}: {name} stands there twice")
+            raise KeypointsError(f"{path}: {short(marker)}: {name} appears twice")
         if name is not None:
             found[name] = (2 + 3 * index, 3 + 3 * index, None)
     if not found:
@@ -84,7 +84,7 @@ def _check_pixels(path: Path, unit: str, own_name: str) -> None:
     if unit.lower() in ("px", "pixel", "pixels") or "_px" in path.name or "_px" in own_name:
         return
     raise KeypointsError(
-        f"{path}: unit {short(unit)}: image points are needed; Sports2D's have _px in the name of the file"
+        f"{path}: unit {short(unit)}: image points are needed; those of Sports2D have _px in the file's name"
     )
 
 
@@ -93,7 +93,7 @@ def _write_like(out: Path, keypoints: Keypoints) -> None:
     source = keypoints.source
     content = content_of(source.path)
     if not is_trc(content):
-        raise KeypointsError(f"{source.path}: has changed since it was read: no TRC any more")
+        raise KeypointsError(f"{source.path}: has changed since it was read: it is no longer a TRC file")
     rows, columns = _table(source.path, content)
     if columns.names != keypoints.names:
         raise KeypointsError(f"{source.path}: has changed since it was read: other joints")

@@ -1,4 +1,4 @@
-"""Keypoints in the format of your choice."""
+"""Writes keypoints in a chosen format."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ WRITERS: dict[str, Callable[[str | PathLike[str], Keypoints], tuple[str, ...]]] 
     "coco": write_coco,
     "csv": write_csv,
 }
-"""Formats and what writes them: path and keypoints in, names of the joints left out back."""
+"""Formats and their writers: these take path and keypoints and return the joints left out."""
 
 
 def write_keypoints(path: str | PathLike[str], keypoints: Keypoints, file_format: str) -> tuple[str, ...]:
     """Writes one person's keypoints: "openpose" (a folder), "coco" (results, JSON) or "csv".
 
-    Returns the joints that the format has no place for, which are left out.
+    Returns the joints that the format cannot store, which are left out.
     """
     if file_format not in WRITERS:
         raise KeypointsError(f"unknown format {file_format!r}: wanted {', '.join(WRITERS)}")

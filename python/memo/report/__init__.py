@@ -36,8 +36,8 @@ class Report:
     bytes: int
     """Size of the file."""
     contents: dict[str, Any]
-    """Number of pictures and explanations in the page, every how many-th frame has one, and `notes`: what
-    could not be shown, and why."""
+    """Number of pictures and explanations in the page, their spacing in frames, and `notes`: what could not
+    be shown, and why."""
 
 
 def write_report(

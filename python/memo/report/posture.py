@@ -88,7 +88,7 @@ def _sentences(document: dict[str, Any]) -> list[str]:
         f"motion breaks a constraint in {document.get('frames_breaking', UNKNOWN)}."
     ]
     if not _is_possible(document):
-        told.insert(0, "The motion is no possible sequence by these rules: every posture in it breaks one.")
+        told.insert(0, "The motion is no possible sequence by these rules: every posture breaks one.")
     most = document.get("most_cut")
     if most:
         often = f"{counted(most['branches'], 'branch', 'branches')} in {counted(most['frames'], 'frame')}"

@@ -35,7 +35,7 @@ class RunFolder:
     missing: list[str]
     """Files of a run that are missing."""
     video: Path | None
-    """The video that was tracked, named by the run or the user; it need not exist any more."""
+    """The video that was tracked, named by the run or the user; it may no longer exist."""
 
     @property
     def overlay(self) -> Path | None:

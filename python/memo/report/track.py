@@ -73,7 +73,7 @@ def track_page(
     }
     notes += choice.told(every if pictures else 1)
     if explained and why_every > 1:
-        notes.append(f"Of the tracked frames in it, every {ordinal(why_every)} is explained.")
+        notes.append(f"Every {ordinal(why_every)} tracked frame in it is explained.")
     page = Page(
         title=f"memo: {run.name}",
         layout="track",
@@ -117,7 +117,7 @@ def _pictures(
     run: RunFolder, choice: Choice, progress: Progress | None, notes: list[str], must_be_there: bool
 ) -> tuple[list[Picture], bool, Sequence[int] | None, int]:
     """The frames as JPEG, whether the model is already drawn on them, the size in pixels that positions
-    refer to, and every how many-th frame they are. A video that the user named must exist."""
+    refer to, and the spacing of the frames. A video that the user named must exist."""
     if run.video is not None:
         try:
             kept, every, size = _video_pictures(run, run.video, choice, progress, notes)
@@ -128,7 +128,7 @@ def _pictures(
             if must_be_there:
                 about = "" if str(run.video) in str(error) else f"{run.video}: "
                 raise ValueError(f"{about}{_one_line(error)}") from None
-            notes.append(f"The video cannot be read any more ({_one_line(error)}).")
+            notes.append(f"The video can no longer be read ({_one_line(error)}).")
     if run.overlay is not None:
         try:
             kept, every = _overlay_pictures(run, run.overlay, choice, progress)
@@ -199,7 +199,7 @@ def _moved(before: Any, now: Any, shrink: int) -> tuple[str | None, tuple[tuple[
 def _explained(
     run: RunFolder, pictures: list[Picture], choice: Choice, progress: Progress | None, notes: list[str]
 ) -> tuple[list[dict[str, Any]], int]:
-    """Frames with their evidence, and every how many-th of the tracked frames in the page they are."""
+    """Frames with their evidence, and their spacing among the tracked frames in the page."""
     shown = {picture.frame for picture in pictures}
     frames = [frame for frame in run.frames if frame in shown]
     if not (choice.why and run.run and frames):

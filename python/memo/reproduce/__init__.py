@@ -1,8 +1,8 @@
-"""The papers' experiments again, beside the numbers printed there.
+"""Repeats the papers' experiments, beside the numbers printed there.
 
-One function a paper gives a `Reproduction`: rows of what is printed, what memo has, a verdict and the
-reason, and figures that are drawn when written. Rows are compared to the digits printed; what rests on
-other input than the paper's is "in kind", and what cannot be made is a row that says why.
+One function per paper returns a `Reproduction`: rows of the printed value, memo's value, a verdict and the
+reason, and figures that are drawn when written. Rows are compared to the printed digits; a result from
+other input than the paper's is "in kind", and what cannot be made is a row with the reason.
 """
 
 from __future__ import annotations
@@ -33,4 +33,4 @@ EXPERIMENTS: dict[str, Callable[..., Reproduction]] = {
     "lee-chen": lee_chen,
     "hoffman-flinchbaugh": hoffman_flinchbaugh,
 }
-"""What can be reproduced, by the name it has on the command line."""
+"""What can be reproduced, by its name on the command line."""

@@ -41,8 +41,8 @@ SEED = 1982
 
 NOTE = f"""The paper prints statements and equations, no data. They are counted here over {TRIALS} rods seen
 three times and {TRIALS} hinges seen twice, drawn from a seed: the tilt of the plane between 5 and 85
-degrees, all angles uniform. "In kind" rows are of a synthetic point-light walker, since Johansson's films
-are not published. Counts say what happens to problems as drawn; they are no proofs."""
+degrees, all angles uniform. "In kind" rows use a synthetic point-light walker, since Johansson's films
+are not published. Counts hold for the problems drawn; they are not proofs."""
 
 # Arms and legs, in the names of point-light displays.
 LINKS = {frozenset(f"{side}{joint}" for joint in pair) for side in "RL" for pair in
@@ -50,7 +50,7 @@ LINKS = {frozenset(f"{side}{joint}" for joint in pair) for side in "RL" for pair
 AZIMUTH_DEG = 60.0
 PX_PER_M = 200.0
 
-NEAR = "lie so near to a degenerate case that 1e-6 is beyond double precision"
+NEAR = "are so near a degenerate case that double precision does not reach 1e-6"
 
 Array = npt.NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _counted(
     rest: str = "",
     least: float = 0.99,
 ) -> Row:
-    """A statement that the paper makes of every problem: "same" when it holds for `least` of those drawn."""
+    """A claim of the paper about every problem: "same" if it holds for `least` of those drawn."""
     verdict = Verdict.SAME if count >= least * of else Verdict.DIFFERS
     bound = "holds for all drawn" if count == of else f"holds for at least {100 * least:g} % of those drawn"
     said = f"{bound}; {why}" if verdict is Verdict.SAME else why
@@ -131,7 +131,7 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             rest=NEAR,
         ),
         compared(
-            *(f"{where}, eq. (6)", "[a1 a2 a3] less k3 z1 + k4 z2 + k5 z3, largest", EQUAL),
+            *(f"{where}, eq. (6)", "[a1 a2 a3] minus k3 z1 + k4 z2 + k5 z3, largest", EQUAL),
             *(
                 rods["triple_product_error"],
                 f"{counted(trials, 'triple')} of vectors with the k's of footnote 11",
@@ -141,10 +141,10 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
         compared(
             *(
                 f"{where}, Jacobian",
-                "determinant less 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), largest",
+                "determinant minus 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), largest",
                 EQUAL,
             ),
-            *(rods["jacobian_error"], "the determinant printed, expanded; footnote 12 asks for its factors"),
+            *(rods["jacobian_error"], "the printed determinant, expanded; footnote 12 uses its factors"),
             within=1e-12,
         ),
         _counted(
@@ -152,12 +152,12 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             *(rods["full_rank"], trials, "smallest singular value over 1e-9 of the largest"),
         ),
         _counted(
-            *(f"{where}, claim", "rods with exactly one root x of eq. (9) that holds", "at most one"),
+            *(f"{where}, claim", "rods with exactly one valid root x of eq. (9)", "at most one"),
             *(
                 rods["one_root"],
                 trials,
-                "a root holds when z3 is real and (6) is met within 1e-6: of the four solutions that Bezout"
-                " allows a mirror pair is left",
+                "a root is valid if z3 is real and (6) is met within 1e-6: of the four solutions that Bezout"
+                " allows, a mirror pair is left",
             ),
             least=0.98,
         ),
@@ -165,12 +165,12 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             *(f"{where}, after (14)", "of z3 = ± with z1 = + sqrt(z3^2 - k2), those that meet (6)", "both"),
             f"one of the two: + in {rods['printed_z1']}, - in {trials - rods['printed_z1']} of {trials}",
             Verdict.DIFFERS,
-            "(5) leaves the sign of z1 open and (6) chooses it; the mirror has the other sign",
+            "(5) does not determine the sign of z1, (6) does; the mirror has the other sign",
         ),
         _counted(
             *("section 6", "rods never seen longer than 0.9 of their length, recovered", "all"),
             *(rods["never_extended_recovered"], rods["never_extended"]),
-            "maximal extension need not be seen, as predicted",
+            "maximal extension need not be visible, as predicted",
         ),
     ]
 
@@ -190,9 +190,9 @@ def _proposition_2(hinges: dict[str, Any]) -> list[Row]:
         _counted(
             *("Proposition 2", "hinges with exactly one plane, up to the mirror", "all"),
             *(hinges["one_plane"], hinges["searched"]),
-            f"by search over all directions of slope, without the closed form; most planes found:"
-            f" {hinges['most_planes']}. The paper leaves its proof out",
-            rest="have their plane so near to another change of sign that steps of 0.025 degrees miss it",
+            f"by search over all directions of slope, without the closed form; largest number of planes:"
+            f" {hinges['most_planes']}. The paper omits its proof",
+            rest="have their plane so near another change of sign that steps of 0.025 degrees miss it",
             least=0.97,
         ),
         _counted(
@@ -207,8 +207,8 @@ def _proposition_2(hinges: dict[str, Any]) -> list[Row]:
 
 def _false_targets(rods: int, hinges: int) -> list[Row]:
     why = (
-        "the claim cannot hold for the least number of views, which has as many equations as unknowns; it"
-        " needs more views and a test with a stated rate, as `memo planar` has"
+        "the claim cannot hold for the smallest number of views, which has as many equations as unknowns; it"
+        " needs more views and a test with a stated rate, as in `memo planar`"
     )
     return [
         Row("section 6", name, "probability zero", _share(count, TRIALS), Verdict.DIFFERS, why)
@@ -240,9 +240,9 @@ def _degenerate_rows(rods: dict[str, Any], degenerate: list[tuple[str, int]]) ->
     rows.append(
         Row(
             *("appendix 1, claim", "k1 = k2 without parallel plane or collinear images", "degenerate"),
-            f"one root holds in {_share(one, of)}",
+            f"one root is valid in {_share(one, of)}",
             Verdict.DIFFERS,
-            "views 2 and 3 mirrored in the ellipse's axis have k1 = k2, and of x = 1 and x = -1 just one is"
+            "views 2 and 3 mirrored in the ellipse's axis have k1 = k2, and only one of x = 1 and x = -1 is"
             " real: such views are not degenerate",
         )
     )
@@ -260,7 +260,7 @@ def _linking_rows(hinges: dict[str, Any]) -> list[Row]:
             *("section 6, linking", "the same with the ankle as the joint", "no interpretation"),
             f"an interpretation in {_share(hinges['joint_at_an_end'], trials)}",
             Verdict.DIFFERS,
-            "two views cannot contradict: see false targets. Over more views the links come out (next rows)",
+            "two views cannot contradict: see false targets. More views give the links (next rows)",
         ),
     ]
 
@@ -315,7 +315,7 @@ class _Walker:
 
     def rows(self) -> list[Row]:
         on = (
-            f"synthetic walker seen from {AZIMUTH_DEG:g} degrees aside, no names given; Johansson's films are"
+            f"synthetic walker seen from {AZIMUTH_DEG:g} degrees aside, without names; Johansson's films are"
             " not published"
         )
         links = self.links(self.found["as it is"])
@@ -355,13 +355,13 @@ class _Walker:
 
 
 def _cannot_rows() -> list[Row]:
-    people = "people are asked, not computed"
+    people = "an experiment with people, not a computation"
     return [
         cannot("section 2", "dots seen as a walker", "within 100-1000 ms", people),
         cannot("section 6", "perception without maximal extension", "not at all reduced", people),
         cannot(
             *("section 6", "Johansson's dancing couple", "interpreted in part"),
-            "the film is not published; what moves out of its plane is refused by the test of `memo planar`",
+            "the film is not published; the test of `memo planar` refuses points that leave their plane",
         ),
         cannot(
             *("section 5", "four points, three views: Ullman's rigidity theorem", "unique"),
@@ -370,13 +370,13 @@ def _cannot_rows() -> list[Row]:
         cannot(
             *("section 6", "motion from known lengths where planarity fails", "inferred uniquely"),
             "stated without proof; in one view each rod of known length has two ends, so a hinge has four"
-            " readings (two up to the mirror): only motion over time chooses, as `memo posture` does",
+            " readings (two up to the mirror): only motion over time decides, as in `memo posture`",
         ),
         cannot(
             "section 5",
             "pairwise-rigid structures without planarity",
             "infinitely many",
-            "a count without end",
+            "the number is infinite",
         ),
         cannot("footnote 8", "a local network", "no numbers", "described elsewhere (Hoffman 1981)"),
     ]
@@ -399,7 +399,7 @@ def _in_plane(angle_deg: float, length: float = 1.0) -> Array:
 
 
 def _figures(walker: _Walker) -> list[Drawing]:
-    example = "Example with its plane chosen here; the paper's drawing has no numbers"
+    example = "Example in a plane chosen here; the paper's drawing has no numbers"
     dots = "Synthetic walker; Johansson's films are not published"
     return [
         Drawing(
@@ -411,7 +411,7 @@ def _figures(walker: _Walker) -> list[Drawing]:
             *(lambda figure: _draw_dots(figure, walker), (7, 5), dots),
         ),
         Drawing(
-            *("fig2", "Fig. 2", "The four descriptions of the input, and what memo has for each"),
+            *("fig2", "Fig. 2", "The four descriptions of the input, and memo's methods for each"),
             *(_draw_inputs, (8, 3.6), "A scheme; its cells are memo's functions"),
         ),
         Drawing(
@@ -427,7 +427,7 @@ def _figures(walker: _Walker) -> list[Drawing]:
             *(lambda figure: _draw_views(figure, [[_in_plane(a) for a in ROD_DEG]]), (6, 5.5), example),
         ),
         Drawing(
-            *("fig5", "Fig. 5", "The solutions for z1, z2, z3: where two hyperbolic sheets and a plane meet"),
+            *("fig5", "Fig. 5", "The solutions for z1, z2, z3: two hyperbolic sheets cut a plane"),
             *(_draw_solutions, (10.5, 5.2), f"{example}; with the k's of footnote 11 of the rod in Fig. 4"),
         ),
         Drawing(
@@ -577,7 +577,7 @@ def _draw_views(figure: Figure, rods: list[list[Array]]) -> None:
 
 
 def _draw_solutions(figure: Figure) -> None:
-    """Left in space: of z1^2 - z2^2 + k1 = 0 and z1^2 - z3^2 + k2 = 0 the sheets through the solution, and
+    """Left in space: the sheets through the solution of z1^2 - z2^2 + k1 = 0 and z1^2 - z3^2 + k2 = 0, and
     the plane k3 z1 + k4 z2 + k5 z3 = 0. Right in that plane: all sheets as curves."""
     ends = np.array([_in_plane(angle) for angle in ROD_DEG])
     printed = _memo.hoffman_flinchbaugh_rod(np.ascontiguousarray(ends[None, :, :2]))

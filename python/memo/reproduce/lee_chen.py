@@ -33,19 +33,19 @@ FRAMES = (1, 3, 5)
 
 NOTE = """Lengths, head, cameras, frame interval and joint limits are the paper's. It prints neither the
 joints of its sequences nor their gait phases and cadence, and the program that drew them (Cutting 1978) is
-not public: so a walker is made anew from average gait curves, with shoulders that turn by 4 and a pelvis
-that turns by 6 degrees, at an ordinary cadence. The phase of frame 1 is that of fifty which brings frame 1
-of Tables 3 and 4 nearest, so that agreement there says that such a walker exists, not that it is the
+not public. So a new walker is made from average gait curves, with shoulders that turn by 4 and a pelvis
+that turns by 6 degrees, at an ordinary cadence. The phase of frame 1 is the one of fifty that brings frame 1
+of Tables 3 and 4 nearest, so agreement there shows that such a walker exists, not that it is the
 paper's."""
 
-WALKER = "on the walker made anew"
+WALKER = "on the new walker"
 
-# Table 1: what it is called in memo, where it stands, extension or adduction and flexion or abduction.
+# Table 1: the name in memo, the joint, extension or adduction and flexion or abduction.
 TABLE_1 = {
     "shoulder swing": ("shoulder, extension and flexion", "50 180"),
     "shoulder abduction": ("shoulder, adduction and abduction", "50 180"),
     "hip swing, straight knee": ("hip, extension and flexion", "40 90"),
-    "hip swing": ("hip, the same when flexion at the knee is allowed", "40 120"),
+    "hip swing": ("hip, the same if flexion at the knee is allowed", "40 120"),
     "hip abduction": ("hip, adduction and abduction", "30 45"),
     "elbow": ("elbow, extension and flexion", "0 160"),
     "knee": ("knee, extension and flexion", "0 130"),
@@ -114,7 +114,7 @@ def lee_chen(progress: Progress = unseen) -> Reproduction:
     )
 
 
-# What goes in: section 2, Table 1, the appendix.
+# Input: section 2, Table 1, the appendix.
 
 
 def _input_rows(inputs: dict[str, Any]) -> list[Row]:
@@ -126,13 +126,15 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
             *("section 3.1", "body configurations of the tree", "8196", 2 ** (len(joints) - 1)),
             "a misprint: 2^13 is 8192",
         ),
-        compared("appendix", "seconds a frame", "0.2", inputs["frame_s"]),
+        compared("appendix", "seconds per frame", "0.2", inputs["frame_s"]),
     ]
     for sequence, printed, camera in zip(
         SEQUENCES, ("400 0 0", "300 0 300"), inputs["cameras_cm"], strict=True
     ):
         quantity = f"camera of {sequence}, centimetres"
-        rows.append(compared("appendix", quantity, printed, np.round(camera, 9), "the image plane's place"))
+        rows.append(
+            compared("appendix", quantity, printed, np.round(camera, 9), "position of the image plane")
+        )
     for name, (least, most) in inputs["angles"]:
         quantity, printed = TABLE_1[name]
         rows.append(compared("Table 1", f"{quantity}, degrees", printed, np.round([-least, most], 9) + 0.0))
@@ -142,7 +144,7 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
         rows.append(compared("Table A.1", f"{name}, centimetres", printed, found, "both sides"))
     for (name, (printed, _)), ours in zip(TABLE_A2.items(), inputs["head_cm"], strict=True):
         why = (
-            "a misprint: y' in A.2(b) and the depth in Table 2(d) both want -31.168, as for the left eye"
+            "a misprint: y' in A.2(b) and the depth in Table 2(d) both imply -31.168, as for the left eye"
             if name == "right eye"
             else ""
         )
@@ -151,8 +153,8 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
     for axis, letter in enumerate("xy"):
         printed = " ".join(projection.split()[axis] for _, projection in TABLE_A2.values())
         why = "from A.2(a) seen from (400, 0, 0) with f = 5" + (
-            "; all six are printed 0.00024 further left: the sequence's camera stood 0.02 cm aside, as t41 of"
-            " Table 2 says too"
+            "; all six are printed 0.00024 further left: the sequence's camera was 0.02 cm to the side, as"
+            " t41 of Table 2 shows too"
             if letter == "x"
             else ""
         )
@@ -165,7 +167,7 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
 
 
 def _head_numbers(column: dict[str, Any]) -> dict[str, float]:
-    """Every number of Table 2 by the name it has in the text, in the table's order."""
+    """Every number of Table 2 by its name in the text, in the table's order."""
     numbers: dict[str, float] = {}
     for part, name in (("(a)", "transform"), ("(b)", "rotation")):
         for (row, place), value in np.ndenumerate(column[name]):
@@ -186,12 +188,12 @@ def _head_table(head: list[dict[str, Any]]) -> Table:
 
 
 def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
-    """Table 2 against the linear solution from projections that were not rounded."""
+    """Table 2 compared with the linear solution from projections without rounding."""
     by_method = {column["method"]: column for column in head}
     printed, exact = head[0], by_method["linear, exact projections"]
     rounded, known = by_method["linear, A.2(b) as printed"], by_method["least squares, f = 5"]
     how = (
-        "eqs. (1)-(5) from projections that are not rounded, as it differs from its own geometry by that much"
+        "eqs. (1)-(5) from projections without rounding; the table differs from its own geometry by that much"
     )
 
     def row(quantity: str, name: str, *, within: float, place: Any = ...) -> Row:
@@ -216,7 +218,7 @@ def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
         ),
         compared(
             *("Table 2", "(c) by least squares from A.2(b), f known", place, known["camera_position"]),
-            f"over a true rotation; known to ({sd}) from the rounding of A.2(b)",
+            f"over true rotations; standard deviations ({sd}) from the rounding of A.2(b)",
             within=0.05,
         ),
     ]
@@ -251,7 +253,7 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
     ratio = max(float(np.max(merged[half][1:] / merged[half][:-1])) for half in HALVES)
     rows += [
         in_kind(
-            *(f"Table {number}", f"numbers equal to the printed, {sequence}", "84", str(equal)),
+            *(f"Table {number}", f"numbers equal to the printed ones, {sequence}", "84", str(equal)),
             f"{WALKER}, frames 1, 3, 5 at gait phases {phases}",
         ),
         in_kind(
@@ -260,7 +262,7 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
         ),
         in_kind(
             *(f"Table {number}", "largest ratio of two levels", "2", f"{ratio:g}"),
-            f"two candidates a joint, {WALKER}",
+            f"two candidates per joint, {WALKER}",
         ),
     ]
     return rows
@@ -287,7 +289,7 @@ def _count_table(number: int, merged: dict[str, Any], apart: dict[str, Any]) -> 
 
 Stages = dict[tuple[str, str], list[dict[str, Any]]]
 READINGS = {
-    "rigid_torso": "instead of rule 3 at the shoulder the neck must lie ahead of the line of the shoulders,"
+    "rigid_torso": "instead of rule 3 at the shoulder, the neck must be ahead of the line of the shoulders,"
     " as a rigid torso is not its mirror image; knees are flexed from 25 degrees",
     "as_printed": "rule 3 refuses arms that swing forward, since the lengths put both shoulders 3.7 cm behind"
     " the neck",
@@ -313,7 +315,7 @@ def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
             ),
             in_kind(
                 *("section 4.2", f"the same after grouping, {sequence}", groups, str(len(found["groups"]))),
-                f"{WALKER}; within 5 cm, as the distance is not printed",
+                f"{WALKER}; within 5 cm, as the grouping distance is not printed",
             ),
         ]
     for (sequence, reading), frames in stages.items():
@@ -329,7 +331,7 @@ def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
                     final,
                 ),
                 f"median {median(groups_left):g}, {min(groups_left)} to {max(groups_left)}",
-                f"printed of frame 1 alone; {WALKER}, frames 1, 3, 5 from each of ten phases on;"
+                f"printed for frame 1 only; {WALKER}, frames 1, 3, 5 for each of ten starting phases;"
                 f" {READINGS[reading]}",
             )
         )
@@ -371,7 +373,7 @@ def _cannot_rows() -> list[Row]:
         cannot("Figs. 6-8, A.1", "the printed figures line for line", "4 figures", unpublished),
         cannot(
             *("section 5", "a unique posture in every frame from a sequence", "no numbers"),
-            "announced with a reference to a dissertation; `memo posture` links frames in its own way",
+            "announced with a reference to a dissertation; `memo posture` links frames by its own method",
         ),
     ]
 
@@ -381,21 +383,21 @@ def _cannot_rows() -> list[Row]:
 
 def plot_posture(ax: Axes, joints: Points, *, alpha: float = 1.0) -> Axes:
     """A posture (14, 3) in camera axes from the side: depth to the right, height upwards; right limbs solid,
-    left dashed."""
+    left limbs dashed."""
     draw_figure(ax, np.column_stack([joints[:, 2], -joints[:, 1]]), alpha=alpha)
     ax.set_aspect("equal")
     return ax
 
 
 def plot_superposition(ax: Axes, figures: Points, truth: Points) -> Axes:
-    """All postures (N, 14, 3) in one, with the true one's joints as dots (Fig. 7)."""
+    """All postures (N, 14, 3) in one plot, with the joints of the true posture as dots (Fig. 7)."""
     for joints in figures:
         plot_posture(ax, joints, alpha=0.45)
     ax.plot(truth[:, 2], -truth[:, 1], linestyle="none", marker=".", color="black", label="true joints")
     for name, style, colour in (("right limbs", "-", RIGHT), ("left limbs", "--", LEFT)):
         ax.plot([], [], color=colour, linestyle=style, label=name)
     ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, fontsize=8, borderaxespad=0)
-    ax.set(xlabel="distance from the camera, m", ylabel="height against the camera, m")
+    ax.set(xlabel="distance from the camera, m", ylabel="height relative to the camera, m")
     return ax
 
 
@@ -418,13 +420,13 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
                 "Fig. 2",
                 "The head's axes and the cameras of both sequences, from above and from the side",
             ),
-            *(_draw_cameras, (6, 7), "Places as printed in the appendix; the walker made anew"),
+            *(_draw_cameras, (6, 7), "Positions as printed in the appendix; the new walker"),
         ),
         Drawing(
             *(
                 "fig3",
                 "Fig. 3",
-                "The two places at which a segment of known length can end on its line of sight",
+                "The two positions at which a segment of known length can end on its line of sight",
             ),
             *(lambda figure: _draw_two_ends(figure, first), (6, 4.2)),
             f"{on_walker}, frame 1 of SEQ1",
@@ -433,7 +435,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             *(
                 "fig4",
                 "Fig. 4",
-                "The interpretation tree, pruned: every path down is one of the postures left",
+                "The pruned interpretation tree: every path down is one of the postures left",
             ),
             *(lambda figure: _draw_tree(figure, first), (10, 6)),
             f"{on_walker}, frame 1 of SEQ1 after rules 1 and 2",
@@ -442,7 +444,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             *(
                 "fig5",
                 "Fig. 5",
-                "Both shoulders can be at two places each; their distance says which go together",
+                "Each shoulder can be at two positions; their distance decides which belong together",
             ),
             *(lambda figure: _draw_rigid(figure, second), (8, 5)),
             f"{on_walker}, frame 1 of SEQ2, from above",
@@ -452,7 +454,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             *(lambda figure: _draw_panels(figure, first), _panel_size(first), from_side),
         ),
         Drawing(
-            *("fig7", "Fig. 7", "The same in one picture"),
+            *("fig7", "Fig. 7", "The same postures in one picture"),
             *(lambda figure: plot_superposition(_plain(figure), first["figures"], first["truth"]), (5, 7)),
             from_side,
         ),
@@ -526,8 +528,8 @@ def _distinct(points: Points) -> Points:
 
 
 def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
-    """Of the joints that the postures put at two places behind the same joint, the pair farthest apart: name
-    of the segment, its start (3,) and both ends (2, 3)."""
+    """Among joints that the postures put at two positions behind the same joint, the pair farthest apart:
+    name of the segment, its start (3,) and both ends (2, 3)."""
     names = _memo.joint_names()
     found = []
     for side in ("right", "left"):
@@ -599,12 +601,12 @@ def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
 
 
 def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
-    """From above: lines of sight, the two places of each shoulder, and the distance of each pair."""
+    """From above: lines of sight, the two positions of each shoulder, and the distance of each pair."""
     names = _memo.joint_names()
     neck = left["truth"][0]
 
     def roots(joint: str) -> Points:
-        """Both places on the line of sight: they lie symmetrically to its point nearest to the neck."""
+        """Both positions on the line of sight: they are symmetric about its point nearest to the neck."""
         true = left["truth"][names.index(joint)]
         ray = true / np.linalg.norm(true)
         both = np.array([true, 2 * (neck @ ray) * ray - true])
@@ -669,7 +671,7 @@ def _panel_size(left: dict[str, Any]) -> tuple[float, float]:
 
 
 def _draw_panels(figure: Figure, left: dict[str, Any]) -> None:
-    """A panel for each group of postures (Figs. 6 and 8); of a group that holds it the true one is drawn."""
+    """One panel per group of postures (Figs. 6 and 8); if a group holds the true posture, it is drawn."""
     rows, columns = _panel_grid(left)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for ax in axes.flat:
@@ -680,5 +682,5 @@ def _draw_panels(figure: Figure, left: dict[str, Any]) -> None:
         marks = ["rules 3-5"] * any(left["passes"][i] for i in members) + ["true"] * is_true
         ax.set_title(f"({chr(ord('a') + number)}) {', '.join(marks)}", fontsize=8)
     figure.suptitle(
-        "camera to the left; right limbs solid, left dashed; marked: what rules 3-5 leave", fontsize=8
+        "camera to the left; right limbs solid, left dashed; marked: left by rules 3-5", fontsize=8
     )

@@ -1,4 +1,4 @@
-"""What a reproduction gives: rows of printed and own values with verdicts, figures, tables, files."""
+"""The result of a reproduction: rows of printed and own values with verdicts, figures, tables, files."""
 
 from __future__ import annotations
 
@@ -37,39 +37,39 @@ __all__ = [
 ]
 
 Progress = Callable[[str, int, int | None], object]
-"""Is told how far a reproduction is: the step, how much of it is done and of how much (None: unknown)."""
+"""Called with the progress of a reproduction: the step, the amount done and the total (None: unknown)."""
 
 
 def unseen(step: str, done: int, total: int | None) -> None:
-    """The progress of one who does not ask."""
+    """The progress for callers that want none."""
 
 
 EQUAL = "equal (0)"
-"""What is printed of the difference of an equation's two sides."""
+"""The printed value for the difference of an equation's two sides."""
 
 ROW_COLUMNS = ("item", "quantity", "printed", "ours", "verdict", "why")
 """Columns of `reproduction.csv`, in order."""
 
 
 class Verdict(StrEnum):
-    """How a printed thing stands."""
+    """The result of comparing a printed value."""
 
     SAME = "same"
-    """Computed anew from what the paper gives, and equal to the digits printed or within what is stated."""
+    """Computed again from what the paper gives, and equal to the printed digits or within a stated bound."""
     DIFFERS = "differs"
-    """Computed anew from what the paper gives, and not equal; the row says why."""
+    """Computed again from what the paper gives, and not equal; the row gives the reason."""
     IN_KIND = "in kind"
-    """Made anew from other input, because the paper's is not published. Not the paper's number."""
+    """Made from other input, because the paper's is not published. Not the paper's number."""
     CANNOT = "cannot"
-    """Not made; the row says why."""
+    """Not made; the row gives the reason."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One printed thing beside what memo has for it."""
+    """One printed value beside memo's value for it."""
 
     item: str
-    """Where it stands in the paper: "Table 3, left ankle", "Fig. 19", "section 6"."""
+    """Place in the paper: "Table 3, left ankle", "Fig. 19", "section 6"."""
     quantity: str
     printed: str
     ours: str
@@ -88,13 +88,13 @@ class Drawing:
     """A figure: drawn into a matplotlib Figure when it is written."""
 
     name: str
-    """Name of the file without its end: "fig19"."""
+    """Name of the file without its ending: "fig19"."""
     item: str
     caption: str
     draw: Callable[[Figure], object] = field(repr=False)
     size_in: tuple[float, float] = (6.4, 4.8)
     why: str = ""
-    """On what it is made."""
+    """The data it is made from."""
     verdict: Verdict = Verdict.IN_KIND
 
     @property
@@ -103,7 +103,7 @@ class Drawing:
         return Row(self.item, self.caption, "figure", f"{self.name}.png", self.verdict, self.why)
 
     def write(self, folder: Path) -> Path:
-        """Draws into `folder`; the file's path."""
+        """Draws into `folder`; returns the file's path."""
         figure = Figure(figsize=self.size_in, dpi=120, layout="constrained")
         FigureCanvasAgg(figure)
         self.draw(figure)
@@ -115,14 +115,14 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Table:
-    """A table with more in it than the rows say."""
+    """A table with more details than the rows."""
 
     name: str
     header: Sequence[str]
     rows: Sequence[Sequence[Any]] = field(repr=False)
 
     def write(self, folder: Path) -> Path:
-        """Writes `folder`/name.csv; its path."""
+        """Writes `folder`/name.csv; returns its path."""
         path = folder / f"{self.name}.csv"
         write_table(path, self.header, self.rows)
         return path
@@ -137,24 +137,24 @@ class Reproduction:
     title: str
     """Authors, year, title."""
     note: str
-    """In a few sentences, what was made anew from what."""
+    """In a few sentences, what was made and from which input."""
     numbers: Sequence[Row] = field(repr=False)
     figures: Sequence[Drawing] = field(repr=False)
     tables: Sequence[Table] = field(default=(), repr=False)
 
     @property
     def rows(self) -> list[Row]:
-        """The numbers and then the figures, a row each."""
+        """The numbers and then the figures, one row each."""
         return [*self.numbers, *(figure.row for figure in self.figures)]
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many rows have each verdict."""
+        """Number of rows with each verdict."""
         found = Counter(row.verdict for row in self.rows)
         return {verdict.value: found[verdict] for verdict in Verdict}
 
     def write(self, folder: str | PathLike[str], progress: Progress = unseen) -> list[Path]:
-        """Writes reproduction.md, reproduction.csv, the tables and the figures; their paths."""
+        """Writes reproduction.md, reproduction.csv, the tables and the figures; returns their paths."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         self._remove_others(folder)
@@ -171,7 +171,7 @@ class Reproduction:
         return written
 
     def _remove_others(self, folder: Path) -> None:
-        """Figures of an earlier run that this one does not draw: they would stand beside other rows."""
+        """Figures of an earlier run that this run does not draw: they would not match the new rows."""
         with contextlib.suppress(OSError, ValueError):
             columns = read_text_columns(folder / "reproduction.csv", ("printed", "ours"))
             rows = zip(*columns.values(), strict=True)
@@ -195,8 +195,8 @@ class Reproduction:
 
 
 def write_index(folder: Path, reproductions: Sequence[Reproduction]) -> Path:
-    """Writes `folder`/reproduction.md, which counts each paper's verdicts and leads to its folder."""
-    lines = ["# The papers again", "", f"| paper | {' | '.join(Verdict)} |", "|---|" + "---|" * len(Verdict)]
+    """Writes `folder`/reproduction.md, with each paper's counts of verdicts and links to its folder."""
+    lines = ["# Papers reproduced", "", f"| paper | {' | '.join(Verdict)} |", "|---|" + "---|" * len(Verdict)]
     for made in reproductions:
         counts = " | ".join(str(count) for count in made.counts.values())
         lines.append(f"| [{made.title}]({made.name}/reproduction.md) | {counts} |")
@@ -212,8 +212,8 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.(\d+))?")
 def compared(
     item: str, quantity: str, printed: str, ours: npt.ArrayLike, why: str = "", *, within: float | None = None
 ) -> Row:
-    """A row whose verdict follows from the numbers: same when each differs from the one printed by no more
-    than half a unit of its last digit, or `within`.
+    """A row whose verdict follows from the numbers: same if each differs from the printed one by at most
+    half a unit of its last digit, or by at most `within`.
 
     `printed` holds as many numbers as `ours`, and may hold words between. A row that differs needs a `why`.
     """
@@ -239,7 +239,7 @@ def compared(
 
 
 def _digits(value: float, digits: int) -> str:
-    """A value with one digit more than printed, or as a whole number where it is one."""
+    """A value with one more digit than printed, or as a whole number if it is one."""
     if digits == 0 and float(value).is_integer():
         return f"{value:.0f}"
     return f"{value:z.{digits + 1}f}"

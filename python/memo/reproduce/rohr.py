@@ -1,7 +1,7 @@
 """Rohr (1994): constants and equations, the model, and every figure in kind.
 
-The paper's sequences are not published. Its numbers that follow from the text are computed; what it shows
-of a sequence is shown of the synthetic scene of `memo demo`, or of a video that is given.
+The paper's sequences are not published. Numbers that follow from the text are computed; results on
+a sequence are shown for the synthetic scene of `memo demo`, or for a given video.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from memo.reproduce.sequence import Clip, NobodyTracked, Sequence, clip_sequence
 
 __all__ = ["Clip", "NobodyTracked", "rohr"]
 
-NOTE = """Numbers and equations are computed from the code that tracks. The paper prints neither its gait
+NOTE = """Numbers and equations are computed by the code of the tracker. The paper prints neither its gait
 samples (Murray's averages at ten instants) nor its body sizes, and its image sequences are not published:
 figures are made in kind, on the synthetic scene of `memo demo` (drawn with the model that tracks it, as the
-paper's synthetic sequence was) or on a video that is given. They are not the paper's figures."""
+paper's synthetic sequence was) or on a given video. They are not the paper's figures."""
 
 CURVES = ("hip", "knee", "shoulder", "elbow")
 
@@ -37,7 +37,7 @@ CURVES = ("hip", "knee", "shoulder", "elbow")
 def rohr(clip: Clip | None = None, progress: Progress = unseen) -> Reproduction:
     """Every number, equation and figure of Rohr (1994); figures of real sequences from `clip`, if given.
 
-    Raises `NobodyTracked` where nobody is tracked in the clip.
+    Raises `NobodyTracked` if nobody is tracked in the clip.
     """
     filmed = clip_sequence(clip, progress) if clip is not None else None
     scene = scene_sequence(progress)
@@ -75,14 +75,14 @@ def _model_rows(numbers: dict[str, float], deviations: dict[str, float]) -> list
         compared("section 3.1", "of arms and legs, three each", "12", numbers["arm_and_leg_parts"]),
         compared("section 3.1", "parameters of a cylinder", "3", len(_memo.body_parts(1.75)[0]) - 1),
         compared(
-            *("section 3.1", "printed inverse of A times A, less I", EQUAL, deviations["inverse"]),
+            *("section 3.1", "printed inverse of A times A, minus I", EQUAL, deviations["inverse"]),
             "largest element, 100 rigid transforms",
             within=1e-9,
         ),
         compared(
             *(
                 "section 3.1",
-                "printed A_i A_i+1 less the product of matrices",
+                "printed A_i A_i+1 minus the product of matrices",
                 EQUAL,
                 deviations["product"],
             ),
@@ -90,13 +90,13 @@ def _model_rows(numbers: dict[str, float], deviations: dict[str, float]) -> list
             within=1e-9,
         ),
         compared(
-            *("section 3.2", "splines through ten samples less the samples, degrees", EQUAL),
+            *("section 3.2", "splines through ten samples minus the samples, degrees", EQUAL),
             deviations["spline_samples_deg"],
             "ten samples of a sine of 60 degrees; periodic cubic spline",
             within=1e-9,
         ),
         compared(
-            *("section 3.2", "left side less right side half a cycle later, degrees", EQUAL),
+            *("section 3.2", "left side minus right side half a cycle later, degrees", EQUAL),
             deviations["left_half_cycle_later_deg"],
             "all four joints, 100 phases: one parameter fixes the posture",
             within=1e-9,
@@ -141,7 +141,7 @@ def _body_table() -> Table:
 def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: Sequence) -> list[Row]:
     soles = shown.soles_m()
     away_m = shown.camera.camera_from_world(soles)[:, 2]
-    scatter = f"{_on(shown)}; from the rectangles alone"
+    scatter = f"{_on(shown)}; from the rectangles only"
     return [
         compared("section 4.1", "grey values in the 5x5 window", "25", numbers["window_px"]),
         compared(
@@ -151,7 +151,7 @@ def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: 
         compared(
             *(
                 "eq. (1)",
-                "norm of two fits' difference less the norm computed",
+                "norm of two fits' difference minus the norm computed",
                 EQUAL,
                 deviations["eq_1"],
             ),
@@ -160,11 +160,11 @@ def _image_rows(numbers: dict[str, float], deviations: dict[str, float], shown: 
         ),
         compared(
             *("eq. (6)", "T* X* + b* over its largest term", EQUAL, deviations["eq_6"]),
-            "100 people before random cameras; six equations, five unknowns",
+            "100 people seen by random cameras; six equations, five unknowns",
             within=1e-9,
         ),
         compared(
-            *("eqs. (3)-(6)", "position from the rectangle less the true one, metres", EQUAL),
+            *("eqs. (3)-(6)", "position from the rectangle minus the true one, metres", EQUAL),
             *(deviations["eq_6_position_m"], "exact midpoints"),
             within=1e-9,
         ),
@@ -187,7 +187,7 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
         compared(
             *(
                 "eq. (7)",
-                "s_i as printed less the score that is used, over l",
+                "s_i as printed minus the score used, over l",
                 EQUAL,
                 deviations["eq_7"],
             ),
@@ -200,14 +200,14 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
             within=1e-9,
         ),
         compared(
-            *("eq. (8)", "change of the exponent when all is three times as large", EQUAL),
+            *("eq. (8)", "change of the exponent if everything is three times as large", EQUAL),
             *(deviations["eq_8_scale"], "the exponent does not depend on the scale"),
             within=1e-9,
         ),
         compared(
             *(
                 "eqs. (9), (10)",
-                "growth of Lowe's measure (10) when all is twice as large",
+                "growth of Lowe's measure (10) if everything is twice as large",
                 "independent of scale (1)",
             ),
             *(
@@ -218,7 +218,7 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
         compared(
             *(
                 "eq. (11)",
-                "1 - s(p) where every contour is an edge",
+                "1 - s(p) if every contour is an edge",
                 EQUAL,
                 deviations["eq_11_perfect"],
             ),
@@ -237,7 +237,7 @@ def _matching_rows(deviations: dict[str, float], shown: Sequence) -> list[Row]:
             in_kind(
                 *(item, "best pose, and the best half a cycle away", printed),
                 f"{best:.2f} and {other:.2f}, {apart:.2f} apart",
-                f"{_on(shown)}, frame {look.frame}; place kept, pose over the whole cycle",
+                f"{_on(shown)}, frame {look.frame}; fixed position, pose over the whole cycle",
             )
         )
     return rows
@@ -251,7 +251,7 @@ def _start_rows(numbers: dict[str, float], filmed: Sequence | None, scene: Seque
         compared("section 6", "images of the start (numbers 2 to 14)", "13", numbers["start_images"]),
         compared(
             *("section 5.1", "their part of a walking cycle, about", "0.5", numbers["start_cycles"]),
-            "13 images at 25 a second, a cycle of 1 s",
+            "13 images at 25 per second, a cycle of 1 s",
             within=0.05,
         ),
         compared("section 5.1", "search space of pose at the start", "1", numbers["interval_pose_start"]),
@@ -264,7 +264,7 @@ def _start_rows(numbers: dict[str, float], filmed: Sequence | None, scene: Seque
             count, of = start_outliers(sequence)
             rows.append(
                 in_kind(
-                    *(item, "single images off the line of the start by over a quarter cycle", printed),
+                    *(item, "single images over a quarter cycle off the line of the start", printed),
                     *(f"{count} of {of}", _on(sequence)),
                 )
             )
@@ -279,29 +279,29 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
     is_as_printed = all(
         n % 2 == 1 and abs(n - printed) <= 1 for n, printed in zip(counts, (20, 10, 20), strict=True)
     )
-    slip = "printed per image², a slip: it is a variance of a position"
+    slip = "printed per image², a mistake: it is a variance of a position"
     return [
         compared(
-            *("eqs. (12)-(22)", "eight-state filter as printed less the filters that run", EQUAL),
+            *("eqs. (12)-(22)", "eight-state filter as printed minus the filters used", EQUAL),
             *(deviations["eqs_12_22"], "largest of states and covariances over 50 images"),
             within=1e-9,
         ),
         compared(
             *("section 6", "average velocity of X, cm/image", "6.4", numbers["x_per_image_cm"]),
-            "1.6 m a cycle of 1 s, 25 images a second",
+            "1.6 m per cycle of 1 s, 25 images per second",
         ),
         compared(
             *("section 6", "average velocity of pose, 1/image", "0.04", numbers["pose_per_image"]),
-            "a cycle of 1 s, 25 images a second",
+            "a cycle of 1 s, 25 images per second",
         ),
         compared(
             *("section 6", "sigma_QX squared, cm²/image²", "3.69", numbers["sigma_q_x_sq"]),
-            f"30 % of 6.4 squared is {numbers['sigma_q_x_sq_from_text']:.4f}; as the filter has it",
+            f"30 % of 6.4 squared is {numbers['sigma_q_x_sq_from_text']:.4f}; the value in the filter",
         ),
-        compared("section 5.2", "sigma_QY squared", "0", numbers["sigma_q_y_sq"], "the height stays"),
+        compared("section 5.2", "sigma_QY squared", "0", numbers["sigma_q_y_sq"], "the height is constant"),
         compared(
             *("section 6", "sigma_Qpose squared, 1/image²", "0.000144", numbers["sigma_q_pose_sq"]),
-            "30 % of 0.04 squared; as the filter has it",
+            "30 % of 0.04 squared; the value in the filter",
         ),
         compared("section 6", "sigma_RX squared, cm²", "400", numbers["sigma_r_x_sq"], slip),
         compared("section 6", "sigma_RY squared, cm²", "100", numbers["sigma_r_y_sq"], slip),
@@ -311,12 +311,12 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
         compared("section 6", "2Δpose", "0.4", numbers["interval_pose"]),
         Row(
             *("section 6", "points n_X = [ΔX], n_Y = [ΔY], n_pose = [100 Δpose], odd", "[20] [10] [20]"),
-            f"{' '.join(map(str, counts))}, {int(numbers['hypotheses'])} hypotheses an image",
+            f"{' '.join(map(str, counts))}, {int(numbers['hypotheses'])} hypotheses per image",
             Verdict.SAME if is_as_printed else Verdict.DIFFERS,
-            "every 2 cm and 0.02 of the intervals, ends included: the odd numbers next to those printed",
+            "every 2 cm and 0.02 of the intervals, ends included: the odd numbers next to the printed ones",
         ),
         in_kind(
-            *("section 5.1", "hypotheses an image at the start", "not printed"),
+            *("section 5.1", "hypotheses per image at the start", "not printed"),
             f"{int(numbers['hypotheses_start'])}",
             "the same steps, the whole cycle at 50 phases",
         ),
@@ -344,7 +344,7 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
                 *("Fig. 26", f"{letter} measured and after the Kalman filter, RMS from the truth, {unit}"),
                 "fairly good agreement",
                 " and ".join(f"{error:.2g}" for error in errors),
-                f"{_on(scene)}; printed variances, no smoothing; the distance stays what the start made it,"
+                f"{_on(scene)}; printed variances, no smoothing; the distance is fixed at the start,"
                 " as in the paper",
             )
         )
@@ -356,7 +356,7 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
             in_kind(
                 *(
                     item,
-                    f"images through which the pedestrian is tracked, {label} sequence",
+                    f"images in which the pedestrian is tracked, {label} sequence",
                     "the whole sequence",
                 ),
                 *(f"{len(frames)}, numbers {frames[0]} to {frames[-1]}", _on(sequence)),
@@ -369,7 +369,7 @@ def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
         in_kind(
             *(
                 "section 6, Figs. 32, 33",
-                "what 3 to 5 degrees at the hip move, at the ankle",
+                "displacement of the ankle by 3 to 5 degrees at the hip",
                 "relatively large changes",
             ),
             *(f"{low:.0f} to {high:.0f} cm", "thigh and shank of memo's body, times the angle"),
@@ -390,18 +390,18 @@ def _cannot_rows(filmed: Sequence | None) -> list[Row]:
             "Figs. 34, 35",
             "pedestrian with cyclist, with car",
             "2 figures",
-            "models of cycle and car are not described",
+            "models of bicycle and car are not described",
         ),
         cannot("sections 4-6", "the paper's own sequences f2, f3 and synthetic", "figures", "not published"),
         cannot(
             "section 4.3",
             "c_l, c_d, c_r, sigma of the angle, T of eq. (1)",
             "not printed",
-            "memo's are its own",
+            "memo has its own values",
         ),
         cannot(
             *("Figs. 32, 33", "dashed curves adjusted by hand", "curves"),
-            "made by a person on the paper's sequence; where the truth is known it is drawn instead",
+            "made by hand on the paper's sequence; if the truth is known, it is drawn instead",
         ),
     ]
     if filmed is None:

@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 
 def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
-    """All figures: those of a sequence from `filmed`, if given, and the synthetic one's from `scene`."""
+    """All figures: those of a real sequence from `filmed`, if given, and the synthetic ones from `scene`."""
     shown = filmed or scene
     first, second = shown.examples
     model = "Memo's body and gait; the paper's sizes and samples are not printed"
@@ -144,7 +144,7 @@ def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
         drawing(
             "fig19",
             "Fig. 19",
-            "Similarity over pose, the place kept",
+            "Similarity over pose, with fixed position",
             lambda f: _draw_similarity(f, shown, first),
             (6, 3.4),
             on(shown, first.frame),
@@ -152,7 +152,7 @@ def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
         drawing(
             "fig19_surface",
             "Fig. 19",
-            "Similarity over pose and place, the best height of each",
+            "Similarity over pose and position, at the best height of each",
             lambda f: _draw_surface(f, shown, first),
             (7, 4),
             f"{on(shown, first.frame)}; not in the paper",
@@ -256,7 +256,7 @@ def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
 
 
 def similarity_curve(sequence: Sequence, look: Look) -> tuple[Array, Array]:
-    """Phases and similarities of a frame over the whole cycle, the place kept."""
+    """Phases and similarities of a frame over the whole cycle, with fixed position."""
     found = _memo.walk_similarity(sequence.walk, look.row, look.stages["edges"])
     return found["phase"], found["scores"][:, 0, 0]
 
@@ -273,7 +273,7 @@ def similarity_peaks(sequence: Sequence, look: Look) -> tuple[float, float, floa
 
 
 def start_outliers(sequence: Sequence) -> tuple[int, int]:
-    """How many frames of the start prefer a phase over a quarter cycle off the line, and of how many."""
+    """Number of frames of the start that prefer a phase over a quarter cycle off the line, and the total."""
     start = sequence.track.start
     at, rate, _ = start["line"]
     line = at + rate * (np.asarray(start["time_s"]) - start["time_s"][0])
@@ -413,7 +413,7 @@ def _draw_velocities(figure: Figure, look: Look) -> None:
     arrows = ax.quiver(
         x, y, u[y, x], v[y, x], color=RIGHT, angles="xy", scale_units="xy", scale=1 / 2, width=0.003
     )
-    ax.quiverkey(arrows, 0.8, 1.03, 5, "5 px a frame", labelpos="E", fontproperties={"size": 8})
+    ax.quiverkey(arrows, 0.8, 1.03, 5, "5 px per frame", labelpos="E", fontproperties={"size": 8})
     _about(ax, look)
 
 
@@ -437,7 +437,7 @@ def _draw_windows(figure: Figure, sequence: Sequence, look: Look) -> None:
 
 
 def _draw_comparison(figure: Figure, sequence: Sequence, look: Look) -> None:
-    """The contour that is answered by an edge neither parallel to it nor on it, the longest."""
+    """The longest contour matched to an edge neither parallel to it nor on it."""
     lines, _ = _memo.walk_lines(sequence.walk, look.row)
     edges = np.ascontiguousarray(look.stages["edges"][:, :4].reshape(-1, 2, 2))
     _, matches = _memo.similarity(lines, edges)
@@ -486,7 +486,7 @@ def _draw_surface(figure: Figure, sequence: Sequence, look: Look) -> None:
     image = ax.pcolormesh(found["phase"], 100 * found["along"], surface.T, cmap="viridis", shading="nearest")
     best = found["best"]
     ax.plot(best[0], 100 * best[1], marker="x", color="white", markersize=9)
-    ax.set(xlabel="pose", ylabel="place along the path, cm from the track's")
+    ax.set(xlabel="pose", ylabel="position along the path, cm from the track's")
     ax.set_title(f"best at pose {best[0]:.2f}, {100 * best[1]:+.0f} cm", fontsize=9, loc="left")
     figure.colorbar(image, ax=ax, label="similarity s(p)")
 
@@ -501,7 +501,7 @@ def _draw_state(figure: Figure, sequence: Sequence, look: Look) -> None:
     ax.set_title(f"pose {best:.2f}", fontsize=9, loc="left")
 
 
-# Place and camera: Figs. 13-15.
+# Position and camera: Figs. 13-15.
 
 
 def _draw_axes(figure: Figure, sequence: Sequence) -> None:
@@ -594,7 +594,7 @@ def _draw_start(figure: Figure, sequence: Sequence) -> None:
 
 
 def _draw_filter(figure: Figure, sequence: Sequence) -> None:
-    """Left what the best hypothesis of each frame says, right the Kalman filter before smoothing."""
+    """Left the best hypothesis of each frame, right the Kalman filter before smoothing."""
     frames = sequence.track.columns["frame"]
     measured, filtered = sequence.walk.measured(), _memo.walk_filtered(sequence.walk)
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
@@ -615,7 +615,7 @@ def _draw_filter(figure: Figure, sequence: Sequence) -> None:
         left.set(ylabel=label)
         for ax in (left, right):
             ax.spines[["top", "right"]].set_visible(False)
-        if name == "z_m":  # the range that the search covers, so that its noise is seen in proportion
+        if name == "z_m":  # the range of the search, so that its noise is shown in proportion
             middle = np.nanmedian(measured[:, column])
             left.set(ylim=(middle - 0.15, middle + 0.15))
         if name == "phase":

@@ -1,4 +1,4 @@
-"""An image sequence tracked and looked at again: what Rohr's figures of a sequence are drawn from."""
+"""Tracks an image sequence and examines it again: the input of Rohr's figures of a sequence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Luma = npt.NDArray[np.uint8]
 Frames = Iterator[tuple[int, float, Luma]]
 
 SEED = 0
-RECTANGLES = 60  # at most so many frames of a clip have their rectangles looked at
+RECTANGLES = 60  # largest number of frames of a clip whose rectangles are computed
 
 
 class NobodyTracked(ValueError):
@@ -33,7 +33,7 @@ class NobodyTracked(ValueError):
 
 @dataclass(frozen=True)
 class Clip:
-    """A video of one person walking past a fixed camera, and what is known of it."""
+    """A video of one person who walks past a fixed camera, and its known parameters."""
 
     video: str | PathLike[str]
     height_m: float = 1.75
@@ -43,7 +43,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class Look:
-    """One frame with its neighbours and what the image stages make of it."""
+    """One frame with its neighbours and the results of the image stages."""
 
     row: int
     """Row of the walk."""
@@ -56,14 +56,14 @@ class Look:
 
 @dataclass(frozen=True)
 class Sequence:
-    """A tracked sequence: the longest walk in it, frames looked at, and rectangles over time."""
+    """A tracked sequence: its longest walk, the frames examined, and rectangles over time."""
 
     label: str
-    """What it is: "the synthetic scene" or the name of a video."""
+    """Its name: "the synthetic scene" or the name of a video."""
     height_m: float
     walk: _memo.Walk
     track: Track
-    """The longest walk alone."""
+    """Only the longest walk."""
     examples: tuple[Look, Look]
     """Two frames of the start."""
     shown: list[tuple[int, Luma]]
@@ -71,15 +71,15 @@ class Sequence:
     rectangles: npt.NDArray[np.float64]
     """(N, 5): frame, left, top, right, bottom, pixels."""
     truth: dict[str, npt.NDArray[Any]] | None
-    """Columns of `track.csv` that are known, where they are."""
+    """Columns of `track.csv` with known truth, if there are any."""
 
     @property
     def camera(self) -> _memo.Camera:
-        """The camera given or guessed."""
+        """The camera given or assumed."""
         return self.walk.camera
 
     def soles_m(self) -> npt.NDArray[np.float64]:
-        """Places (N, 3) from single rectangles, eqs. (3)-(6), without those that no upright person spans."""
+        """Positions (N, 3) from single rectangles, eqs. (3)-(6), without those no upright person spans."""
         found = []
         for _, left, top, right, bottom in self.rectangles:
             middle = 0.5 * (left + right)
@@ -89,7 +89,7 @@ class Sequence:
         return np.array(found).reshape(-1, 3)
 
     def true(self, name: str) -> npt.NDArray[Any]:
-        """The truth of a column in the frames of the track; only where there is one."""
+        """The truth of a column in the frames of the track; only if there is one."""
         if self.truth is None:
             raise ValueError(f"{self.label} has no truth")
         at = np.searchsorted(self.truth["frame"], self.track.columns["frame"])
@@ -110,7 +110,7 @@ def scene_sequence(progress: Progress) -> Sequence:
 
 
 def clip_sequence(clip: Clip, progress: Progress) -> Sequence:
-    """A video. Raises `NobodyTracked` where no walker is found."""
+    """A video. Raises `NobodyTracked` if no walker is found."""
     from memo.video import VideoReader
 
     def frames() -> Frames:
@@ -150,7 +150,7 @@ def _sequence(
     rectangles: list[list[float]] = []
     window: deque[tuple[int, Luma]] = deque(maxlen=3)
     for done, (index, _, luma) in enumerate(frames()):
-        progress(f"rohr: looking at {label} again", done, count)
+        progress(f"rohr: examining {label} again", done, count)
         window.append((index, np.array(luma)))
         if len(window) < 3 or window[1][0] not in row_of:
             continue
@@ -173,6 +173,6 @@ def _sequence(
 
 
 def _spread(rows: Any, count: int) -> list[int]:
-    """So many of the rows, spread evenly and away from both ends."""
+    """This many of the rows, spread evenly and away from both ends."""
     places = (np.arange(count) + 0.5) / count * len(rows)
     return [rows[int(place)] for place in places]
