@@ -34,7 +34,7 @@ LANGUAGES = ("sh", "console", "python", "pycon")
 NOT_RUN = {
     "README.md": 4,
     "CONTRIBUTING.md": 2,
-    "docs/start/install.md": 2,
+    "docs/start/install.md": 4,
     "docs/start/rust.md": 3,
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 6,
