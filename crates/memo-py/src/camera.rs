@@ -89,9 +89,9 @@ impl PyCamera {
             return Err(PyValueError::new_err(format!("translation must be 3 numbers, got {}", t.len())));
         };
         let lens = distortion.map_or(Ok(vec![0.0; 5]), |lens| flat(lens, "distortion"))?;
-        let coefficients = match lens.as_slice() {
-            &[k1, k2, p1, p2] => [k1, k2, p1, p2, 0.0],
-            &[k1, k2, p1, p2, k3] => [k1, k2, p1, p2, k3],
+        let coefficients = match *lens.as_slice() {
+            [k1, k2, p1, p2] => [k1, k2, p1, p2, 0.0],
+            [k1, k2, p1, p2, k3] => [k1, k2, p1, p2, k3],
             _ => {
                 let message = format!(
                     "distortion must be 4 or 5 coefficients (k1, k2, p1, p2, k3), got {}",

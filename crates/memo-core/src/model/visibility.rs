@@ -560,9 +560,9 @@ impl Conic {
 
     /// The real roots in ascending order; one is infinite where the function is linear.
     ///
-    /// The discriminant is computed from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]) with [pq] = p₀ q₁
-    /// - p₁ q₀: products of the differences between the ends. b² - 4ac would lose all digits for a camera
-    /// near the plane of an end, where m approaches 0.
+    /// The discriminant is computed from the adjoint of the form, m (m/4 [αβ]² + [eα] [eβ]), with the products of the
+    /// differences between the ends [pq] = p₀ q₁ - p₁ q₀. b² - 4ac would lose all digits for a camera near the plane
+    /// of an end, where m approaches 0.
     fn roots(&self) -> Option<[f64; 2]> {
         let (e, alpha, beta, m) = (self.e, self.alpha, self.beta, self.m);
         let across = alpha.cross(beta);

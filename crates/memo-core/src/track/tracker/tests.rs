@@ -132,8 +132,11 @@ fn a_grown_rectangle_stays_inside_the_picture() {
     assert_eq!(grown(&r, &evidence, 16.0), Rectangle { left: 0, top: 0, right: 639, bottom: 479 });
 }
 
+/// A change of the options, and the name of the one that it makes senseless.
+type Wrong = (fn(&mut TrackerOptions), &'static str);
+
 /// A change to each option that makes it senseless, and the option's name.
-fn every_wrong_option() -> Vec<(fn(&mut TrackerOptions), &'static str)> {
+fn every_wrong_option() -> Vec<Wrong> {
     vec![
         (|o| o.walk.similarity.c_l = 0.0, "c_l"),
         (|o| o.walk.similarity.c_d = -1.0, "c_d"),
