@@ -1,15 +1,15 @@
 """`run.json`: the input and the findings of `memo track`, so that its folder can be read and explained.
 
-Keys: `memo` (version), `command`, `video` (absolute path, null where frames were drawn), `frames` ([first,
-stop], stop null for the end), `frames_read`, `interrupted` (whether requested frames were left
-unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `shrink` (pixels of the video, along
-each axis, per pixel of the pictures that were tracked), `pixels_of` ("video": the unit of the pixels of
-`track.csv` and of `camera`), `camera_given`, `camera` (of the video: the camera given, or the one assumed for
-the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` with the distortions nearest
-to it; null if nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of
-`Track`), `walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and the input of
-`memo.explain` and `contours_of_run`: pixels there are those of the pictures that were tracked, and frames
-are counted from the first one read).
+Keys: `schema` (`SCHEMA`; 1 where it is missing), `memo` (version), `command`, `video` (absolute path, null
+where frames were drawn), `frames` ([first, stop], stop null for the end), `frames_read`, `interrupted`
+(whether requested frames were left unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`,
+`shrink` (pixels of the video, along each axis, per pixel of the pictures that were tracked), `pixels_of`
+("video": the unit of the pixels of `track.csv` and of `camera`), `camera_given`, `camera` (of the video:
+the camera given, or the one assumed for the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens
+`tsai_kappa` with the distortions nearest to it; null if nobody was tracked without a camera), `options` (of
+`Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk `message`, `start_s`, `end_s`,
+`direction`, `gait`, `p_swapped`, and the input of `memo.explain` and `contours_of_run`: pixels there are
+those of the pictures that were tracked, and frames are counted from the first one read).
 
 Without `pixels_of`, as in folders of older versions, table and camera are those of the pictures that were
 tracked; `read_run`, `read_track_csv` and `read_keypoints` convert them to the video.
@@ -33,9 +33,12 @@ from memo.files import write_json
 from memo.pixels import camera_of_video, of_video
 from memo.wording import counted
 
-__all__ = ["RunError", "Source", "contours_of_run", "read_run", "write_run"]
+__all__ = ["SCHEMA", "RunError", "Source", "contours_of_run", "read_run", "write_run"]
 
 NAME = "run.json"
+
+SCHEMA = 2
+"""Version of the files in the folder of a run; docs/reference/files.md says what changed with each."""
 
 
 class RunError(ValueError):
@@ -84,6 +87,7 @@ def write_run(
     write_json(
         path,
         {
+            "schema": SCHEMA,
             "memo": __version__,
             "command": "track",
             "video": None if source.video is None else str(source.video.absolute()),
@@ -106,6 +110,7 @@ def write_run(
 
 
 _KINDS: dict[str, tuple[type, ...]] = {
+    "schema": (int,),
     "memo": (str,),
     "command": (str,),
     "video": (str, type(None)),
@@ -128,8 +133,9 @@ _KINDS: dict[str, tuple[type, ...]] = {
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     """Reads `run.json` of a folder; checks that all keys exist and have the right type.
 
-    `interrupted`, `shrink` and `pixels_of` may be missing, as in older folders; they are then `False`, 1 and
-    "video", and the camera is converted to that of the video.
+    `schema`, `interrupted`, `shrink` and `pixels_of` may be missing, as in older folders; they are then 1,
+    `False`, 1 and "video", and the camera is converted to that of the video. A schema newer than `SCHEMA` is
+    refused.
     """
     path = Path(folder) / NAME
     try:
@@ -142,6 +148,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         raise RunError(f"{path}: not JSON: {error}") from None
     if not isinstance(run, dict):
         raise RunError(f"{path}: must be an object, got {type(run).__name__}")
+    run.setdefault("schema", 1)
     run.setdefault("interrupted", False)
     run.setdefault("shrink", 1)
     of_pictures = "pixels_of" not in run
@@ -155,6 +162,10 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     first, stop = run["frames"] if len(run["frames"]) == 2 else (None, None)
     if not isinstance(first, int) or first < 0 or not (stop is None or isinstance(stop, int)):
         raise RunError(f"{path}: frames must be [first, stop], got {json.dumps(run['frames'])[:60]}")
+    if not 1 <= run["schema"] <= SCHEMA:
+        raise RunError(
+            f"{path}: schema must be 1 to {SCHEMA}, got {run['schema']}: a newer memo may have written it"
+        )
     if run["shrink"] < 1:
         raise RunError(f"{path}: shrink must be at least 1, got {run['shrink']}")
     if run["frames_read"] < 0:

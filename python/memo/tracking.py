@@ -119,19 +119,41 @@ def track(
     fps: float | None = None,
     camera: _memo.Camera | None = None,
     progress: Callable[[int, int | None], object] | None = None,
-    **options: Any,
+    fov_deg: float | None = None,
+    gait: str = "dense",
+    adapt: bool = True,
+    start_frames: int = 13,
+    compensate_gain: bool = False,
+    background: bool = False,
+    measure: str = "rohr",
+    full_gradient: float | None = None,
+    full_velocity: float | None = None,
+    part_weights: Sequence[float] | None = None,
 ) -> Track:
     """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
-    `options` are those of `Tracker`. Pixels in the result are those of the given frames. An interrupt
-    (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
+    the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
+    An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
-    tracker = Tracker(height_m, camera, **options)
+    tracker = Tracker(
+        height_m,
+        camera,
+        fov_deg=fov_deg,
+        gait=gait,
+        adapt=adapt,
+        start_frames=start_frames,
+        compensate_gain=compensate_gain,
+        background=background,
+        measure=measure,
+        full_gradient=full_gradient,
+        full_velocity=full_velocity,
+        part_weights=part_weights,
+    )
     count = len(frames) if isinstance(frames, Sized) else None
     times = iter(times_s) if times_s is not None else None
     index = -1
