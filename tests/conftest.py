@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import memo
 import numpy as np
 import pytest
 from hypothesis import settings
+from memo import cli
 
 #: Third-party footage with ground truth; not part of this repository.
 SHARED_DATA = Path(
@@ -39,6 +41,20 @@ def core(monkeypatch):
     for name, part in fake_core.PARTS.items():
         monkeypatch.setattr(memo, name, part, raising=False)
     return fake_core
+
+
+@pytest.fixture
+def memo_command(monkeypatch, capsys):
+    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+        said = capsys.readouterr()
+        return exited.value.code or 0, said.out, said.err
+
+    return run
 
 
 @pytest.fixture

@@ -2,14 +2,12 @@
 
 import json
 import re
-import sys
 import tomllib
 
 import memo
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo import cli
 from memo.calibration import board_places, draw_ground, read_picture, write_picture
 from memo.keypoints.points import layouts
 
@@ -43,18 +41,6 @@ def spread(count, seed=0):
 
 
 POSE = look_at(np.array([1.5, -6.0, 1.6]), np.array([0.0, 0.0, 0.9]), 1.0)
-
-
-@pytest.fixture
-def memo_command(monkeypatch, capsys):
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code or 0, said.out, said.err
-
-    return run
 
 
 # Points.

@@ -57,17 +57,9 @@ CAMERA = "[side]\nname = 'side'\nsize = [50, 36]\n[front]\nname = 'front'\nsize 
 
 
 @pytest.fixture
-def memo_command(core, monkeypatch, capsys):
-    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code or 0, said.out, said.err
-
-    return run
+def memo_command(core, memo_command):
+    """With the stand-in core."""
+    return memo_command
 
 
 @pytest.fixture

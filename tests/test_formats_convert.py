@@ -3,14 +3,12 @@
 import csv
 import json
 import os
-import sys
 from pathlib import Path
 
 import ezc3d
 import numpy as np
 import pandas
 import pytest
-from memo import cli
 from memo.files import JOINTS, TRACK_COLUMNS, write_columns_csv, write_events_csv, write_track_csv
 from memo.formats import READERS, WRITERS, Motion, read_motion, write_motion
 from motions import shared_motion, stick_figure, walk
@@ -20,15 +18,12 @@ FRAMES = np.r_[10:40, 50:75]
 
 
 @pytest.fixture
-def memo_command(monkeypatch, capsys):
-    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
+def memo_command(memo_command):
+    """With the lines of complaints joined."""
 
     def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code or 0, said.out, " ".join(said.err.split())
+        code, said, complaint = memo_command(*arguments)
+        return code, said, " ".join(complaint.split())
 
     return run
 

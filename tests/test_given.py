@@ -2,25 +2,21 @@
 
 import re
 import shlex
-import sys
 
 import pytest
-from memo import batch, cli
+from memo import batch
 from memo.given import InputError, is_url, nothing_at, tracker_options
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
+def command(monkeypatch, memo_command, tmp_path):
     """Runs a command in an empty folder; exit code and what is said."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
 
     def run(line):
-        monkeypatch.setattr(sys, "argv", ["memo", *shlex.split(line)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code or 0, said.out + said.err
+        code, said, complaint = memo_command(*shlex.split(line))
+        return code, said + complaint
 
     return run
 

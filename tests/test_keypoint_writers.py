@@ -2,13 +2,11 @@
 
 import json
 import math
-import sys
 
 import memo
 import numpy as np
 import pandas as pd
 import pytest
-from memo import cli
 from memo.files import TRACK_COLUMNS, write_track_csv
 from memo.formats.parquet import write_parquet
 from memo.keypoints import (
@@ -41,20 +39,6 @@ def walker(layout, count=6):
 
 def point(keypoints, name):
     return keypoints.points[:, keypoints.names.index(name)]
-
-
-@pytest.fixture
-def memo_command(monkeypatch, capsys):
-    """Runs `memo ARGUMENTS` in this process; gives the exit code, what it printed and what it complained."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code, said.out, said.err
-
-    return run
 
 
 # OpenPose, read by pose-format.

@@ -4,15 +4,14 @@ are told in one line."""
 import csv
 import json
 import math
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import memo
 import numpy as np
 import pytest
 from conftest import SHARED_DATA
-from memo import cli
 from memo.report import write_report
 from scipy.spatial.transform import Rotation
 
@@ -134,15 +133,8 @@ def found(scene):
 
 
 @pytest.fixture
-def memo_posture(monkeypatch, capsys):
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", "posture", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code or 0, said.out, said.err
-
-    return run
+def memo_posture(memo_command):
+    return partial(memo_command, "posture")
 
 
 def errors_m(estimated, truth):

@@ -2,12 +2,11 @@
 
 import csv
 import json
-import sys
+from functools import partial
 
 import memo
 import numpy as np
 import pytest
-from memo import cli
 from memo.files import FLIP_COLUMNS
 from memo.keypoints import KeypointsError, read_keypoints, write_csv
 
@@ -46,15 +45,8 @@ def confused(tmp_path):
 
 
 @pytest.fixture
-def memo_unswap(monkeypatch, capsys):
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["memo", "unswap", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-        said = capsys.readouterr()
-        return exited.value.code, said.out, said.err
-
-    return run
+def memo_unswap(memo_command):
+    return partial(memo_command, "unswap")
 
 
 def test_planted_exchanges_are_undone_and_reported(confused):

@@ -136,7 +136,10 @@ pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>
     let step_s = median(&mut steps).unwrap_or(1.0);
     let lag = ((LAG_S / step_s).round() as usize).clamp(1, 50);
     let of_means: Vec<[f64; 2]> = tracks.iter().map(|t| noise_and_bend(times_s, t, step_s, lag)).collect();
-    let noise_sq = median(&mut of_means.iter().map(|m| m[0]).collect::<Vec<_>>()).unwrap_or(0.0);
+    // Of two groups in the middle the noisier one: noise that is underestimated makes swaps of noise.
+    let mut noises_sq: Vec<f64> = of_means.iter().map(|m| m[0]).collect();
+    noises_sq.sort_unstable_by(f64::total_cmp);
+    let noise_sq = noises_sq.get(noises_sq.len() / 2).copied().unwrap_or(0.0);
     let lengths = tracks.iter().flatten().flatten().map(|s| s.difference.length());
     let floor_sq = (0.005 * median(&mut lengths.collect::<Vec<_>>()).unwrap_or(0.0)).powi(2) + 1e-12;
     let scale = |(i, track): (usize, &Track)| {
