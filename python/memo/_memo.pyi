@@ -72,7 +72,7 @@ __all__ = [
 __version__: str
 
 class InternalError(RuntimeError):
-    """A bug in memo, not a mistake in what it was given; standard error says where it is."""
+    """A bug in memo, not a mistake in the input; standard error gives its place."""
 
 def _panic(message: str, way: str) -> None: ...
 
@@ -238,7 +238,7 @@ class Tracker:
 
 @final
 class Explainer:
-    """Frames in, the wanted ones explained, one frame later; `memo.explain` wraps it."""
+    """Takes frames and explains the requested ones, one frame later; `memo.explain` wraps it."""
 
     def __new__(cls, tracker: Tracker, records: Sequence[dict[str, Any]], wanted: set[int]) -> Self: ...
     def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> dict[str, Any] | None: ...

@@ -131,7 +131,7 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             rest=NEAR,
         ),
         compared(
-            *(f"{where}, eq. (6)", "[a1 a2 a3] minus k3 z1 + k4 z2 + k5 z3, largest", EQUAL),
+            *(f"{where}, eq. (6)", "[a1 a2 a3] minus (k3 z1 + k4 z2 + k5 z3), largest", EQUAL),
             *(
                 rods["triple_product_error"],
                 f"{counted(trials, 'triple')} of vectors with the k's of footnote 11",
