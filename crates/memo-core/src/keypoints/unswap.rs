@@ -24,7 +24,6 @@
 mod chain;
 mod relative;
 
-use crate::estimate::median::median;
 use crate::option_error::OptionError;
 use crate::wording::counted;
 use chain::{Chain, Posterior, Prior, Step};
@@ -539,7 +538,8 @@ impl<'a> Limb<'a> {
             reason: Reason::NothingSeen,
         };
         let mut verdicts = vec![nothing; self.times_s.len()];
-        let usual_s = median(&mut self.times_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>());
+        let usual_s =
+            relative::upper_median(&mut self.times_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>());
         let gains = self.gains(solution);
         let mut run = 0;
         for (step, &(t, seen)) in self.shown.iter().enumerate() {

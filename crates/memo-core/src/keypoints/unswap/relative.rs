@@ -4,7 +4,6 @@
 //! leaves m unchanged. So m gives the noise whatever the labels, and the labels are correct where the signs
 //! make d smooth.
 
-use crate::estimate::median::median;
 use glam::DVec2;
 
 /// A pair visible on both sides.
@@ -83,7 +82,7 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
         let off = distances_from_line(times_s, track, &seen);
         let lengths = seen.iter().filter_map(|&t| track[t]).map(|s| s.difference.length());
         let (Some(typical), Some(length)) =
-            (median(&mut off.clone()), median(&mut lengths.collect::<Vec<_>>()))
+            (upper_median(&mut off.clone()), upper_median(&mut lengths.collect::<Vec<_>>()))
         else {
             break;
         };
@@ -110,7 +109,8 @@ pub(super) fn drop_outliers(times_s: &[f64], track: &mut Track) -> Vec<usize> {
 /// Divided by the ratio of the neighbours' spacing to the usual spacing, because the bend is proportional to
 /// h1 h2.
 fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f64> {
-    let Some(step) = median(&mut seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect::<Vec<_>>())
+    let Some(step) =
+        upper_median(&mut seen.windows(2).map(|w| times_s[w[1]] - times_s[w[0]]).collect::<Vec<_>>())
     else {
         return Vec::new();
     };
@@ -133,15 +133,12 @@ fn distances_from_line(times_s: &[f64], track: &Track, seen: &[usize]) -> Vec<f6
 /// `signs` are those of an earlier path; without them the smoothest of the four patterns is used.
 pub(super) fn scales(times_s: &[f64], tracks: &[Track], signs: Option<&[Vec<f64>]>) -> Vec<Scale> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
-    let step_s = median(&mut steps).unwrap_or(1.0);
+    let step_s = upper_median(&mut steps).unwrap_or(1.0);
     let lag = ((LAG_S / step_s).round() as usize).clamp(1, 50);
     let of_means: Vec<[f64; 2]> = tracks.iter().map(|t| noise_and_bend(times_s, t, step_s, lag)).collect();
-    // Of two groups in the middle the noisier one: noise that is underestimated makes swaps of noise.
-    let mut noises_sq: Vec<f64> = of_means.iter().map(|m| m[0]).collect();
-    noises_sq.sort_unstable_by(f64::total_cmp);
-    let noise_sq = noises_sq.get(noises_sq.len() / 2).copied().unwrap_or(0.0);
+    let noise_sq = upper_median(&mut of_means.iter().map(|m| m[0]).collect::<Vec<_>>()).unwrap_or(0.0);
     let lengths = tracks.iter().flatten().flatten().map(|s| s.difference.length());
-    let floor_sq = (0.005 * median(&mut lengths.collect::<Vec<_>>()).unwrap_or(0.0)).powi(2) + 1e-12;
+    let floor_sq = (0.005 * upper_median(&mut lengths.collect::<Vec<_>>()).unwrap_or(0.0)).powi(2) + 1e-12;
     let scale = |(i, track): (usize, &Track)| {
         let lag = if signs.is_some() { lag } else { 1 };
         let r_sq = |w: [usize; 3]| {
@@ -198,8 +195,15 @@ fn second_difference_variance(
         .map(|t| [t - 2 * lag, t - lag, t])
         .filter(|w| even(w[0], w[1]) && even(w[1], w[2]))
         .filter_map(r_sq);
-    median(&mut values.collect::<Vec<_>>()).map(|m| m / MEDIAN_CHI2)
+    upper_median(&mut values.collect::<Vec<_>>()).map(|m| m / MEDIAN_CHI2)
 }
+/// The middle value; of the two in the middle of an even number the larger, because noise that is underestimated
+/// makes swaps of noise.
+pub(super) fn upper_median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
