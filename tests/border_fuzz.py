@@ -456,6 +456,25 @@ def _(d):
     )
 
 
+@case("Camera.__new__", "Camera.matrix", "Camera.rotation", "Camera.translation")
+def _(d, name):
+    usual = memo.Camera.level((64, 48), 60.0, 1.2, 5.0)
+    wrong = [np.eye(4), np.zeros(3), "K", None, [], np.full((3, 3), np.nan), 1e300 * np.eye(3)]
+
+    def given(*right):
+        return d.one(wrong) if d.is_wrong() else d.choice(*right)
+
+    camera = memo.Camera(
+        given(usual.matrix, usual.matrix.tolist()),
+        given(usual.rotation, np.array([1.4, 0.2, -0.3])),
+        given(usual.translation),
+        d.picture(),
+        distortion=given(None, [-0.2, 0.1, 0.001, 0.001], np.zeros(5)),
+    )
+    camera.project(np.ones((2, 0, 3)))
+    return camera if name == "Camera.__new__" else getattr(camera, name.partition(".")[2])
+
+
 @case("Camera.from_parameters")
 def _(d):
     parameters = d.one(CAMERAS).parameters()

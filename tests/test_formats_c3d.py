@@ -221,7 +221,7 @@ def wrong(data, at, replacement):
         (lambda data: wrong(data, 0, b"\xff"), "byte 0: the parameters begin at block 255"),
         (lambda data: wrong(data, 515, b"\x57"), "byte 515: processor 87"),
         (lambda data: wrong(data, 2, b"\xff\xff"), "65535 points in the header, parameter POINT:USED has 15"),
-        (lambda data: data[:-600], "room for 20 frames of 240 bytes is wanted"),
+        (lambda data: data[:-600], "room for 20 frames of 240 bytes is needed"),
         (lambda data: data.replace(b"mm", b"ly"), "parameter POINT:UNITS: 'ly', wanted m, cm or mm"),
         (lambda data: data.replace(b"+Z", b"+X"), r"the up axis is '\+X'"),
         (lambda data: wrong(data, 523, b"\xff\x7f"), "byte 516, parameter TRIAL: .* outside the section"),
@@ -242,7 +242,7 @@ def test_a_loop_in_the_parameters_ends(tmp_path):
     data = path.read_bytes()
     at = data.index(b"LABELS") + 6
     path.write_bytes(wrong(data, at, struct.pack("<h", -40)))
-    with pytest.raises(FormatError, match="parameter LABELS: the next one is -40 bytes on"):
+    with pytest.raises(FormatError, match="parameter LABELS: the next one is -40 bytes further"):
         read_motion(path)
 
 

@@ -114,7 +114,7 @@ def test_up_axes_are_turned_not_mirrored():
         ),
         ({"points": np.full((2, 1, 3), np.inf)}, "point a: infinite in frame 0"),
         ({"times_s": [0, 0]}, "frame 1: times must increase, 0 s follows 0 s"),
-        ({"times_s": [0, np.nan]}, "frame 1: the time nan s is no time"),
+        ({"times_s": [0, np.nan]}, "frame 1: the time nan s is not a valid time"),
         ({"times_s": [0, 1e300]}, "frame 1: the time 1e[+]300 s is not a valid time"),
         ({"angles": {"k": [1]}}, r"angle k: wanted \(2,\), got \(1,\)"),
         ({"events": (GaitEvent(0, "jump", "left"),)}, "not a gait event"),

@@ -346,7 +346,7 @@ def test_trc_in_pixels_is_read_and_written(tmp_path, end):
         (lambda text: text.replace("\t0.000\t", "\t0.500\t"), "points in space"),
         (lambda text: text.replace("LHip", "RHip"), "right_hip appears twice"),
         (lambda text: text.replace("RKnee", "right_kne"), "did you mean"),
-        (lambda text: text[:200], "header has 5"),
+        (lambda text: text[:200], "header alone has 5"),
         (lambda text: text.replace("\n1\t", "\n0\t"), "at two times"),
         (lambda text: text.replace("\n1\t0.040\t", "\n1\t0.000\t"), "time_s must increase"),
         (lambda text: text.replace("\n1\t", "\none\t"), "one is not a number"),
@@ -368,7 +368,7 @@ def test_broken_trc_is_refused(tmp_path, change, message):
 
 
 def test_trc_of_points_in_space_is_refused():
-    with pytest.raises(KeypointsError, match="not image points"):
+    with pytest.raises(KeypointsError, match="image points are needed"):
         read_keypoints(next(pose2sim_sample().glob("*.trc")))
 
 

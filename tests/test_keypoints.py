@@ -102,7 +102,7 @@ def test_the_layout_is_seen_from_the_points_and_may_be_given(tmp_path, layout):
 def test_the_layout_given_wins(tmp_path):
     folder = write_openpose(tmp_path / "json", {0: openpose_frame(figure(layouts()["BODY_25"]))})
     assert read_keypoints(folder, fps=25, layout="BODY_25B").names == layouts()["BODY_25B"]
-    with pytest.raises(KeypointsError, match="has 25 points a person, COCO_17 has 17"):
+    with pytest.raises(KeypointsError, match="has 25 points per person, COCO_17 has 17"):
         read_keypoints(folder, fps=25, layout="COCO_17")
     with pytest.raises(KeypointsError, match="did you mean `BODY_25`"):
         read_keypoints(folder, fps=25, layout="BODY_52")

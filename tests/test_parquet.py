@@ -105,8 +105,8 @@ def test_every_table_of_a_run_goes_to_parquet(tmp_path):
         for column, values in columns.items():
             np.testing.assert_array_equal(again[column], values)
     for text, message in (
-        ("", "a header"),
-        ("a,a\n", "a header"),
+        ("", "the names in the header"),
+        ("a,a\n", "the names in the header"),
         ("a,b\n1\n", "row 2 has 1 cell, the header 2"),
         (b"\xff\n", "not a table"),
     ):

@@ -257,7 +257,7 @@ def test_times_are_numbers(time_s):
         ({"start_frames": -1}, "start_frames must be between"),
         ({"gait": "moonwalk"}, "gait must be 'dense', 'sampled_10' or 'boulic', got \"moonwalk\""),
         ({"measure": "x"}, "measure must be 'rohr' or 'lowe'"),
-        ({"full_velocity": 0.0}, "full_velocity must be a positive number"),
+        ({"full_velocity": 0.0}, "full_velocity must be positive and finite"),
     ],
 )
 def test_senseless_options_are_refused(options, message):

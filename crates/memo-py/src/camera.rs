@@ -380,9 +380,9 @@ fn flat(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
 
 fn square(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; 3]> {
     let (rows, _) = vectors_from_numpy::<3>(object, &format!("wanted {name}: numpy array of shape (3, 3)"))?;
-    let count = rows.len();
+    let count = counted(rows.len(), "row");
     let refused =
-        |_| PyValueError::new_err(format!("wanted {name}: numpy array of shape (3, 3); got {count} rows"));
+        |_| PyValueError::new_err(format!("wanted {name}: numpy array of shape (3, 3); got {count}"));
     <[[f64; 3]; 3]>::try_from(rows).map_err(refused)
 }
 

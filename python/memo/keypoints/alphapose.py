@@ -43,7 +43,8 @@ def read_by_image(path: Path, data: dict[str, Any]) -> Found:
         frame = image_number(image, where)
         if frame in names:
             raise KeypointsError(
-                f"{path}: {short(names[frame])} and {short(image)}: both frame {frame}; one camera per file"
+                f"{path}: {short(names[frame])} and {short(image)} are both frame {frame}; "
+                "one camera per file"
             )
         names[frame] = image
         for place, values in frame_people(frame_data, where):
