@@ -154,6 +154,18 @@ def track(
         full_velocity=full_velocity,
         part_weights=part_weights,
     )
+    _feed(tracker, frames, times_s, fps, progress)
+    return tracker.finish()
+
+
+def _feed(
+    tracker: Tracker,
+    frames: Iterable[npt.NDArray[np.uint8]],
+    times_s: Iterable[float] | None,
+    fps: float | None,
+    progress: Callable[[int, int | None], object] | None,
+) -> None:
+    """Gives the tracker all frames with their times."""
     count = len(frames) if isinstance(frames, Sized) else None
     times = iter(times_s) if times_s is not None else None
     index = -1
@@ -172,7 +184,6 @@ def track(
             progress(index + 1, count)
     if times is not None and next(times, None) is not None:
         raise ValueError(f"times_s has more values than the {counted(index + 1, 'frame')}")
-    return tracker.finish()
 
 
 @dataclass(frozen=True)

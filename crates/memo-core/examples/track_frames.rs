@@ -89,7 +89,7 @@ fn csv_row(row: &Row, walk: &TrackedWalk) -> String {
         values.extend([side.hip, side.knee, side.shoulder, side.elbow].map(f64::to_degrees));
     }
     for joint in [row.right, row.left].into_iter().flat_map(SideJoints::to_array) {
-        let pixel = walk.camera.project(joint).unwrap_or(glam::DVec2::NAN);
+        let pixel = walk.camera.project(joint).unwrap_or(memo_core::glam::DVec2::NAN);
         values.extend([joint.x, joint.y, joint.z, pixel.x, pixel.y]);
     }
     let values: Vec<String> = values.iter().map(|v| format!("{v:.6}")).collect();

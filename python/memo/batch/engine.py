@@ -142,13 +142,7 @@ def run(
         fingerprints = {row.name: row.fingerprint for row in mine}
         to_do = [row for row in mine if _is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
         notes = _notes(read, folder, known, to_do, fingerprints)
-        for row in to_do:
-            if row.problems:
-                folder.forget(row.name)
-                message = "; ".join(row.problems)
-                folder.write_record(
-                    Record(row.name, "failed", message, 0.0, 1, __version__, fingerprints[row.name])
-                )
+        _record_problems(folder, to_do)
         processors = _processors()
         jobs = jobs or processors
         tasks = [
@@ -184,6 +178,15 @@ def run(
         done_now=teller.told,
         notes=notes,
     )
+
+
+def _record_problems(folder: OutFolder, rows: Iterable[Row]) -> None:
+    """Records the rows that cannot be tracked as written as failed."""
+    for row in rows:
+        if row.problems:
+            folder.forget(row.name)
+            message = "; ".join(row.problems)
+            folder.write_record(Record(row.name, "failed", message, 0.0, 1, __version__, row.fingerprint))
 
 
 def default_out(manifest: object) -> Path:

@@ -130,19 +130,7 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                         raise FormatError(f"joint {node.name}: no OFFSET")
                 return nodes, index
             if word in ("ROOT", "JOINT", "End"):
-                if (word == "ROOT") == bool(open_nodes) or (word == "ROOT" and nodes):
-                    raise FormatError(f"{where}: {word} is not allowed here; all joints must be in one ROOT")
-                if len(nodes) >= _MOST_NODES:
-                    raise FormatError(f"{where}: more than {_MOST_NODES} joints")
-                if open_nodes and nodes[open_nodes[-1]].is_end:
-                    raise FormatError(f"{where}: {word} inside an End Site")
-                parent = open_nodes[-1] if open_nodes else -1
-                name = f"{nodes[parent].name}_end" if word == "End" else "_".join(_until_brace(words))
-                if word == "End":
-                    _until_brace(words)
-                if not name:
-                    raise FormatError(f"{where}: {word} without a name")
-                nodes.append(_Node(name, parent, np.full(3, np.nan), is_end=word == "End"))
+                nodes.append(_joint(word, words, nodes, open_nodes, where))
                 awaits_brace = True
             elif word == "{":
                 if not awaits_brace:
@@ -154,28 +142,55 @@ def _hierarchy(lines: list[str]) -> tuple[list[_Node], int]:
                     raise FormatError(f"{where}: }} without a joint")
                 open_nodes.pop()
             elif word == "OFFSET" and open_nodes:
-                cells, words = words[:3], words[3:]
-                if len(cells) < 3:
-                    raise FormatError(f"{where}: OFFSET has {counted(len(cells), 'number')}, wanted 3")
-                place = [number(cell, f"{where}, OFFSET") for cell in cells]
-                if not all(abs(x) < 1e9 for x in place):
-                    raise FormatError(f"{where}: OFFSET {' '.join(cells)[:60]} is implausibly large")
-                nodes[open_nodes[-1]].offset = np.array(place)
+                nodes[open_nodes[-1]].offset = _offset(words[:3], where)
+                del words[:3]
             elif word == "CHANNELS" and open_nodes:
                 node = nodes[open_nodes[-1]]
-                count = whole_number(words[0] if words else "", f"{where}, CHANNELS", 6)
-                channels, words = words[1 : 1 + count], words[1 + count :]
-                unknown = [name for name in channels if name not in _CHANNELS]
-                if unknown or len(channels) != count or len(set(channels)) != count:
-                    got = f"{count} {' '.join(channels)[:80]}"
-                    raise FormatError(f"{where}: CHANNELS {got}: wanted {count} of Xposition ... Zrotation")
-                if node.channels or node.is_end:
-                    raise FormatError(f"{where}: CHANNELS of {node.name} are not allowed here")
-                node.channels, node.column = channels, column
-                column += count
+                node.channels, node.column = _channels(words, node, where), column
+                column += len(node.channels)
             else:
                 raise FormatError(f"{where}: {word[:40]!r} does not belong in a hierarchy")
     raise FormatError(f"line {len(lines)}: no line MOTION")
+
+
+def _joint(word: str, words: list[str], nodes: list[_Node], open_nodes: list[int], where: str) -> _Node:
+    """The node that ROOT, JOINT or End begins; consumes its name."""
+    if (word == "ROOT") == bool(open_nodes) or (word == "ROOT" and nodes):
+        raise FormatError(f"{where}: {word} is not allowed here; all joints must be in one ROOT")
+    if len(nodes) >= _MOST_NODES:
+        raise FormatError(f"{where}: more than {_MOST_NODES} joints")
+    if open_nodes and nodes[open_nodes[-1]].is_end:
+        raise FormatError(f"{where}: {word} inside an End Site")
+    parent = open_nodes[-1] if open_nodes else -1
+    given = "_".join(_until_brace(words))
+    name = f"{nodes[parent].name}_end" if word == "End" else given
+    if not name:
+        raise FormatError(f"{where}: {word} without a name")
+    return _Node(name, parent, np.full(3, np.nan), is_end=word == "End")
+
+
+def _offset(cells: list[str], where: str) -> npt.NDArray[np.float64]:
+    """The place of a joint in its parent, (3,), in the file's unit."""
+    if len(cells) < 3:
+        raise FormatError(f"{where}: OFFSET has {counted(len(cells), 'number')}, wanted 3")
+    place = [number(cell, f"{where}, OFFSET") for cell in cells]
+    if not all(abs(x) < 1e9 for x in place):
+        raise FormatError(f"{where}: OFFSET {' '.join(cells)[:60]} is implausibly large")
+    return np.array(place)
+
+
+def _channels(words: list[str], node: _Node, where: str) -> list[str]:
+    """The names of a joint's channels; consumes their number and them."""
+    count = whole_number(words[0] if words else "", f"{where}, CHANNELS", 6)
+    channels = words[1 : 1 + count]
+    del words[: 1 + count]
+    unknown = [name for name in channels if name not in _CHANNELS]
+    if unknown or len(channels) != count or len(set(channels)) != count:
+        got = f"{count} {' '.join(channels)[:80]}"
+        raise FormatError(f"{where}: CHANNELS {got}: wanted {count} of Xposition ... Zrotation")
+    if node.channels or node.is_end:
+        raise FormatError(f"{where}: CHANNELS of {node.name} are not allowed here")
+    return channels
 
 
 def _until_brace(words: list[str]) -> list[str]:

@@ -403,8 +403,14 @@ def plot_superposition(ax: Axes, figures: Points, truth: Points) -> Axes:
 
 def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
     first, second = (left[sequence] for sequence in SEQUENCES)
-    from_side = f"{WALKER[:1].upper()}{WALKER[1:]}; depth and height without perspective"
-    on_walker = f"{WALKER[:1].upper()}{WALKER[1:]}"
+    return [*_figures_of_the_method(first, second), *_figures_of_what_is_left(first, second), _fig_a1()]
+
+
+ON_WALKER = f"{WALKER[:1].upper()}{WALKER[1:]}"
+
+
+def _figures_of_the_method(first: dict[str, Any], second: dict[str, Any]) -> list[Drawing]:
+    """Figs. 1 to 5."""
     return [
         Drawing(
             "fig1",
@@ -412,7 +418,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             "The stick figure of 14 joints and 17 segments",
             _draw_model,
             (5, 6.5),
-            on_walker,
+            ON_WALKER,
         ),
         Drawing(
             *(
@@ -429,7 +435,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
                 "The two positions at which a segment of known length can end on its line of sight",
             ),
             *(lambda figure: _draw_two_ends(figure, first), (6, 4.2)),
-            f"{on_walker}, frame 1 of SEQ1",
+            f"{ON_WALKER}, frame 1 of SEQ1",
         ),
         Drawing(
             *(
@@ -438,7 +444,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
                 "The pruned interpretation tree: every path down is one of the postures left",
             ),
             *(lambda figure: _draw_tree(figure, first), (10, 6)),
-            f"{on_walker}, frame 1 of SEQ1 after rules 1 and 2",
+            f"{ON_WALKER}, frame 1 of SEQ1 after rules 1 and 2",
         ),
         Drawing(
             *(
@@ -447,8 +453,15 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
                 "Each shoulder can be at two positions; their distance decides which belong together",
             ),
             *(lambda figure: _draw_rigid(figure, second), (8, 5)),
-            f"{on_walker}, frame 1 of SEQ2, from above",
+            f"{ON_WALKER}, frame 1 of SEQ2, from above",
         ),
+    ]
+
+
+def _figures_of_what_is_left(first: dict[str, Any], second: dict[str, Any]) -> list[Drawing]:
+    """Figs. 6 to 8."""
+    from_side = f"{ON_WALKER}; depth and height without perspective"
+    return [
         Drawing(
             *("fig6", "Fig. 6", "Postures left of frame 1 of SEQ1, grouped"),
             *(lambda figure: _draw_panels(figure, first), _panel_size(first), from_side),
@@ -462,15 +475,18 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
             *("fig8", "Fig. 8", "Postures left of frame 1 of SEQ2"),
             *(lambda figure: _draw_panels(figure, second), _panel_size(second), from_side),
         ),
-        Drawing(
-            *(
-                "figA1",
-                "Fig. A.1",
-                "The image sequences: SEQ1 above, SEQ2 (in a dissertation, not in the paper) below",
-            ),
-            *(_draw_sequences, (10, 6), f"{on_walker}; central projection"),
-        ),
     ]
+
+
+def _fig_a1() -> Drawing:
+    return Drawing(
+        *(
+            "figA1",
+            "Fig. A.1",
+            "The image sequences: SEQ1 above, SEQ2 (in a dissertation, not in the paper) below",
+        ),
+        *(_draw_sequences, (10, 6), f"{ON_WALKER}; central projection"),
+    )
 
 
 def _plain(figure: Figure) -> Axes:

@@ -26,230 +26,170 @@ def figures(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
     """All figures: those of a real sequence from `filmed`, if given, and the synthetic ones from `scene`."""
     shown = filmed or scene
     first, second = shown.examples
-    model = "Memo's body and gait; the paper's sizes and samples are not printed"
+    return [
+        *_of_the_model(),
+        *_of_the_evidence(shown, first),
+        *_of_the_position(shown),
+        *_of_the_comparison(shown, first, second),
+        *_of_a_sequence(scene, filmed),
+        *(_of_a_side(shown, *side) for side in ((32, "right"), (33, "left"))),
+    ]
 
-    def on(sequence: Sequence, frame: int | None = None) -> str:
-        at = "" if frame is None else f", frame {frame}"
-        return f"In kind, on {sequence.label}{at}; the paper's sequence is not published"
 
-    def drawing(
-        name: str, item: str, caption: str, draw: Callable[[Figure], object], size: Any, why: str
-    ) -> Drawing:
-        return Drawing(name, item, caption, draw, size, why)
+def _on(sequence: Sequence, look: Look | None = None) -> str:
+    at = "" if look is None else f", frame {look.frame}"
+    return f"In kind, on {sequence.label}{at}; the paper's sequence is not published"
 
-    made = [
-        drawing(
-            "fig4", "Fig. 4", "The body: all contours, and those not hidden", _draw_body, (6, 5.5), model
-        ),
-        drawing("fig5", "Fig. 5", "Several persons, hidden contours removed", _draw_several, (8, 4.5), model),
-        drawing(
-            "fig6",
-            "Fig. 6",
-            "Motion curves over the walking cycle: ten samples and their spline, and fifty",
-            _draw_gait,
-            (9, 6),
-            model,
-        ),
-        drawing(
-            "fig7", "Fig. 7", "Movement states for half of the walking cycle", _draw_states, (11, 3), model
-        ),
-        drawing(
-            "fig8",
-            "Fig. 8",
-            "Grey-value image",
-            lambda f: _draw_image(f, first),
-            (6.4, 4.8),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig9",
-            "Fig. 9",
-            "Result of the change detection, eq. (1)",
-            lambda f: _draw_mask(f, first.stages["changed"]),
-            (6.4, 4.8),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig10",
-            "Fig. 10",
-            "After the binary operations, with the surrounding rectangle",
-            lambda f: _draw_cleaned(f, first),
-            (6.4, 4.8),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig11",
-            "Fig. 11",
-            "Outline",
-            lambda f: _draw_outline(f, first),
-            (4.5, 5.5),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig12",
-            "Fig. 12",
-            "Velocity field",
-            lambda f: _draw_velocities(f, first),
-            (5, 5.5),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig13",
-            "Fig. 13",
-            "Coordinate systems of scene, camera and image",
-            lambda f: _draw_axes(f, shown),
-            (6.5, 5.5),
-            f"{on(shown)}; memo's axes: Z up where the paper has Y",
-        ),
-        drawing(
-            "fig14",
-            "Fig. 14",
-            "Midpoints of the bottom and top edges of the rectangles",
-            lambda f: _draw_midpoints(f, shown),
-            (6.4, 4.8),
-            on(shown),
-        ),
-        drawing(
-            "fig15",
-            "Fig. 15",
-            "Positions from single rectangles on the ground plane",
-            lambda f: _draw_positions(f, shown),
-            (7, 3.6),
-            on(shown),
-        ),
-        drawing(
+
+_PICTURE = (6.4, 4.8)
+_PERSON = (4.5, 5.5)
+
+
+def _of_the_model() -> list[Drawing]:
+    """Section 3."""
+    why = "Memo's body and gait; the paper's sizes and samples are not printed"
+    curves = "Motion curves over the walking cycle: ten samples and their spline, and fifty"
+    half = "Movement states for half of the walking cycle"
+    return [
+        Drawing("fig4", "Fig. 4", "The body: all contours, and those not hidden", _draw_body, (6, 5.5), why),
+        Drawing("fig5", "Fig. 5", "Several persons, hidden contours removed", _draw_several, (8, 4.5), why),
+        Drawing("fig6", "Fig. 6", curves, _draw_gait, (9, 6), why),
+        Drawing("fig7", "Fig. 7", half, _draw_states, (11, 3), why),
+    ]
+
+
+def _of_the_evidence(shown: Sequence, look: Look) -> list[Drawing]:
+    """Section 4.1."""
+    why = _on(shown, look)
+    cleaned = "After the binary operations, with the surrounding rectangle"
+
+    def draw_change(figure: Figure) -> object:
+        return _draw_mask(figure, look.stages["changed"])
+
+    return [
+        Drawing("fig8", "Fig. 8", "Grey-value image", lambda f: _draw_image(f, look), _PICTURE, why),
+        Drawing("fig9", "Fig. 9", "Result of the change detection, eq. (1)", draw_change, _PICTURE, why),
+        Drawing("fig10", "Fig. 10", cleaned, lambda f: _draw_cleaned(f, look), _PICTURE, why),
+        Drawing("fig11", "Fig. 11", "Outline", lambda f: _draw_outline(f, look), _PERSON, why),
+        Drawing("fig12", "Fig. 12", "Velocity field", lambda f: _draw_velocities(f, look), (5, 5.5), why),
+    ]
+
+
+def _of_the_position(shown: Sequence) -> list[Drawing]:
+    """Section 4.2."""
+    axes = "Coordinate systems of scene, camera and image"
+    midpoints = "Midpoints of the bottom and top edges of the rectangles"
+    positions = "Positions from single rectangles on the ground plane"
+    z_up = f"{_on(shown)}; memo's axes: Z up where the paper has Y"
+    why = _on(shown)
+    return [
+        Drawing("fig13", "Fig. 13", axes, lambda f: _draw_axes(f, shown), (6.5, 5.5), z_up),
+        Drawing("fig14", "Fig. 14", midpoints, lambda f: _draw_midpoints(f, shown), _PICTURE, why),
+        Drawing("fig15", "Fig. 15", positions, lambda f: _draw_positions(f, shown), (7, 3.6), why),
+    ]
+
+
+def _of_the_comparison(shown: Sequence, first: Look, second: Look) -> list[Drawing]:
+    """Sections 4.3 and 5.1, on two frames."""
+    why, other = _on(shown, first), _on(shown, second)
+    cut = "An edge cut to its window, and the model contour"
+    curve, surface = (
+        "Similarity over pose, with fixed position",
+        "Similarity over pose and position, at the best height of each",
+    )
+
+    def draw_surface(figure: Figure) -> None:
+        _draw_surface(figure, shown, first)
+
+    def draw_state(look: Look) -> Callable[[Figure], object]:
+        return lambda f: _draw_state(f, shown, look)
+
+    def draw_curve(look: Look) -> Callable[[Figure], object]:
+        return lambda f: _draw_similarity(f, shown, look)
+
+    return [
+        Drawing(
             "fig16",
             "Fig. 16",
             "Enclosing rectangle and edge lines",
             lambda f: _draw_edges(f, first),
-            (4.5, 5.5),
-            on(shown, first.frame),
+            _PERSON,
+            why,
         ),
-        drawing(
+        Drawing(
             "fig17",
             "Fig. 17",
             "Search windows of the model",
             lambda f: _draw_windows(f, shown, first),
-            (4.5, 5.5),
-            on(shown, first.frame),
+            _PERSON,
+            why,
         ),
-        drawing(
-            "fig18",
-            "Fig. 18",
-            "An edge cut to its window, and the model contour",
-            lambda f: _draw_comparison(f, shown, first),
-            (6.5, 3.6),
-            on(shown, first.frame),
+        Drawing("fig18", "Fig. 18", cut, lambda f: _draw_comparison(f, shown, first), (6.5, 3.6), why),
+        Drawing("fig19", "Fig. 19", curve, draw_curve(first), (6, 3.4), why),
+        Drawing("fig19_surface", "Fig. 19", surface, draw_surface, (7, 4), f"{why}; not in the paper"),
+        Drawing("fig20", "Fig. 20", "Determined motion state", draw_state(first), _PERSON, why),
+        Drawing(
+            "fig21", "Fig. 21", "Similarity over pose, another image", draw_curve(second), (6, 3.4), other
         ),
-        drawing(
-            "fig19",
-            "Fig. 19",
-            "Similarity over pose, with fixed position",
-            lambda f: _draw_similarity(f, shown, first),
-            (6, 3.4),
-            on(shown, first.frame),
+        Drawing(
+            "fig22", "Fig. 22", "Determined motion state, another image", draw_state(second), _PERSON, other
         ),
-        drawing(
-            "fig19_surface",
-            "Fig. 19",
-            "Similarity over pose and position, at the best height of each",
-            lambda f: _draw_surface(f, shown, first),
-            (7, 4),
-            f"{on(shown, first.frame)}; not in the paper",
-        ),
-        drawing(
-            "fig20",
-            "Fig. 20",
-            "Determined motion state",
-            lambda f: _draw_state(f, shown, first),
-            (4.5, 5.5),
-            on(shown, first.frame),
-        ),
-        drawing(
-            "fig21",
-            "Fig. 21",
-            "Similarity over pose, another image",
-            lambda f: _draw_similarity(f, shown, second),
-            (6, 3.4),
-            on(shown, second.frame),
-        ),
-        drawing(
-            "fig22",
-            "Fig. 22",
-            "Determined motion state, another image",
-            lambda f: _draw_state(f, shown, second),
-            (4.5, 5.5),
-            on(shown, second.frame),
-        ),
-        drawing(
-            "fig23",
-            "Fig. 23",
-            "The start on a synthetic sequence",
-            lambda f: _draw_start(f, scene),
-            (6, 3.6),
-            on(scene),
-        ),
-        drawing(
+    ]
+
+
+def _of_a_sequence(scene: Sequence, filmed: Sequence | None) -> list[Drawing]:
+    """Section 6: start, filter and models, synthetic and, if there is one, of a real sequence."""
+    truth = f"{_on(scene)}; dashed: the truth"
+    rows = [
+        ("fig23", "Fig. 23", "The start on a synthetic sequence", _draw_start, scene, _on(scene)),
+        (
             "fig26",
             "Fig. 26",
             "X, Y and pose: measured, and after the Kalman filter with one sigma",
-            lambda f: _draw_filter(f, scene),
-            (8, 6.5),
-            f"{on(scene)}; dashed: the truth",
+            _draw_filter,
+            scene,
+            truth,
         ),
-        drawing(
-            "fig27",
-            "Fig. 27",
-            "Estimated models, synthetic sequence",
-            lambda f: _draw_models(f, scene),
-            _models_size(scene),
-            on(scene),
-        ),
+        ("fig27", "Fig. 27", "Estimated models, synthetic sequence", _draw_models, scene, _on(scene)),
     ]
     if filmed is not None:
-        made += [
-            drawing(
-                "fig24",
-                "Figs. 24, 25",
-                "The start on a real sequence",
-                lambda f: _draw_start(f, filmed),
-                (6, 3.6),
-                on(filmed),
-            ),
-            drawing(
-                "fig28",
-                "Figs. 28, 30",
-                "As Fig. 26, on a real sequence",
-                lambda f: _draw_filter(f, filmed),
-                (8, 6.5),
-                on(filmed),
-            ),
-            drawing(
-                "fig29",
-                "Figs. 29, 31",
-                "Estimated models, real sequence",
-                lambda f: _draw_models(f, filmed),
-                _models_size(filmed),
-                on(filmed),
-            ),
+        why = _on(filmed)
+        rows += [
+            ("fig24", "Figs. 24, 25", "The start on a real sequence", _draw_start, filmed, why),
+            ("fig28", "Figs. 28, 30", "As Fig. 26, on a real sequence", _draw_filter, filmed, why),
+            ("fig29", "Figs. 29, 31", "Estimated models, real sequence", _draw_models, filmed, why),
         ]
-    for number, side in ((32, "right"), (33, "left")):
-        caption = f"Hip and knee of the {side} side: estimated, and the model's optimal movement" + (
-            ", with the truth" if shown.truth is not None else ""
+    sizes = {_draw_start: (6, 3.6), _draw_filter: (8, 6.5)}
+    return [
+        Drawing(
+            name,
+            item,
+            caption,
+            _drawn_of(draw, of),
+            sizes[draw] if draw in sizes else _models_size(of),
+            why,
         )
-        made.append(
-            Drawing(
-                *(
-                    f"fig{number}",
-                    f"Fig. {number}",
-                    caption,
-                    lambda f, s=side: _draw_angles(f, shown, s),
-                    (7, 5),
-                ),
-                on(shown),
-            )
-        )
-    return made
+        for name, item, caption, draw, of, why in rows
+    ]
+
+
+def _drawn_of(draw: Callable[[Figure, Sequence], object], of: Sequence) -> Callable[[Figure], object]:
+    return lambda figure: draw(figure, of)
+
+
+def _of_a_side(shown: Sequence, number: int, side: str) -> Drawing:
+    """Figs. 32 and 33."""
+    caption = f"Hip and knee of the {side} side: estimated, and the model's optimal movement"
+    if shown.truth is not None:
+        caption += ", with the truth"
+    return Drawing(
+        f"fig{number}",
+        f"Fig. {number}",
+        caption,
+        lambda f: _draw_angles(f, shown, side),
+        (7, 5),
+        _on(shown),
+    )
 
 
 # Numbers that rows share with figures.
