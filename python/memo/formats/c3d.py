@@ -470,15 +470,15 @@ def _columns(motion: Motion, up: Up) -> tuple[list[tuple[str, bool]], np.ndarray
     return labels, np.concatenate(parts, axis=1)
 
 
-def _parameter_section(
+def _parameter_groups(
     motion: Motion, labels: Sequence[tuple[str, bool]], first: int, rate_hz: float, up: Up
-) -> bytes:
-    """The parameter section, whole blocks."""
+) -> dict[str, list[bytes]]:
+    """The parameters by group; where the data starts is still to be added."""
     frames = len(motion.times_s)
     names = [label for label, _ in labels]
     angles = [label for label, is_angle in labels if is_angle]
     split = [(value & 0xFFFF, value >> 16) for value in (first, first + frames - 1)]
-    groups: dict[str, list[bytes]] = {
+    return {
         "TRIAL": [
             _integers("ACTUAL_START_FIELD", split[0], (2,)),
             _integers("ACTUAL_END_FIELD", split[1], (2,)),
@@ -517,6 +517,13 @@ def _parameter_section(
         ],
         "EVENT": _event_parameters(motion, first, rate_hz),
     }
+
+
+def _parameter_section(
+    motion: Motion, labels: Sequence[tuple[str, bool]], first: int, rate_hz: float, up: Up
+) -> bytes:
+    """The parameter section, whole blocks."""
+    groups = _parameter_groups(motion, labels, first, rate_hz, up)
     data_start = _integers("DATA_START", [0], ())
     groups["POINT"].insert(2, data_start)
     content = bytearray()

@@ -112,8 +112,11 @@ def _counted(
 
 
 def _proposition_1(rods: dict[str, Any]) -> list[Row]:
+    return [*_recovered_rods(rods), *_steps_of_the_proof(rods)]
+
+
+def _recovered_rods(rods: dict[str, Any]) -> list[Row]:
     trials = rods["trials"]
-    where = "appendix 1"
     return [
         _counted(
             *("Proposition 1", "rods recovered from three views, up to the mirror", "all"),
@@ -130,6 +133,13 @@ def _proposition_1(rods: dict[str, Any]) -> list[Row]:
             *(rods["recovered_as_printed"], trials, "(14) loses digits near k1 = 0 and k3 = 0"),
             rest=NEAR,
         ),
+    ]
+
+
+def _steps_of_the_proof(rods: dict[str, Any]) -> list[Row]:
+    trials = rods["trials"]
+    where = "appendix 1"
+    return [
         compared(
             *(f"{where}, eq. (6)", "[a1 a2 a3] minus (k3 z1 + k4 z2 + k5 z3), largest", EQUAL),
             *(
