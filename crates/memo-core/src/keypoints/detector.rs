@@ -30,13 +30,10 @@ use glam::DVec2;
 
 use super::layouts::{LAYOUTS, Layout};
 use super::names::{DetectorError, SIDE_PARTS, STICK_JOINTS, SwapGroup, joint_name};
+use crate::model::skeleton::PELVIS_ON_TRUNK;
 
 /// Names of the head points in the order of table A.2.
 pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "right_ear", "left_ear"];
-
-/// Position of the pelvis joint between the midpoint of the hips (0) and the midpoint of the shoulders (1),
-/// from the lengths of table A.1 as a rigid trunk.
-pub const PELVIS_ON_TRUNK: f64 = 10.09 / (10.09 + 45.98);
 
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,7 +183,7 @@ impl Detector {
         let points_px = sources.map(|source| match source {
             Source::Own(at) => points_px[at],
             Source::Middle(ends) => middle(ends),
-            Source::OnTrunk([hips, shoulders]) => middle(hips).lerp(middle(shoulders), PELVIS_ON_TRUNK),
+            Source::OnTrunk([hips, shoulders]) => middle(shoulders).lerp(middle(hips), PELVIS_ON_TRUNK),
             Source::Absent => DVec2::NAN,
         });
         let least =
