@@ -539,7 +539,7 @@ def test_a_distance_less_sure_than_long_is_none(scene, tmp_path, memo_posture):
     code, said, complaint = memo_posture(*arguments, "--out", tmp_path / "out")
     assert (code, complaint) == (3, "")
     assert "postures left in 0: in the first, the distance of the neck is not known: " in said
-    assert "m says nothing" in said and "m away" not in said and "depth directions of the limbs" not in said
+    assert "too uncertain" in said and "m away" not in said and "depth directions of the limbs" not in said
     document = json.loads((tmp_path / "out" / "postures.json").read_text())
     for frame in document["per_frame"]:
         assert frame["anchor_m"] is None and "not known" in frame["problem"] and frame["cut_all"] is None

@@ -7,14 +7,19 @@
 //! empty field is missing. Rows of the output: frame, survivors, groups, then x, y, z in metres (world, Z up)
 //! of the linked joints.
 
-use glam::DVec2;
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
-use memo_core::model::{Camera, CameraFileOptions};
-use memo_core::posture::sequence::{KeypointSequence, PostureSequence, SequenceOptions, postures};
-use memo_core::reproduce::stick_walker::{StickWalker, world_from_head};
-use memo_core::synth::Random;
+use memo_core::glam::DVec2;
+use memo_core::model::CameraFileOptions;
+use memo_core::model::skeleton::JOINT_COUNT;
+use memo_core::synth::{Random, WalkOptions, sampled_walk};
+use memo_core::{
+    Camera, Detector, Joint, KeypointSequence, PerJoint, PostureSequence, SequenceOptions, TrackerOptions,
+    postures,
+};
 use std::error::Error;
 use std::time::Instant;
+
+/// Height of the synthetic walker, metres.
+const HEIGHT_M: f64 = 1.75;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,7 +33,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn found(arguments: &[String]) -> Result<PostureSequence, Box<dyn Error>> {
     let mut options = SequenceOptions::default();
     let ((times_s, points_px), camera) = match arguments {
-        [walker, frames] if walker == "--walker" => synthetic(frames.parse()?)?,
+        [walker, frames] if walker == "--walker" => {
+            options.height_m = Some(HEIGHT_M);
+            synthetic(frames.parse()?)?
+        }
         [csv, camera, height_m @ ..] if height_m.len() < 2 => {
             options.height_m = height_m.first().map(|height_m| height_m.parse()).transpose()?;
             let camera = Camera::from_file(camera.as_ref(), &CameraFileOptions::default())?;
@@ -83,27 +91,24 @@ fn read(csv: &str) -> Result<Keypoints, Box<dyn Error>> {
     Ok((times_s, points_px))
 }
 
-/// The walker of Lee and Chen at 25 Hz and 1 px of noise, to and fro 2 m before a level camera 6 m away.
+/// A walker at 25 Hz and 1 px of noise, seen from the side by a level camera 6 m away.
 fn synthetic(frames: usize) -> Result<(Keypoints, Camera), Box<dyn Error>> {
-    let camera = Camera::level([1920, 1920], 0.9273, 1.2, 6.0)?;
-    let walker = StickWalker::lee_chen();
+    let camera = Camera::level([1920, 1080], 0.9273, 1.2, 6.0)?;
+    let walker = TrackerOptions::for_height(HEIGHT_M).walker(1.3)?;
+    let walk = sampled_walk(&walker, &WalkOptions { frames, rate_hz: 25.0, ..WalkOptions::default() })?;
+    let detector = Detector::from_names(walk.names())?;
     let mut random = Random::new(1);
-    let (mut times_s, mut points_px) = (vec![], vec![]);
-    for t in 0..frames {
-        let time_s = t as f64 / 25.0;
-        let walked = walker.posed(time_s, glam::DVec3::ZERO);
-        let along_m = 2.0 * (1.2 * time_s / 2.0).sin();
-        let figure: StickFigure =
-            PerJoint(walked.0.map(|p| world_from_head(p) + glam::DVec3::new(along_m, 0.0, 1.38)));
-        let mut pixels = PerJoint([DVec2::NAN; JOINT_COUNT]);
-        for joint in Joint::ALL {
-            let [a, b] = random.normal_pair().map(f64::from);
-            pixels[joint] = camera.project(figure[joint]).unwrap_or(DVec2::NAN) + DVec2::new(a, b);
+    let mut points_px = vec![];
+    for frame in 0..walk.frames() {
+        let mut seen = vec![];
+        for point in 0..walk.points() {
+            let noise_px = DVec2::from(random.normal_pair().map(f64::from));
+            let pixel = walk.at(frame, point).and_then(|place| camera.project(place));
+            seen.push(pixel.map_or(DVec2::NAN, |pixel| pixel + noise_px));
         }
-        times_s.push(time_s);
-        points_px.push(pixels);
+        points_px.push(PerJoint(detector.stick_joints(&seen, &vec![1.0; seen.len()])?.points_px));
     }
-    Ok(((times_s, points_px), camera))
+    Ok(((walk.times_s().to_vec(), points_px), camera))
 }
 
 #[cfg(test)]

@@ -344,20 +344,7 @@ fn check(tracks: &[Vec<DVec2>], times_s: &[f64], options: &FigureOptions) -> Res
     if let Some(size) = options.size {
         OptionError::unless(SIZES.contains(&size), "size", "between 1e-9 and 1e12", size)?;
     }
-    let f = &options.fit;
-    for (name, wanted, value, is_good) in [
-        ("noise_sd", "finite and not negative", f.noise_sd, (0.0..=1e9).contains(&f.noise_sd)),
-        ("max_tilt_deg", "between 0 and 90", f.max_tilt_deg, f.max_tilt_deg > 0.0 && f.max_tilt_deg < 90.0),
-        ("outlier_sd", "positive", f.outlier_sd, f.outlier_sd > 0.0 && f.outlier_sd.is_finite()),
-        (
-            "max_outlier_fraction",
-            "between 0 and 0.5",
-            f.max_outlier_fraction,
-            (0.0..=0.5).contains(&f.max_outlier_fraction),
-        ),
-    ] {
-        OptionError::unless(is_good, name, wanted, value)?;
-    }
+    options.fit.check()?;
     Ok(())
 }
 

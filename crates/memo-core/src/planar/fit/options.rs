@@ -70,27 +70,14 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    pub(super) fn check(&self) -> Result<(), FitError> {
-        let positive = "positive and finite";
-        let checks = [
-            ("noise_sd", "finite and not negative", self.noise_sd, self.noise_sd >= 0.0),
-            (
-                "max_tilt_deg",
-                "in (0, 90)",
-                self.max_tilt_deg,
-                self.max_tilt_deg > 0.0 && self.max_tilt_deg < 90.0,
-            ),
-            ("outlier_sd", positive, self.outlier_sd, self.outlier_sd > 0.0),
-            (
-                "max_outlier_fraction",
-                "in [0, 0.5]",
-                self.max_outlier_fraction,
-                (0.0..=0.5).contains(&self.max_outlier_fraction),
-            ),
-        ];
-        for (name, wanted, value, is_good) in checks {
-            OptionError::unless(is_good && value.is_finite(), name, wanted, value)?;
-        }
-        Ok(())
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        let Self { noise_sd, max_tilt_deg, outlier_sd, max_outlier_fraction } = *self;
+        OptionError::unless((0.0..=1e9).contains(&noise_sd), "noise_sd", "between 0 and 1e9", noise_sd)?;
+        let is_tilt = max_tilt_deg > 0.0 && max_tilt_deg < 90.0;
+        OptionError::unless(is_tilt, "max_tilt_deg", "more than 0 and less than 90", max_tilt_deg)?;
+        OptionError::unless_positive("outlier_sd", outlier_sd)?;
+        let (name, is_minority) = ("max_outlier_fraction", (0.0..=0.5).contains(&max_outlier_fraction));
+        OptionError::unless(is_minority, name, "between 0 and 0.5", max_outlier_fraction)
     }
 }
