@@ -13,7 +13,7 @@ import sys, time
 import numpy as np
 import memo
 walk = memo.walker_motion(90, rate_hz=30)
-dots = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)["positions_px"]
+dots = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30).positions_px
 """
 
 CALLS = {
@@ -24,9 +24,9 @@ call = lambda: memo.planar(tracks, np.arange(len(tracks)) / 30)
     "memo.posture, 20,000 frames": """
 from memo.keypoints import Keypoints
 camera = memo.Camera.level((1280, 720), 60.0, 1.2, 4.0)
-pixels = np.stack([camera.project(np.ascontiguousarray(row)) for row in walk["positions"]])
+pixels = np.stack([camera.project(np.ascontiguousarray(row)) for row in walk.positions])
 pixels = np.concatenate([pixels] * 222)
-names = list(walk["names"])
+names = list(walk.names)
 keypoints = Keypoints.from_arrays(pixels, np.ones(pixels.shape[:2]), names=names, fps=30)
 call = lambda: memo.posture(keypoints, camera, height_m=1.75, unswap=False)
 """,

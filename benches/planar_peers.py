@@ -96,10 +96,8 @@ def main() -> None:
             assert np.allclose(ours(views), peer(views), rtol=1e-6, atol=1e-6, equal_nan=True)
             compare(f"{name}, {count} at once", views, ours, peer)
     walk = memo.walker_motion(120)
-    shown = memo.pointlight(
-        walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30, noise_sd_px=1.0
-    )
-    tracks, times_s = shown["positions_px"][:, :12], shown["times_s"]
+    shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30, noise_sd_px=1.0)
+    tracks, times_s = shown.positions_px[:, :12], shown.times_s
     triples = [(a, o, b) for o in range(12) for a in range(12) for b in range(a + 1, 12) if o not in (a, b)]
     sample = triples[:: len(triples) // 40]
 

@@ -27,8 +27,8 @@ pixels = true.project(places) + np.random.default_rng(0).normal(0, 0.5, (len(pla
 # The fit says how far off the points are, in pixels, and leaves out what chance would not put there.
 
 found = memo.calibrate_points(places, pixels, (1280, 720))
-camera = found["camera"]
-print(f"reprojection error {found['rms_px']:.2f} px; left out: {len(found['outliers'])}")
+camera = found.camera
+print(f"reprojection error {found.rms_px:.2f} px; left out: {len(found.outliers)}")
 print("camera at", np.round(camera.position, 2), "m; truly at", np.round(true.position, 2))
 
 # %%

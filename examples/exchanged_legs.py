@@ -19,15 +19,15 @@ import numpy as np
 
 walker = memo.walker_motion(120, rate_hz=60, height_m=1.75)
 camera = memo.Camera.level((1280, 960), 60, 1.2, 4.0)
-points_px = np.stack([camera.project(joints) for joints in walker["positions"]])
+points_px = np.stack([camera.project(joints) for joints in walker.positions])
 points_px += np.random.default_rng(0).normal(0, 1, points_px.shape)
-names = list(walker["names"])
+names = list(walker.names)
 right, left = ([names.index(side + joint) for joint in ("HP", "KN", "AN")] for side in "RL")
 points_px[40:56, right + left] = points_px[40:56, left + right]
 
 folder = Path(tempfile.mkdtemp())
 header = ",".join(f"{name}_x,{name}_y" for name in names)
-rows = np.column_stack([walker["times_s"], points_px.reshape(len(points_px), -1)])
+rows = np.column_stack([walker.times_s, points_px.reshape(len(points_px), -1)])
 np.savetxt(folder / "joints.csv", rows, delimiter=",", header="time_s," + header, comments="", fmt="%.5f")
 
 # %%

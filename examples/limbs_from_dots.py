@@ -17,22 +17,22 @@ from memo.linkage_plot import plot_linkage
 # Twelve dots of a walker seen 45 degrees off the side, without their names, half a pixel of noise.
 
 walker = memo.walker_motion(150, rate_hz=60)
-joints = [k for k, name in enumerate(walker["names"]) if name != "HEAD"]
+joints = [k for k, name in enumerate(walker.names) if name != "HEAD"]
 display = memo.pointlight(
-    walker["positions"][:, joints],
-    walker["times_s"],
-    [walker["names"][k] for k in joints],
+    walker.positions[:, joints],
+    walker.times_s,
+    [walker.names[k] for k in joints],
     azimuth_deg=45,
     noise_sd_px=0.5,
 )
-tracks, times_s = display["positions_px"], display["times_s"]
+tracks, times_s = display.positions_px, display.times_s
 figure = memo.planar(tracks, times_s, noise_px=0.5)
-print([window["status"] for window in figure.windows])
+print([window.status for window in figure.windows])
 
 # %%
 # The linkage, with the length of every link in pixels and how sure it is.
 
-names = [walker["names"][k] for k in joints]
+names = [walker.names[k] for k in joints]
 for a, b, length, confidence, windows in figure.links():
     print(f"{names[a]}-{names[b]}: {length:.0f} px, confidence {confidence:.2f}, in {windows} windows")
 
@@ -46,7 +46,7 @@ plot_linkage(ax, Points(names, times_s, tracks), figure, 0)
 knee, ankle = names.index("RKN"), names.index("RAN")
 found = figure.depth[:, ankle] - figure.depth[:, knee]
 azimuth = np.radians(45)
-positions = walker["positions"][:, joints]
+positions = walker.positions[:, joints]
 view = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
 away = -(positions[:, ankle] - positions[:, knee]) @ view * 200
 known = np.isfinite(found)

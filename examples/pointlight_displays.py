@@ -15,7 +15,7 @@ import numpy as np
 from memo.linkage_plot import write_display_video
 
 walker = memo.walker_motion(60, rate_hz=60)
-motion = (walker["positions"], walker["times_s"], walker["names"])
+motion = (walker.positions, walker.times_s, walker.names)
 
 # %%
 # Six displays of the same motion. Crosses are noise dots, which the display does not tell apart; here the
@@ -32,7 +32,7 @@ displays = {
 fig, axes = plt.subplots(2, 3, figsize=(9, 6.5), layout="constrained")
 for ax, (title, options) in zip(axes.flat, displays.items(), strict=True):
     display = memo.pointlight(*motion, seed=1, **options)
-    dots, noise = display["positions_px"], display["labels"][0] < 0
+    dots, noise = display.positions_px, display.labels[0] < 0
     for k in range(dots.shape[1] if "lifetime_frames" not in options else 0):
         ax.plot(*dots[:24, k].T, color="0.75", lw=0.7)
     ax.plot(*dots[0, ~noise].T, "o", color="k", ms=5)
@@ -47,5 +47,5 @@ for ax, (title, options) in zip(axes.flat, displays.items(), strict=True):
 
 display = memo.pointlight(*motion, azimuth_deg=45)
 video = Path(tempfile.mkdtemp()) / "display.mp4"
-write_display_video(video, display["times_s"], display["positions_px"])
-print(video.name, display["positions_px"].shape, f"{np.diff(display['times_s']).mean():.4f} s a frame")
+write_display_video(video, display.times_s, display.positions_px)
+print(video.name, display.positions_px.shape, f"{np.diff(display.times_s).mean():.4f} s a frame")

@@ -21,7 +21,7 @@ from memo.posture_plot import plot_from_above, plot_from_the_side, plot_strip
 
 walker = memo.walker_motion(120, rate_hz=60, heading_deg=45, height_m=1.75)
 camera = memo.Camera.level((1280, 960), 60, 1.2, 4.0)
-points_px = np.stack([camera.project(joints) for joints in walker["positions"]])
+points_px = np.stack([camera.project(joints) for joints in walker.positions])
 points_px += np.random.default_rng(0).normal(0, 1, points_px.shape)
 
 # %%
@@ -29,8 +29,8 @@ points_px += np.random.default_rng(0).normal(0, 1, points_px.shape)
 # do.
 
 folder = Path(tempfile.mkdtemp())
-header = ",".join(f"{name}_x,{name}_y" for name in walker["names"])
-rows = np.column_stack([walker["times_s"], points_px.reshape(len(points_px), -1)])
+header = ",".join(f"{name}_x,{name}_y" for name in walker.names)
+rows = np.column_stack([walker.times_s, points_px.reshape(len(points_px), -1)])
 np.savetxt(folder / "joints.csv", rows, delimiter=",", header="time_s," + header, comments="", fmt="%.5f")
 keypoints = memo.read_keypoints(folder / "joints.csv")
 print(keypoints.points.shape, keypoints.names[:4])
@@ -72,7 +72,7 @@ plot_strip(ax, postures)
 
 names = [f"{side}{joint}" for side in "RL" for joint in ("EL", "WR", "KN", "AN")]
 spelt = [f"{side}_{joint}" for side in ("right", "left") for joint in ("elbow", "wrist", "knee", "ankle")]
-true = walker["positions"][:, [walker["names"].index(name) for name in names]]
+true = walker.positions[:, [walker.names.index(name) for name in names]]
 found = postures.smoothed_m[:, [postures.joints.index(name) for name in spelt]]
 sight = true - np.array(camera.position)
 sight /= np.linalg.norm(sight, axis=-1, keepdims=True)

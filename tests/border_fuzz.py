@@ -324,6 +324,9 @@ SCRATCH = Path(_SCRATCH.name)
 
 CASES = {}
 
+NO_CALLS = {"__doc__", "__module__", "__hash__", "__slotnames__", "__lt__", "__le__", "__gt__", "__ge__"}
+"""Names that Python gives to a class: the last four for `__eq__`, `__slotnames__` when one is pickled."""
+
 
 def case(*names):
     def kept(function):
@@ -804,7 +807,7 @@ def _(d):
 @case("pointlight")
 def _(d):
     frames, count = d.size(31, 1), d.size(13, 1)
-    names = d.choice([f"p{k}" for k in range(count)], memo.walker_motion(1)["names"][:count])
+    names = d.choice([f"p{k}" for k in range(count)], memo.walker_motion(1).names[:count])
     limbs = [
         (int(d.random.integers(max(1, count))), int(d.random.integers(max(1, count))))
         for _ in range(d.size(5))
@@ -876,6 +879,48 @@ def planar_arguments(d):
 def _(d):
     arguments, options = planar_arguments(d)
     return _memo.planar(*arguments, **options)
+
+
+def results():
+    """One object of each class of results, by its name."""
+    walk = memo.walker_motion(40)
+    shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30.0)
+    limbs = _memo.planar(shown.positions_px[:, :6], walk.times_s, 0.5, window_s=0.5)
+    camera, places = CAMERAS[0], np.random.default_rng(0).uniform((-1, 4, 0), (1, 6, 2), (12, 3))
+    ground = places * (3, 3, 0) - (0, 6, 0)
+    ends = [camera.project(ground + np.array([0, 0, height_m])) for height_m in (0, 1.75)]
+    joints, _ = _memo.lee_chen_walker("SEQ1", 4)
+    pixels = 800.0 * joints[..., :2] / joints[..., 2:] + (320.0, 240.0)
+    postures = _memo.posture(np.arange(4) / 25, pixels, np.ones((4, 14)), camera, height_m=1.75)
+    window = next(window for window in limbs.windows if window.chains)
+    made = [
+        *(walk, shown, limbs, window, window.chains[0], window.chains[0].links[0], postures),
+        _memo.SecondMotion(["neck"], 0, joints, 1.0, 0.3),
+        *_memo.unswap(walk.times_s, shown.positions_px, groups={"legs": {"hip": [(6, 9)]}}).values(),
+        memo.calibrate_points(places, camera.project(places), camera.size),
+        memo.calibrate_walker(*ends, camera.size, 1.75, focal_px=camera.matrix[0, 0]),
+    ]
+    return {type(result).__name__: result for result in made}
+
+
+RESULTS = results()
+
+
+@case(
+    *(
+        f"{kind}.{part}"
+        for kind, result in RESULTS.items()
+        for part in vars(type(result))
+        if part not in NO_CALLS
+    )
+)
+def _(d, name):
+    kind, part = name.split(".")
+    fields = RESULTS[kind].__getnewargs__()
+    given = [d.one(WRONG_OBJECTS) if d.is_wrong() else field for field in fields]
+    made = type(RESULTS[kind])(*d.one([given, given, given[1:], [*given, 1]] if d.is_wrong() else [given]))
+    found = getattr(made, part)
+    return repr(made), made.__getnewargs__(), found
 
 
 @case("planar_rods", "planar_hinges")
@@ -1329,20 +1374,12 @@ def bindings():
         if not inspect.isclass(part):
             found.add(name)
         elif not issubclass(part, BaseException):
-            found |= {
-                f"{name}.{own}"
-                for own in vars(part)
-                if own not in ("__doc__", "__module__", "__hash__", *ORDERING)
-            }
+            found |= {f"{name}.{own}" for own in vars(part) if own not in NO_CALLS}
     for name in memo.__all__:
         part = getattr(memo, name)
         if callable(part) and part is not getattr(_memo, name, None) and name not in ELSEWHERE:
             found.add(f"memo.{name}")
     return found
-
-
-ORDERING = ("__lt__", "__le__", "__gt__", "__ge__")
-"""Python makes these of `__eq__`."""
 
 
 def draw_of(name, number, seed, wrong=None):

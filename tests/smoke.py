@@ -24,8 +24,8 @@ def main() -> None:
     assert len(track) > 60 and error_m.max() < 0.1, (len(track), error_m.max())
     assert repr(pickle.loads(pickle.dumps(track))) == repr(track)
     walk = memo.walker_motion(60, rate_hz=30)
-    dots = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)
-    figure = memo.planar(dots["positions_px"], dots["times_s"])
+    dots = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30)
+    figure = memo.planar(dots.positions_px, dots.times_s)
     assert len(figure.links()) >= 8, figure
     command = subprocess.run([sys.executable, "-m", "memo.cli", "demo"], capture_output=True, text=True)
     assert command.returncode == 4 and "typer: pip install " in command.stderr, command

@@ -87,4 +87,4 @@ def test_small_pictures_are_calibrated(size):
     places = np.stack([0.7 * column - 1.4, 0.4 * column + 1.5 * row, 0.8 + 1.1 * row + 0.1 * column], axis=1)
     focal_px = camera.parameters()["matrix"][0][0]
     found = memo.calibrate_points(places, camera.project(places), size, focal_px=focal_px)
-    np.testing.assert_allclose(found["camera"].position, camera.position, atol=1e-4)
+    np.testing.assert_allclose(found.camera.position, camera.position, atol=1e-4)

@@ -50,16 +50,16 @@ POSE = look_at(np.array([1.5, -6.0, 1.6]), np.array([0.0, 0.0, 0.9]), 1.0)
 def test_a_planted_camera_is_recovered(count):
     places = spread(count)
     found = memo.calibrate_points(places, project(places, 1100, POSE), SIZE)
-    assert found["estimates"]["focal_px"][0] == pytest.approx(1100, abs=1e-3)
-    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-5)
-    assert found["outliers"] == [] and set(found["estimates"]) == {"focal_px", "x_m", "y_m", "z_m"}
+    assert found.estimates["focal_px"][0] == pytest.approx(1100, abs=1e-3)
+    np.testing.assert_allclose(found.camera.position, [1.5, -6.0, 1.6], atol=1e-5)
+    assert found.outliers == [] and set(found.estimates) == {"focal_px", "x_m", "y_m", "z_m"}
 
 
 def test_what_the_points_ask_for_is_fitted():
     places = spread(40)
     pixels = project(places, 1100, POSE, k=(-0.25, 0.0), centre=(610.0, 380.0))
     pixels += np.random.default_rng(1).normal(0, 0.3, pixels.shape)
-    estimates = memo.calibrate_points(places, pixels, SIZE)["estimates"]
+    estimates = memo.calibrate_points(places, pixels, SIZE).estimates
     for name, planted in {"focal_px": 1100, "centre_u_px": 610, "centre_v_px": 380, "k1": -0.25}.items():
         value, sd = estimates[name]
         assert abs(value - planted) < 4 * sd, name
@@ -68,11 +68,11 @@ def test_what_the_points_ask_for_is_fitted():
 def test_a_plane_and_a_known_focal_length():
     floor = np.array([[x, y, 0.0] for x in (-1.5, 0, 1.5) for y in (-1.0, 1.0, 3.0)])
     found = memo.calibrate_points(floor, project(floor, 1100, POSE), SIZE)
-    assert found["is_planar"]
-    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-4)
+    assert found.is_planar
+    np.testing.assert_allclose(found.camera.position, [1.5, -6.0, 1.6], atol=1e-4)
     corners = floor[[0, 2, 6, 8]]
     found = memo.calibrate_points(corners, project(corners, 1100, POSE), SIZE, focal_px=1100.0)
-    np.testing.assert_allclose(found["camera"].position, [1.5, -6.0, 1.6], atol=1e-4)
+    np.testing.assert_allclose(found.camera.position, [1.5, -6.0, 1.6], atol=1e-4)
 
 
 def test_poses_are_those_of_opencv(tmp_path):
@@ -89,9 +89,9 @@ def test_poses_are_those_of_opencv(tmp_path):
     path.write_text(json.dumps({"size": SIZE, "K": matrix.tolist(), "D": lens.tolist()}))
     known = memo.Camera.from_file(path, lens_only=True)
     ours = memo.calibrate_points(places, pixels, SIZE, lens=known)
-    sd = [ours["estimates"][name][1] for name in ("x_m", "y_m", "z_m")]
+    sd = [ours.estimates[name][1] for name in ("x_m", "y_m", "z_m")]
     # Ours are residuals before the lens, theirs behind it: a tenth of the deviation apart at most.
-    assert (np.abs(np.array(ours["camera"].position) - theirs) < 0.2 * np.array(sd)).all()
+    assert (np.abs(np.array(ours.camera.position) - theirs) < 0.2 * np.array(sd)).all()
 
 
 def test_deviations_are_those_of_repetition():
@@ -101,10 +101,10 @@ def test_deviations_are_those_of_repetition():
     values, deviations = [], []
     for _ in range(60):
         found = memo.calibrate_points(places, exact + random.normal(0, 1.0, exact.shape), SIZE)
-        if "centre_u_px" in found["estimates"] or "k1" in found["estimates"] or found["outliers"]:
+        if "centre_u_px" in found.estimates or "k1" in found.estimates or found.outliers:
             continue
-        values.append([found["estimates"][name][0] for name in ("focal_px", "x_m", "y_m", "z_m")])
-        deviations.append([found["estimates"][name][1] for name in ("focal_px", "x_m", "y_m", "z_m")])
+        values.append([found.estimates[name][0] for name in ("focal_px", "x_m", "y_m", "z_m")])
+        deviations.append([found.estimates[name][1] for name in ("focal_px", "x_m", "y_m", "z_m")])
     assert len(values) > 45
     ratio = np.std(values, axis=0) / np.sqrt(np.mean(np.square(deviations), axis=0))
     assert ((ratio > 0.7) & (ratio < 1.3)).all(), ratio
@@ -115,8 +115,8 @@ def test_a_mistaken_point_is_left_out():
     pixels = project(places, 1100, POSE) + np.random.default_rng(0).normal(0, 0.5, (12, 2))
     pixels[4] += [60, -25]
     found = memo.calibrate_points(places, pixels, SIZE)
-    assert found["outliers"] == [4]
-    assert np.hypot(*found["residuals_px"][4]) == pytest.approx(65, abs=6)
+    assert found.outliers == [4]
+    assert np.hypot(*found.residuals_px[4]) == pytest.approx(65, abs=6)
 
 
 def test_faults_say_what_is_missing():
@@ -143,7 +143,7 @@ def test_faults_say_what_is_missing():
     head_on = look_at(np.array([0, -6.0, 1.0]), np.array([0, 0, 1.0]))
     refused(wall, project(wall, 1100, head_on), "do not tell focal length from distance")
     found = memo.calibrate_points(wall, project(wall, 1100, head_on), SIZE, focal_px=1100.0)
-    np.testing.assert_allclose(found["camera"].position, [0, -6, 1], atol=1e-4)
+    np.testing.assert_allclose(found.camera.position, [0, -6, 1], atol=1e-4)
     refused(places, pixels, "focal length must be positive", focal_px=-1.0)
 
 
@@ -209,12 +209,12 @@ def round_walk(count=60):
 
 def test_a_walk_near_and_far_tells_the_camera():
     found = memo.calibrate_walker(*walked(round_walk(), 1100, HIGH), SIZE, 1.75)
-    estimates = found["estimates"]
+    estimates = found.estimates
     assert estimates["focal_px"][0] == pytest.approx(1100, rel=1e-3)
     assert estimates["height_m"][0] == pytest.approx(4.0, rel=1e-3)
     assert estimates["pitch_deg"][0] == pytest.approx(np.degrees(np.arctan2(3.5, 8)), abs=0.02)
     # Distances between places are those walked, whatever the axes.
-    places = found["places"][:, :2]
+    places = found.places[:, :2]
     apart = np.linalg.norm(places[:30] - places[30:], axis=1)
     np.testing.assert_allclose(
         apart, np.linalg.norm(round_walk()[:30] - round_walk()[30:], axis=1), rtol=1e-4
@@ -227,8 +227,8 @@ def test_walker_deviations_are_those_of_repetition():
         found = memo.calibrate_walker(
             *walked(round_walk(40), 1100, HIGH, noise_px=1.5, seed=seed), SIZE, 1.75
         )
-        values.append([found["estimates"][name][0] for name in ("focal_px", "pitch_deg", "height_m")])
-        deviations.append([found["estimates"][name][1] for name in ("focal_px", "pitch_deg", "height_m")])
+        values.append([found.estimates[name][0] for name in ("focal_px", "pitch_deg", "height_m")])
+        deviations.append([found.estimates[name][1] for name in ("focal_px", "pitch_deg", "height_m")])
     ratio = np.std(values, axis=0) / np.sqrt(np.mean(np.square(deviations), axis=0))
     assert ((ratio > 0.7) & (ratio < 1.3)).all(), ratio
     assert abs(np.mean(values, axis=0)[0] - 1100) < 25
@@ -241,8 +241,8 @@ def test_what_a_walk_does_not_tell_is_said():
     with pytest.raises(ValueError, match=r"does not tell the focal length.*give the field of view"):
         memo.calibrate_walker(feet, heads, SIZE, 1.75)
     found = memo.calibrate_walker(feet, heads, SIZE, 1.75, focal_px=1100.0)
-    assert found["estimates"]["height_m"][0] == pytest.approx(1.2, abs=0.1)
-    assert abs(found["estimates"]["pitch_deg"][0]) < 1.0
+    assert found.estimates["height_m"][0] == pytest.approx(1.2, abs=0.1)
+    assert abs(found.estimates["pitch_deg"][0]) < 1.0
     for arguments, reason in {
         (1.0, 0, 3): "3 sightings of the whole person.*4 are needed",
         (75.0, 0, 40): "height must be 0.5 to 2.5",
@@ -262,8 +262,8 @@ def test_wrong_detections_are_left_out():
     feet, heads = walked(round_walk(), 1100, HIGH, noise_px=1.0)
     heads[[7, 20, 41]] += [[30, -60], [-45, 80], [100, 0]]
     found = memo.calibrate_walker(feet, heads, SIZE, 1.75)
-    assert {7, 20, 41} <= set(found["outliers"]) and len(found["outliers"]) < 6
-    assert found["estimates"]["focal_px"][0] == pytest.approx(1100, rel=0.1)
+    assert {7, 20, 41} <= set(found.outliers) and len(found.outliers) < 6
+    assert found.estimates["focal_px"][0] == pytest.approx(1100, rel=0.1)
 
 
 def pets_boxes(person):
@@ -284,11 +284,11 @@ def test_pets_from_annotated_boxes():
     with pytest.raises(ValueError, match="does not tell the focal length"):
         memo.calibrate_walker(*pets_boxes(15)[:2], (768, 576), 1.75)
     found = memo.calibrate_walker(feet, heads, (768, 576), 1.75, focal_px=1190.0)
-    assert found["camera"].position[2] == pytest.approx(true.position[2], rel=0.12)
+    assert found.camera.position[2] == pytest.approx(true.position[2], rel=0.12)
     pixels = [(u, v) for u, v in feet.tolist()]
-    ours, published = found["camera"].ground_points(pixels), true.ground_points(pixels)
+    ours, published = found.camera.ground_points(pixels), true.ground_points(pixels)
     apart = [np.linalg.norm(places[:-40] - places[40:], axis=1) for places in (ours, published)]
-    print(found["estimates"], np.median(apart[0] / apart[1]), np.std(apart[0] / apart[1]))
+    print(found.estimates, np.median(apart[0] / apart[1]), np.std(apart[0] / apart[1]))
     assert np.median(apart[0] / apart[1]) == pytest.approx(1, abs=0.15)
 
 

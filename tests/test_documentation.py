@@ -146,7 +146,7 @@ def write_keypoints(folder, camera):
     """A walker as OpenPose writes COCO-18, one file a frame."""
     folder.mkdir()
     walker = memo.walker_motion(90, rate_hz=30, heading_deg=20, height_m=1.75)
-    places = dict(zip(walker["names"], walker["positions"].transpose(1, 0, 2), strict=True))
+    places = dict(zip(walker.names, walker.positions.transpose(1, 0, 2), strict=True))
     places["NECK"] = (places["RSH"] + places["LSH"]) / 2
     order = ["HEAD", "NECK", *(f"{side}{joint}" for side in "RL" for joint in ("SH", "EL", "WR"))]
     order += [f"{side}{joint}" for side in "RL" for joint in ("HP", "KN", "AN")]

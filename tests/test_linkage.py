@@ -4,6 +4,7 @@ import csv
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,23 +21,23 @@ def walk(frames=66):
 
 def display(**options):
     points = walk()
-    return memo.pointlight(points["positions"], points["times_s"], points["names"], **options)
+    return memo.pointlight(points.positions, points.times_s, points.names, **options)
 
 
 def test_a_display_has_its_shapes_and_labels():
     shown = display(noise_dots=5, azimuth_deg=30)
-    assert shown["positions_px"].shape == (66, 18, 2)
-    assert shown["labels"][0].tolist() == [*range(13), *[-1] * 5]
-    assert shown["visible"].all()
+    assert shown.positions_px.shape == (66, 18, 2)
+    assert shown.labels[0].tolist() == [*range(13), *[-1] * 5]
+    assert shown.visible.all()
     limited = display(lifetime_frames=2, life_dots=6)
-    assert limited["labels"].shape == (66, 6)
-    assert (limited["limb_ends"] == limited["labels"] + 1).all()
+    assert limited.labels.shape == (66, 6)
+    assert (limited.limb_ends == limited.labels + 1).all()
 
 
 def test_the_orthographic_view_is_the_documented_one():
     points = walk()
-    shown = display(locomotion="translating")["positions_px"]
-    assert np.allclose(shown, points["positions"][..., [0, 2]] * [200, -200])
+    shown = display(locomotion="translating").positions_px
+    assert np.allclose(shown, points.positions[..., [0, 2]] * [200, -200])
 
 
 def test_bad_options_are_told():
@@ -48,25 +49,25 @@ def test_bad_options_are_told():
         with pytest.raises(ValueError, match=part):
             display(**options)
     with pytest.raises(ValueError, match="3 times"):
-        memo.pointlight(walk(4)["positions"], [0.0, 1.0, 2.0], ["a"] * 13)
+        memo.pointlight(walk(4).positions, [0.0, 1.0, 2.0], ["a"] * 13)
 
 
 def test_limbs_are_found_again():
     shown = display(azimuth_deg=30, noise_sd_px=1.0)
-    found = memo.planar(shown["positions_px"], shown["times_s"], 1.0)
-    assert [window["status"] for window in found.windows] == ["interpreted"]
+    found = memo.planar(shown.positions_px, shown.times_s, 1.0)
+    assert [window.status for window in found.windows] == ["interpreted"]
     assert {(a, b) for a, b, *_ in found.links()} == LIMBS
     assert found.depth.shape == (66, 13)
     with pytest.raises(ValueError, match="too few"):
-        memo.planar(shown["positions_px"][:3], shown["times_s"][:3])
+        memo.planar(shown.positions_px[:3], shown.times_s[:3])
 
 
 def test_points_files_are_read_as_written(tmp_path):
     shown = display()
     names = [f"dot{i}" for i in range(13)]
-    positions = shown["positions_px"].copy()
+    positions = shown.positions_px.copy()
     positions[3, 4] = np.nan
-    points = figure.Points(names, shown["times_s"], positions)
+    points = figure.Points(names, shown.times_s, positions)
     figure.write_points_csv(tmp_path / "dots.csv", points)
     read = figure.read_points_csv(tmp_path / "dots.csv", 2)
     assert read.names == names
@@ -77,37 +78,37 @@ def test_points_files_are_read_as_written(tmp_path):
 
 def test_names_tell_limbs_from_their_mirrors():
     shown = display(azimuth_deg=30, noise_sd_px=0.5)
-    tracks = shown["positions_px"][:, :12]
-    names = walk()["names"][:12]
-    found = memo.planar(tracks, shown["times_s"], 0.5, names=names, focal_px=1500.0)
-    chains = found.windows[0]["chains"]
-    assert all(chain["reflection_margin_deg"] > 0 for chain in chains)
+    tracks = shown.positions_px[:, :12]
+    names = walk().names[:12]
+    found = memo.planar(tracks, shown.times_s, 0.5, names=names, focal_px=1500.0)
+    chains = found.windows[0].chains
+    assert all(chain.reflection_margin_deg > 0 for chain in chains)
     # Seen from the walker's right and rear: who walks to the right also walks away.
-    assert all(chain["slope"][0] * chains[0]["slope"][0] > 0 for chain in chains)
+    assert all(chain.slope[0] * chains[0].slope[0] > 0 for chain in chains)
     assert 0 < found.perspective_px < 20
     # The mirror image of a walker is a walker with the sides exchanged.
     exchanged = [("L" if name[0] == "R" else "R") + name[1:] for name in names]
-    again = memo.planar(tracks * [-1, 1], shown["times_s"], 0.5, names=exchanged).windows[0]["chains"]
-    assert all(chain["slope"][0] * chains[0]["slope"][0] < 0 for chain in again)
+    again = memo.planar(tracks * [-1, 1], shown.times_s, 0.5, names=exchanged).windows[0].chains
+    assert all(chain.slope[0] * chains[0].slope[0] < 0 for chain in again)
     with pytest.raises(ValueError, match="11 names"):
-        memo.planar(tracks, shown["times_s"], 0.5, names=names[:11])
+        memo.planar(tracks, shown.times_s, 0.5, names=names[:11])
 
 
 def test_scales_are_divided_out():
     shown = display(azimuth_deg=30)
     scales = np.linspace(0.8, 1.25, 66)
-    plain = memo.planar(shown["positions_px"], shown["times_s"])
-    scaled = memo.planar(shown["positions_px"] * scales[:, None, None], shown["times_s"], scales=scales)
+    plain = memo.planar(shown.positions_px, shown.times_s)
+    scaled = memo.planar(shown.positions_px * scales[:, None, None], shown.times_s, scales=scales)
     assert [link[:2] for link in plain.links()] == [link[:2] for link in scaled.links()]
     assert np.allclose([link[2] for link in plain.links()], [link[2] for link in scaled.links()], rtol=1e-6)
     with pytest.raises(ValueError, match="scale"):
-        memo.planar(shown["positions_px"], shown["times_s"], scales=scales[:5])
+        memo.planar(shown.positions_px, shown.times_s, scales=scales[:5])
 
 
 def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
-    shown, names = display(azimuth_deg=60), walk()["names"]
+    shown, names = display(azimuth_deg=60), walk().names
     scales = np.linspace(0.7, 1.4, 66)
-    points = figure.Points(names, shown["times_s"], shown["positions_px"] * scales[:, None, None], scales)
+    points = figure.Points(names, shown.times_s, shown.positions_px * scales[:, None, None], scales)
     found = memo.planar(points.positions, points.times_s, scales=scales)
     figure.write_figure_csv(tmp_path, found, points)
     rows = list(csv.DictReader((tmp_path / "points3d.csv").read_text().splitlines()))
@@ -123,12 +124,13 @@ def test_limbs_keep_their_lengths_where_the_scale_changes(tmp_path):
 
 def found_with(verdicts, status="interpreted", **more):
     """A figure of one window for each verdict, with the link 0 - 1 as long as the window's number."""
-    link = {"points": (0, 1), "length_sd": 0.1, "margin": 1.0, "confidence": 0.9}
-    windows = [
-        {"status": status, "chains": [{"verdict": verdict, "links": [link | {"length": float(number)}]}]}
-        | more
-        for number, verdict in enumerate(verdicts)
-    ]
+
+    def window(number, verdict):
+        link = memo._memo.PlanarLink((0, 1), float(number), 0.1, 1.0, 0.9)
+        chain = SimpleNamespace(verdict=verdict, links=[link])
+        return SimpleNamespace(**{"status": status, "method": "cover", "chains": [chain], **more})
+
+    windows = [window(number, verdict) for number, verdict in enumerate(verdicts)]
     return figure.PlanarFigure(windows, np.zeros((8, 2)), ["planar"] * 8)
 
 
@@ -202,7 +204,7 @@ def test_labels_hold_any_name(tmp_path):
     from memo.cli.pointlight import _write_labels
 
     shown = display()
-    names = ['a,"b"', *walk()["names"][1:]]
+    names = ['a,"b"', *walk().names[1:]]
     _write_labels(tmp_path / "labels.csv", names, names, shown)
     rows = csv.DictReader((tmp_path / "labels.csv").read_text().splitlines())
     assert next(rows) == dict(frame="0", dot=names[0], shows=names[0], limb_end="", fraction="", visible="1")
@@ -214,9 +216,9 @@ def test_frames_without_points_are_drawn(tmp_path):
     from memo import linkage_plot
 
     shown = display(azimuth_deg=30)
-    tracks = shown["positions_px"].copy()
+    tracks = shown.positions_px.copy()
     tracks[30:36] = np.nan
-    points = figure.Points(walk()["names"], shown["times_s"], tracks)
+    points = figure.Points(walk().names, shown.times_s, tracks)
     found = memo.planar(tracks, points.times_s, 0.5)
     assert found.interpreted
     linkage_plot.write_linkage_png(tmp_path / "linkage.png", points, found)
@@ -264,9 +266,9 @@ def test_limbs_are_found_in_keypoints(tmp_path):
     from memo.keypoints import Keypoints, write_keypoints
 
     shown = display(azimuth_deg=30, noise_sd_px=1.0)
-    names = ["nose" if name == "HEAD" else name for name in walk()["names"]]
-    seen = Keypoints.from_arrays(shown["positions_px"] + 500, names=names, times_s=shown["times_s"])
-    rate_hz = 1 / (shown["times_s"][1] - shown["times_s"][0])
+    names = ["nose" if name == "HEAD" else name for name in walk().names]
+    seen = Keypoints.from_arrays(shown.positions_px + 500, names=names, times_s=shown.times_s)
+    rate_hz = 1 / (shown.times_s[1] - shown.times_s[0])
     for written in ("openpose", "coco", "csv"):
         path = tmp_path / {"openpose": "walk_json", "coco": "walk.json", "csv": "walk.csv"}[written]
         write_keypoints(path, seen, written)
@@ -321,7 +323,7 @@ def test_tracks_without_a_window_are_told(tmp_path):
 def test_points_seen_but_not_joined_are_not_called_unseen():
     tracks = np.random.default_rng(1).normal(0, 100, (150, 2, 2)).cumsum(axis=0)
     tracks[75:] = np.nan
-    states = [window["status"] for window in memo.planar(tracks, np.arange(150) / 60, window_s=0.5).windows]
+    states = [window.status for window in memo.planar(tracks, np.arange(150) / 60, window_s=0.5).windows]
     assert states[0] == "nothing linked" and states[-1] == "unseen"
 
 
@@ -329,9 +331,9 @@ def test_a_spanning_tree_is_told(tmp_path):
     from memo.cli.planar import _about_figure
 
     shown = display(azimuth_deg=30)
-    tracks = np.concatenate([shown["positions_px"], shown["positions_px"][:, :6] + 400], axis=1)
-    points = figure.Points([f"d{i}" for i in range(19)], shown["times_s"], tracks)
-    found = memo.planar(tracks, shown["times_s"])
+    tracks = np.concatenate([shown.positions_px, shown.positions_px[:, :6] + 400], axis=1)
+    points = figure.Points([f"d{i}" for i in range(19)], shown.times_s, tracks)
+    found = memo.planar(tracks, shown.times_s)
     assert "19 are too many points" in _about_figure(found, points, 0.5)[1]
     figure.write_figure_csv(tmp_path, found, points)
     rows = csv.DictReader((tmp_path / "windows.csv").read_text().splitlines())

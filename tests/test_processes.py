@@ -36,6 +36,8 @@ def digest(found):
                 add(one)
         elif isinstance(part, np.ndarray):
             total.update(part.tobytes())
+        elif type(part).__module__ == "memo._memo":
+            add(part.__getnewargs__())
         else:
             total.update(repr(part).encode())
     add(found)
@@ -67,8 +69,8 @@ def tracked():
 
 def figure():
     motion = memo.walker_motion(60)
-    shown = memo.pointlight(motion["positions"], motion["times_s"], motion["names"], azimuth_deg=90.0)
-    return _memo.planar(shown["positions_px"][:, :6], motion["times_s"], 0.5)
+    shown = memo.pointlight(motion.positions, motion.times_s, motion.names, azimuth_deg=90.0)
+    return _memo.planar(shown.positions_px[:, :6], motion.times_s, 0.5)
 
 def postures(frames=4, progress=None):
     joints, _ = _memo.lee_chen_walker("SEQ1", frames)
@@ -322,5 +324,5 @@ def test_a_bug_in_the_core_is_an_ordinary_exception(capfd, way):
     copy = pickle.loads(pickle.dumps(caught.value))
     assert (type(copy), str(copy)) == (memo.InternalError, "a planted fault")
     motion = memo.walker_motion(30)
-    points = np.ascontiguousarray(motion["positions"][:, :4, :2]) * 100.0
-    assert memo.planar(points, motion["times_s"]).windows  # the threads still work
+    points = np.ascontiguousarray(motion.positions[:, :4, :2]) * 100.0
+    assert memo.planar(points, motion.times_s).windows  # the threads still work

@@ -579,8 +579,8 @@ def limb_folder(tmp_path_factory):
     """A folder as `memo planar` leaves it, of the synthetic walker's dots."""
     folder = tmp_path_factory.mktemp("limbs")
     walk = memo.walker_motion(72)
-    shown = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=60.0)
-    points = Points(list(walk["names"]), np.asarray(walk["times_s"]), np.asarray(shown["positions_px"]))
+    shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=60.0)
+    points = Points(list(walk.names), np.asarray(walk.times_s), np.asarray(shown.positions_px))
     write_figure_csv(folder, memo.planar(points.positions, points.times_s, 0.5), points)
     return folder
 

@@ -23,15 +23,15 @@ CAMERA = memo.Camera.level((1280, 720), 60.0, 1.2, 4.0)
 def walk_keypoints(frames=60):
     """Projections of the synthetic walker's joints, and their names."""
     walk = memo.walker_motion(frames, rate_hz=30, heading_deg=20)
-    pixels = np.stack([CAMERA.project(np.ascontiguousarray(row)) for row in walk["positions"]])
-    return np.asarray(walk["times_s"]), pixels, list(walk["names"])
+    pixels = np.stack([CAMERA.project(np.ascontiguousarray(row)) for row in walk.positions])
+    return np.asarray(walk.times_s), pixels, list(walk.names)
 
 
 def dots(frames=60):
     """Times and dots of a point-light display of the walker, with their names."""
     walk = memo.walker_motion(frames, rate_hz=30)
-    shown = memo.pointlight(walk["positions"], walk["times_s"], walk["names"], azimuth_deg=30)
-    return shown["times_s"], shown["positions_px"], list(walk["names"])
+    shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30)
+    return shown.times_s, shown.positions_px, list(walk.names)
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +127,24 @@ def test_a_result_survives_pickling(results, name):
     assert repr(again) == repr(result)
     for ours, theirs in zip(again.to_pandas().items(), result.to_pandas().items(), strict=True):
         pandas.testing.assert_series_equal(ours[1], theirs[1])
+
+
+def test_results_of_the_core_keep_every_field():
+    walk = memo.walker_motion(60, rate_hz=30)
+    shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30)
+    window = memo.planar(shown.positions_px, walk.times_s).windows[0]
+    places = np.random.default_rng(0).uniform([-2, 2, 0], [2, 6, 2], (12, 3))
+    camera = memo.calibrate_points(places, CAMERA.project(places), CAMERA.size)
+    for found in (walk, shown, window, window.chains[0], window.chains[0].links[0], camera):
+        again = pickle.loads(pickle.dumps(found))
+        assert repr(again) == repr(found) and len(repr(found)) < 120
+        for name in [name for name in dir(found) if not name.startswith("_")]:
+            ours, theirs = getattr(again, name), getattr(found, name)
+            if name in ("chains", "links"):
+                ours, theirs = list(map(repr, ours)), list(map(repr, theirs))
+            np.testing.assert_equal(ours, theirs, err_msg=name)
+        with pytest.raises(AttributeError):
+            setattr(found, name, None)
 
 
 def test_a_pickled_track_answers_all_it_did(track):

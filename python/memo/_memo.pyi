@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, Self, final
+from typing import Any, Final, Self, final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,20 @@ __all__ = [
     "ClothedScene",
     "Explainer",
     "InternalError",
+    "LimbSides",
+    "PlanarChain",
+    "PlanarInterpretation",
+    "PlanarLink",
+    "PlanarWindow",
+    "PointCalibration",
+    "PointLightDisplay",
+    "PostureSequence",
     "Scene",
+    "SecondMotion",
     "Tracker",
     "Walk",
+    "WalkerCalibration",
+    "WalkerMotion",
     "__version__",
     "_camera",
     "_panic",
@@ -302,6 +313,29 @@ def edge_segments(
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+
+@final
+class WalkerMotion:
+    """Motion of the body model."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    positions: Final[npt.NDArray[np.float64]]
+    times_s: Final[npt.NDArray[np.float64]]
+    names: Final[list[str]]
+    cycle_s: Final[float]
+
+@final
+class PointLightDisplay:
+    """A point-light display."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    positions_px: Final[npt.NDArray[np.float64]]
+    visible: Final[npt.NDArray[np.bool_]]
+    labels: Final[npt.NDArray[np.int64]]
+    limb_ends: Final[npt.NDArray[np.int64]]
+    fractions: Final[npt.NDArray[np.float64]]
+    times_s: Final[npt.NDArray[np.float64]]
+
 def walker_motion(
     frames: int = 60,
     *,
@@ -310,7 +344,7 @@ def walker_motion(
     heading_deg: float = 0.0,
     phase: float = 0.0,
     height_m: float = 1.75,
-) -> dict[str, Any]: ...
+) -> WalkerMotion: ...
 def pointlight(
     positions: npt.NDArray[np.float64],
     times_s: Sequence[float] | npt.NDArray[np.float64],
@@ -339,7 +373,65 @@ def pointlight(
     noise_speed_px_s: float = 60.0,
     noise_sd_px: float = 0.0,
     seed: int = 0,
-) -> dict[str, npt.NDArray[Any]]: ...
+) -> PointLightDisplay: ...
+
+@final
+class PlanarLink:
+    """Two points at a constant distance in space."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    points: Final[tuple[int, int]]
+    length: Final[float]
+    length_sd: Final[float]
+    margin: Final[float]
+    confidence: Final[float]
+
+@final
+class PlanarChain:
+    """One or two links in one plane."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    points: Final[list[int]]
+    links: Final[list[PlanarLink]]
+    slope: Final[tuple[float, float]]
+    tilt_deg: Final[float]
+    residual: Final[float]
+    reflection_margin_deg: Final[float | None]
+    verdict: Final[str]
+    statistic: Final[float]
+    threshold: Final[float]
+    motion: Final[float]
+    depth: Final[npt.NDArray[np.float64]]
+    angle_deg: Final[npt.NDArray[np.float64]]
+
+@final
+class PlanarWindow:
+    """The linkage in a window of time."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    start: Final[int]
+    end: Final[int]
+    status: Final[str]
+    planar: Final[int]
+    refuted: Final[int]
+    undecided: Final[int]
+    method: Final[str]
+    chains: Final[list[PlanarChain]]
+    joints: Final[list[tuple[int, int, float]]]
+    alone: Final[list[int]]
+    cost: Final[float]
+    size: Final[float]
+
+@final
+class PlanarInterpretation:
+    """What `memo.PlanarFigure` is made of."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    windows: Final[list[PlanarWindow]]
+    perspective_px: Final[float | None]
+    depth: Final[npt.NDArray[np.float64]]
+    sources: Final[list[str]]
+
 def planar(
     tracks: npt.NDArray[np.float64],
     times_s: Sequence[float] | npt.NDArray[np.float64],
@@ -354,7 +446,7 @@ def planar(
     scales: Sequence[float] | npt.NDArray[np.float64] | None = None,
     focal_px: float | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> dict[str, Any]: ...
+) -> PlanarInterpretation: ...
 def planar_rods(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 def planar_hinges(views: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
 def keypoint_layouts() -> list[str]: ...
@@ -375,6 +467,20 @@ def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int
 def follow_person(
     frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
 ) -> list[bool]: ...
+
+@final
+class LimbSides:
+    """Right and left of a limb."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    levels: Final[list[str]]
+    decided: Final[npt.NDArray[np.bool_]]
+    p_flipped: Final[npt.NDArray[np.float64]]
+    reason: Final[list[str]]
+    level_flipped: Final[npt.NDArray[np.bool_]]
+    level_p_flipped: Final[npt.NDArray[np.float64]]
+    p_global: Final[float]
+
 def unswap(
     times_s: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -385,7 +491,54 @@ def unswap(
     partial_begin_nats: float | None = None,
     partial_stay_nats: float | None = None,
     decided_at: float | None = None,
-) -> dict[str, Any]: ...
+) -> dict[str, LimbSides]: ...
+
+@final
+class SecondMotion:
+    """What `memo.postures.SecondBest` is made of."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    joints: Final[list[str]]
+    first_row: Final[int]
+    postures_m: Final[npt.NDArray[np.float64]]
+    margin_nats: Final[float]
+    p: Final[float]
+
+@final
+class PostureSequence:
+    """What `memo.Postures` is made of."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    lengths_m: Final[dict[str, float]]
+    length_sd_m: Final[dict[str, float]]
+    length_basis: Final[dict[str, str]]
+    scale_from: Final[str]
+    anchor_source: Final[list[str]]
+    anchor_conflicts: Final[list[str]]
+    anchor_m: Final[npt.NDArray[np.float64]]
+    anchor_sd_m: Final[npt.NDArray[np.float64]]
+    level_reached: Final[npt.NDArray[np.int64]]
+    level_survived: Final[npt.NDArray[np.int64]]
+    level_without_root: Final[npt.NDArray[np.int64]]
+    reasons: Final[list[list[tuple[str, str, int]]]]
+    reason_totals: Final[list[tuple[str, str, str, int, int, str]]]
+    survivors: Final[npt.NDArray[np.int64]]
+    groups_m: Final[list[npt.NDArray[np.float64]]]
+    group_sizes: Final[list[npt.NDArray[np.int64]]]
+    group_counts: Final[list[int | None]]
+    cut_all: Final[list[list[str] | None]]
+    problems: Final[list[str | None]]
+    linked_m: Final[npt.NDArray[np.float64]]
+    linked_breaks: Final[list[list[str]]]
+    smoothed_m: Final[npt.NDArray[np.float64]]
+    sd_m: Final[npt.NDArray[np.float64]]
+    gap_m: Final[npt.NDArray[np.float64]]
+    margin_nats: Final[npt.NDArray[np.float64]]
+    p_mirrored: Final[npt.NDArray[np.float64]]
+    second: Final[SecondMotion | None]
+    heading_source: Final[str]
+    warnings: Final[list[str]]
+
 def posture(
     times_s: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
@@ -405,7 +558,7 @@ def posture(
     group_m: float = 0.10,
     max_groups: int = 64,
     progress: Callable[[int, int], object] | None = None,
-) -> dict[str, Any]: ...
+) -> PostureSequence: ...
 def posture_tree(
     rays: npt.NDArray[np.float64],
     neck: Sequence[float],
@@ -415,6 +568,36 @@ def posture_tree(
     strength: str = "measured",
     noise_rad: float = 0.0,
 ) -> npt.NDArray[np.float64]: ...
+
+@final
+class PointCalibration:
+    """A camera calibrated from measured points."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    camera: Final[Camera]
+    estimates: Final[dict[str, tuple[float, float]]]
+    covariance: Final[npt.NDArray[np.float64]]
+    residuals_px: Final[npt.NDArray[np.float64]]
+    outliers: Final[list[int]]
+    rms_px: Final[float]
+    noise_px: Final[float]
+    degrees_of_freedom: Final[int]
+    is_planar: Final[bool]
+
+@final
+class WalkerCalibration:
+    """A camera calibrated from a walker."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    camera: Final[Camera]
+    estimates: Final[dict[str, tuple[float, float]]]
+    residuals_px: Final[npt.NDArray[np.float64]]
+    outliers: Final[list[int]]
+    rms_px: Final[float]
+    person_px: Final[float]
+    alike: Final[float]
+    places: Final[npt.NDArray[np.float64]]
+
 def calibrate_points(
     places: npt.ArrayLike,
     pixels: npt.ArrayLike,
@@ -422,7 +605,7 @@ def calibrate_points(
     *,
     focal_px: float | None = None,
     lens: Camera | None = None,
-) -> dict[str, Any]: ...
+) -> PointCalibration: ...
 def calibrate_walker(
     feet: npt.ArrayLike,
     heads: npt.ArrayLike,
@@ -433,7 +616,7 @@ def calibrate_walker(
     head_share: Sequence[float] | npt.NDArray[np.float64] | None = None,
     focal_px: float | None = None,
     lens: Camera | None = None,
-) -> dict[str, Any]: ...
+) -> WalkerCalibration: ...
 def walker_sightings(
     names: Sequence[str], points: npt.NDArray[np.float64]
 ) -> tuple[

@@ -94,27 +94,22 @@ class Points:
 class PlanarFigure:
     """The linkage found in tracks, window by window.
 
-    `windows` holds one dict each: start and end frame, status ("interpreted", "lost", "still", "unseen",
-    or "nothing linked" if points are visible but none linked),
-    the numbers of chains with the verdicts (planar, refuted, undecided), and the chains with points, links
-    (length, length_sd, margin, confidence), slope, tilt_deg, residual, verdict, statistic, threshold,
-    motion, depth, angle_deg and reflection_margin_deg (by how much joint limits prefer this reflection, None
-    if it is undecided). `depth` (T, K) is each point's depth relative to the first point of its chain
+    `depth` (T, K) is each point's depth relative to the first point of its chain
     in pixels, NaN if unknown, up to a reflection of each undecided chain; `sources` gives its source per
     frame. `perspective_px`: the largest displacement of a point by perspective, if a focal length was given.
     `points`: the tracks as given, with the names of the points or their numbers.
     """
 
-    windows: list[dict[str, Any]]
+    windows: list[_memo.PlanarWindow]
     depth: Array
     sources: list[str]
     perspective_px: float | None = None
     points: Points | None = None
 
     @property
-    def interpreted(self) -> list[dict[str, Any]]:
+    def interpreted(self) -> list[_memo.PlanarWindow]:
         """The windows that could be interpreted."""
-        return [window for window in self.windows if window["status"] == "interpreted"]
+        return [window for window in self.windows if window.status == "interpreted"]
 
     def links(self) -> list[tuple[int, int, float, float, int]]:
         """Links of the interpreted windows: two points, mean length, mean confidence, number of windows.
@@ -124,7 +119,7 @@ class PlanarFigure:
         found: dict[tuple[int, int], list[tuple[float, float]]] = {}
         for link, verdict in self._judged():
             if verdict != REFUTED:
-                found.setdefault(link["points"], []).append((link["length"], link["confidence"]))
+                found.setdefault(link.points, []).append((link.length, link.confidence))
         rows = [(a, b, *np.mean(seen, axis=0), len(seen)) for (a, b), seen in found.items()]
         return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
 
@@ -132,7 +127,7 @@ class PlanarFigure:
         """For each link in the interpreted windows, the number of windows with each verdict on its chain."""
         counts: dict[tuple[int, int], Counter[str]] = {}
         for link, verdict in self._judged():
-            counts.setdefault(link["points"], Counter())[verdict] += 1
+            counts.setdefault(link.points, Counter())[verdict] += 1
         return {points: dict(counts[points].most_common()) for points in sorted(counts)}
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -173,10 +168,10 @@ class PlanarFigure:
             f"{len(self.interpreted)} of {counted(len(self.windows), 'window')} interpreted)"
         )
 
-    def _judged(self) -> list[tuple[dict[str, Any], str]]:
+    def _judged(self) -> list[tuple[_memo.PlanarLink, str]]:
         """Links of the interpreted windows with the verdicts on their chains."""
-        chains = (chain for window in self.interpreted for chain in window["chains"])
-        return [(link, chain["verdict"]) for chain in chains for link in chain["links"]]
+        chains = (chain for window in self.interpreted for chain in window.chains)
+        return [(link, chain.verdict) for chain in chains for link in chain.links]
 
 
 def planar(
@@ -198,11 +193,9 @@ def planar(
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
     at_s = np.asarray(times_s, dtype=np.float64)
     found = _memo.planar(tracks, at_s, noise_px, progress=progress, **options)
-    for window in found["windows"]:
-        if window["status"] == "unseen" and np.isfinite(tracks[window["start"] : window["end"]]).any():
-            window["status"] = "nothing linked"
     names = options.get("names") or [str(number) for number in range(tracks.shape[1])]
-    figure = PlanarFigure(**found, points=Points(list(names), at_s, tracks))
+    points = Points(list(names), at_s, tracks)
+    figure = PlanarFigure(found.windows, found.depth, found.sources, found.perspective_px, points)
     _log.info("%r", figure)
     return figure
 
@@ -280,22 +273,22 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
     name = points.names.__getitem__
     links, chains, windows = [], [], []
     for number, window in enumerate(figure.windows):
-        start_s, end_s = (float(points.times_s[frame]) for frame in (window["start"], window["end"] - 1))
-        verdicts = [str(window[key]) for key in ("planar", "refuted", "undecided")]
+        start_s, end_s = (float(points.times_s[frame]) for frame in (window.start, window.end - 1))
+        verdicts = [str(count) for count in (window.planar, window.refuted, window.undecided)]
         times = [f"{start_s:.3f}", f"{end_s:.3f}"]
-        windows.append([str(number), *times, window["status"], window.get("method", ""), *verdicts])
-        for chain in window["chains"]:
-            label = "-".join(name(point) for point in chain["points"])
-            values = [chain[key] for key in ("tilt_deg", "residual", "motion", "statistic", "threshold")]
-            angles = chain["angle_deg"]
+        windows.append([str(number), *times, window.status, window.method, *verdicts])
+        for chain in window.chains:
+            label = "-".join(name(point) for point in chain.points)
+            values = [chain.tilt_deg, chain.residual, chain.motion, chain.statistic, chain.threshold]
+            angles = chain.angle_deg
             bend = [np.nanmin(angles), np.nanmax(angles)] if np.isfinite(angles).any() else [np.nan] * 2
-            margin = chain["reflection_margin_deg"]
-            numbers = [*chain["slope"], *values, *bend, np.nan if margin is None else margin]
-            chains.append([str(number), label, chain["verdict"], *_cells(numbers)])
-            for link in chain["links"]:
-                a, b = link["points"]
-                numbers = [link[key] for key in ("length", "length_sd", "margin", "confidence")]
-                labels = [str(number), window["status"], name(a), name(b), chain["verdict"]]
+            margin = chain.reflection_margin_deg
+            numbers = [*chain.slope, *values, *bend, np.nan if margin is None else margin]
+            chains.append([str(number), label, chain.verdict, *_cells(numbers)])
+            for link in chain.links:
+                a, b = link.points
+                numbers = [link.length, link.length_sd, link.margin, link.confidence]
+                labels = [str(number), window.status, name(a), name(b), chain.verdict]
                 links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
     window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]

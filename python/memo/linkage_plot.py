@@ -31,20 +31,20 @@ COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4
 def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *, names: bool = True) -> Axes:
     """The points in the middle of a window, where most are visible, with trails, links and confidence."""
     part = figure.windows[window]
-    tracks = points.positions[part["start"] : part["end"]]
+    tracks = points.positions[part.start : part.end]
     middle = tracks[_fullest(tracks)]
     against = tracks - _centre(tracks) + _centre(middle[None])
     ax.plot(against[..., 0], against[..., 1], color="#bbbbbb", linewidth=0.6, zorder=1)
-    for index, chain in enumerate(part["chains"]):
+    for index, chain in enumerate(part.chains):
         colour = COLOURS[index % len(COLOURS)]
-        for link in chain["links"]:
-            a, b = link["points"]
+        for link in chain.links:
+            a, b = link.points
             ends = middle[[a, b]]
             ax.plot(ends[:, 0], ends[:, 1], color=colour, linewidth=3)
-            if np.isfinite(link["confidence"]):
-                text = f" {link['length']:.0f} px, {link['confidence']:.0%}"
+            if np.isfinite(link.confidence):
+                text = f" {link.length:.0f} px, {link.confidence:.0%}"
                 ax.annotate(text, ends.mean(axis=0), fontsize=7, color=colour)
-    for a, b, _ in part["joints"]:
+    for a, b, _ in part.joints:
         ax.plot(middle[[a, b], 0], middle[[a, b], 1], color="#888888", linewidth=1, linestyle=":")
     ax.plot(middle[:, 0], middle[:, 1], "o", color="black", markersize=5)
     if names:
@@ -52,14 +52,14 @@ def plot_linkage(ax: Axes, points: Points, figure: PlanarFigure, window: int, *,
             ax.annotate(name, place, fontsize=7, xytext=(-4, 4), textcoords="offset points", ha="right")
     ax.set(aspect="equal", xlabel="u, px", ylabel="v, px")
     ax.invert_yaxis()
-    start_s, end_s = points.times_s[part["start"]], points.times_s[part["end"] - 1]
-    ax.set_title(f"{start_s:.2f} to {end_s:.2f} s: {part['status']}", loc="left")
+    start_s, end_s = points.times_s[part.start], points.times_s[part.end - 1]
+    ax.set_title(f"{start_s:.2f} to {end_s:.2f} s: {part.status}", loc="left")
     return ax
 
 
 def telling_window(figure: PlanarFigure) -> int:
     """The first interpreted window, or else the first window."""
-    states = [window["status"] for window in figure.windows]
+    states = [window.status for window in figure.windows]
     return states.index("interpreted") if "interpreted" in states else 0
 
 
@@ -156,7 +156,7 @@ def write_turned_png(
     drawing = Figure(figsize=(10, 6.5), layout="constrained")
     FigureCanvasAgg(drawing)
     grid = drawing.subplots(2, 5, sharex=True, sharey=True)
-    for column, frame in enumerate(np.linspace(window["start"], window["end"] - 1, 5).astype(int)):
+    for column, frame in enumerate(np.linspace(window.start, window.end - 1, 5).astype(int)):
         for ax, places in zip(grid[:, column], (flat, turned), strict=True):
             for index, a, b in links_at[frame]:
                 ends = places[frame, [a, b]]
@@ -178,12 +178,8 @@ def _links_by_frame(figure: PlanarFigure, frames: int) -> list[list[tuple[int, i
     def links(frame: int) -> list[tuple[int, int, int]]:
         if not read:
             return []
-        window = min(read, key=lambda w: abs(w["start"] + w["end"] - 2 * frame - 1))
-        return [
-            (index, *link["points"])
-            for index, chain in enumerate(window["chains"])
-            for link in chain["links"]
-        ]
+        window = min(read, key=lambda w: abs(w.start + w.end - 2 * frame - 1))
+        return [(index, *link.points) for index, chain in enumerate(window.chains) for link in chain.links]
 
     return [links(frame) for frame in range(frames)]
 

@@ -372,10 +372,10 @@ def posture(
         max_groups=max_groups,
         progress=progress,
     )
-    found["warnings"] = [*_head_down(found["linked"]), *found["warnings"]]
-    for warning in found["warnings"]:
+    postures = _named(found, used, camera, points_px, weights, repair)
+    for warning in postures.warnings:
         _log.warning("%s", warning)
-    return _named(found, used, camera, points_px, weights, repair)
+    return postures
 
 
 def _check_known(what: str, value: str, known: Sequence[str]) -> None:
@@ -490,14 +490,14 @@ def _stick_points(keypoints: Keypoints) -> tuple[Array, Array, Array | None]:
 
 
 def _named(
-    found: dict[str, Any],
+    found: _memo.PostureSequence,
     keypoints: Keypoints,
     camera: _memo.Camera,
     points_px: Array,
     weights: Array,
     repair: sides.SideRepair | None,
 ) -> Postures:
-    second = found["second"]
+    second = found.second
     return Postures(
         frames=keypoints.frames,
         times_s=keypoints.times_s,
@@ -505,50 +505,46 @@ def _named(
         camera=camera,
         points_px=points_px,
         weights=weights,
-        lengths_m=dict(found["lengths"]),
-        length_sd_m=dict(found["length_sd"]),
-        length_basis=dict(found["length_basis"]),
-        scale_from=found["scale_from"],
-        anchor_m=found["anchor_m"],
-        anchor_sd_m=found["anchor_sd_m"],
-        anchor_source=tuple(found["anchor_source"]),
-        anchor_conflicts=tuple(found["anchor_conflicts"]),
-        level_reached=_whole(found["level_reached"]),
-        level_survived=_whole(found["level_survived"]),
-        level_without_root=_whole(found["level_without_root"]),
-        reasons=tuple(tuple(Reason(*row) for row in frame) for frame in found["reasons"]),
-        reason_totals=tuple(ReasonTotal(*row) for row in found["reason_totals"]),
-        survivors=_whole(found["survivors"]),
-        groups_m=tuple(np.asarray(groups).reshape(-1, 14, 3) for groups in found["groups"]),
-        group_sizes=tuple(_whole(sizes) for sizes in found["group_sizes"]),
-        group_counts=tuple(found["group_counts"]),
-        problems=tuple(found["problems"]),
-        cut_all=tuple(None if why is None else tuple(why) for why in found["cut_all"]),
-        linked_m=found["linked"],
-        linked_breaks=tuple(map(tuple, found["linked_breaks"])),
-        smoothed_m=found["smoothed"],
-        sd_m=found["sd_m"],
-        gap_m=found["gap_m"],
-        margin_nats=found["margin"],
-        p_mirrored=found["p_mirrored"],
+        lengths_m=found.lengths_m,
+        length_sd_m=found.length_sd_m,
+        length_basis=found.length_basis,
+        scale_from=found.scale_from,
+        anchor_m=found.anchor_m,
+        anchor_sd_m=found.anchor_sd_m,
+        anchor_source=tuple(found.anchor_source),
+        anchor_conflicts=tuple(found.anchor_conflicts),
+        level_reached=found.level_reached,
+        level_survived=found.level_survived,
+        level_without_root=found.level_without_root,
+        reasons=tuple(tuple(Reason(*row) for row in frame) for frame in found.reasons),
+        reason_totals=tuple(ReasonTotal(*row) for row in found.reason_totals),
+        survivors=found.survivors,
+        groups_m=tuple(found.groups_m),
+        group_sizes=tuple(found.group_sizes),
+        group_counts=tuple(found.group_counts),
+        problems=tuple(found.problems),
+        cut_all=tuple(None if why is None else tuple(why) for why in found.cut_all),
+        linked_m=found.linked_m,
+        linked_breaks=tuple(map(tuple, found.linked_breaks)),
+        smoothed_m=found.smoothed_m,
+        sd_m=found.sd_m,
+        gap_m=found.gap_m,
+        margin_nats=found.margin_nats,
+        p_mirrored=found.p_mirrored,
         second=None
         if second is None
         else SecondBest(
-            joints=tuple(second["joints"]),
-            first_frame=int(keypoints.frames[second["from"]]),
-            last_frame=int(keypoints.frames[second["from"] + len(second["postures"]) - 1]),
-            postures_m=second["postures"],
-            margin_nats=second["margin"],
-            p=second["p"],
+            joints=tuple(second.joints),
+            first_frame=int(keypoints.frames[second.first_row]),
+            last_frame=int(keypoints.frames[second.first_row + len(second.postures_m) - 1]),
+            postures_m=second.postures_m,
+            margin_nats=second.margin_nats,
+            p=second.p,
         ),
-        heading_source=found["heading_source"],
-        warnings=tuple(found["warnings"]),
+        heading_source=found.heading_source,
+        warnings=(*_head_down(found.linked_m), *found.warnings),
         repair=repair,
     )
-
-
-def _whole(numbers: npt.ArrayLike) -> Whole:
-    return np.asarray(numbers, np.int64)
 
 
 # Lengths.

@@ -101,12 +101,12 @@ def unswap(
     points, scores = keypoints.points.copy(), keypoints.scores.copy()
     for group, levels in pairs.items():
         for level, at in enumerate(levels.values()):
-            rows = np.flatnonzero(found[group]["level_flipped"][:, level])[:, None]
+            rows = np.flatnonzero(found[group].level_flipped[:, level])[:, None]
             for left, right in at:
                 points[rows, [left, right]] = points[rows, [right, left]]
                 scores[rows, [left, right]] = scores[rows, [right, left]]
-    exchanged = {group: found[group]["level_flipped"].any(axis=1) for group in pairs}
-    decided = {group: found[group]["decided"] for group in pairs}
+    exchanged = {group: found[group].level_flipped.any(axis=1) for group in pairs}
+    decided = {group: found[group].decided for group in pairs}
     flips = [row for group in pairs for row in _rows(keypoints, group, found[group])]
     return SideRepair(
         keypoints=keypoints.replaced(points, scores),
@@ -114,7 +114,7 @@ def unswap(
         exchanged={group: int((exchanged[group] & decided[group]).sum()) for group in pairs},
         guessed={group: int((exchanged[group] & ~decided[group]).sum()) for group in pairs},
         undecided={group: int((~decided[group]).sum()) for group in pairs},
-        p_global={group: float(found[group]["p_global"]) for group in pairs},
+        p_global={group: found[group].p_global for group in pairs},
     )
 
 
@@ -127,8 +127,8 @@ def _levels(names: Sequence[str], group: str) -> dict[str, list[tuple[int, int]]
     return {level: pairs for level, pairs in levels.items() if pairs}
 
 
-def _rows(keypoints: Keypoints, group: str, found: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    flipped, probability = found["level_flipped"], found["level_p_flipped"]
+def _rows(keypoints: Keypoints, group: str, found: _memo.LimbSides) -> Iterator[dict[str, Any]]:
+    flipped, probability, reasons = found.level_flipped, found.level_p_flipped, found.reason
 
     def row(first: int, last: int, told: int, levels: Any, verdict: str, p: float) -> dict[str, Any]:
         return {
@@ -139,16 +139,16 @@ def _rows(keypoints: Keypoints, group: str, found: dict[str, Any]) -> Iterator[d
             "levels": " ".join(levels),
             "verdict": verdict,
             "probability": p,
-            "reason": found["reason"][told],
+            "reason": reasons[told],
         }
 
     for t in np.flatnonzero(flipped.any(axis=1)).tolist():
-        levels = [name for name, own in zip(found["levels"], flipped[t], strict=True) if own]
-        verdict = "flipped" if found["decided"][t] else "guessed"
+        levels = [name for name, own in zip(found.levels, flipped[t], strict=True) if own]
+        verdict = "flipped" if found.decided[t] else "guessed"
         yield row(t, t, t, levels, verdict, float(probability[t][flipped[t]].min()))
-    doubt = np.flatnonzero(~found["decided"])
+    doubt = np.flatnonzero(~found.decided)
     for run in np.split(doubt, np.flatnonzero(np.diff(doubt) > 1) + 1):
         if len(run):
-            least_sure = run[np.argmin(np.abs(found["p_flipped"][run] - 0.5))]
-            p = float(found["p_flipped"][least_sure])
-            yield row(run[0], run[-1], least_sure, found["levels"], "undecided", p)
+            least_sure = run[np.argmin(np.abs(found.p_flipped[run] - 0.5))]
+            p = float(found.p_flipped[least_sure])
+            yield row(run[0], run[-1], least_sure, found.levels, "undecided", p)

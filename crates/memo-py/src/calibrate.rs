@@ -5,45 +5,88 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::result::result;
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::{
     Estimate, KnownLens, PointOptions, Sighting, WalkerOptions, camera_from_points, camera_from_walker,
-    sightings_from_joints,
+    points, sightings_from_joints, walker,
 };
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
+
+result! {
+    /// A camera calibrated from measured points, and its uncertainty.
+    PointCalibration |py, found: points::PointCalibration| {
+        /// The camera.
+        camera: PyCamera = PyCamera(found.camera),
+        /// Value and standard deviation of what was fitted: `focal_px`, `centre_u_px`, `centre_v_px`, `k1`, `k2`, and
+        /// the camera's position `x_m`, `y_m`, `z_m`. Standard deviations are NaN if there are as many equations as
+        /// unknowns.
+        estimates: Py<PyDict> = estimates(py, &found.estimates)?,
+        /// Covariance (n, n) of the fitted parameters: those of the lens as in `estimates`, but with the logarithm of
+        /// the focal length, then the rotation (a vector in camera axes, radians) and the translation, metres.
+        covariance: Py<PyArray2<f64>> =
+            numpy_from_column(py, found.covariance.as_slice().to_vec()).reshape(found.covariance.shape())?,
+        /// Projected minus given pixel of every point, (N, 2).
+        residuals_px: Py<PyArray2<f64>> = residuals(py, &found.residuals_px)?,
+        /// Indices of the points left out, from 0.
+        outliers: Vec<usize>,
+        /// Root mean square distance of projected and given pixels, over the points not left out.
+        rms_px: f64,
+        /// Standard deviation of a pixel coordinate, estimated from the residuals.
+        noise_px: f64,
+        /// Number of equations minus number of unknowns.
+        degrees_of_freedom: usize,
+        /// Whether all points lie in one plane.
+        is_planar: bool,
+    }
+    |own| format!("{:.3} px RMS, {} left out", own.rms_px, counted(own.outliers.len(), "point"))
+}
+
+result! {
+    /// A camera calibrated from a walker, and its uncertainty. The origin is on the ground below the mean position of
+    /// the person, Y is the viewing direction.
+    WalkerCalibration |py, found: walker::WalkerCalibration| {
+        /// The camera.
+        camera: PyCamera = PyCamera(found.camera),
+        /// Value and standard deviation of `focal_px` unless it was given, `pitch_deg` (down), `roll_deg`, and
+        /// `height_m` of the camera.
+        estimates: Py<PyDict> = estimates(py, &found.estimates)?,
+        /// Fitted minus measured head of every sighting (N, 2), pixels; NaN where the feet are above the horizon.
+        residuals_px: Py<PyArray2<f64>> = residuals(py, &found.residuals_px)?,
+        /// Indices of the sightings left out, from 0.
+        outliers: Vec<usize>,
+        /// Root mean square of the residuals of the other sightings.
+        rms_px: f64,
+        /// Median distance between head and feet.
+        person_px: f64,
+        /// Number of consecutive sightings with similar errors.
+        alike: f64,
+        /// Where the person stood (N, 3), world axes, metres; NaN where the feet are above the horizon.
+        places: Py<PyArray2<f64>> = numpy_from_rows(py, found.places.iter().map(|p| p.to_array()).collect())?,
+    }
+    |own| format!("{:.3} px RMS, {} left out", own.rms_px, counted(own.outliers.len(), "sighting"))
+}
 
 /// The camera that projects points (N, 3), metres, to pixels (N, 2).
 #[pyfunction]
 #[pyo3(signature = (places, pixels, size, *, focal_px=None, lens=None))]
-pub fn calibrate_points<'py>(
-    py: Python<'py>,
-    places: &Bound<'py, PyAny>,
-    pixels: &Bound<'py, PyAny>,
+pub fn calibrate_points(
+    py: Python<'_>,
+    places: &Bound<'_, PyAny>,
+    pixels: &Bound<'_, PyAny>,
     size: (u32, u32),
     focal_px: Option<f64>,
     lens: Option<PyCamera>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<PointCalibration> {
     let places: Vec<DVec3> = points_from_numpy(places)?.into_iter().map(DVec3::from).collect();
     let pixels = pixels_from_numpy(pixels)?;
     let options = PointOptions { size: size.into(), lens: known_lens(focal_px, lens)? };
     let found = py.detach(|| camera_from_points(&places, &pixels, &options)).map_err(value_error)?;
-    let dict = PyDict::new(py);
-    dict.set_item("camera", PyCamera(found.camera))?;
-    dict.set_item("estimates", estimates(py, &found.estimates)?)?;
-    let rows = found.covariance.nrows();
-    let covariance = numpy_from_column(py, found.covariance.as_slice().to_vec()).reshape([rows, rows])?;
-    dict.set_item("covariance", covariance)?;
-    dict.set_item("residuals_px", numpy_from_rows(py, residuals(&found.residuals_px))?)?;
-    dict.set_item("outliers", found.outliers)?;
-    dict.set_item("rms_px", found.rms_px)?;
-    dict.set_item("noise_px", found.noise_px)?;
-    dict.set_item("degrees_of_freedom", found.degrees_of_freedom)?;
-    dict.set_item("is_planar", found.is_planar)?;
-    Ok(dict)
+    PointCalibration::of(py, found)
 }
 
 /// The camera that sees a person of `height_m` with feet (N, 2) and heads (N, 2), pixels in order of time. The
@@ -52,17 +95,17 @@ pub fn calibrate_points<'py>(
 #[pyfunction]
 #[pyo3(signature = (feet, heads, size, height_m, *, foot_share=None, head_share=None, focal_px=None, lens=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
-pub fn calibrate_walker<'py>(
-    py: Python<'py>,
-    feet: &Bound<'py, PyAny>,
-    heads: &Bound<'py, PyAny>,
+pub fn calibrate_walker(
+    py: Python<'_>,
+    feet: &Bound<'_, PyAny>,
+    heads: &Bound<'_, PyAny>,
     size: (u32, u32),
     height_m: f64,
     foot_share: Option<Vec<f64>>,
     head_share: Option<Vec<f64>>,
     focal_px: Option<f64>,
     lens: Option<PyCamera>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<WalkerCalibration> {
     let (feet, heads) = (pixels_from_numpy(feet)?, pixels_from_numpy(heads)?);
     let shares = |given: Option<Vec<f64>>, usual| given.unwrap_or_else(|| vec![usual; feet.len()]);
     let (foot_share, head_share) = (shares(foot_share, 0.0), shares(head_share, 1.0));
@@ -83,16 +126,7 @@ pub fn calibrate_walker<'py>(
     let sightings: Vec<Sighting> = (0..feet.len()).map(sighting).collect();
     let options = WalkerOptions { size: size.into(), height_m, lens: known_lens(focal_px, lens)? };
     let found = py.detach(|| camera_from_walker(&sightings, &options)).map_err(value_error)?;
-    let dict = PyDict::new(py);
-    dict.set_item("camera", PyCamera(found.camera))?;
-    dict.set_item("estimates", estimates(py, &found.estimates)?)?;
-    dict.set_item("residuals_px", numpy_from_rows(py, residuals(&found.residuals_px))?)?;
-    dict.set_item("outliers", found.outliers)?;
-    dict.set_item("rms_px", found.rms_px)?;
-    dict.set_item("person_px", found.person_px)?;
-    dict.set_item("alike", found.alike)?;
-    dict.set_item("places", numpy_from_rows(py, found.places.iter().map(|p| p.to_array()).collect())?)?;
-    Ok(dict)
+    WalkerCalibration::of(py, found)
 }
 
 /// Feet and heads of a person from joints over time (T, K, 2): feet (N, 2), heads (N, 2), and the heights of both
@@ -144,15 +178,11 @@ fn known_lens(focal_px: Option<f64>, lens: Option<PyCamera>) -> PyResult<KnownLe
     }
 }
 
-/// A dict of (value, standard deviation) by name.
+/// (value, standard deviation) by name.
 fn estimates<'py>(py: Python<'py>, estimates: &[Estimate]) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    for estimate in estimates {
-        dict.set_item(estimate.name, (estimate.value, estimate.sd))?;
-    }
-    Ok(dict)
+    estimates.iter().map(|estimate| (estimate.name, (estimate.value, estimate.sd))).into_py_dict(py)
 }
 
-fn residuals(residuals_px: &[DVec2]) -> Vec<[f64; 2]> {
-    residuals_px.iter().map(|r| r.to_array()).collect()
+fn residuals<'py>(py: Python<'py>, residuals_px: &[DVec2]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    numpy_from_rows(py, residuals_px.iter().map(|r| r.to_array()).collect())
 }

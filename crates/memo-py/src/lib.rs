@@ -13,6 +13,7 @@ mod pointlight;
 mod pool;
 mod posture;
 mod reproduce;
+mod result;
 mod score;
 mod synth;
 mod tracker;
@@ -27,7 +28,9 @@ mod _memo {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use super::calibrate::{calibrate_points, calibrate_walker, walker_sightings};
+    use super::calibrate::{
+        PointCalibration, WalkerCalibration, calibrate_points, calibrate_walker, walker_sightings,
+    };
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
@@ -40,11 +43,13 @@ mod _memo {
         stick_joints,
     };
     #[pymodule_export]
-    use super::planar::{planar, planar_hinges, planar_rods};
+    use super::planar::{
+        PlanarChain, PlanarInterpretation, PlanarLink, PlanarWindow, planar, planar_hinges, planar_rods,
+    };
     #[pymodule_export]
-    use super::pointlight::{pointlight, walker_motion};
+    use super::pointlight::{PointLightDisplay, WalkerMotion, pointlight, walker_motion};
     #[pymodule_export]
-    use super::posture::{posture, posture_tree};
+    use super::posture::{PostureSequence, SecondMotion, posture, posture_tree};
     #[pymodule_export]
     use super::reproduce::hoffman_flinchbaugh::{
         hoffman_flinchbaugh_degenerate, hoffman_flinchbaugh_false_targets, hoffman_flinchbaugh_hinges,
@@ -67,7 +72,7 @@ mod _memo {
     #[pymodule_export]
     use super::tracker::{PyTracker, PyWalk};
     #[pymodule_export]
-    use super::unswap::unswap;
+    use super::unswap::{LimbSides, unswap};
     #[pymodule_export]
     use super::wait::panic_on_purpose;
 

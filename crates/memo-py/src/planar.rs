@@ -2,19 +2,119 @@
 
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat, rows_from_numpy};
 use crate::error::value_error;
+use crate::result::{objects, result};
 use crate::wait::watched;
 use glam::DVec2;
 use memo_core::planar::{
-    Chain, DepthSource, EvidenceOptions, FalseTargetRate, Figure, FigureOptions, FitOptions, Interpretation,
-    Method, Status, Undecided, Verdict, at_one_scale, hinge_depths, interpret_with_progress, joint_of,
-    perspective_of_figure_px, rod_depths,
+    Chain, DepthSource, EvidenceOptions, FalseTargetRate, FigureOptions, FigureWindow, FitOptions,
+    Interpretation, Link, Method, Status, Undecided, Verdict, at_one_scale, hinge_depths,
+    interpret_with_progress, joint_of, perspective_of_figure_px, rod_depths,
 };
 use memo_core::progress::Progress;
-use numpy::PyArrayDyn;
+use memo_core::wording::counted;
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 use std::sync::Arc;
+
+result! {
+    /// Two points at a constant distance in space. Lengths are in pixels.
+    PlanarLink |_py, link: &Link| {
+        /// The two points, the lower number first.
+        points: (usize, usize),
+        /// Length.
+        length: f64,
+        /// Standard deviation of the length.
+        length_sd: f64,
+        /// Extra cost of the best figure without this link, infinite if there is none.
+        margin: f64,
+        /// Share of the weight of all figures that contain this link, 0 to 1; NaN for the method "forest".
+        confidence: f64,
+    }
+    |own| format!("{} - {}, {:.1} px", own.points.0, own.points.1, own.length)
+}
+
+result! {
+    /// One or two links in one plane over the frames of a window. Lengths are in pixels.
+    PlanarChain |py, chain: &Chain| {
+        /// End and end, or end, pivot and end.
+        points: Vec<usize> = chain.points.clone(),
+        /// The links, in that order.
+        links: Vec<Py<PlanarLink>> = objects(py, chain.links.iter().map(|link| PlanarLink::of(py, link)))?,
+        /// Slopes p and q of the plane.
+        slope: (f64, f64) = (chain.plane.p, chain.plane.q),
+        /// Angle between the plane and the image.
+        tilt_deg: f64 = chain.plane.tilt_rad().to_degrees(),
+        /// Root mean square of the residuals.
+        residual: f64 = chain.residual_rms,
+        /// By how much joint limits prefer this reflection, None if it is undecided.
+        reflection_margin_deg: Option<f64> = chain.reflection_margin_deg,
+        /// "planar", "not planar", "little motion", "edge-on", "few views" or "unfalsifiable".
+        verdict: String = verdict(chain.evidence.verdict),
+        /// F, infinite without redundancy.
+        statistic: f64 = chain.evidence.statistic,
+        /// Largest F that counts as planar.
+        threshold: f64 = chain.evidence.threshold,
+        /// Root mean square motion of the link that moves least.
+        motion: f64 = chain.evidence.motion,
+        /// (frames, points) depth relative to the first point, NaN if not seen; all signs may be opposite.
+        depth: Py<PyArrayDyn<f64>> =
+            numpy_from_flat(py, chain.depth.concat(), vec![chain.depth.len(), chain.points.len()])?,
+        /// (frames,) angle at the pivot, 180 if straight; empty for one link.
+        angle_deg: Py<PyArray1<f64>> =
+            numpy_from_column(py, chain.angle_rad.iter().map(|angle| angle.to_degrees()).collect()),
+    }
+    |own| format!("{:?}, {}, tilted {:.0} deg", own.points, own.verdict, own.tilt_deg)
+}
+
+result! {
+    /// The linkage in a window of time.
+    PlanarWindow |py, window: &FigureWindow, tracks: &[Vec<DVec2>]| {
+        /// First frame.
+        start: usize = window.start,
+        /// Last frame plus one.
+        end: usize = window.end,
+        /// "interpreted", "lost", "still", "unseen", or "nothing linked" if points are visible but none linked.
+        status: String = status(window, tracks),
+        /// Number of chains that move in their plane.
+        planar: usize = window.chains[0],
+        /// Number of chains that leave it.
+        refuted: usize = window.chains[1],
+        /// Number of chains without a verdict.
+        undecided: usize = window.chains[2],
+        /// "cover", or "forest" if there are too many points to compare all links.
+        method: String = if window.figure.method == Method::Cover { "cover" } else { "forest" },
+        /// The chains of the best figure, also if the status is "lost".
+        chains: Vec<Py<PlanarChain>> =
+            objects(py, window.figure.chains.iter().map(|chain| PlanarChain::of(py, chain)))?,
+        /// Contacts of chains and single points, best first: two points, and how far apart they are.
+        joints: Vec<(usize, usize, f64)> =
+            window.figure.joints.iter().map(|j| (j.points[0], j.points[1], j.apart)).collect::<Vec<_>>(),
+        /// Points in no chain.
+        alone: Vec<usize> = window.figure.alone.clone(),
+        /// Cost of the figure, pixels; NaN for the method "forest".
+        cost: f64 = window.figure.cost,
+        /// Size to which costs are relative, pixels.
+        size: f64 = window.figure.size,
+    }
+    |own| {
+        let chains = counted(own.chains.len(), "chain");
+        format!("frames {} to {}, {}, {chains}", own.start, own.end, own.status)
+    }
+}
+
+result! {
+    /// What `memo.PlanarFigure` is made of.
+    PlanarInterpretation |py, found: Interpretation, tracks: &[Vec<DVec2>], focal_px: Option<f64>| {
+        windows: Vec<Py<PlanarWindow>> =
+            objects(py, found.windows.iter().map(|window| PlanarWindow::of(py, window, tracks)))?,
+        perspective_px: Option<f64> = focal_px.map(|px| perspective_of_figure_px(tracks, &found.depth, px)),
+        depth: Py<PyArrayDyn<f64>> =
+            numpy_from_flat(py, found.depth, vec![found.sources.len(), tracks.len()])?,
+        sources: Vec<String> = found.sources.iter().map(|&of| source(of).to_owned()).collect::<Vec<_>>(),
+    }
+    |own| counted(own.windows.len(), "window")
+}
 
 /// Depths z1, z2, z3 (N, 3) of N rods from three views each: image vectors (N, 3, 2) from pivot to end. NaN for
 /// rods without a solution.
@@ -48,19 +148,15 @@ pub fn planar_hinges<'py>(
 /// `names`: names of the points that are joints (`RKN` or `right_knee`); joint limits then distinguish limbs from
 /// their mirror images. `scales` (T,): scale of each frame, by which its points are divided. `focal_px`: focal
 /// length in pixels. `progress` is called with the number of windows done and the number of all windows.
-///
-/// Returns windows (a list of dicts); depth (T, K) relative to the first point of each chain, NaN if unknown;
-/// sources (T,) of "planar", "carried" or "unknown"; and perspective_px, the largest displacement of a point by
-/// perspective, None without `focal_px`.
 #[pyfunction]
 #[pyo3(signature = (
     tracks, times_s, noise_px=0.0, *, window_s=1.2, size_px=None, carry=false, false_target_rate=0.01,
     max_tilt_deg=80.0, names=None, scales=None, focal_px=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keyword options")]
-pub fn planar<'py>(
-    py: Python<'py>,
-    tracks: &Bound<'py, PyAny>,
+pub fn planar(
+    py: Python<'_>,
+    tracks: &Bound<'_, PyAny>,
     times_s: Vec<f64>,
     noise_px: f64,
     window_s: f64,
@@ -71,8 +167,8 @@ pub fn planar<'py>(
     names: Option<Vec<String>>,
     scales: Option<Vec<f64>>,
     focal_px: Option<f64>,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PlanarInterpretation> {
     let (points, frames, count) = motion_from_numpy::<2>(tracks)?;
     let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
     let Some(rate) = rates.into_iter().find(|rate| rate.fraction() == false_target_rate) else {
@@ -101,93 +197,17 @@ pub fn planar<'py>(
         interpret_with_progress(&of_worker, joints.as_deref(), &times_s, &options, progress)
     };
     let found = watched(py, progress, interpret)?.map_err(value_error)?;
-    let perspective_px = focal_px.map(|focal_px| perspective_of_figure_px(&tracks, &found.depth, focal_px));
-    let result = dict_of(py, found, frames, count)?;
-    result.set_item("perspective_px", perspective_px)?;
-    Ok(result)
+    PlanarInterpretation::of(py, found, &tracks, focal_px)
 }
 
-fn dict_of(
-    py: Python<'_>,
-    found: Interpretation,
-    frames: usize,
-    count: usize,
-) -> PyResult<Bound<'_, PyDict>> {
-    let windows = PyList::empty(py);
-    for window in &found.windows {
-        let row = figure(py, &window.figure)?;
-        row.set_item("start", window.start)?;
-        row.set_item("end", window.end)?;
-        row.set_item("status", status(window.status))?;
-        let [planar, refuted, undecided] = window.chains;
-        row.set_item("planar", planar)?;
-        row.set_item("refuted", refuted)?;
-        row.set_item("undecided", undecided)?;
-        windows.append(row)?;
-    }
-    let sources: Vec<&str> = found.sources.iter().map(|s| source(*s)).collect();
-    let result = PyDict::new(py);
-    result.set_item("windows", windows)?;
-    result.set_item("depth", numpy_from_flat(py, found.depth, vec![frames, count])?)?;
-    result.set_item("sources", sources)?;
-    Ok(result)
-}
-
-fn figure<'py>(py: Python<'py>, figure: &Figure) -> PyResult<Bound<'py, PyDict>> {
-    let chains = PyList::empty(py);
-    for part in &figure.chains {
-        chains.append(chain(py, part)?)?;
-    }
-    let row = PyDict::new(py);
-    row.set_item("method", if figure.method == Method::Cover { "cover" } else { "forest" })?;
-    row.set_item("chains", chains)?;
-    row.set_item(
-        "joints",
-        figure.joints.iter().map(|j| (j.points[0], j.points[1], j.apart)).collect::<Vec<_>>(),
-    )?;
-    row.set_item("alone", figure.alone.clone())?;
-    row.set_item("cost", figure.cost)?;
-    row.set_item("size", figure.size)?;
-    Ok(row)
-}
-
-fn chain<'py>(py: Python<'py>, chain: &Chain) -> PyResult<Bound<'py, PyDict>> {
-    let links = PyList::empty(py);
-    for link in &chain.links {
-        let row = PyDict::new(py);
-        row.set_item("points", (link.points[0], link.points[1]))?;
-        row.set_item("length", link.length)?;
-        row.set_item("length_sd", link.length_sd)?;
-        row.set_item("margin", link.margin)?;
-        row.set_item("confidence", link.confidence)?;
-        links.append(row)?;
-    }
-    let row = PyDict::new(py);
-    let frames = chain.depth.len();
-    let depth: Vec<f64> = chain.depth.iter().flatten().copied().collect();
-    row.set_item("points", chain.points.clone())?;
-    row.set_item("links", links)?;
-    row.set_item("slope", (chain.plane.p, chain.plane.q))?;
-    row.set_item("tilt_deg", chain.plane.tilt_rad().to_degrees())?;
-    row.set_item("residual", chain.residual_rms)?;
-    row.set_item("reflection_margin_deg", chain.reflection_margin_deg)?;
-    row.set_item("verdict", verdict(chain.evidence.verdict))?;
-    row.set_item("statistic", chain.evidence.statistic)?;
-    row.set_item("threshold", chain.evidence.threshold)?;
-    row.set_item("motion", chain.evidence.motion)?;
-    row.set_item("depth", numpy_from_flat(py, depth, vec![frames, chain.points.len()])?)?;
-    row.set_item(
-        "angle_deg",
-        numpy_from_column(py, chain.angle_rad.iter().map(|a| a.to_degrees()).collect::<Vec<f64>>()),
-    )?;
-    Ok(row)
-}
-
-fn status(status: Status) -> &'static str {
-    match status {
+fn status(window: &FigureWindow, tracks: &[Vec<DVec2>]) -> &'static str {
+    match window.status {
         Status::Interpreted => "interpreted",
         Status::Lost => "lost",
         Status::Still => "still",
+        Status::Unseen if tracks.iter().flat_map(|t| &t[window.start..window.end]).any(|p| p.is_finite()) => {
+            "nothing linked"
+        }
         Status::Unseen => "unseen",
     }
 }

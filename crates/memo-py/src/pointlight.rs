@@ -3,47 +3,81 @@
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat};
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::result::result;
 use glam::DVec3;
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::synth::{
-    DotSource, LifeSites, LimitedLife, Locomotion, Motion, NoiseDots, NoiseKind, PhaseScramble,
+    self, DotSource, LifeSites, LimitedLife, Locomotion, Motion, NoiseDots, NoiseKind, PhaseScramble,
     PointLightOptions, View, WalkOptions, point_light_display, sampled_walk,
 };
 use memo_core::wording::counted;
+use numpy::{PyArray1, PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
-/// Motion of the body model walking through the origin: positions (T, 13, 3) in metres, times_s, names, cycle_s.
+result! {
+    /// Motion of the body model.
+    WalkerMotion |py, motion: Motion, cycle: f64| {
+        /// Points (T, 13, 3), metres, Z up.
+        positions: Py<PyArrayDyn<f64>> = {
+            let flat = motion.positions().iter().flat_map(|p| p.to_array()).collect();
+            numpy_from_flat(py, flat, vec![motion.frames(), motion.points(), 3])?
+        },
+        /// Times (T,) of the frames.
+        times_s: Py<PyArray1<f64>> = numpy_from_column(py, motion.times_s().to_vec()),
+        /// Names of the points.
+        names: Vec<String> = motion.names().to_vec(),
+        /// Duration of a gait cycle.
+        cycle_s: f64 = cycle,
+    }
+    |own| format!("{}, {:.3} s per cycle", counted(own.names.len(), "point"), own.cycle_s)
+}
+
+result! {
+    /// A point-light display of N dots over T frames.
+    PointLightDisplay |py, shown: synth::PointLightDisplay| {
+        /// The dots (T, N, 2), NaN for dots that are not visible.
+        positions_px: Py<PyArrayDyn<f64>> = {
+            let flat = shown.positions_px.iter().flat_map(|p| p.to_array()).collect();
+            numpy_from_flat(py, flat, vec![shown.times_s.len(), shown.dots, 2])?
+        },
+        /// Whether each dot is visible, (T, N).
+        visible: Py<PyArrayDyn<bool>> = per_dot(py, &shown, shown.positions_px.iter().map(|p| p.is_finite()))?,
+        /// Index of the point shown or of a limb's first end (T, N); -1 for noise.
+        labels: Py<PyArrayDyn<i64>> = per_dot(py, &shown, shown.sources.iter().map(|s| shows(s).0))?,
+        /// Index of the limb's second end (T, N); -1 for others.
+        limb_ends: Py<PyArrayDyn<i64>> = per_dot(py, &shown, shown.sources.iter().map(|s| shows(s).1))?,
+        /// Place along the limb (T, N), 0 to 1.
+        fractions: Py<PyArrayDyn<f64>> = per_dot(py, &shown, shown.sources.iter().map(|s| shows(s).2))?,
+        /// Times (T,) of the frames.
+        times_s: Py<PyArray1<f64>> = numpy_from_column(py, shown.times_s),
+    }
+    |own| Python::attach(|py| match own.visible.bind(py).shape() {
+        [frames, dots] => format!("{} in {}", counted(*dots, "dot"), counted(*frames, "frame")),
+        _ => String::new(),
+    })
+}
+
+/// Motion of the body model walking through the origin.
 #[pyfunction]
 #[pyo3(signature = (frames=60, *, rate_hz=60.0, speed_mps=1.3, heading_deg=0.0, phase=0.0, height_m=1.75))]
-pub fn walker_motion<'py>(
-    py: Python<'py>,
+pub fn walker_motion(
+    py: Python<'_>,
     frames: usize,
     rate_hz: f64,
     speed_mps: f64,
     heading_deg: f64,
     phase: f64,
     height_m: f64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<WalkerMotion> {
     let body = Body::from_height(height_m).map_err(value_error)?;
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
     let options = WalkOptions { frames, rate_hz, speed_mps, heading_rad: heading_deg.to_radians(), phase };
     let motion = py.detach(|| sampled_walk(&walker, &options)).map_err(value_error)?;
-    let flat = motion.positions().iter().flat_map(|p| p.to_array()).collect();
-    let result = PyDict::new(py);
-    result.set_item("positions", numpy_from_flat(py, flat, vec![motion.frames(), motion.points(), 3])?)?;
-    result.set_item("times_s", numpy_from_column(py, motion.times_s().to_vec()))?;
-    result.set_item("names", motion.names().to_vec())?;
-    result.set_item("cycle_s", options.cycle_s(&walker))?;
-    Ok(result)
+    WalkerMotion::of(py, motion, options.cycle_s(&walker))
 }
 
 /// A point-light display of points over time (T, K, 3), world metres, Z up, NaN if unknown.
-///
-/// Returns times_s (T,); positions_px (T, N, 2), NaN for dots that are not visible; visible (T, N); labels (T,
-/// N), the index of the point shown or of a limb's first end, -1 for noise; limb_ends (T, N), the index of the
-/// limb's second end or -1; fractions (T, N) along the limb.
 #[pyfunction]
 #[pyo3(signature = (
     positions, times_s, names, *, azimuth_deg=0.0, elevation_deg=0.0, px_per_m=200.0, camera=None,
@@ -53,9 +87,9 @@ pub fn walker_motion<'py>(
     noise_speed_px_s=60.0, noise_sd_px=0.0, seed=0
 ))]
 #[allow(clippy::too_many_arguments, reason = "each is one of the usual conditions of a display")]
-pub fn pointlight<'py>(
-    py: Python<'py>,
-    positions: &Bound<'py, PyAny>,
+pub fn pointlight(
+    py: Python<'_>,
+    positions: &Bound<'_, PyAny>,
     times_s: Vec<f64>,
     names: Vec<String>,
     azimuth_deg: f64,
@@ -81,7 +115,7 @@ pub fn pointlight<'py>(
     noise_speed_px_s: f64,
     noise_sd_px: f64,
     seed: u64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<PointLightDisplay> {
     let (points, frames, count) = motion_from_numpy::<3>(positions)?;
     if times_s.len() != frames || names.len() != count {
         let given = format!("{} and {}", counted(times_s.len(), "time"), counted(names.len(), "name"));
@@ -131,27 +165,24 @@ pub fn pointlight<'py>(
         noise_sd_px,
     };
     let shown = py.detach(|| point_light_display(&motion, &options)).map_err(value_error)?;
-    let shape = vec![shown.times_s.len(), shown.dots];
-    let (labels, rest): (Vec<i64>, Vec<(i64, f64)>) = shown
-        .sources
-        .iter()
-        .map(|source| match *source {
-            DotSource::Joint(k) => (k as i64, (-1, 0.0)),
-            DotSource::Limb([a, b], fraction) => (a as i64, (b as i64, fraction)),
-            DotSource::Noise(_) => (-1, (-1, 0.0)),
-        })
-        .unzip();
-    let (limb_ends, fractions): (Vec<i64>, Vec<f64>) = rest.into_iter().unzip();
-    let visible: Vec<bool> = shown.positions_px.iter().map(|p| p.is_finite()).collect();
-    let flat: Vec<f64> = shown.positions_px.iter().flat_map(|p| p.to_array()).collect();
-    let result = PyDict::new(py);
-    result.set_item("positions_px", numpy_from_flat(py, flat, vec![shape[0], shape[1], 2])?)?;
-    result.set_item("visible", numpy_from_flat(py, visible, shape.clone())?)?;
-    result.set_item("labels", numpy_from_flat(py, labels, shape.clone())?)?;
-    result.set_item("limb_ends", numpy_from_flat(py, limb_ends, shape.clone())?)?;
-    result.set_item("fractions", numpy_from_flat(py, fractions, shape)?)?;
-    result.set_item("times_s", numpy_from_column(py, shown.times_s))?;
-    Ok(result)
+    PointLightDisplay::of(py, shown)
+}
+
+/// The point or the limb's first end, the limb's second end, and the place along the limb.
+fn shows(source: &DotSource) -> (i64, i64, f64) {
+    match *source {
+        DotSource::Joint(k) => (k as i64, -1, 0.0),
+        DotSource::Limb([a, b], fraction) => (a as i64, b as i64, fraction),
+        DotSource::Noise(_) => (-1, -1, 0.0),
+    }
+}
+
+fn per_dot<'py, T: numpy::Element>(
+    py: Python<'py>,
+    shown: &synth::PointLightDisplay,
+    values: impl Iterator<Item = T>,
+) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    numpy_from_flat(py, values.collect(), vec![shown.times_s.len(), shown.dots])
 }
 
 fn unknown(option: &str, given: &str, known: &str) -> PyErr {

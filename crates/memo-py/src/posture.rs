@@ -6,22 +6,129 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::result::result;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths, StickFigure};
+use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
+use memo_core::posture::link::Alternative;
 use memo_core::posture::sequence::{
-    AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameReading, KeypointSequence, Motion, PostureSequence,
-    SequenceLengths, SequenceOptions, Strength, postures_with_progress, reason_totals,
+    self, AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameProblem, FrameReading, KeypointSequence, Motion,
+    ReasonTotal, SequenceOptions, Strength, postures_with_progress, reason_totals,
 };
-use memo_core::posture::tree::{LevelCount, View};
+use memo_core::posture::tree::{CutCount, LevelCount, View};
 use memo_core::progress::Progress;
-use numpy::{PyArray2, PyArray3};
+use memo_core::wording::counted;
+use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use std::collections::HashMap;
+
+result! {
+    /// What `memo.Postures` is made of; its fields have the same names.
+    PostureSequence |py, found: sequence::PostureSequence| {
+        lengths_m: Py<PyDict> = found.lengths.lengths.named().into_py_dict(py)?,
+        length_sd_m: Py<PyDict> = names(&found).zip(&found.lengths.sd_m).into_py_dict(py)?,
+        length_basis: Py<PyDict> =
+            names(&found).zip(found.lengths.origin.iter().map(|origin| origin.name())).into_py_dict(py)?,
+        scale_from: String = found.lengths.scale_name(),
+        anchor_source: Vec<String> = texts(found.neck.from.iter().map(|from| from.name())),
+        anchor_conflicts: Vec<String> = texts(&found.neck.conflicts),
+        anchor_m: Py<PyArray1<f64>> = numpy_from_column(py, found.neck.distance_m),
+        anchor_sd_m: Py<PyArray1<f64>> = numpy_from_column(py, found.neck.sd_m),
+        level_reached: Py<PyArray2<i64>> = levels(py, &found.frames, |level| level.reached)?,
+        level_survived: Py<PyArray2<i64>> = levels(py, &found.frames, |level| level.survived)?,
+        level_without_root: Py<PyArray2<i64>> = levels(py, &found.frames, |level| level.without_root)?,
+        reasons: Vec<Vec<Reason>> = each(&found.frames, |f| f.tree.reasons.iter().map(reason).collect()),
+        reason_totals: Vec<Total> = reason_totals(&found.frames).into_iter().map(total).collect::<Vec<_>>(),
+        survivors: Py<PyArray1<i64>> =
+            numpy_from_column(py, each(&found.frames, |frame| frame.survivors() as i64)),
+        groups_m: Vec<Py<PyArray3<f64>>> = {
+            let figures = each(&found.frames, |f| f.groups.iter().map(|g| g.figure).collect::<Vec<_>>());
+            figures.iter().map(|of| Ok(numpy_from_figures(py, of)?.unbind())).collect::<PyResult<Vec<_>>>()?
+        },
+        group_sizes: Vec<Py<PyArray1<i64>>> = {
+            let sizes = each(&found.frames, |frame| frame.groups.iter().map(|g| g.size as i64).collect());
+            sizes.into_iter().map(|of| numpy_from_column(py, of).unbind()).collect::<Vec<_>>()
+        },
+        group_counts: Vec<Option<usize>> =
+            found.frames.iter().map(|f| f.as_ref().map_or(Some(0), |f| f.group_count)).collect::<Vec<_>>(),
+        cut_all: Vec<Option<Vec<String>>> = each(&found.frames, FrameReading::cut_all),
+        problems: Vec<Option<String>> =
+            found.frames.iter().map(|f| f.as_ref().err().map(ToString::to_string)).collect::<Vec<_>>(),
+        linked_m: Py<PyArray3<f64>> = numpy_from_figures(py, &found.linked.figures)?,
+        linked_breaks: Vec<Vec<String>> =
+            found.linked_breaks.iter().map(|c| texts(c.iter().map(|c| c.name()))).collect::<Vec<_>>(),
+        smoothed_m: Py<PyArray3<f64>> = numpy_from_figures(py, &found.linked.smoothed)?,
+        sd_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.sd_m.iter().map(|row| row.0).collect())?,
+        gap_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.linked.gap_m.iter().map(|row| row.0).collect())?,
+        margin_nats: Py<PyArray1<f64>> = numpy_from_column(py, found.linked.margin.clone()),
+        p_mirrored: Py<PyArray2<f64>> = {
+            let frame = |t| Joint::ALL.map(|joint| found.linked.probability_mirrored(t, joint));
+            numpy_from_rows(py, (0..found.linked.figures.len()).map(frame).collect())?
+        },
+        second: Option<Py<SecondMotion>> = match &found.linked.second {
+            Some(second) => Some(Py::new(py, SecondMotion::of(py, second)?)?),
+            None => None,
+        },
+        heading_source: String = found.heading.from.name(),
+        warnings: Vec<String> = texts(&found.warnings),
+    }
+    |own| counted(own.problems.len(), "frame")
+}
+
+result! {
+    /// What `memo.postures.SecondBest` is made of; `first_row` is the first of the rows of its postures.
+    SecondMotion |py, second: &Alternative| {
+        joints: Vec<String> = texts(second.joints.iter().map(|&joint| Joint::name(joint))),
+        first_row: usize = second.from,
+        postures_m: Py<PyArray3<f64>> = numpy_from_figures(py, &second.figures)?,
+        margin_nats: f64 = second.margin,
+        p: f64 = second.probability(),
+    }
+    |own| own.joints.join(", ")
+}
+
+/// The fields of `memo.postures.Reason`.
+type Reason = (String, String, u32);
+/// The fields of `memo.postures.ReasonTotal`.
+type Total = (String, String, String, u64, usize, String);
+
+fn reason(cut: &CutCount) -> Reason {
+    (cut.constraint.name(), cut.joint.name().to_owned(), cut.branches)
+}
+
+fn total(total: ReasonTotal) -> Total {
+    let (constraint, joint) = (total.constraint, total.joint.name().to_owned());
+    let kind = constraint.kind().name().to_owned();
+    (constraint.name(), kind, joint, total.branches, total.frames, constraint.description())
+}
+
+fn names(found: &sequence::PostureSequence) -> impl Iterator<Item = String> {
+    found.lengths.lengths.named().map(|(name, _)| name)
+}
+
+fn texts(items: impl IntoIterator<Item: ToString>) -> Vec<String> {
+    items.into_iter().map(|item| item.to_string()).collect()
+}
+
+/// A value of each frame, the default if the frame cannot be used.
+fn each<T: Default>(
+    frames: &[Result<FrameReading, FrameProblem>],
+    value: impl Fn(&FrameReading) -> T,
+) -> Vec<T> {
+    frames.iter().map(|frame| frame.as_ref().map(&value).unwrap_or_default()).collect()
+}
+
+fn levels<'py>(
+    py: Python<'py>,
+    frames: &[Result<FrameReading, FrameProblem>],
+    count: fn(&LevelCount) -> u32,
+) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    numpy_from_rows(py, each(frames, |frame| frame.tree.counts.0.map(|level| i64::from(count(&level)))))
+}
 
 /// One distance for all frames, or one per frame.
 #[derive(FromPyObject)]
@@ -42,11 +149,11 @@ pub enum Distances {
     head_points=None, group_m=0.10, max_groups=64, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
-pub fn posture<'py>(
-    py: Python<'py>,
-    times_s: &Bound<'py, PyAny>,
-    points: &Bound<'py, PyAny>,
-    weights: &Bound<'py, PyAny>,
+pub fn posture(
+    py: Python<'_>,
+    times_s: &Bound<'_, PyAny>,
+    points: &Bound<'_, PyAny>,
+    weights: &Bound<'_, PyAny>,
     camera: &PyCamera,
     lengths: Option<HashMap<String, f64>>,
     height_m: Option<f64>,
@@ -57,11 +164,11 @@ pub fn posture<'py>(
     distance_m: Option<Distances>,
     distance_sd_m: Option<f64>,
     moving_direction: Option<[f64; 3]>,
-    head_points: Option<&Bound<'py, PyAny>>,
+    head_points: Option<&Bound<'_, PyAny>>,
     group_m: f64,
     max_groups: usize,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PostureSequence> {
     let times_s = times_from_numpy(times_s)?;
     let track = track_from_numpy(points)?;
     if track.joints != JOINT_COUNT {
@@ -94,7 +201,7 @@ pub fn posture<'py>(
         postures_with_progress(&sequence, &camera, &options, progress)
     };
     let found = watched(py, progress, interpret)?.map_err(value_error)?;
-    dict_from_postures(py, found)
+    PostureSequence::of(py, found)
 }
 
 /// All postures that one view allows. `rays` (14, 3) are unit vectors in camera axes with NaN for joints that are
@@ -176,120 +283,4 @@ fn anchor_choice(name: &str, distance_m: Option<Distances>, sd_m: Option<f64>) -
         }
         (choice, None) => Ok(choice),
     }
-}
-
-fn dict_from_postures(py: Python<'_>, found: PostureSequence) -> PyResult<Bound<'_, PyDict>> {
-    let dict = PyDict::new(py);
-    set_lengths(&dict, &found.lengths)?;
-    set_neck(&dict, &found)?;
-    set_frames(&dict, &found)?;
-    set_linked(&dict, &found)?;
-    dict.set_item("heading_source", found.heading.from.name())?;
-    let warnings: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
-    dict.set_item("warnings", warnings)?;
-    Ok(dict)
-}
-
-fn set_lengths(dict: &Bound<'_, PyDict>, lengths: &SequenceLengths) -> PyResult<()> {
-    let [length_m, sd_m, basis] = [(); 3].map(|()| PyDict::new(dict.py()));
-    for (i, (name, length)) in lengths.lengths.named().enumerate() {
-        length_m.set_item(&name, length)?;
-        sd_m.set_item(&name, lengths.sd_m[i])?;
-        basis.set_item(&name, lengths.origin[i].name())?;
-    }
-    dict.set_item("lengths", length_m)?;
-    dict.set_item("length_sd", sd_m)?;
-    dict.set_item("length_basis", basis)?;
-    dict.set_item("scale_from", lengths.scale_name())
-}
-
-fn set_neck(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()> {
-    let neck = &found.neck;
-    dict.set_item("anchor_m", numpy_from_column(dict.py(), neck.distance_m.clone()))?;
-    dict.set_item("anchor_sd_m", numpy_from_column(dict.py(), neck.sd_m.clone()))?;
-    let sources: Vec<&str> = neck.from.iter().map(|from| from.name()).collect();
-    dict.set_item("anchor_source", sources)?;
-    let conflicts: Vec<String> = neck.conflicts.iter().map(ToString::to_string).collect();
-    dict.set_item("anchor_conflicts", conflicts)
-}
-
-/// Adds the results of each frame alone.
-fn set_frames(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()> {
-    let py = dict.py();
-    let levels = |of: fn(&LevelCount) -> u32| -> PyResult<Bound<'_, PyArray2<i64>>> {
-        let row = |frame: Option<&FrameReading>| match frame {
-            Some(frame) => frame.tree.counts.0.map(|level| i64::from(of(&level))),
-            None => [0; JOINT_COUNT],
-        };
-        numpy_from_rows(py, found.frames.iter().map(|frame| row(frame.as_ref().ok())).collect())
-    };
-    dict.set_item("level_reached", levels(|level| level.reached)?)?;
-    dict.set_item("level_survived", levels(|level| level.survived)?)?;
-    dict.set_item("level_without_root", levels(|level| level.without_root)?)?;
-    let reasons = |frame: &FrameReading| -> Vec<(String, &str, u32)> {
-        let cut = |cut: &memo_core::posture::tree::CutCount| {
-            (cut.constraint.name(), cut.joint.name(), cut.branches)
-        };
-        frame.tree.reasons.iter().map(cut).collect()
-    };
-    let of_frames: Vec<_> =
-        found.frames.iter().map(|frame| frame.as_ref().map(reasons).unwrap_or_default()).collect();
-    dict.set_item("reasons", of_frames)?;
-    let totals: Vec<(String, &str, &str, u64, usize, String)> = reason_totals(&found.frames)
-        .into_iter()
-        .map(|total| {
-            let constraint = total.constraint;
-            let (name, kind, joint) = (constraint.name(), constraint.kind().name(), total.joint.name());
-            (name, kind, joint, total.branches, total.frames, constraint.description())
-        })
-        .collect();
-    dict.set_item("reason_totals", totals)?;
-    let survivors = found.frames.iter().map(|f| f.as_ref().map_or(0, |f| f.survivors() as i64)).collect();
-    dict.set_item("survivors", numpy_from_column::<i64>(py, survivors))?;
-    let (mut groups, mut sizes) = (Vec::new(), Vec::new());
-    for frame in &found.frames {
-        let of_frame = frame.as_ref().map_or(&[][..], |frame| &frame.groups);
-        let figures: Vec<StickFigure> = of_frame.iter().map(|group| group.figure).collect();
-        groups.push(numpy_from_figures(py, &figures)?);
-        sizes.push(numpy_from_column(py, of_frame.iter().map(|group| group.size as i64).collect()));
-    }
-    let group_counts: Vec<Option<usize>> =
-        found.frames.iter().map(|frame| frame.as_ref().map_or(Some(0), |frame| frame.group_count)).collect();
-    let cut_all: Vec<Option<Vec<String>>> =
-        found.frames.iter().map(|frame| frame.as_ref().ok().and_then(FrameReading::cut_all)).collect();
-    let problems: Vec<Option<String>> =
-        found.frames.iter().map(|frame| frame.as_ref().err().map(ToString::to_string)).collect();
-    dict.set_item("problems", problems)?;
-    dict.set_item("group_counts", group_counts)?;
-    dict.set_item("groups", groups)?;
-    dict.set_item("group_sizes", sizes)?;
-    dict.set_item("cut_all", cut_all)
-}
-
-fn set_linked(dict: &Bound<'_, PyDict>, found: &PostureSequence) -> PyResult<()> {
-    let py = dict.py();
-    let linked = &found.linked;
-    let table = |rows: &[PerJoint<f64>]| numpy_from_rows(py, rows.iter().map(|row| row.0).collect());
-    dict.set_item("linked", numpy_from_figures(py, &linked.figures)?)?;
-    dict.set_item("smoothed", numpy_from_figures(py, &linked.smoothed)?)?;
-    dict.set_item("sd_m", table(&found.sd_m)?)?;
-    dict.set_item("gap_m", table(&linked.gap_m)?)?;
-    dict.set_item("margin", numpy_from_column(py, linked.margin.clone()))?;
-    let mirrored = |t: usize| Joint::ALL.map(|joint| linked.probability_mirrored(t, joint));
-    dict.set_item("p_mirrored", numpy_from_rows(py, (0..linked.figures.len()).map(mirrored).collect())?)?;
-    let breaks: Vec<Vec<String>> =
-        found.linked_breaks.iter().map(|broken| broken.iter().map(|c| c.name()).collect()).collect();
-    dict.set_item("linked_breaks", breaks)?;
-    let second = linked.second.as_ref().map(|second| -> PyResult<_> {
-        let dict = PyDict::new(py);
-        let joints: Vec<&str> = second.joints.iter().map(|&joint| Joint::name(joint)).collect();
-        dict.set_item("joints", joints)?;
-        dict.set_item("from", second.from)?;
-        dict.set_item("to", second.to)?;
-        dict.set_item("postures", numpy_from_figures(py, &second.figures)?)?;
-        dict.set_item("margin", second.margin)?;
-        dict.set_item("p", second.probability())?;
-        Ok(dict)
-    });
-    dict.set_item("second", second.transpose()?)
 }

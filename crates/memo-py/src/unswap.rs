@@ -2,18 +2,48 @@
 
 use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track_from_numpy};
 use crate::error::value_error;
+use crate::result::result;
 use crate::wait::interruptible;
 use memo_core::keypoints::unswap::{
-    GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, Unswapped, unswap as core_unswap,
+    GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, unswap as core_unswap,
 };
-use numpy::{IntoPyArray, PyArrayMethods};
+use memo_core::wording::counted;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use std::sync::Arc;
+
+result! {
+    /// Right and left of a limb over T frames, at L levels from the trunk outwards.
+    LimbSides |py, group: &LimbGroup, found: &GroupResult| {
+        /// Names of the levels.
+        levels: Vec<String> = group.levels.iter().map(|level| level.name.clone()).collect::<Vec<_>>(),
+        /// Whether the labels are decided, (T,).
+        decided: Py<PyArray1<bool>> =
+            numpy_from_column(py, found.verdicts.iter().map(|v| v.decided).collect()),
+        /// Probability that the labels are exchanged, (T,).
+        p_flipped: Py<PyArray1<f64>> =
+            numpy_from_column(py, found.verdicts.iter().map(|v| v.probability).collect()),
+        /// Why, in words, (T,).
+        reason: Vec<String> = found.verdicts.iter().map(|v| v.describe(group)).collect::<Vec<_>>(),
+        /// Whether the labels of each level are exchanged, (T, L).
+        level_flipped: Py<PyArray2<bool>> = {
+            let flipped: Vec<bool> = found.verdicts.iter().flat_map(|v| v.level_flipped.clone()).collect();
+            flipped.into_pyarray(py).reshape([found.verdicts.len(), group.levels.len()])?
+        },
+        /// Probability that they are exchanged, (T, L).
+        level_p_flipped: Py<PyArray2<f64>> = {
+            let p: Vec<f64> = found.verdicts.iter().flat_map(|v| v.level_probability.clone()).collect();
+            p.into_pyarray(py).reshape([found.verdicts.len(), group.levels.len()])?
+        },
+        /// Probability that most labels are right.
+        p_global: f64 = found.global_probability,
+    }
+    |own| format!("{}, {}", own.levels.join(", "), counted(own.reason.len(), "frame"))
+}
 
 /// Corrects swaps of left and right in joints over time: times (T,) s, points (T, K, 2) px with NaN if missing,
 /// scores (T, K) in [0, 1] or None, groups {limb: {level: [(left, right), ...]}} from the trunk outwards.
-/// Returns, per limb, arrays over frames and `p_global`, the probability that most labels are right.
 #[pyfunction]
 #[pyo3(signature = (
     times_s, points, scores=None, *, groups, as_is_nats=None, partial_begin_nats=None,
@@ -55,7 +85,10 @@ pub fn unswap<'py>(
         core_unswap(&keypoints, &of_worker, &options)
     };
     let found = interruptible(py, repair)?.map_err(value_error)?;
-    dict_from_unswapped(py, found, &groups)
+    let limbs = groups.iter().zip(&found.groups);
+    let limbs: PyResult<Vec<_>> =
+        limbs.map(|(group, found)| Ok((&group.name, LimbSides::of(py, group, found)?))).collect();
+    limbs?.into_py_dict(py)
 }
 
 /// Limbs in the given order.
@@ -74,39 +107,4 @@ fn groups_from_dict(groups: &Bound<'_, PyDict>) -> PyResult<Vec<LimbGroup>> {
         Ok(LimbGroup { name: name.extract().map_err(|_| bad(&name))?, levels })
     };
     groups.iter().map(group).collect()
-}
-
-fn dict_from_unswapped<'py>(
-    py: Python<'py>,
-    found: Unswapped,
-    groups: &[LimbGroup],
-) -> PyResult<Bound<'py, PyDict>> {
-    let of_groups = PyDict::new(py);
-    for (group, found) in groups.iter().zip(&found.groups) {
-        of_groups.set_item(&group.name, dict_from_group(py, group, found)?)?;
-    }
-    Ok(of_groups)
-}
-
-fn dict_from_group<'py>(
-    py: Python<'py>,
-    group: &LimbGroup,
-    found: &GroupResult,
-) -> PyResult<Bound<'py, PyDict>> {
-    let verdicts = &found.verdicts;
-    let shape = [verdicts.len(), group.levels.len()];
-    let result = PyDict::new(py);
-    result.set_item("decided", numpy_from_column(py, verdicts.iter().map(|v| v.decided).collect()))?;
-    let probability = verdicts.iter().map(|v| v.probability).collect();
-    result.set_item("p_flipped", numpy_from_column(py, probability))?;
-    let reasons: Vec<String> = verdicts.iter().map(|v| v.describe(group)).collect();
-    result.set_item("reason", reasons)?;
-    let levels: Vec<&str> = group.levels.iter().map(|level| level.name.as_str()).collect();
-    result.set_item("levels", levels)?;
-    let flipped: Vec<bool> = verdicts.iter().flat_map(|v| v.level_flipped.iter().copied()).collect();
-    result.set_item("level_flipped", flipped.into_pyarray(py).reshape(shape)?)?;
-    let p: Vec<f64> = verdicts.iter().flat_map(|v| v.level_probability.iter().copied()).collect();
-    result.set_item("level_p_flipped", p.into_pyarray(py).reshape(shape)?)?;
-    result.set_item("p_global", found.global_probability)?;
-    Ok(result)
 }

@@ -212,18 +212,18 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
         except ValueError as error:
             from_0 = " (point numbers start at 0)" if re.search(r"points? \d", str(error)) else ""
             raise InputError(f"{path}: {error}{from_0}") from None
-    off = np.hypot(*found["residuals_px"].T)
-    kept = len(off) - len(found["outliers"])
-    lines = [f"Reprojection error {found['rms_px']:.2f} px RMS over {counted(kept, 'point')}."]
-    if found["outliers"]:
-        left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found["outliers"])
+    off = np.hypot(*found.residuals_px.T)
+    kept = len(off) - len(found.outliers)
+    lines = [f"Reprojection error {found.rms_px:.2f} px RMS over {counted(kept, 'point')}."]
+    if found.outliers:
+        left_out = ", ".join(f"line {table.lines[i]} ({off[i]:.0f} px off)" for i in found.outliers)
         lines.append(f"Left out as outliers: {left_out}.")
-    if found["is_planar"] and view["lens"] is None:
+    if found.is_planar and view["lens"] is None:
         lines.append("All points lie in a plane: square pixels were assumed.")
-    if "centre_u_px" not in found["estimates"] and view["lens"] is None:
+    if "centre_u_px" not in found.estimates and view["lens"] is None:
         lines.append("The principal point is the picture's centre; the points do not contradict it.")
-    marks = np.stack([table.pixels, table.pixels + found["residuals_px"]], axis=1)
-    summary = {"points": len(off), "left_out_lines": [table.lines[i] for i in found["outliers"]]}
+    marks = np.stack([table.pixels, table.pixels + found.residuals_px], axis=1)
+    summary = {"points": len(off), "left_out_lines": [table.lines[i] for i in found.outliers]}
     return _deliver(found, view, lines, summary, marks, delivery)
 
 
@@ -266,17 +266,17 @@ def _walker(
             )
         except ValueError as error:
             raise InputError(f"{source}: {error}") from None
-    kept = len(feet) - len(found["outliers"])
+    kept = len(feet) - len(found.outliers)
     lines = [
-        f"Reprojection error of the head {found['rms_px']:.1f} px RMS,"
-        f" {found['rms_px'] / found['person_px']:.1%}"
+        f"Reprojection error of the head {found.rms_px:.1f} px RMS,"
+        f" {found.rms_px / found.person_px:.1%}"
         f" of the person's height, over {kept} of {counted(len(feet), 'sighting')}.",
         f"All lengths are based on the person's height of {height_m:g} m.",
     ]
     if view["focal_px"] is not None:
         lines.append("The focal length was given by --fov-deg.")
-    marks = np.stack([heads, heads + found["residuals_px"]], axis=1)
-    summary = {"sightings": len(feet), "left_out": len(found["outliers"]), "person_px": found["person_px"]}
+    marks = np.stack([heads, heads + found.residuals_px], axis=1)
+    summary = {"sightings": len(feet), "left_out": len(found.outliers), "person_px": found.person_px}
     return _deliver(found, view, lines, summary, marks, delivery)
 
 
@@ -352,11 +352,11 @@ def _checkerboard(
     except ValueError:  # seen from below: the corners are in the opposite order
         places = places * np.array([1.0, -1.0, 1.0])
         found = memo.calibrate_points(places, board, boards.size, lens=known)
-    lines.append(f"On the floor: reprojection error {found['rms_px']:.2f} px RMS.")
+    lines.append(f"On the floor: reprojection error {found.rms_px:.2f} px RMS.")
     view = {"size": boards.size, "luma": read_picture(floor), "lens": known, "focal_px": None}
-    marks = np.stack([board, board + found["residuals_px"]], axis=1)
+    marks = np.stack([board, board + found.residuals_px], axis=1)
     return _deliver(
-        found, view, lines, {**summary, "floor_rms_px": found["rms_px"]}, marks, delivery, [lens_file]
+        found, view, lines, {**summary, "floor_rms_px": found.rms_px}, marks, delivery, [lens_file]
     )
 
 
@@ -364,7 +364,7 @@ def _checkerboard(
 
 
 def _deliver(
-    found: dict[str, Any],
+    found: memo._memo.PointCalibration | memo._memo.WalkerCalibration,
     view: dict[str, Any],
     lines: list[str],
     summary: dict[str, Any],
@@ -374,7 +374,7 @@ def _deliver(
 ) -> Exit:
     from memo.calibration import PERSON_M, draw_ground, standing_place, write_picture
 
-    camera = found["camera"]
+    camera = found.camera
     toml, picture = delivery.out / "camera.toml", delivery.out / "ground.png"
     luma = view["luma"]
     if luma is None:
@@ -384,7 +384,7 @@ def _deliver(
     write_picture(picture, drawn)
     place = standing_place(camera)
     person_px = None if place is None else camera.pixel_height(place[0], PERSON_M)
-    estimates = {name: {"value": value, "sd": sd} for name, (value, sd) in found["estimates"].items()}
+    estimates = {name: {"value": value, "sd": sd} for name, (value, sd) in found.estimates.items()}
     pitch_deg = _pitch_deg(camera)
     x, y, z = camera.position
     where = (
@@ -400,7 +400,7 @@ def _deliver(
     summary = {
         **summary,
         "estimates": estimates,
-        "rms_px": found["rms_px"],
+        "rms_px": found.rms_px,
         "person_px_at": None if place is None else {"place_m": place[0], "height_px": person_px},
         "position_m": camera.position,
         "pitch_deg": pitch_deg,

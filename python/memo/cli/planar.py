@@ -118,7 +118,7 @@ def _planar(
         }
         for a, b, length, sure, count in figure.links()
     ]
-    states = [window["status"] for window in figure.windows]
+    states = [window.status for window in figure.windows]
     summary = {"windows": states, "links": links, "perspective_px": figure.perspective_px}
     delivery.tell(summary, _about_figure(figure, points, noise_px), written)
     return Exit.DONE if figure.interpreted else Exit.NOBODY
@@ -135,16 +135,16 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     """Reports the findings in sentences."""
     if not figure.windows:
         return ["No window: no stretch between pauses is long enough. Nothing is claimed."]
-    states = [window["status"] for window in figure.windows]
+    states = [window.status for window in figure.windows]
     told = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     lines = [f"Windows: {', '.join(told)}."]
-    if any(window.get("method") == "forest" and window["chains"] for window in figure.windows):
+    if any(window.method == "forest" and window.chains for window in figure.windows):
         lines.append(
             f"{len(points.names)} are too many points to compare all links (at most 16): "
             "a spanning tree links them, without confidences, and false links are likely."
         )
     if not figure.interpreted:
-        guess = " The best guess is in links.csv." if any(w["chains"] for w in figure.windows) else ""
+        guess = " The best guess is in links.csv." if any(w.chains for w in figure.windows) else ""
         return [*lines, f"No window shows planar motion: nothing is claimed.{guess}"]
     lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
@@ -152,8 +152,8 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
             f"Perspective moves points by up to {figure.perspective_px:.1f} px, more than the noise: "
             "lengths and depths are off by more than their standard deviations."
         )
-    chains = [chain for window in figure.interpreted for chain in window["chains"]]
-    fixed = sum(chain["reflection_margin_deg"] is not None for chain in chains)
+    chains = [chain for window in figure.interpreted for chain in window.chains]
+    fixed = sum(chain.reflection_margin_deg is not None for chain in chains)
     if fixed:
         lines.append(f"Front and back decided by joint limits in {fixed} of {counted(len(chains), 'chain')}.")
     if fixed < len(chains):

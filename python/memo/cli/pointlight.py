@@ -136,12 +136,12 @@ def _pointlight(
     out = delivery.out
     check_writable(out)
     display = _new_display(points, options)
-    shown, labels = display["positions_px"], display["labels"]
+    shown, labels = display.positions_px, display.labels
     stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
     named = [points.names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
-    write_points_csv(out / "dots.csv", Points(named, display["times_s"], shown))
+    write_points_csv(out / "dots.csv", Points(named, display.times_s, shown))
     _write_labels(out / "labels.csv", points.names, named, display)
-    write_display_video(out / "display.mp4", display["times_s"], shown)
+    write_display_video(out / "display.mp4", display.times_s, shown)
     written = [out / "dots.csv", out / "labels.csv", out / "display.mp4"]
     summary = {"dots": shown.shape[1], "frames": shown.shape[0], "notes": list(notes)}
     delivery.tell(
@@ -183,19 +183,21 @@ def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
         raise InputError("--period needs --scramble-phase")
 
 
-def _write_labels(path: Path, names: list[str], dots: list[str], display: dict[str, Any]) -> None:
+def _write_labels(
+    path: Path, names: list[str], dots: list[str], display: memo._memo.PointLightDisplay
+) -> None:
     """One row per frame and dot: the joint, or both ends of the limb, or "noise"."""
     rows = []
-    for frame, row in enumerate(display["labels"]):
+    for frame, row in enumerate(display.labels):
         for dot, label in enumerate(row):
-            end = int(display["limb_ends"][frame, dot])
+            end = int(display.limb_ends[frame, dot])
             shows = names[label] if label >= 0 else "noise"
-            limb = [names[end], f"{display['fractions'][frame, dot]:.4f}"] if end >= 0 else ["", ""]
-            rows.append([frame, dots[dot], shows, *limb, int(display["visible"][frame, dot])])
+            limb = [names[end], f"{display.fractions[frame, dot]:.4f}"] if end >= 0 else ["", ""]
+            rows.append([frame, dots[dot], shows, *limb, int(display.visible[frame, dot])])
     write_table(path, ["frame", "dot", "shows", "limb_end", "fraction", "visible"], rows)
 
 
-def _new_display(points: Any, options: dict[str, Any]) -> dict[str, Any]:
+def _new_display(points: Any, options: dict[str, Any]) -> memo._memo.PointLightDisplay:
     positions = np.ascontiguousarray(points.positions, dtype=np.float64)
     return memo.pointlight(positions, points.times_s, points.names, **options)
 
@@ -206,4 +208,4 @@ def _walker_points(seconds: float, rate_hz: float) -> Any:
     if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
         raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
     walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz)
-    return Points(walk["names"], walk["times_s"], walk["positions"])
+    return Points(walk.names, walk.times_s, walk.positions)

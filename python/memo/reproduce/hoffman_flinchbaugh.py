@@ -280,35 +280,35 @@ class _Walker:
 
     def __init__(self) -> None:
         motion = _memo.walker_motion(frames=90, rate_hz=60.0)
-        self.names: list[str] = list(motion["names"])
-        self.times_s: Array = np.asarray(motion["times_s"])
+        self.names: list[str] = list(motion.names)
+        self.times_s: Array = np.asarray(motion.times_s)
         self.lengths_m = {
             link: float(
-                np.linalg.norm(np.subtract(*(motion["positions"][0, self.names.index(n)] for n in link)))
+                np.linalg.norm(np.subtract(*(motion.positions[0, self.names.index(n)] for n in link)))
             )
             for link in LINKS
         }
         self.shown = {
             "as it is": self._display(motion),
             "starting times scrambled": self._display(
-                motion, scramble_phase="periodic", period_s=motion["cycle_s"]
+                motion, scramble_phase="periodic", period_s=motion.cycle_s
             ),
         }
         self.found = {name: self._read(tracks, 0.0) for name, tracks in self.shown.items()}
         self.at_1_px = self._read(self._display(motion, noise_sd_px=1.0), 1.0)
 
-    def _display(self, motion: dict[str, Any], **conditions: Any) -> Array:
+    def _display(self, motion: _memo.WalkerMotion, **conditions: Any) -> Array:
         shown = _memo.pointlight(
-            motion["positions"],
-            motion["times_s"],
-            motion["names"],
+            motion.positions,
+            motion.times_s,
+            motion.names,
             azimuth_deg=AZIMUTH_DEG,
             px_per_m=PX_PER_M,
             seed=SEED,
             **conditions,
         )
-        order = np.argsort(shown["labels"][0])  # a dot shows the same point in all frames
-        return np.asarray(shown["positions_px"][:, order])
+        order = np.argsort(shown.labels[0])  # a dot shows the same point in all frames
+        return np.asarray(shown.positions_px[:, order])
 
     def _read(self, tracks: Array, noise_px: float) -> PlanarFigure:
         return planar(tracks, self.times_s, noise_px, window_s=1.4)
@@ -318,9 +318,9 @@ class _Walker:
         if not found.interpreted:
             return {}
         return {
-            frozenset(self.names[point] for point in link["points"]): link["length"] / PX_PER_M
-            for chain in found.interpreted[0]["chains"]
-            for link in chain["links"]
+            frozenset(self.names[point] for point in link.points): link.length / PX_PER_M
+            for chain in found.interpreted[0].chains
+            for link in chain.links
         }
 
     def rows(self) -> list[Row]:
@@ -470,9 +470,9 @@ def _dots(ax: Axes, places: Array) -> None:
 def _linked(ax: Axes, walker: _Walker, places: Array, found: PlanarFigure) -> None:
     if not found.interpreted:
         return
-    for index, chain in enumerate(found.interpreted[0]["chains"]):
-        for link in chain["links"]:
-            ends = places[list(link["points"])]
+    for index, chain in enumerate(found.interpreted[0].chains):
+        for link in chain.links:
+            ends = places[list(link.points)]
             ax.plot(*ends.T, color=COLOURS[index % len(COLOURS)], linewidth=2.5)
 
 
