@@ -883,6 +883,7 @@ def _(d):
 
 def results():
     """One object of each class of results, by its name."""
+    scene = _memo.Scene(5, frames=14)
     walk = memo.walker_motion(40)
     shown = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30.0)
     limbs = _memo.planar(shown.positions_px[:, :6], walk.times_s, 0.5, window_s=0.5)
@@ -899,6 +900,11 @@ def results():
         *_memo.unswap(walk.times_s, shown.positions_px, groups={"legs": {"hip": [(6, 9)]}}).values(),
         memo.calibrate_points(places, camera.project(places), camera.size),
         memo.calibrate_walker(*ends, camera.size, 1.75, focal_px=camera.matrix[0, 0]),
+        *(_memo.lee_chen_counts("SEQ1"), _memo.lee_chen_last_stage("SEQ1", "rigid_torso")[0]),
+        *(_memo.lee_chen_figures("SEQ1"), _memo.lee_chen_head()[0], _memo.lee_chen_inputs()),
+        *(_memo.hoffman_flinchbaugh_rods(9, 0), _memo.hoffman_flinchbaugh_hinges(9, 1, 0)),
+        _memo.hoffman_flinchbaugh_rod(np.random.default_rng(0).uniform(-9, 9, (1, 3, 2))),
+        *(_memo.image_stages(*map(scene.frame, (4, 5, 6))), _memo.walk_similarity(WALK, 0, [])),
     ]
     return {type(result).__name__: result for result in made}
 

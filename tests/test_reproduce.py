@@ -265,11 +265,9 @@ def test_the_image_stages_find_a_square_that_moves():
     for k in range(3):
         frames[k, 15:45, 20 + 3 * k : 40 + 3 * k] = 200
     stages = _memo.image_stages(*frames)
-    assert set(stages) == {"changed", "cleaned", "outlines", "rectangle", "edges"}
-    assert stages["changed"].shape == stages["cleaned"].shape == (60, 80)
-    assert stages["cleaned"].sum() >= stages["changed"].sum()
-    nothing = _memo.image_stages(frames[0], frames[0], frames[0])
-    assert nothing["rectangle"] is None and nothing["edges"] is None and not nothing["changed"].any()
+    assert stages.changed.shape == stages.cleaned.shape == (60, 80)
+    assert stages.cleaned.sum() >= stages.changed.sum()
+    assert _memo.image_stages(frames[0], frames[0], frames[0]) is None
     with pytest.raises(ValueError, match="80"):
         _memo.image_stages(frames[0], frames[1][:, :40], frames[2])
 
@@ -282,9 +280,9 @@ def test_a_search_window_is_as_long_as_the_contour_and_half_as_wide():
 
 def test_a_walk_is_searched_over_the_cycle_and_filtered_without_smoothing(scene):
     look = scene.examples[1]
-    found = _memo.walk_similarity(scene.walk, look.row, look.stages["edges"], along_m=0.2, height_m=0.1)
-    assert found["scores"].shape == (50, 21, 11)
-    assert found["scores"].max() <= 1 and found["phase"][0] == pytest.approx(0)
+    found = _memo.walk_similarity(scene.walk, look.row, look.stages.edges, along_m=0.2, height_m=0.1)
+    assert found.scores.shape == (50, 21, 11)
+    assert found.scores.max() <= 1 and found.phase[0] == pytest.approx(0)
     best, other, apart = similarity_peaks(scene, look)
     true = scene.true("phase")[look.row]
     assert abs((best - true + 0.5) % 1 - 0.5) < 0.05 and 0.35 <= apart <= 0.5 and best != other
@@ -294,7 +292,7 @@ def test_a_walk_is_searched_over_the_cycle_and_filtered_without_smoothing(scene)
     with pytest.raises(IndexError, match="of a walk with"):
         _memo.walk_lines(scene.walk, 10_000)
     with pytest.raises(ValueError, match="along_m"):
-        _memo.walk_similarity(scene.walk, 0, look.stages["edges"], along_m=float("nan"))
+        _memo.walk_similarity(scene.walk, 0, look.stages.edges, along_m=float("nan"))
     with pytest.raises(ValueError, match="four numbers"):
         _memo.walk_similarity(scene.walk, 0, np.zeros((1, 3)))
 
@@ -323,25 +321,25 @@ def test_a_clip_without_a_walker_is_told(write_video, luma_frames):
 def test_counts_stand_beside_the_printed_ones_and_double_at_most(sequence):
     table = _memo.lee_chen_counts(sequence)
     for half, printed in zip(("physical", "rules_1_2"), PRINTED_LEAVES[sequence], strict=True):
-        counts = table[half]
+        counts = table.counts[half]
         assert counts.shape == (14, 3) and (counts[0] == 1).all()
         assert (counts[1:] <= 2 * counts[:-1]).all()
-        assert table[f"printed_{half}"][-1].tolist() == printed
-    assert np.all(table["truth_kept"])
+        assert table.printed[half][-1].tolist() == printed
+    assert np.all(table.truth_kept)
 
 
 def test_frame_1_of_seq1_has_the_printed_counts():
     table = _memo.lee_chen_counts("SEQ1")
     for half in ("physical", "rules_1_2"):
-        assert table[half][:, 0].tolist() == table[f"printed_{half}"][:, 0].tolist()
+        assert table.counts[half][:, 0].tolist() == table.printed[half][:, 0].tolist()
 
 
 @pytest.mark.parametrize(("sequence", "postures"), [("SEQ1", 2), ("SEQ2", 1)])
 def test_the_last_stage_leaves_two_postures_from_the_front_and_one_from_the_side(sequence, postures):
     frames = _memo.lee_chen_last_stage(sequence, "rigid_torso")
     assert len(frames) == 30
-    assert all(frame["truth_kept"] and not frame["broken"] for frame in frames)
-    assert np.median([frame["groups"] for frame in frames]) == postures
+    assert all(frame.truth_kept and not frame.broken for frame in frames)
+    assert np.median([frame.groups for frame in frames]) == postures
 
 
 def test_lee_chens_tables_are_those_of_the_paper(papers):
@@ -375,13 +373,13 @@ def test_misprints_of_lee_and_chen_are_told(papers):
 
 def test_the_head_is_where_the_paper_puts_it(papers):
     printed, *methods = _memo.lee_chen_head()
-    assert list(printed["camera_position"]) == [400.00116, -0.01535, 0.00595]
+    assert list(printed.camera_position) == [400.00116, -0.01535, 0.00595]
     for method in methods:
-        assert method["transform"].shape == (4, 3)
-        assert abs(method["camera_position"][0] - 400) < 5, method["method"]
-        assert np.allclose(method["rotation"], printed["rotation"], atol=0.02)
+        assert method.transform.shape == (4, 3)
+        assert abs(method.camera_position[0] - 400) < 5, method.method
+        assert np.allclose(method.rotation, printed.rotation, atol=0.02)
     known = methods[-1]
-    assert np.allclose(known["camera_position"], (400, 0, 0), atol=4 * max(known["camera_position_sd"]))
+    assert np.allclose(known.camera_position, (400, 0, 0), atol=4 * max(known.camera_position_sd))
     neck = row_of(papers["lee-chen"], "(d) Neck, centimetres")
     assert neck.printed == "-0.00499 52.12662 434.17551"
     assert np.allclose([float(v) for v in neck.ours.split()], [-0.00499, 52.12662, 434.17551], atol=0.03)
@@ -390,12 +388,12 @@ def test_the_head_is_where_the_paper_puts_it(papers):
 def test_figures_have_the_lengths_of_the_paper():
     left = _memo.lee_chen_figures("SEQ1")
     joint = {name: place for place, name in enumerate(_memo.joint_names())}
-    thighs = left["figures"][:, joint["right_knee"]] - left["figures"][:, joint["right_hip"]]
-    assert len(left["figures"]) == 32
+    thighs = left.figures[:, joint["right_knee"]] - left.figures[:, joint["right_hip"]]
+    assert len(left.figures) == 32
     # A merged root is the middle of two less than 4 cm apart.
     assert np.allclose(np.linalg.norm(thighs, axis=1), 0.38, atol=0.001)
-    assert sorted(i for _, members in left["groups"] for i in members) == list(range(32))
-    assert left["passes"][left["true_one"]]
+    assert sorted(i for _, members in left.groups for i in members) == list(range(32))
+    assert left.passes[left.true_one]
 
 
 @pytest.mark.parametrize("sequence", ["SEQ3", ""])
@@ -423,15 +421,15 @@ def test_a_posture_is_drawn_from_the_side_with_the_left_limbs_dashed():
 
     left = _memo.lee_chen_figures("SEQ2")
     ax = Figure().subplots()
-    assert plot_posture(ax, left["truth"]) is ax
+    assert plot_posture(ax, left.truth) is ax
     limbs = [line for line in ax.lines if len(line.get_xdata()) == 3]
     assert [line.get_linestyle() for line in limbs] == ["-", "-", "--", "--"]
     joint = {name: place for place, name in enumerate(_memo.joint_names())}
-    knee = left["truth"][joint["right_knee"]]
+    knee = left.truth[joint["right_knee"]]
     assert limbs[1].get_xdata()[1] == knee[2] and limbs[1].get_ydata()[1] == -knee[1]
     before = len(ax.lines)
-    assert plot_superposition(ax, left["figures"], left["truth"]) is ax
-    assert len(ax.lines) > before + 12 * len(left["figures"])
+    assert plot_superposition(ax, left.figures, left.truth) is ax
+    assert len(ax.lines) > before + 12 * len(left.figures)
 
 
 def test_places_in_drawn_figures_are_those_of_the_geometry():
@@ -470,8 +468,8 @@ def test_places_in_drawn_figures_are_those_of_the_geometry():
 
 def test_the_propositions_hold_and_false_targets_are_common():
     rods, hinges = _memo.hoffman_flinchbaugh_rods(5000, 3), _memo.hoffman_flinchbaugh_hinges(5000, 100, 3)
-    assert rods["recovered"] >= 4990 and rods["one_root"] >= 4900 and rods["equal_images_one_root"] >= 4900
-    assert hinges["recovered"] >= 4980 and hinges["most_planes"] == 1
+    assert rods.recovered >= 4990 and rods.one_root >= 4900 and rods.equal_images_one_root >= 4900
+    assert hinges.recovered >= 4980 and hinges.most_planes == 1
     pairs, triples = _memo.hoffman_flinchbaugh_false_targets(20_000, 3)
     assert 0.33 < pairs / 20_000 < 0.37 and 0.31 < triples / 20_000 < 0.35  # measured 35 % and 33 %
 
@@ -494,12 +492,12 @@ def test_the_printed_solution_of_a_rod_is_its_depths():
     h = np.sqrt(0.5)
     views = np.array([[[h, 0.0], [0.0, 1.0], [0.5, h]]])
     found = _memo.hoffman_flinchbaugh_rod(views)
-    assert np.allclose(found["k"], [-0.5, -0.25, -0.5, -0.5, h])
-    assert found["valid_roots"] == 1
-    assert np.allclose(np.abs(found["depths"]), [h, 0, 0.5], atol=1e-7)
+    assert np.allclose(found.k, [-0.5, -0.25, -0.5, -0.5, h])
+    assert found.valid_roots == 1
+    assert np.allclose(np.abs(found.depths), [h, 0, 0.5], atol=1e-7)
     with pytest.raises(ValueError, match="one rod"):
         _memo.hoffman_flinchbaugh_rod(np.zeros((2, 3, 2)))
-    assert _memo.hoffman_flinchbaugh_rod(np.full((1, 3, 2), np.nan))["depths"] is None
+    assert _memo.hoffman_flinchbaugh_rod(np.full((1, 3, 2), np.nan)).depths is None
 
 
 # The command.

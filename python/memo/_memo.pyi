@@ -10,8 +10,14 @@ import numpy.typing as npt
 __all__ = [
     "Camera",
     "ClothedScene",
+    "CountTable",
     "Explainer",
+    "FrameSurvivors",
+    "HeadColumn",
+    "HingeTrials",
+    "ImageStages",
     "InternalError",
+    "LastStage",
     "LimbSides",
     "PlanarChain",
     "PlanarInterpretation",
@@ -20,10 +26,14 @@ __all__ = [
     "PointCalibration",
     "PointLightDisplay",
     "PostureSequence",
+    "PrintedRod",
+    "RodTrials",
     "Scene",
     "SecondMotion",
+    "TableInputs",
     "Tracker",
     "Walk",
+    "WalkSimilarity",
     "WalkerCalibration",
     "WalkerMotion",
     "__version__",
@@ -624,19 +634,122 @@ def walker_sightings(
 ]: ...
 def joint_names() -> list[str]: ...
 def segment_names() -> list[str]: ...
-def lee_chen_counts(sequence: str, merge_m: float = ...) -> dict[str, Any]: ...
-def lee_chen_figures(sequence: str) -> dict[str, Any]: ...
-def lee_chen_head() -> list[dict[str, Any]]: ...
-def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = ...) -> list[dict[str, Any]]: ...
-def lee_chen_inputs() -> dict[str, Any]: ...
+
+@final
+class CountTable:
+    """Table 3 or 4, beside the printed one."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    phases: Final[list[float]]
+    counts: Final[dict[str, npt.NDArray[np.uint32]]]
+    printed: Final[dict[str, npt.NDArray[np.uint32]]]
+    truth_kept: Final[list[list[bool]]]
+
+@final
+class LastStage:
+    """Result of rules 1 to 5 and grouping at one phase."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    phase: Final[float]
+    postures: Final[int]
+    groups: Final[int]
+    truth_kept: Final[bool]
+    broken: Final[list[str]]
+
+@final
+class FrameSurvivors:
+    """The postures of a frame that satisfy the physical constraints and rules 1 and 2."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    figures: Final[npt.NDArray[np.float64]]
+    truth: Final[npt.NDArray[np.float64]]
+    groups: Final[list[tuple[int, list[int]]]]
+    true_one: Final[int | None]
+    passes: Final[list[bool]]
+
+@final
+class HeadColumn:
+    """Table 2 by a method."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    method: Final[str]
+    transform: Final[npt.NDArray[np.float64]]
+    rotation: Final[npt.NDArray[np.float64]]
+    focal: Final[float]
+    camera_position: Final[list[float]]
+    camera_position_sd: Final[list[float] | None]
+    points: Final[dict[str, list[float]]]
+
+@final
+class TableInputs:
+    """Inputs of the tables."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    angles: Final[list[tuple[str, tuple[float, float]]]]
+    lengths_cm: Final[list[tuple[str, float]]]
+    head_cm: Final[npt.NDArray[np.float64]]
+    projections_cm: Final[npt.NDArray[np.float64]]
+    frame_s: Final[float]
+    cameras_cm: Final[list[list[float]]]
+
+def lee_chen_counts(sequence: str, merge_m: float = ...) -> CountTable: ...
+def lee_chen_figures(sequence: str) -> FrameSurvivors: ...
+def lee_chen_head() -> list[HeadColumn]: ...
+def lee_chen_last_stage(sequence: str, reading: str, merge_m: float = ...) -> list[LastStage]: ...
+def lee_chen_inputs() -> TableInputs: ...
 def lee_chen_walker(
     sequence: str, frames: int
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
-def hoffman_flinchbaugh_rods(trials: int, seed: int) -> dict[str, Any]: ...
-def hoffman_flinchbaugh_hinges(trials: int, searched: int, seed: int) -> dict[str, Any]: ...
+
+@final
+class RodTrials:
+    """Proposition 1 on random rods."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    trials: Final[int]
+    recovered: Final[int]
+    recovered_by_ellipse: Final[int]
+    recovered_as_printed: Final[int]
+    one_root: Final[int]
+    printed_z1: Final[int]
+    full_rank: Final[int]
+    triple_product_error: Final[float]
+    jacobian_error: Final[float]
+    never_extended: Final[int]
+    never_extended_recovered: Final[int]
+    equal_images: Final[int]
+    equal_images_one_root: Final[int]
+
+@final
+class HingeTrials:
+    """Proposition 2 on random hinges."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    trials: Final[int]
+    recovered: Final[int]
+    full_rank: Final[int]
+    searched: Final[int]
+    one_plane: Final[int]
+    most_planes: Final[int]
+    joint_in_the_middle: Final[int]
+    joint_at_an_end: Final[int]
+
+@final
+class PrintedRod:
+    """Eqs. (4)-(14) on three views of a rod."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    k: Final[list[float]]
+    roots: Final[list[float] | None]
+    z3_sq: Final[list[float]]
+    valid_roots: Final[int]
+    depths: Final[list[float] | None]
+
+def hoffman_flinchbaugh_rods(trials: int, seed: int) -> RodTrials: ...
+def hoffman_flinchbaugh_hinges(trials: int, searched: int, seed: int) -> HingeTrials: ...
 def hoffman_flinchbaugh_false_targets(trials: int, seed: int) -> list[int]: ...
 def hoffman_flinchbaugh_degenerate(trials: int, seed: int) -> list[tuple[str, int]]: ...
-def hoffman_flinchbaugh_rod(views: npt.NDArray[np.float64]) -> dict[str, Any]: ...
+def hoffman_flinchbaugh_rod(views: npt.NDArray[np.float64]) -> PrintedRod: ...
 def rohr_numbers() -> list[tuple[str, float]]: ...
 def rohr_deviations(seed: int = 0) -> list[tuple[str, float]]: ...
 def gait_curves(gait: str, phases: Sequence[float]) -> npt.NDArray[np.float64]: ...
@@ -648,9 +761,32 @@ def model_contours(
     gait: str = "dense",
     hidden: bool = False,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8], npt.NDArray[np.int64]]: ...
+
+@final
+class ImageStages:
+    """Results of the image stages."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    outlines: Final[list[npt.NDArray[np.float64]]]
+    rectangle: Final[list[int]]
+    edges: Final[npt.NDArray[np.float64]]
+    changed: Final[npt.NDArray[np.bool_]]
+    cleaned: Final[npt.NDArray[np.bool_]]
+
+@final
+class WalkSimilarity:
+    """Similarity over the whole cycle."""
+
+    def __new__(cls, *fields: object) -> Self: ...
+    best: Final[list[float]]
+    scores: Final[npt.NDArray[np.float32]]
+    phase: Final[npt.NDArray[np.float64]]
+    along: Final[npt.NDArray[np.float64]]
+    height: Final[npt.NDArray[np.float64]]
+
 def image_stages(
     before: npt.NDArray[np.uint8], frame: npt.NDArray[np.uint8], after: npt.NDArray[np.uint8]
-) -> dict[str, Any]: ...
+) -> ImageStages | None: ...
 def search_windows(lines: npt.NDArray[np.float64], c_r: float = 0.25) -> npt.NDArray[np.float64]: ...
 def walk_filtered(walk: Walk) -> npt.NDArray[np.float64]: ...
 def walk_lines(
@@ -663,4 +799,4 @@ def walk_similarity(
     *,
     along_m: float = 0.0,
     height_m: float = 0.0,
-) -> dict[str, Any]: ...
+) -> WalkSimilarity: ...

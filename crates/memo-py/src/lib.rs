@@ -52,18 +52,20 @@ mod _memo {
     use super::posture::{PostureSequence, SecondMotion, posture, posture_tree};
     #[pymodule_export]
     use super::reproduce::hoffman_flinchbaugh::{
-        hoffman_flinchbaugh_degenerate, hoffman_flinchbaugh_false_targets, hoffman_flinchbaugh_hinges,
-        hoffman_flinchbaugh_rod, hoffman_flinchbaugh_rods,
+        HingeTrials, PrintedRod, RodTrials, hoffman_flinchbaugh_degenerate,
+        hoffman_flinchbaugh_false_targets, hoffman_flinchbaugh_hinges, hoffman_flinchbaugh_rod,
+        hoffman_flinchbaugh_rods,
     };
     #[pymodule_export]
     use super::reproduce::lee_chen::{
-        joint_names, lee_chen_counts, lee_chen_figures, lee_chen_head, lee_chen_inputs, lee_chen_last_stage,
-        lee_chen_walker, segment_names,
+        CountTable, FrameSurvivors, HeadColumn, LastStage, TableInputs, joint_names, lee_chen_counts,
+        lee_chen_figures, lee_chen_head, lee_chen_inputs, lee_chen_last_stage, lee_chen_walker,
+        segment_names,
     };
     #[pymodule_export]
     use super::reproduce::rohr::{
-        body_parts, gait_curves, image_stages, model_contours, rohr_deviations, rohr_numbers, search_windows,
-        walk_filtered, walk_lines, walk_similarity,
+        ImageStages, WalkSimilarity, body_parts, gait_curves, image_stages, model_contours, rohr_deviations,
+        rohr_numbers, search_windows, walk_filtered, walk_lines, walk_similarity,
     };
     #[pymodule_export]
     use super::score::similarity;

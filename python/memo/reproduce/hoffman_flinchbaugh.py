@@ -111,39 +111,39 @@ def _counted(
 # Appendix 1.
 
 
-def _proposition_1(rods: dict[str, Any]) -> list[Row]:
+def _proposition_1(rods: _memo.RodTrials) -> list[Row]:
     return [*_recovered_rods(rods), *_steps_of_the_proof(rods)]
 
 
-def _recovered_rods(rods: dict[str, Any]) -> list[Row]:
-    trials = rods["trials"]
+def _recovered_rods(rods: _memo.RodTrials) -> list[Row]:
+    trials = rods.trials
     return [
         _counted(
             *("Proposition 1", "rods recovered from three views, up to the mirror", "all"),
-            *(rods["recovered"], trials, "depths within 1e-6 of the length"),
+            *(rods.recovered, trials, "depths within 1e-6 of the length"),
             rest=NEAR,
         ),
         _counted(
             *("Proposition 1", "the same by the ellipse of footnote 14 (Horn)", "all"),
-            *(rods["recovered_by_ellipse"], trials, "linear in the form of the ellipse"),
+            *(rods.recovered_by_ellipse, trials, "linear in the form of the ellipse"),
             rest=NEAR,
         ),
         _counted(
             *("Proposition 1", "the same by eqs. (4)-(14) in the printed order", "all"),
-            *(rods["recovered_as_printed"], trials, "(14) loses digits near k1 = 0 and k3 = 0"),
+            *(rods.recovered_as_printed, trials, "(14) loses digits near k1 = 0 and k3 = 0"),
             rest=NEAR,
         ),
     ]
 
 
-def _steps_of_the_proof(rods: dict[str, Any]) -> list[Row]:
-    trials = rods["trials"]
+def _steps_of_the_proof(rods: _memo.RodTrials) -> list[Row]:
+    trials = rods.trials
     where = "appendix 1"
     return [
         compared(
             *(f"{where}, eq. (6)", "[a1 a2 a3] minus (k3 z1 + k4 z2 + k5 z3), largest", EQUAL),
             *(
-                rods["triple_product_error"],
+                rods.triple_product_error,
                 f"{counted(trials, 'triple')} of vectors with the k's of footnote 11",
             ),
             within=1e-12,
@@ -154,17 +154,17 @@ def _steps_of_the_proof(rods: dict[str, Any]) -> list[Row]:
                 "determinant minus 4 (k3 z2 z3 + k4 z1 z3 + k5 z1 z2), largest",
                 EQUAL,
             ),
-            *(rods["jacobian_error"], "the printed determinant, expanded; footnote 12 uses its factors"),
+            *(rods.jacobian_error, "the printed determinant, expanded; footnote 12 uses its factors"),
             within=1e-12,
         ),
         _counted(
             *(f"{where}, Jacobian", "rods whose Jacobian has rank 3", "rank three"),
-            *(rods["full_rank"], trials, "smallest singular value over 1e-9 of the largest"),
+            *(rods.full_rank, trials, "smallest singular value over 1e-9 of the largest"),
         ),
         _counted(
             *(f"{where}, claim", "rods with exactly one valid root x of eq. (9)", "at most one"),
             *(
-                rods["one_root"],
+                rods.one_root,
                 trials,
                 "a root is valid if z3 is real and (6) is met within 1e-6: of the four solutions that Bezout"
                 " allows, a mirror pair is left",
@@ -173,13 +173,13 @@ def _steps_of_the_proof(rods: dict[str, Any]) -> list[Row]:
         ),
         Row(
             *(f"{where}, after (14)", "of z3 = ± with z1 = + sqrt(z3^2 - k2), those that meet (6)", "both"),
-            f"one of the two: + in {rods['printed_z1']}, - in {trials - rods['printed_z1']} of {trials}",
+            f"one of the two: + in {rods.printed_z1}, - in {trials - rods.printed_z1} of {trials}",
             Verdict.DIFFERS,
             "(5) does not determine the sign of z1, (6) does; the mirror has the other sign",
         ),
         _counted(
             *("section 6", "rods never seen longer than 0.9 of their length, recovered", "all"),
-            *(rods["never_extended_recovered"], rods["never_extended"]),
+            *(rods.never_extended_recovered, rods.never_extended),
             "maximal extension need not be visible, as predicted",
         ),
     ]
@@ -188,26 +188,26 @@ def _steps_of_the_proof(rods: dict[str, Any]) -> list[Row]:
 # Appendix 2.
 
 
-def _proposition_2(hinges: dict[str, Any]) -> list[Row]:
-    trials = hinges["trials"]
+def _proposition_2(hinges: _memo.HingeTrials) -> list[Row]:
+    trials = hinges.trials
     return [
         _counted(
             *("Proposition 2", "hinges recovered from two views, up to the mirror", "all"),
-            *(hinges["recovered"], trials),
+            *(hinges.recovered, trials),
             "depths within 1e-6 of the length",
             rest=NEAR,
         ),
         _counted(
             *("Proposition 2", "hinges with exactly one plane, up to the mirror", "all"),
-            *(hinges["one_plane"], hinges["searched"]),
+            *(hinges.one_plane, hinges.searched),
             f"by search over all directions of slope, without the closed form; largest number of planes:"
-            f" {hinges['most_planes']}. The paper omits its proof",
+            f" {hinges.most_planes}. The paper omits its proof",
             rest="have their plane so near another change of sign that steps of 0.025 degrees miss it",
             least=0.97,
         ),
         _counted(
             *("appendix 2, Jacobian", "hinges whose Jacobian has rank 4", "rank four"),
-            *(hinges["full_rank"], trials, "smallest singular value over 1e-9 of the largest"),
+            *(hinges.full_rank, trials, "smallest singular value over 1e-9 of the largest"),
         ),
     ]
 
@@ -229,7 +229,7 @@ def _false_targets(rods: int, hinges: int) -> list[Row]:
     ]
 
 
-def _degenerate_rows(rods: dict[str, Any], degenerate: list[tuple[str, int]]) -> list[Row]:
+def _degenerate_rows(rods: _memo.RodTrials, degenerate: list[tuple[str, int]]) -> list[Row]:
     paper = {
         "rod in a plane parallel to the image": "degenerate",
         "rod in a plane seen edge-on": "degenerate (collinear)",
@@ -246,7 +246,7 @@ def _degenerate_rows(rods: dict[str, Any], degenerate: list[tuple[str, int]]) ->
         )
         for name, count in degenerate
     ]
-    one, of = rods["equal_images_one_root"], rods["equal_images"]
+    one, of = rods.equal_images_one_root, rods.equal_images
     rows.append(
         Row(
             *("appendix 1, claim", "k1 = k2 without parallel plane or collinear images", "degenerate"),
@@ -259,16 +259,16 @@ def _degenerate_rows(rods: dict[str, Any], degenerate: list[tuple[str, int]]) ->
     return rows
 
 
-def _linking_rows(hinges: dict[str, Any]) -> list[Row]:
-    trials = hinges["trials"]
+def _linking_rows(hinges: _memo.HingeTrials) -> list[Row]:
+    trials = hinges.trials
     return [
         _counted(
             *("section 6, linking", "ankle, knee, hip: read with the knee as the joint", "an interpretation"),
-            *(hinges["joint_in_the_middle"], trials, "two views, exact"),
+            *(hinges.joint_in_the_middle, trials, "two views, exact"),
         ),
         Row(
             *("section 6, linking", "the same with the ankle as the joint", "no interpretation"),
-            f"an interpretation in {_share(hinges['joint_at_an_end'], trials)}",
+            f"an interpretation in {_share(hinges.joint_at_an_end, trials)}",
             Verdict.DIFFERS,
             "two views cannot contradict: see false targets. More views give the links (next rows)",
         ),
@@ -591,8 +591,8 @@ def _draw_solutions(figure: Figure) -> None:
     the plane k3 z1 + k4 z2 + k5 z3 = 0. Right in that plane: all sheets as curves."""
     ends = np.array([_in_plane(angle) for angle in ROD_DEG])
     printed = _memo.hoffman_flinchbaugh_rod(np.ascontiguousarray(ends[None, :, :2]))
-    k1, k2, *normal = printed["k"]
-    z = np.asarray(printed["depths"])
+    k1, k2, *normal = printed.k
+    z = np.asarray(printed.depths)
     first = np.cross(normal, [0, 0, 1.0])
     first /= np.linalg.norm(first)
     second = np.cross(normal, first) / np.linalg.norm(normal)
@@ -630,7 +630,7 @@ def _draw_solutions(figure: Figure) -> None:
         plane.plot(solution @ first, solution @ second, marker="o", color="black")
     plane.set(aspect="equal", xlabel="in the plane", ylabel="in the plane")
     plane.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
-    numbers = ", ".join(f"{k:.3f}" for k in printed["k"])
+    numbers = ", ".join(f"{k:.3f}" for k in printed.k)
     figure.suptitle(
         f"k1 ... k5 = {numbers}; z1, z2, z3 = ±({z[0]:.3f}, {z[1]:.3f}, {z[2]:.3f})", fontsize=9, ha="center"
     )

@@ -117,7 +117,7 @@ def lee_chen(progress: Progress = unseen) -> Reproduction:
 # Input: section 2, Table 1, the appendix.
 
 
-def _input_rows(inputs: dict[str, Any]) -> list[Row]:
+def _input_rows(inputs: _memo.TableInputs) -> list[Row]:
     joints, segments = _memo.joint_names(), _memo.segment_names()
     rows = [
         compared("section 1, Fig. 1", "joints of the stick figure", "14", len(joints)),
@@ -126,30 +126,28 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
             *("section 3.1", "body configurations of the tree", "8196", 2 ** (len(joints) - 1)),
             "a misprint: 2^13 is 8192",
         ),
-        compared("appendix", "seconds per frame", "0.2", inputs["frame_s"]),
+        compared("appendix", "seconds per frame", "0.2", inputs.frame_s),
     ]
-    for sequence, printed, camera in zip(
-        SEQUENCES, ("400 0 0", "300 0 300"), inputs["cameras_cm"], strict=True
-    ):
+    for sequence, printed, camera in zip(SEQUENCES, ("400 0 0", "300 0 300"), inputs.cameras_cm, strict=True):
         quantity = f"camera of {sequence}, centimetres"
         rows.append(
             compared("appendix", quantity, printed, np.round(camera, 9), "position of the image plane")
         )
-    for name, (least, most) in inputs["angles"]:
+    for name, (least, most) in inputs.angles:
         quantity, printed = TABLE_1[name]
         rows.append(compared("Table 1", f"{quantity}, degrees", printed, np.round([-least, most], 9) + 0.0))
-    lengths = dict(inputs["lengths_cm"])
+    lengths = dict(inputs.lengths_cm)
     for name, (printed, pattern) in TABLE_A1.items():
         found = sorted({round(lengths[pattern.format(side)], 9) for side in ("right", "left")})
         rows.append(compared("Table A.1", f"{name}, centimetres", printed, found, "both sides"))
-    for (name, (printed, _)), ours in zip(TABLE_A2.items(), inputs["head_cm"], strict=True):
+    for (name, (printed, _)), ours in zip(TABLE_A2.items(), inputs.head_cm, strict=True):
         why = (
             "a misprint: y' in A.2(b) and the depth in Table 2(d) both imply -31.168, as for the left eye"
             if name == "right eye"
             else ""
         )
         rows.append(compared("Table A.2 (a)", f"{name}, centimetres", printed, np.round(ours, 9), why))
-    projections = inputs["projections_cm"]
+    projections = inputs.projections_cm
     for axis, letter in enumerate("xy"):
         printed = " ".join(projection.split()[axis] for _, projection in TABLE_A2.values())
         why = "from A.2(a) seen from (400, 0, 0) with f = 5" + (
@@ -166,30 +164,30 @@ def _input_rows(inputs: dict[str, Any]) -> list[Row]:
 # Table 2.
 
 
-def _head_numbers(column: dict[str, Any]) -> dict[str, float]:
+def _head_numbers(column: _memo.HeadColumn) -> dict[str, float]:
     """Every number of Table 2 by its name in the text, in the table's order."""
     numbers: dict[str, float] = {}
-    for part, name in (("(a)", "transform"), ("(b)", "rotation")):
-        for (row, place), value in np.ndenumerate(column[name]):
-            numbers[f"{part} {name[0].upper()}{row + 1}{(1, 2, 4 if name[0] == 't' else 3)[place]}"] = value
-    for axis, value in zip("xyz", column["camera_position"], strict=True):
+    for part, name, last, matrix in (("(a)", "T", 4, column.transform), ("(b)", "R", 3, column.rotation)):
+        for (row, place), number in np.ndenumerate(matrix):
+            numbers[f"{part} {name}{row + 1}{(1, 2, last)[place]}"] = float(number)
+    for axis, value in zip("xyz", column.camera_position, strict=True):
         numbers[f"(c) {axis}0"] = value
-    for point, position in column["points"].items():
+    for point, position in column.points.items():
         for axis, value in zip("xyz", position, strict=True):
             numbers[f"(d) {point} {axis}"] = value
-    numbers["f"] = column["focal"]
+    numbers["f"] = column.focal
     return numbers
 
 
-def _head_table(head: list[dict[str, Any]]) -> Table:
+def _head_table(head: list[_memo.HeadColumn]) -> Table:
     columns = [_head_numbers(column) for column in head]
     rows = [[name, *(f"{column[name]:z.5f}" for column in columns)] for name in columns[0]]
-    return Table("table2", ["quantity", *(column["method"] for column in head)], rows)
+    return Table("table2", ["quantity", *(column.method for column in head)], rows)
 
 
-def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
+def _head_rows(head: list[_memo.HeadColumn]) -> list[Row]:
     """Table 2 compared with the linear solution from projections without rounding."""
-    by_method = {column["method"]: column for column in head}
+    by_method = {column.method: column for column in head}
     printed, exact = head[0], by_method["linear, exact projections"]
     rounded, known = by_method["linear, A.2(b) as printed"], by_method["least squares, f = 5"]
     how = (
@@ -197,27 +195,29 @@ def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
     )
 
     def row(quantity: str, name: str, *, within: float, place: Any = ...) -> Row:
-        text = " ".join(f"{value:.5f}" for value in np.atleast_1d(np.asarray(printed[name])[place]))
-        return compared("Table 2", quantity, text, np.asarray(exact[name])[place], how, within=within)
+        text = " ".join(f"{value:.5f}" for value in np.atleast_1d(np.asarray(getattr(printed, name))[place]))
+        return compared(
+            "Table 2", quantity, text, np.asarray(getattr(exact, name))[place], how, within=within
+        )
 
     rows = [
         row(f"(a) [T], row {k + 1}", "transform", within=1e-4 if k < 3 else 0.03, place=k) for k in range(4)
     ]
     rows += [row(f"(b) [R], row {k + 1}", "rotation", within=1e-4, place=k) for k in range(3)]
     rows.append(row("(c) camera position, centimetres", "camera_position", within=0.03))
-    for name, point in printed["points"].items():
+    for name, point in printed.points.items():
         text = " ".join(f"{value:.5f}" for value in point)
         quantity = f"(d) {name.replace('_', ' ')}, centimetres"
-        rows.append(compared("Table 2", quantity, text, exact["points"][name], how, within=0.03))
-    place = " ".join(f"{value:.5f}" for value in printed["camera_position"])
-    sd = ", ".join(f"{value:.3f}" for value in known["camera_position_sd"])
+        rows.append(compared("Table 2", quantity, text, exact.points[name], how, within=0.03))
+    place = " ".join(f"{value:.5f}" for value in printed.camera_position)
+    sd = ", ".join(f"{value:.3f}" for value in known.camera_position_sd or [])
     rows += [
         compared(
-            *("Table 2", "(c) by eq. (3) from A.2(b) as printed", place, rounded["camera_position"]),
+            *("Table 2", "(c) by eq. (3) from A.2(b) as printed", place, rounded.camera_position),
             "the system is ill-conditioned and five digits are too few for it",
         ),
         compared(
-            *("Table 2", "(c) by least squares from A.2(b), f known", place, known["camera_position"]),
+            *("Table 2", "(c) by least squares from A.2(b), f known", place, known.camera_position),
             f"over true rotations; standard deviations ({sd}) from the rounding of A.2(b)",
             within=0.05,
         ),
@@ -230,15 +230,15 @@ def _head_rows(head: list[dict[str, Any]]) -> list[Row]:
 HALVES = ("physical", "rules_1_2")
 
 
-def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[str, Any]) -> list[Row]:
+def _count_rows(number: int, sequence: str, merged: _memo.CountTable, apart: _memo.CountTable) -> list[Row]:
     rows = []
     equal = 0
     for level, joint in enumerate(_memo.joint_names()):
-        printed, ours = ([merged[f"{prefix}{half}"][level] for half in HALVES] for prefix in ("printed_", ""))
+        printed, ours = ([one[half][level] for half in HALVES] for one in (merged.printed, merged.counts))
         here = int(np.sum(np.asarray(printed) == np.asarray(ours)))
         equal += here
         texts = ["; ".join(" ".join(map(str, half)) for half in cells) for cells in (printed, ours)]
-        roots = "; ".join(" ".join(map(str, apart[half][level])) for half in HALVES)
+        roots = "; ".join(" ".join(map(str, apart.counts[half][level])) for half in HALVES)
         rows.append(
             in_kind(
                 f"Table {number}",
@@ -248,9 +248,9 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
                 f" {roots})",
             )
         )
-    phases = ", ".join(f"{phase:.2f}" for phase in merged["phases"])
-    kept = " and ".join(f"{sum(map(all, table['truth_kept']))} of 3" for table in (merged, apart))
-    ratio = max(float(np.max(merged[half][1:] / merged[half][:-1])) for half in HALVES)
+    phases = ", ".join(f"{phase:.2f}" for phase in merged.phases)
+    kept = " and ".join(f"{sum(map(all, table.truth_kept))} of 3" for table in (merged, apart))
+    ratio = max(float(np.max(table[1:] / table[:-1])) for table in merged.counts.values())
     rows += [
         in_kind(
             *(f"Table {number}", f"numbers equal to the printed ones, {sequence}", "84", str(equal)),
@@ -268,14 +268,11 @@ def _count_rows(number: int, sequence: str, merged: dict[str, Any], apart: dict[
     return rows
 
 
-def _count_table(number: int, merged: dict[str, Any], apart: dict[str, Any]) -> Table:
+def _count_table(number: int, merged: _memo.CountTable, apart: _memo.CountTable) -> Table:
     columns = {
-        "physical": merged["physical"],
-        "rules_1_2": merged["rules_1_2"],
-        "printed_physical": merged["printed_physical"],
-        "printed_rules_1_2": merged["printed_rules_1_2"],
-        "unmerged_physical": apart["physical"],
-        "unmerged_rules_1_2": apart["rules_1_2"],
+        **merged.counts,
+        **{f"printed_{half}": table for half, table in merged.printed.items()},
+        **{f"unmerged_{half}": table for half, table in apart.counts.items()},
     }
     header = ["level", "joint", *(f"{name}_frame{frame}" for name in columns for frame in FRAMES)]
     rows = [
@@ -287,7 +284,7 @@ def _count_table(number: int, merged: dict[str, Any], apart: dict[str, Any]) -> 
 
 # The last stage: rules 1 to 5 and grouping.
 
-Stages = dict[tuple[str, str], list[dict[str, Any]]]
+Stages = dict[tuple[str, str], list[_memo.LastStage]]
 READINGS = {
     "rigid_torso": "instead of rule 3 at the shoulder, the neck must be ahead of the line of the shoulders,"
     " as a rigid torso is not its mirror image; knees are flexed from 25 degrees",
@@ -304,24 +301,24 @@ def _last_stages() -> Stages:
     }
 
 
-def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
+def _stage_rows(stages: Stages, left: dict[str, _memo.FrameSurvivors]) -> list[Row]:
     rows = []
     for sequence, survivors, groups in (("SEQ1", "32", "16"), ("SEQ2", "6", "6")):
         found = left[sequence]
         rows += [
             in_kind(
                 *("section 4.2", f"postures of frame 1 of {sequence} after rules 1 and 2", survivors),
-                *(str(len(found["figures"])), WALKER),
+                *(str(len(found.figures)), WALKER),
             ),
             in_kind(
-                *("section 4.2", f"the same after grouping, {sequence}", groups, str(len(found["groups"]))),
+                *("section 4.2", f"the same after grouping, {sequence}", groups, str(len(found.groups))),
                 f"{WALKER}; within 5 cm, as the grouping distance is not printed",
             ),
         ]
     for (sequence, reading), frames in stages.items():
         final = {"SEQ1": "2", "SEQ2": "1"}[sequence]
-        groups_left = [frame["groups"] for frame in frames]
-        kept = sum(frame["truth_kept"] for frame in frames)
+        groups_left = [frame.groups for frame in frames]
+        kept = sum(frame.truth_kept for frame in frames)
         name = reading.replace("_", " ")
         rows.append(
             in_kind(
@@ -335,7 +332,7 @@ def _stage_rows(stages: Stages, left: dict[str, dict[str, Any]]) -> list[Row]:
                 f" {READINGS[reading]}",
             )
         )
-        broken = Counter(cause for frame in frames for cause in {_without_side(b) for b in frame["broken"]})
+        broken = Counter(cause for frame in frames for cause in {_without_side(b) for b in frame.broken})
         causes = ", ".join(f"{cause} ({count})" for cause, count in sorted(broken.items()))
         rows.append(
             in_kind(
@@ -355,8 +352,8 @@ def _stage_table(stages: Stages) -> Table:
     header = ["sequence", "reading", "phase", "postures", "groups", "truth_kept", "truth_breaks"]
     rows = [
         [
-            *(sequence, reading, f"{frame['phase']:.3f}", frame["postures"], frame["groups"]),
-            *(int(frame["truth_kept"]), " ".join(frame["broken"])),
+            *(sequence, reading, f"{frame.phase:.3f}", frame.postures, frame.groups),
+            *(int(frame.truth_kept), " ".join(frame.broken)),
         ]
         for (sequence, reading), frames in stages.items()
         for frame in frames
@@ -401,7 +398,7 @@ def plot_superposition(ax: Axes, figures: Points, truth: Points) -> Axes:
     return ax
 
 
-def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
+def _figures(left: dict[str, _memo.FrameSurvivors]) -> list[Drawing]:
     first, second = (left[sequence] for sequence in SEQUENCES)
     return [*_figures_of_the_method(first, second), *_figures_of_what_is_left(first, second), _fig_a1()]
 
@@ -409,7 +406,7 @@ def _figures(left: dict[str, dict[str, Any]]) -> list[Drawing]:
 ON_WALKER = f"{WALKER[:1].upper()}{WALKER[1:]}"
 
 
-def _figures_of_the_method(first: dict[str, Any], second: dict[str, Any]) -> list[Drawing]:
+def _figures_of_the_method(first: _memo.FrameSurvivors, second: _memo.FrameSurvivors) -> list[Drawing]:
     """Figs. 1 to 5."""
     return [
         Drawing(
@@ -458,7 +455,7 @@ def _figures_of_the_method(first: dict[str, Any], second: dict[str, Any]) -> lis
     ]
 
 
-def _figures_of_what_is_left(first: dict[str, Any], second: dict[str, Any]) -> list[Drawing]:
+def _figures_of_what_is_left(first: _memo.FrameSurvivors, second: _memo.FrameSurvivors) -> list[Drawing]:
     """Figs. 6 to 8."""
     from_side = f"{ON_WALKER}; depth and height without perspective"
     return [
@@ -468,7 +465,7 @@ def _figures_of_what_is_left(first: dict[str, Any], second: dict[str, Any]) -> l
         ),
         Drawing(
             *("fig7", "Fig. 7", "The same postures in one picture"),
-            *(lambda figure: plot_superposition(_plain(figure), first["figures"], first["truth"]), (5, 7)),
+            *(lambda figure: plot_superposition(_plain(figure), first.figures, first.truth), (5, 7)),
             from_side,
         ),
         Drawing(
@@ -515,7 +512,7 @@ def _draw_cameras(figure: Figure) -> None:
     inputs = _memo.lee_chen_inputs()
     figures, _ = _memo.lee_chen_walker("SEQ1", 1)
     # Camera axes of SEQ1 in the head's: x to the walker's right hand is its left in the image.
-    lens = inputs["cameras_cm"][0][0] / 100 + 0.05
+    lens = inputs.cameras_cm[0][0] / 100 + 0.05
     forward, up, right = lens - figures[0, :, 2], -figures[0, :, 1], -figures[0, :, 0]
     above, aside = figure.subplots(2, 1, sharex=True, height_ratios=(3.5, 1.7))
     for ax, across, label in ((above, right, "z, to the walker's right, m"), (aside, up, "y, up, m")):
@@ -525,7 +522,7 @@ def _draw_cameras(figure: Figure) -> None:
             ax.annotate("", axis, (0, 0), arrowprops={"arrowstyle": "->", "color": "black"})
         ax.set(xlabel="x, moving direction, m", ylabel=label, aspect="equal")
         ax.spines[["top", "right"]].set_visible(False)
-    for sequence, (x, y, z) in zip(SEQUENCES, np.asarray(inputs["cameras_cm"]) / 100, strict=True):
+    for sequence, (x, y, z) in zip(SEQUENCES, np.asarray(inputs.cameras_cm) / 100, strict=True):
         for ax, across in ((above, z), (aside, y)):
             ax.plot([x, 0], [across, 0], color=NEUTRAL, linewidth=0.8, linestyle=":")
             ax.plot(x, across, marker="s", color=RIGHT)
@@ -543,14 +540,14 @@ def _distinct(points: Points) -> Points:
     return np.array(kept)
 
 
-def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
+def _two_ends(left: _memo.FrameSurvivors) -> tuple[str, Points, Points]:
     """Among joints that the postures put at two positions behind the same joint, the pair farthest apart:
     name of the segment, its start (3,) and both ends (2, 3)."""
     names = _memo.joint_names()
     found = []
     for side in ("right", "left"):
         for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")):
-            starts, ends = (left["figures"][:, names.index(f"{side}_{joint}")] for joint in (start, end))
+            starts, ends = (left.figures[:, names.index(f"{side}_{joint}")] for joint in (start, end))
             for place in _distinct(starts):
                 both = _distinct(ends[np.linalg.norm(starts - place, axis=1) < 1e-3])
                 if len(both) == 2:
@@ -561,7 +558,7 @@ def _two_ends(left: dict[str, Any]) -> tuple[str, Points, Points]:
     return name, place, both
 
 
-def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
+def _draw_two_ends(figure: Figure, left: _memo.FrameSurvivors) -> None:
     """In the plane of the line of sight and the known joint: the segment's circle cuts the line twice."""
     name, start, ends = _two_ends(left)
     ray = ends[0] / np.linalg.norm(ends[0])
@@ -585,9 +582,9 @@ def _draw_two_ends(figure: Figure, left: dict[str, Any]) -> None:
     ax.set_title(f"{name}, {100 * length:.0f} cm", loc="left", fontsize=9)
 
 
-def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
+def _draw_tree(figure: Figure, left: _memo.FrameSurvivors) -> None:
     """The postures as paths through the tree, side by side in the order of the tree."""
-    keys = np.round(left["figures"], 3)
+    keys = np.round(left.figures, 3)
     order = sorted(range(len(keys)), key=lambda leaf: keys[leaf].ravel().tolist())
     ax = figure.subplots()
     names = _memo.joint_names()
@@ -597,7 +594,7 @@ def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
         for x, leaf in enumerate(order):
             at.setdefault(keys[leaf, : level + 1].tobytes(), []).append(x)
         places.append({key: float(np.mean(leaves)) for key, leaves in at.items()})
-    true_one = left["true_one"]
+    true_one = left.true_one
     for leaf in range(len(keys)):
         path = [places[level][keys[leaf, : level + 1].tobytes()] for level in range(len(names))]
         ax.plot(path, range(len(names)), color=NEUTRAL, linewidth=0.7, marker=".", markersize=4, zorder=1)
@@ -616,20 +613,20 @@ def _draw_tree(figure: Figure, left: dict[str, Any]) -> None:
     ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0)
 
 
-def _draw_rigid(figure: Figure, left: dict[str, Any]) -> None:
+def _draw_rigid(figure: Figure, left: _memo.FrameSurvivors) -> None:
     """From above: lines of sight, the two positions of each shoulder, and the distance of each pair."""
     names = _memo.joint_names()
-    neck = left["truth"][0]
+    neck = left.truth[0]
 
     def roots(joint: str) -> Points:
         """Both positions on the line of sight: they are symmetric about its point nearest to the neck."""
-        true = left["truth"][names.index(joint)]
+        true = left.truth[names.index(joint)]
         ray = true / np.linalg.norm(true)
         both = np.array([true, 2 * (neck @ ray) * ray - true])
         return both[np.argsort(both[:, 2])]
 
     right, other = roots("right_shoulder"), roots("left_shoulder")
-    wanted = dict(_memo.lee_chen_inputs()["lengths_cm"])["right_shoulder_to_left_shoulder"]
+    wanted = dict(_memo.lee_chen_inputs().lengths_cm)["right_shoulder_to_left_shoulder"]
     ax = _plain(figure)
     for letter, places, colour in (("A", right, RIGHT), ("B", other, LEFT)):
         near, far = min(places[:, 2]) - 0.25, max(places[:, 2]) + 0.25
@@ -675,27 +672,27 @@ def _draw_sequences(figure: Figure) -> None:
             ax.set_title(f"{sequence}, frame {number}, phase {phase % 1:.2f}", fontsize=8)
 
 
-def _panel_grid(left: dict[str, Any]) -> tuple[int, int]:
-    count = len(left["groups"])
+def _panel_grid(left: _memo.FrameSurvivors) -> tuple[int, int]:
+    count = len(left.groups)
     columns = min(8, count)
     return -(-count // columns), columns
 
 
-def _panel_size(left: dict[str, Any]) -> tuple[float, float]:
+def _panel_size(left: _memo.FrameSurvivors) -> tuple[float, float]:
     rows, columns = _panel_grid(left)
     return max(1.4 * columns, 4.8), 2.9 * rows + 0.5
 
 
-def _draw_panels(figure: Figure, left: dict[str, Any]) -> None:
+def _draw_panels(figure: Figure, left: _memo.FrameSurvivors) -> None:
     """One panel per group of postures (Figs. 6 and 8); if a group holds the true posture, it is drawn."""
     rows, columns = _panel_grid(left)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for ax in axes.flat:
         ax.set_axis_off()
-    for number, (ax, (representative, members)) in enumerate(zip(axes.flat, left["groups"], strict=False)):
-        is_true = left["true_one"] in members
-        plot_posture(ax, left["figures"][left["true_one"] if is_true else representative])
-        marks = ["rules 3-5"] * any(left["passes"][i] for i in members) + ["true"] * is_true
+    for number, (ax, (representative, members)) in enumerate(zip(axes.flat, left.groups, strict=False)):
+        is_true = left.true_one in members
+        plot_posture(ax, left.figures[left.true_one if is_true else representative])
+        marks = ["rules 3-5"] * any(left.passes[i] for i in members) + ["true"] * is_true
         ax.set_title(f"({chr(ord('a') + number)}) {', '.join(marks)}", fontsize=8)
     figure.suptitle(
         "camera to the left; right limbs solid, left dashed; marked: left by rules 3-5", fontsize=8

@@ -64,7 +64,7 @@ def _of_the_evidence(shown: Sequence, look: Look) -> list[Drawing]:
     cleaned = "After the binary operations, with the surrounding rectangle"
 
     def draw_change(figure: Figure) -> object:
-        return _draw_mask(figure, look.stages["changed"])
+        return _draw_mask(figure, look.stages.changed)
 
     return [
         Drawing("fig8", "Fig. 8", "Grey-value image", lambda f: _draw_image(f, look), _PICTURE, why),
@@ -195,10 +195,10 @@ def _of_a_side(shown: Sequence, number: int, side: str) -> Drawing:
 # Numbers that rows share with figures.
 
 
-def similarity_curve(sequence: Sequence, look: Look) -> tuple[Array, Array]:
+def similarity_curve(sequence: Sequence, look: Look) -> tuple[Array, npt.NDArray[np.float32]]:
     """Phases and similarities of a frame over the whole cycle, with fixed position."""
-    found = _memo.walk_similarity(sequence.walk, look.row, look.stages["edges"])
-    return found["phase"], found["scores"][:, 0, 0]
+    found = _memo.walk_similarity(sequence.walk, look.row, look.stages.edges)
+    return found.phase, found.scores[:, 0, 0]
 
 
 def similarity_peaks(sequence: Sequence, look: Look) -> tuple[float, float, float]:
@@ -307,14 +307,14 @@ def _grey(ax: Axes, luma: npt.NDArray[np.uint8], *, faint: bool = False) -> None
 
 def _about(ax: Axes, look: Look, margin: float = 0.12) -> None:
     """Shows the part of the image about the rectangle."""
-    left, top, right, bottom = look.stages["rectangle"]
+    left, top, right, bottom = look.stages.rectangle
     edge = margin * (bottom - top)
     ax.set(xlim=(left - edge, right + edge), ylim=(bottom + edge, top - edge))
     ax.set_aspect("equal")
 
 
 def _rectangle(ax: Axes, look: Look, colour: str) -> None:
-    left, top, right, bottom = look.stages["rectangle"]
+    left, top, right, bottom = look.stages.rectangle
     ax.plot([left, right, right, left, left], [top, top, bottom, bottom, top], color=colour, linewidth=1)
 
 
@@ -330,12 +330,12 @@ def _draw_mask(figure: Figure, mask: npt.NDArray[np.bool_]) -> Axes:
 
 
 def _draw_cleaned(figure: Figure, look: Look) -> None:
-    _rectangle(_draw_mask(figure, look.stages["cleaned"]), look, RIGHT)
+    _rectangle(_draw_mask(figure, look.stages.cleaned), look, RIGHT)
 
 
 def _draw_outline(figure: Figure, look: Look) -> None:
     ax = figure.subplots()
-    for outline in look.stages["outlines"]:
+    for outline in look.stages.outlines:
         closed = np.vstack([outline, outline[:1]])
         ax.plot(closed[:, 0], closed[:, 1], color="black", linewidth=1)
     _rectangle(ax, look, RIGHT)
@@ -344,8 +344,8 @@ def _draw_outline(figure: Figure, look: Look) -> None:
 
 
 def _draw_velocities(figure: Figure, look: Look) -> None:
-    u, v = _memo.velocity_field(look.luma, look.after, look.stages["cleaned"])
-    left, top, right, bottom = look.stages["rectangle"]
+    u, v = _memo.velocity_field(look.luma, look.after, look.stages.cleaned)
+    left, top, right, bottom = look.stages.rectangle
     step = max(4, (bottom - top) // 40)
     y, x = np.mgrid[top : bottom + 1 : step, left : right + 1 : step]
     ax = figure.subplots()
@@ -359,7 +359,7 @@ def _draw_velocities(figure: Figure, look: Look) -> None:
 
 def _draw_edges(figure: Figure, look: Look) -> None:
     ax = figure.subplots()
-    _lines(ax, look.stages["edges"][:, :4].reshape(-1, 2, 2), "black", 1.2)
+    _lines(ax, look.stages.edges[:, :4].reshape(-1, 2, 2), "black", 1.2)
     _rectangle(ax, look, RIGHT)
     _about(ax, look)
     ax.set_axis_off()
@@ -379,7 +379,7 @@ def _draw_windows(figure: Figure, sequence: Sequence, look: Look) -> None:
 def _draw_comparison(figure: Figure, sequence: Sequence, look: Look) -> None:
     """The longest contour matched to an edge neither parallel to it nor on it."""
     lines, _ = _memo.walk_lines(sequence.walk, look.row)
-    edges = np.ascontiguousarray(look.stages["edges"][:, :4].reshape(-1, 2, 2))
+    edges = np.ascontiguousarray(look.stages.edges[:, :4].reshape(-1, 2, 2))
     _, matches = _memo.similarity(lines, edges)
     lengths = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
     telling = (np.degrees(matches[:, 4]) > 1.5) & (matches[:, 3] > 1)
@@ -420,11 +420,11 @@ def _draw_similarity(figure: Figure, sequence: Sequence, look: Look) -> None:
 
 
 def _draw_surface(figure: Figure, sequence: Sequence, look: Look) -> None:
-    found = _memo.walk_similarity(sequence.walk, look.row, look.stages["edges"], along_m=0.4, height_m=0.1)
-    surface = found["scores"].max(axis=2)
+    found = _memo.walk_similarity(sequence.walk, look.row, look.stages.edges, along_m=0.4, height_m=0.1)
+    surface = found.scores.max(axis=2)
     ax = figure.subplots()
-    image = ax.pcolormesh(found["phase"], 100 * found["along"], surface.T, cmap="viridis", shading="nearest")
-    best = found["best"]
+    image = ax.pcolormesh(found.phase, 100 * found.along, surface.T, cmap="viridis", shading="nearest")
+    best = found.best
     ax.plot(best[0], 100 * best[1], marker="x", color="white", markersize=9)
     ax.set(xlabel="pose", ylabel="position along the path, cm from the track's")
     ax.set_title(f"best at pose {best[0]:.2f}, {100 * best[1]:+.0f} cm", fontsize=9, loc="left")

@@ -50,8 +50,7 @@ class Look:
     frame: int
     luma: Luma
     after: Luma
-    stages: dict[str, Any]
-    """`changed`, `cleaned`, `outlines`, `rectangle`, `edges`: see `_memo.image_stages`."""
+    stages: _memo.ImageStages
 
 
 @dataclass(frozen=True)
@@ -159,8 +158,8 @@ def _sequence(
         if row not in example_rows and row not in shown_rows and row % step:
             continue
         stages = _memo.image_stages(before, here, after)
-        if stages["rectangle"] is not None:
-            rectangles.append([at, *stages["rectangle"]])
+        if stages is not None:
+            rectangles.append([at, *stages.rectangle])
             if row in example_rows:
                 examples.append(Look(row, at, here, after, stages))
         if row in shown_rows:

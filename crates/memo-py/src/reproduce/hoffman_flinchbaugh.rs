@@ -1,14 +1,61 @@
 //! Hoffman and Flinchbaugh (1982): the propositions on random problems.
 
 use crate::array::rows_from_numpy;
+use crate::result::result;
 use crate::wait::interruptible;
 use glam::DVec2;
 use memo_core::reproduce::hoffman_flinchbaugh::{
-    DEGENERATE, PrintedRod, degenerate_refusals, false_targets, hinge_trials, rod_trials,
+    self, DEGENERATE, degenerate_refusals, false_targets, hinge_trials, rod_trials,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+
+result! {
+    /// Proposition 1 on random rods in three views: counts and largest errors.
+    RodTrials |_py, found: hoffman_flinchbaugh::RodTrials| {
+        trials: usize,
+        recovered: usize,
+        recovered_by_ellipse: usize,
+        recovered_as_printed: usize,
+        one_root: usize,
+        printed_z1: usize,
+        full_rank: usize,
+        triple_product_error: f64,
+        jacobian_error: f64,
+        never_extended: usize,
+        never_extended_recovered: usize,
+        equal_images: usize,
+        equal_images_one_root: usize,
+    }
+    |own| format!("{} of {} recovered", own.recovered, own.trials)
+}
+
+result! {
+    /// Proposition 2 on random hinges in two views: counts.
+    HingeTrials |_py, found: hoffman_flinchbaugh::HingeTrials| {
+        trials: usize,
+        recovered: usize,
+        full_rank: usize,
+        searched: usize,
+        one_plane: usize,
+        most_planes: usize,
+        joint_in_the_middle: usize,
+        joint_at_an_end: usize,
+    }
+    |own| format!("{} of {} recovered", own.recovered, own.trials)
+}
+
+result! {
+    /// Eqs. (4)-(14) on three views of a rod.
+    PrintedRod |_py, found: hoffman_flinchbaugh::PrintedRod| {
+        k: [f64; 5],
+        roots: Option<[f64; 2]>,
+        z3_sq: [f64; 2],
+        valid_roots: usize = found.valid_roots(),
+        depths: Option<[f64; 3]> = found.depths(),
+    }
+    |own| format!("k = {:?}", own.k)
+}
 
 /// Maximum number of problems; more take hours.
 const MOST_TRIALS: usize = 100_000_000;
@@ -20,61 +67,23 @@ fn checked(trials: usize) -> PyResult<usize> {
     Ok(trials)
 }
 
-/// Proposition 1 on random rods in three views: counts and largest errors by name.
+/// Proposition 1 on random rods in three views.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_rods<'py>(
-    py: Python<'py>,
-    trials: usize,
-    seed: u64,
-) -> PyResult<Bound<'py, PyDict>> {
+pub fn hoffman_flinchbaugh_rods(py: Python<'_>, trials: usize, seed: u64) -> PyResult<RodTrials> {
     let trials = checked(trials)?;
-    let t = interruptible(py, move || rod_trials(trials, seed))?;
-    let dict = PyDict::new(py);
-    for (name, count) in [
-        ("trials", t.trials),
-        ("recovered", t.recovered),
-        ("recovered_by_ellipse", t.recovered_by_ellipse),
-        ("recovered_as_printed", t.recovered_as_printed),
-        ("one_root", t.one_root),
-        ("printed_z1", t.printed_z1),
-        ("full_rank", t.full_rank),
-        ("never_extended", t.never_extended),
-        ("never_extended_recovered", t.never_extended_recovered),
-        ("equal_images", t.equal_images),
-        ("equal_images_one_root", t.equal_images_one_root),
-    ] {
-        dict.set_item(name, count)?;
-    }
-    dict.set_item("triple_product_error", t.triple_product_error)?;
-    dict.set_item("jacobian_error", t.jacobian_error)?;
-    Ok(dict)
+    RodTrials::of(py, interruptible(py, move || rod_trials(trials, seed))?)
 }
 
-/// Proposition 2 on random hinges in two views: counts by name. For the first `searched`, all planes are found by
-/// search.
+/// Proposition 2 on random hinges in two views. For the first `searched`, all planes are found by search.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_hinges<'py>(
-    py: Python<'py>,
+pub fn hoffman_flinchbaugh_hinges(
+    py: Python<'_>,
     trials: usize,
     searched: usize,
     seed: u64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<HingeTrials> {
     let trials = checked(trials)?;
-    let t = interruptible(py, move || hinge_trials(trials, searched, seed))?;
-    let dict = PyDict::new(py);
-    for (name, count) in [
-        ("trials", t.trials),
-        ("recovered", t.recovered),
-        ("full_rank", t.full_rank),
-        ("searched", t.searched),
-        ("one_plane", t.one_plane),
-        ("most_planes", t.most_planes),
-        ("joint_in_the_middle", t.joint_in_the_middle),
-        ("joint_at_an_end", t.joint_at_an_end),
-    ] {
-        dict.set_item(name, count)?;
-    }
-    Ok(dict)
+    HingeTrials::of(py, interruptible(py, move || hinge_trials(trials, searched, seed))?)
 }
 
 /// The number of `trials` unrelated pairs in three views, and triples in two, with a planar interpretation.
@@ -96,24 +105,13 @@ pub fn hoffman_flinchbaugh_degenerate(
     Ok(DEGENERATE.into_iter().zip(refused).collect())
 }
 
-/// Eqs. (4)-(14) on three views (1, 3, 2) from pivot to end: `k` (5), `roots` (2) or None, `z3_sq` (2),
-/// `valid_roots`, `depths` (3) or None.
+/// Eqs. (4)-(14) on three views (1, 3, 2) from pivot to end.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_rod<'py>(
-    py: Python<'py>,
-    views: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyDict>> {
+pub fn hoffman_flinchbaugh_rod(py: Python<'_>, views: &Bound<'_, PyAny>) -> PyResult<PrintedRod> {
     let views = rows_from_numpy(views, 3)?;
     let (problems, _) = views.as_slice()?.as_chunks::<2>().0.as_chunks::<3>();
     let [problem] = problems else {
         return Err(PyValueError::new_err(format!("wanted one rod, got {}", problems.len())));
     };
-    let printed = PrintedRod::new(&problem.map(DVec2::from_array));
-    let dict = PyDict::new(py);
-    dict.set_item("k", printed.k)?;
-    dict.set_item("roots", printed.roots)?;
-    dict.set_item("z3_sq", printed.z3_sq)?;
-    dict.set_item("valid_roots", printed.valid_roots())?;
-    dict.set_item("depths", printed.depths())?;
-    Ok(dict)
+    PrintedRod::of(py, hoffman_flinchbaugh::PrintedRod::new(&problem.map(DVec2::from_array)))
 }

@@ -6,22 +6,57 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::result::result;
 use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
 use crate::wait::pooled;
 use glam::{DVec2, DVec3};
-use memo_core::image::{ChangeDetector, ChangeOptions, outlines};
+use memo_core::image::{ChangeDetector, ChangeOptions, Mask, Outline, Rectangle, outlines};
 use memo_core::model::body::Part;
 use memo_core::model::{Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours};
 use memo_core::reproduce::rohr;
-use memo_core::track::evidence::{EvidenceOptions, EvidenceStream};
+use memo_core::track::evidence::{Evidence, EvidenceOptions, EvidenceStream, WindowEdges};
 use memo_core::track::score::EdgeLine;
 use memo_core::track::search::Hypothesis;
-use memo_core::track::search::{Axis, Grid, search};
+use memo_core::track::search::{Axis, Grid, SearchResult, search};
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+
+result! {
+    /// Results of the image stages: `changed`, eq. (1) against either neighbour; `cleaned` after the binary operations;
+    /// `outlines` (n, 2) in pixels; `rectangle` (left, top, right, bottom) of the largest candidate, and `edges` (n, 5)
+    /// in it: u0, v0, u1, v1 and gradient.
+    ImageStages |py, evidence: Evidence, change: Mask, main: Rectangle, found: WindowEdges| {
+        outlines: Vec<Py<PyArray2<f64>>> = {
+            let rows = |o: Outline| o.pixels.into_iter().map(|p| p.map(|v| v as f64)).collect();
+            let outlines = outlines(&evidence.firm_mask).into_iter();
+            outlines.map(|o| Ok(numpy_from_rows(py, rows(o))?.unbind())).collect::<PyResult<Vec<_>>>()?
+        },
+        rectangle: [usize; 4] = [main.left, main.top, main.right, main.bottom],
+        edges: Py<PyArray2<f64>> = numpy_from_rows(py, found.lines.iter().map(edge_row).collect())?,
+        changed: Py<PyArray2<bool>> = numpy_from_image(py, change)?,
+        cleaned: Py<PyArray2<bool>> = numpy_from_image(py, evidence.firm_mask)?,
+    }
+    |own| format!("rectangle {:?}", own.rectangle)
+}
+
+result! {
+    /// Similarity (eq. 11) over the whole cycle: `scores` (phases, along, heights), the values of the axes, the last
+    /// two as differences in metres, and the best of each.
+    WalkSimilarity |py, found: SearchResult, grid: &Grid, at: &Hypothesis| {
+        best: [f64; 3] = {
+            let best = found.best();
+            [best.phase, best.along_m - at.along_m, best.height_m - at.height_m]
+        },
+        scores: Py<PyArrayDyn<f32>> =
+            numpy_from_flat(py, found.scores, vec![grid.phase.count, grid.along.count, grid.height.count])?,
+        phase: Py<PyArray1<f64>> = numpy_from_column(py, values(&grid.phase, 0.0)),
+        along: Py<PyArray1<f64>> = numpy_from_column(py, values(&grid.along, at.along_m)),
+        height: Py<PyArray1<f64>> = numpy_from_column(py, values(&grid.height, at.height_m)),
+    }
+    |own| format!("best at phase {:.3}", own.best[0])
+}
 
 /// The paper's constants as used by the code, by name.
 #[pyfunction]
@@ -124,17 +159,14 @@ pub fn model_contours<'py>(
     Ok((numpy_from_segments(py, segments)?, numpy_from_column(py, parts), numpy_from_column(py, owners)))
 }
 
-/// Results of the image stages for a frame with its neighbours: `changed`, eq. (1) against either neighbour;
-/// `cleaned` after the binary operations; `outlines`, a list of (n, 2) pixels; `rectangle` (left, top, right,
-/// bottom) of the largest candidate, and `edges` (n, 5) in it: u0, v0, u1, v1 and gradient; or None if nothing
-/// moves.
+/// Image stages for a frame with its neighbours; None if nothing moves.
 #[pyfunction]
-pub fn image_stages<'py>(
-    py: Python<'py>,
-    before: &Bound<'py, PyAny>,
-    frame: &Bound<'py, PyAny>,
-    after: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyDict>> {
+pub fn image_stages(
+    py: Python<'_>,
+    before: &Bound<'_, PyAny>,
+    frame: &Bound<'_, PyAny>,
+    after: &Bound<'_, PyAny>,
+) -> PyResult<Option<ImageStages>> {
     let arrays = [frame_from_numpy(before)?, frame_from_numpy(frame)?, frame_from_numpy(after)?];
     let [before, frame, after] = [arrays[0].as_frame()?, arrays[1].as_frame()?, arrays[2].as_frame()?];
     let options = EvidenceOptions::default();
@@ -148,28 +180,9 @@ pub fn image_stages<'py>(
     let (Some(changed), Some(evidence)) = (changed, evidence) else {
         return Err(PyValueError::new_err("three frames gave no evidence"));
     };
-    let dict = PyDict::new(py);
-    let main = evidence.candidates(&options).into_iter().next();
-    let outline = |pixels: Vec<[usize; 2]>| {
-        numpy_from_rows(py, pixels.into_iter().map(|p| p.map(|v| v as f64)).collect())
-    };
-    let borders = outlines(&evidence.firm_mask).into_iter().map(|o| outline(o.pixels));
-    dict.set_item("outlines", borders.collect::<PyResult<Vec<_>>>()?)?;
-    let rectangle = main.as_ref().map(|region| {
-        let r = region.rectangle;
-        [r.left, r.top, r.right, r.bottom]
-    });
-    dict.set_item("rectangle", rectangle)?;
-    let edges = main
-        .map(|region| evidence.edges(&region.rectangle, None, &options))
-        .transpose()
-        .map_err(value_error)?
-        .map(|edges| numpy_from_rows(py, edges.lines.iter().map(edge_row).collect()))
-        .transpose()?;
-    dict.set_item("edges", edges)?;
-    dict.set_item("changed", numpy_from_image(py, changed)?)?;
-    dict.set_item("cleaned", numpy_from_image(py, evidence.firm_mask)?)?;
-    Ok(dict)
+    let Some(main) = evidence.candidates(&options).into_iter().next() else { return Ok(None) };
+    let edges = evidence.edges(&main.rectangle, None, &options).map_err(value_error)?;
+    ImageStages::of(py, evidence, changed, main.rectangle, edges).map(Some)
 }
 
 fn edge_row(edge: &EdgeLine) -> [f64; 5] {
@@ -226,18 +239,17 @@ pub fn walk_lines<'py>(
 }
 
 /// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels and a walk's model near the position of a row,
-/// over the whole cycle: `scores` (phases, along, heights) and the values of the axes, the last two as
-/// differences in metres. `along_m` and `height_m` are half widths; 0 keeps the position.
+/// over the whole cycle. `along_m` and `height_m` are half widths; 0 keeps the position.
 #[pyfunction]
 #[pyo3(signature = (walk, row, edges, *, along_m=0.0, height_m=0.0))]
-pub fn walk_similarity<'py>(
-    py: Python<'py>,
-    walk: PyRef<'py, PyWalk>,
+pub fn walk_similarity(
+    py: Python<'_>,
+    walk: PyRef<'_, PyWalk>,
     row: usize,
     edges: Vec<Vec<f64>>,
     along_m: f64,
     height_m: f64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<WalkSimilarity> {
     for (name, value) in [("along_m", along_m), ("height_m", height_m)] {
         if !(0.0..=2.0).contains(&value) {
             return Err(PyValueError::new_err(format!("{name} must lie between 0 and 2, got {value}")));
@@ -264,16 +276,11 @@ pub fn walk_similarity<'py>(
         let options = &tracked.options;
         search(&edges, &tracked.scene(), &grid, &options.similarity, options.hidden_lines)
     })?;
-    let values = |axis: &Axis, from: f64| (0..axis.count).map(|i| axis.at(i) - from).collect::<Vec<f64>>();
-    let shape = vec![grid.phase.count, grid.along.count, grid.height.count];
-    let best = found.best();
-    let dict = PyDict::new(py);
-    dict.set_item("scores", numpy_from_flat(py, found.scores, shape)?)?;
-    dict.set_item("phase", numpy_from_column(py, values(&grid.phase, 0.0)))?;
-    dict.set_item("along", numpy_from_column(py, values(&grid.along, at.along_m)))?;
-    dict.set_item("height", numpy_from_column(py, values(&grid.height, at.height_m)))?;
-    dict.set_item("best", (best.phase, best.along_m - at.along_m, best.height_m - at.height_m))?;
-    Ok(dict)
+    WalkSimilarity::of(py, found, &grid, &at)
+}
+
+fn values(axis: &Axis, from: f64) -> Vec<f64> {
+    (0..axis.count).map(|i| axis.at(i) - from).collect()
 }
 
 fn hypothesis(walk: &PyWalk, row: usize) -> PyResult<Hypothesis> {
