@@ -434,8 +434,6 @@ class PlanarWindow:
 
 @final
 class PlanarInterpretation:
-    """What `memo.PlanarFigure` is made of."""
-
     def __new__(cls, *fields: object) -> Self: ...
     windows: Final[list[PlanarWindow]]
     perspective_px: Final[float | None]
@@ -480,8 +478,6 @@ def follow_person(
 
 @final
 class LimbSides:
-    """Right and left of a limb."""
-
     def __new__(cls, *fields: object) -> Self: ...
     levels: Final[list[str]]
     decided: Final[npt.NDArray[np.bool_]]
@@ -505,8 +501,6 @@ def unswap(
 
 @final
 class SecondMotion:
-    """What `memo.postures.SecondBest` is made of."""
-
     def __new__(cls, *fields: object) -> Self: ...
     joints: Final[list[str]]
     first_row: Final[int]
@@ -516,8 +510,6 @@ class SecondMotion:
 
 @final
 class PostureSequence:
-    """What `memo.Postures` is made of."""
-
     def __new__(cls, *fields: object) -> Self: ...
     lengths_m: Final[dict[str, float]]
     length_sd_m: Final[dict[str, float]]
@@ -637,8 +629,6 @@ def segment_names() -> list[str]: ...
 
 @final
 class CountTable:
-    """Table 3 or 4, beside the printed one."""
-
     def __new__(cls, *fields: object) -> Self: ...
     phases: Final[list[float]]
     counts: Final[dict[str, npt.NDArray[np.uint32]]]
@@ -647,8 +637,6 @@ class CountTable:
 
 @final
 class LastStage:
-    """Result of rules 1 to 5 and grouping at one phase."""
-
     def __new__(cls, *fields: object) -> Self: ...
     phase: Final[float]
     postures: Final[int]
@@ -658,8 +646,6 @@ class LastStage:
 
 @final
 class FrameSurvivors:
-    """The postures of a frame that satisfy the physical constraints and rules 1 and 2."""
-
     def __new__(cls, *fields: object) -> Self: ...
     figures: Final[npt.NDArray[np.float64]]
     truth: Final[npt.NDArray[np.float64]]
@@ -669,8 +655,6 @@ class FrameSurvivors:
 
 @final
 class HeadColumn:
-    """Table 2 by a method."""
-
     def __new__(cls, *fields: object) -> Self: ...
     method: Final[str]
     transform: Final[npt.NDArray[np.float64]]
@@ -682,8 +666,6 @@ class HeadColumn:
 
 @final
 class TableInputs:
-    """Inputs of the tables."""
-
     def __new__(cls, *fields: object) -> Self: ...
     angles: Final[list[tuple[str, tuple[float, float]]]]
     lengths_cm: Final[list[tuple[str, float]]]
@@ -703,8 +685,6 @@ def lee_chen_walker(
 
 @final
 class RodTrials:
-    """Proposition 1 on random rods."""
-
     def __new__(cls, *fields: object) -> Self: ...
     trials: Final[int]
     recovered: Final[int]
@@ -722,8 +702,6 @@ class RodTrials:
 
 @final
 class HingeTrials:
-    """Proposition 2 on random hinges."""
-
     def __new__(cls, *fields: object) -> Self: ...
     trials: Final[int]
     recovered: Final[int]
@@ -736,8 +714,6 @@ class HingeTrials:
 
 @final
 class PrintedRod:
-    """Eqs. (4)-(14) on three views of a rod."""
-
     def __new__(cls, *fields: object) -> Self: ...
     k: Final[list[float]]
     roots: Final[list[float] | None]
@@ -764,8 +740,6 @@ def model_contours(
 
 @final
 class ImageStages:
-    """Results of the image stages."""
-
     def __new__(cls, *fields: object) -> Self: ...
     outlines: Final[list[npt.NDArray[np.float64]]]
     rectangle: Final[list[int]]
@@ -775,8 +749,6 @@ class ImageStages:
 
 @final
 class WalkSimilarity:
-    """Similarity over the whole cycle."""
-
     def __new__(cls, *fields: object) -> Self: ...
     best: Final[list[float]]
     scores: Final[npt.NDArray[np.float32]]
