@@ -34,6 +34,8 @@ JOINTS = {
         ("AN", "ankle"),
     )
 }
+#: The same of the toes, which not every truth or track has.
+TOES = {"RTO": "right_toe", "LTO": "left_toe"}
 STRIKE_PHASE = {"right": 0.0, "left": 0.5}
 #: A phase nearer than this to the truth (or to its half-cycle twin) counts as there.
 NEAR_PHASE = 0.1
@@ -225,11 +227,11 @@ def evaluate_mocap(
     `view_direction` is the camera's horizontal viewing direction in world (x, y).
     """
     track, truth = read_track(track_csv), read_columns(truth_csv)
-    in_track, in_truth = _common_frames(track["frame"], truth["frame"])
+    in_track, in_truth = common_frames(track["frame"], truth["frame"])
     forward = walking_direction(truth)
     left = np.array([-forward[1], forward[0], 0.0])
     view = np.array([*view_direction, 0.0]) / np.hypot(*view_direction)
-    error = _points(track, "")[in_track] - true_torso(truth)[in_truth]
+    error = points(track, "")[in_track] - true_torso(truth)[in_truth]
 
     strikes = true_strikes(read_columns(events_csv))
     phase_error = phase_errors(track, strikes)
@@ -242,12 +244,12 @@ def evaluate_mocap(
         across_m=Spread.of(error @ left),
         depth_m=Spread.of(error @ view),
         height_m=Spread.of(error[:, 2]),
-        heading_deg=Spread.of(_wrap(heading, 360.0)),
+        heading_deg=Spread.of(wrap(heading, 360.0)),
         within_2sd=_within_2sd(track, in_track, error, phase_error),
         phase=_phase_summary(phase_error),
         sides=_sides(phase_error, track["p_swapped"]),
         angles_deg={
-            name: Spread.of(_wrap(track[f"{name}_deg"][in_track] - angle[in_truth], 360.0))
+            name: Spread.of(wrap(track[f"{name}_deg"][in_track] - angle[in_truth], 360.0))
             for name, angle in true_deg.items()
         },
         joint_median_m=float(np.nanmedian(distance_m)),
@@ -272,9 +274,9 @@ def evaluate_weizmann(track_csv: Path | str, annotation_dir: Path | str) -> Half
     """Judges the track of `weizmann_ido_walk` (near side = right), where left and right can't be told:
     the phase modulo half a cycle must be right, and `p_swapped` should say "undecided"."""
     track = read_track(track_csv)
-    strikes = _annotated_strikes(Path(annotation_dir), near="right", min_certainty=0.0)
+    strikes = annotated_strikes(Path(annotation_dir), near="right", min_certainty=0.0)
     error = phase_errors(track, strikes)
-    folded = _wrap(error[np.isfinite(error)], 0.5)
+    folded = wrap(error[np.isfinite(error)], 0.5)
     frames = track["frame"]
     return HalfCycleEvaluation(
         first_frame=int(frames[0]),
@@ -282,7 +284,7 @@ def evaluate_weizmann(track_csv: Path | str, annotation_dir: Path | str) -> Half
         frames=frames.size,
         folded_median_abs=_median(np.abs(folded)),
         folded_p95_abs=_percentile(np.abs(folded), 95),
-        folded_bias=_circular_mean(folded, 0.5),
+        folded_bias=circular_mean(folded, 0.5),
         sides=_sides(error, track["p_swapped"]),
     )
 
@@ -291,7 +293,7 @@ def _evaluate_annotated(
     track_csv: Path | str, events_csv: Path | str | None, annotation: Path, near: str
 ) -> AnnotatedEvaluation:
     track = read_track(track_csv)
-    strikes = _annotated_strikes(annotation, near, MIN_CERTAINTY)
+    strikes = annotated_strikes(annotation, near, MIN_CERTAINTY)
     phase_error = phase_errors(track, strikes)
     frames = track["frame"]
     return AnnotatedEvaluation(
@@ -301,7 +303,7 @@ def _evaluate_annotated(
         phase=_phase_summary(phase_error),
         sides=_sides(phase_error, track["p_swapped"]),
         strikes=match_strikes(_tracked_strikes(track, events_csv), strikes),
-        angles_deg=_annotated_angles(track, read_columns(annotation / "angles.csv"), near),
+        angles_deg=annotated_angles(track, read_columns(annotation / "angles.csv"), near),
         joints_px=_annotated_joints(track, read_columns(annotation / "joints.csv"), near),
     )
 
@@ -320,17 +322,21 @@ def read_columns(path: Path | str) -> Columns:
 
 def read_track(path: Path | str) -> Columns:
     """A `track.csv` sorted by frame, rows without a finite torso dropped (they are not tracked)."""
-    track = read_columns(path)
+    return tracked_rows(read_columns(path), path)
+
+
+def tracked_rows(track: Columns, source: Path | str = "track") -> Columns:
+    """The rows of a track with a finite torso, sorted by frame; `source` is for complaints."""
     needed = {"frame", "x_m", "y_m", "z_m", "heading_rad", "phase", "p_swapped"}
     if missing := sorted(needed - track.keys()):
-        raise ValueError(f"{path}: columns missing: {missing}")
-    finite = np.isfinite(_points(track, "")).all(axis=1)
+        raise ValueError(f"{source}: columns missing: {missing}")
+    finite = np.isfinite(points(track, "")).all(axis=1)
     order = np.argsort(track["frame"], kind="stable")
     order = order[finite[order]]
     if order.size == 0:
-        raise ValueError(f"{path}: no row with a finite torso")
+        raise ValueError(f"{source}: no row with a finite torso")
     if (repeated := np.flatnonzero(np.diff(track["frame"][order]) == 0)).size:
-        raise ValueError(f"{path}: frame {track['frame'][order][repeated[0]]:g} occurs more than once")
+        raise ValueError(f"{source}: frame {track['frame'][order][repeated[0]]:g} occurs more than once")
     return {name: column[order] for name, column in track.items()}
 
 
@@ -341,7 +347,7 @@ def _as_array(texts: Sequence[str]) -> np.ndarray:
         return np.array(texts)
 
 
-def _points(columns: Columns, prefix: str) -> np.ndarray:
+def points(columns: Columns, prefix: str) -> np.ndarray:
     """(N, 3) points of the columns `{prefix}x_m`, `{prefix}y_m`, `{prefix}z_m`."""
     return np.stack([columns[f"{prefix}{axis}_m"] for axis in "xyz"], axis=1)
 
@@ -350,7 +356,7 @@ def _pixels(columns: Columns, prefix: str) -> np.ndarray:
     return np.stack([columns[f"{prefix}{axis}_px"] for axis in "uv"], axis=1)
 
 
-def _common_frames(tracked: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def common_frames(tracked: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Row indices, in the track and in the truth, of the frames they share."""
     common, in_track, in_truth = np.intersect1d(tracked, true, assume_unique=True, return_indices=True)
     if common.size == 0:
@@ -365,7 +371,7 @@ def _common_frames(tracked: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, n
 
 def true_torso(truth: Columns) -> np.ndarray:
     """(N, 3) torso centres: midpoint of mid-shoulders and mid-hips, metres."""
-    return np.mean([_points(truth, f"{joint}_") for joint in ("RSH", "LSH", "RHP", "LHP")], axis=0)
+    return np.mean([points(truth, f"{joint}_") for joint in ("RSH", "LSH", "RHP", "LHP")], axis=0)
 
 
 def walking_direction(truth: Columns) -> np.ndarray:
@@ -376,20 +382,42 @@ def walking_direction(truth: Columns) -> np.ndarray:
 
 
 def true_angles_deg(truth: Columns, forward: np.ndarray) -> dict[str, np.ndarray]:
-    """Hip and knee angles in the vertical plane of the walking direction.
+    """Hip and knee angles of `joint_angles_deg`."""
+    angles = joint_angles_deg(truth, {code: code for code in JOINTS}, forward)
+    return {name: angle for name, angle in angles.items() if name.endswith(("_hip", "_knee"))}
 
-    hip = thigh against the vertical, forward positive; knee flexion = thigh angle - shank angle.
+
+def joint_angles_deg(
+    columns: Columns, names: Mapping[str, str], forward: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Flexion of the joints in the vertical plane of the walking direction, `right_hip` and so on.
+
+    `names` gives the joints' names in the columns by their codes. hip = thigh against the vertical, forward
+    positive; knee = thigh - shank; shoulder = upper arm against the vertical; elbow = forearm - upper arm;
+    ankle, where there are toes, = foot - shank - 90 degrees, toes up positive.
     """
     angles = {}
     for code, side in (("R", "right"), ("L", "left")):
-        hip, knee, ankle = (_points(truth, f"{code}{joint}_") for joint in ("HP", "KN", "AN"))
-        thigh = _limb_angle_deg(knee - hip, forward)
+        at = {
+            joint: points(columns, f"{names[code + joint]}_")
+            for joint in ("SH", "EL", "WR", "HP", "KN", "AN", "TO")
+            if code + joint in names
+        }
+        thigh, shank, upper_arm, forearm = (
+            limb_angle_deg(at[end] - at[start], forward)
+            for start, end in (("HP", "KN"), ("KN", "AN"), ("SH", "EL"), ("EL", "WR"))
+        )
         angles[f"{side}_hip"] = thigh
-        angles[f"{side}_knee"] = _wrap(thigh - _limb_angle_deg(ankle - knee, forward), 360.0)
+        angles[f"{side}_knee"] = wrap(thigh - shank, 360.0)
+        angles[f"{side}_shoulder"] = upper_arm
+        angles[f"{side}_elbow"] = wrap(forearm - upper_arm, 360.0)
+        if "TO" in at:
+            foot = limb_angle_deg(at["TO"] - at["AN"], forward)
+            angles[f"{side}_ankle"] = wrap(foot - shank - 90.0, 360.0)
     return angles
 
 
-def _limb_angle_deg(limb: np.ndarray, forward: np.ndarray) -> np.ndarray:
+def limb_angle_deg(limb: np.ndarray, forward: np.ndarray) -> np.ndarray:
     """Angle of hanging limbs against the vertical, positive when they point forward."""
     return np.degrees(np.arctan2(limb @ forward, -limb[:, 2]))
 
@@ -423,13 +451,18 @@ def true_strikes(events: Columns) -> StrikeList:
     return StrikeList(frames[order], sides[order])
 
 
-def _annotated_strikes(annotation: Path, near: str, min_certainty: float) -> StrikeList:
+def annotated_strikes(annotation: Path, near: str, min_certainty: float) -> StrikeList:
     """Heel strikes marked by eye, near and far turned into sides."""
+    return true_strikes(annotated_events(annotation, near, min_certainty))
+
+
+def annotated_events(annotation: Path, near: str, min_certainty: float) -> Columns:
+    """Columns `frame`, `event` and `side` of the events marked by eye, near and far turned into sides."""
     events = read_columns(annotation / "events.csv")
     far = "left" if near == "right" else "right"
     keep = events["certainty"] >= min_certainty
     side = np.where(events["leg"] == "near", near, far)
-    return true_strikes({"frame": events["frame"][keep], "event": events["event"][keep], "side": side[keep]})
+    return {"frame": events["frame"][keep], "event": events["event"][keep], "side": side[keep]}
 
 
 # Comparing
@@ -438,7 +471,7 @@ def _annotated_strikes(annotation: Path, near: str, min_certainty: float) -> Str
 def phase_errors(track: Columns, strikes: StrikeList) -> np.ndarray:
     """Tracked minus true phase per tracked frame, in [-0.5, 0.5); NaN outside the strikes' range."""
     true = np.interp(track["frame"], strikes.frames, strikes.cycles(), left=np.nan, right=np.nan)
-    return _wrap(track["phase"] - true, 1.0)
+    return wrap(track["phase"] - true, 1.0)
 
 
 def _phase_summary(errors: np.ndarray) -> PhaseErrors:
@@ -446,7 +479,7 @@ def _phase_summary(errors: np.ndarray) -> PhaseErrors:
     size = np.abs(e)
     return PhaseErrors(
         median_abs=_median(size),
-        bias=_circular_mean(e, 1.0),
+        bias=circular_mean(e, 1.0),
         p95_abs=_percentile(size, 95),
         near_truth=_fraction(size <= NEAR_PHASE),
         near_half=_fraction(0.5 - size <= NEAR_PHASE),
@@ -497,7 +530,7 @@ def strikes_from_phase(frames: np.ndarray, phase: np.ndarray) -> list[tuple[floa
     """Frames at which the phase advances over 0 (right) or 0.5 (left), linear between rows."""
     strikes = []
     for f0, f1, p0, p1 in zip(frames[:-1], frames[1:], phase[:-1], phase[1:], strict=True):
-        step = _wrap(p1 - p0, 1.0)
+        step = wrap(p1 - p0, 1.0)
         for side, at in STRIKE_PHASE.items():
             ahead = (at - p0) % 1.0
             if 0.0 < ahead <= step:
@@ -511,7 +544,7 @@ def _joint_distances(
     """Distances of all twelve joints in all common frames, metres and pixels."""
     metres, pixels = [], []
     for code, name in JOINTS.items():
-        offset_m = _points(track, f"{name}_")[in_track] - _points(truth, f"{code}_")[in_truth]
+        offset_m = points(track, f"{name}_")[in_track] - points(truth, f"{code}_")[in_truth]
         offset_px = _pixels(track, f"{name}_")[in_track] - _pixels(truth, f"{code}_")[in_truth]
         metres.append(np.linalg.norm(offset_m, axis=1))
         pixels.append(np.linalg.norm(offset_px, axis=1))
@@ -532,7 +565,7 @@ def _within_2sd(
     }
 
 
-def _annotated_angles(track: Columns, angles: Columns, near: str) -> dict[str, Spread]:
+def annotated_angles(track: Columns, angles: Columns, near: str) -> dict[str, Spread]:
     """Errors of the annotated angles; the far leg's are those corrected for the annotator's single hip."""
     far = "left" if near == "right" else "right"
     pairs = {
@@ -542,9 +575,9 @@ def _annotated_angles(track: Columns, angles: Columns, near: str) -> dict[str, S
         "far_hip": (f"{far}_hip_deg", "far_thigh_parallax_corrected_deg"),
         "far_knee": (f"{far}_knee_deg", "far_knee_flexion_parallax_corrected_deg"),
     }
-    in_track, in_truth = _common_frames(track["frame"], angles["frame"])
+    in_track, in_truth = common_frames(track["frame"], angles["frame"])
     return {
-        name: Spread.of(_wrap(track[tracked][in_track] - angles[true][in_truth], 360.0))
+        name: Spread.of(wrap(track[tracked][in_track] - angles[true][in_truth], 360.0))
         for name, (tracked, true) in pairs.items()
     }
 
@@ -554,7 +587,7 @@ def _annotated_joints(track: Columns, joints: Columns, near: str) -> dict[str, t
     far = "left" if near == "right" else "right"
     names = {f"near_{j}": f"{near}_{j}" for j in ("shoulder", "elbow", "wrist", "knee", "ankle")}
     names |= {"hip": f"{near}_hip", "far_knee": f"{far}_knee", "far_ankle": f"{far}_ankle"}
-    in_track, in_truth = _common_frames(track["frame"], joints["frame"])
+    in_track, in_truth = common_frames(track["frame"], joints["frame"])
     result = {}
     for annotated, tracked in names.items():
         true = np.stack([joints[f"{annotated}_x"], joints[f"{annotated}_y"]], axis=1)[in_truth]
@@ -566,12 +599,12 @@ def _annotated_joints(track: Columns, joints: Columns, near: str) -> dict[str, t
 # Small statistics
 
 
-def _wrap(value: np.ndarray, period: float) -> np.ndarray:
+def wrap(value: np.ndarray, period: float) -> np.ndarray:
     """The value modulo the period, in [-period/2, period/2)."""
     return (value + period / 2.0) % period - period / 2.0
 
 
-def _circular_mean(values: np.ndarray, period: float) -> float:
+def circular_mean(values: np.ndarray, period: float) -> float:
     if values.size == 0:
         return np.nan
     turn = 2.0 * np.pi / period
