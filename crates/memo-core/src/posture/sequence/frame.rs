@@ -21,7 +21,7 @@ pub enum FrameProblem {
     #[error("the distance of the neck is not known")]
     NoDistance,
     /// The distance is smaller than its standard deviation.
-    #[error("the distance of the neck is too uncertain: {distance_m:.2} ± {sd_m:.2} m")]
+    #[error("the distance of the neck is not known: {distance_m:.2} ± {sd_m:.2} m is too uncertain")]
     VagueDistance {
         /// The distance, metres.
         distance_m: f64,
