@@ -204,6 +204,7 @@ fn truth(scene: &ClothedScene, line: &GaitParameter) -> Option<f64> {
     let step = |side| scene.step(side);
     let ((right_m, right_s), (left_m, left_s)) = (step(Side::Right), step(Side::Left));
     let difference = |right: f64, left: f64| 200.0 * (right - left) / (right + left);
+    let stance = 50.0 * (scene.stance[0] + scene.stance[1]);
     Some(match line.quantity {
         GaitQuantity::Cadence => 120.0 * scene.cycle_hz,
         GaitQuantity::Speed => scene.speed_mps,
@@ -213,7 +214,11 @@ fn truth(scene: &ClothedScene, line: &GaitParameter) -> Option<f64> {
         GaitQuantity::StepLength => line.side.map_or(0.5 * scene.speed_mps * stride_s, |side| step(side).0),
         GaitQuantity::StepTimeSymmetry => difference(right_s, left_s),
         GaitQuantity::StepLengthSymmetry => difference(right_m, left_m),
-        GaitQuantity::Stance | GaitQuantity::DoubleSupport => return None,
+        GaitQuantity::Stance => stance,
+        GaitQuantity::Swing => 100.0 - stance,
+        GaitQuantity::DoubleSupport => 2.0 * stance - 100.0,
+        GaitQuantity::SingleSupport => 200.0 - 2.0 * stance,
+        GaitQuantity::HipRange | GaitQuantity::KneeRange | GaitQuantity::KneePeak => return None,
     })
 }
 

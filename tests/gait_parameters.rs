@@ -99,7 +99,7 @@ impl Drawn {
             GaitQuantity::StepLengthSymmetry => {
                 Some(200.0 * (step_m(1.0) - step_m(-1.0)) / (speed * stride_s))
             }
-            GaitQuantity::Stance | GaitQuantity::DoubleSupport => None,
+            _ => None,
         }
     }
 }

@@ -33,6 +33,7 @@ __all__ = [
     "TableInputs",
     "Tracker",
     "Walk",
+    "WalkFit",
     "WalkSimilarity",
     "WalkerCalibration",
     "WalkerMotion",
@@ -266,11 +267,31 @@ class Explainer:
     def finish(self) -> dict[str, Any] | None: ...
 
 def recorded_contours(
-    tracker: Tracker,
-    record: dict[str, Any],
-    torso_m: npt.NDArray[np.float64],
-    phases: npt.NDArray[np.float64],
+    record: dict[str, Any], frames: Sequence[int]
 ) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]]: ...
+
+@final
+class WalkFit:
+    """The measured person of a walk: how well the model fits, and the person's own body and curves."""
+
+    residual_px: Final[float]
+    """Mean distance of the edges from the outline of the model, pixels."""
+    height_px: Final[float]
+    """Height of the person in the middle of the walk, pixels."""
+    missed: Final[float]
+    """Share of the outline without an edge in the frames."""
+    missed_inside: Final[float]
+    """The same of the lines inside the body."""
+    worst_length_sd: Final[float]
+    """The farthest that a length of the body is from its mean over people, standard deviations."""
+    lengths_m: Final[dict[str, float]]
+    """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
+    curves_deg: Final[npt.NDArray[np.float64]]
+    """The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and left;
+    hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
 class Walk:
@@ -292,7 +313,9 @@ class Walk:
     @property
     def p_swapped(self) -> float: ...
     @property
-    def deviation(self) -> tuple[float, float, float, float, float, bool] | None: ...
+    def fit(self) -> WalkFit | None: ...
+    @property
+    def fit_problem(self) -> str | None: ...
     def __len__(self) -> int: ...
 
 def change_mask(

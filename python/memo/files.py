@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 SIDES = ("right", "left")
-ANGLES = ("hip", "knee", "shoulder", "elbow")
+ANGLES = ("hip", "knee", "ankle", "shoulder", "elbow")
 JOINTS = tuple(
     f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 )
@@ -55,7 +55,7 @@ JOINTS = tuple(
 TRACK_COLUMNS = (
     *("frame", "time_s", "x_m", "y_m", "z_m", "heading_rad", "phase", "p_swapped", "speed_mps"),
     *("sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"),
-    *(f"{side}_{angle}_deg" for side in SIDES for angle in ANGLES),
+    *(f"{first}{side}_{angle}_deg" for side in SIDES for angle in ANGLES for first in ("", "sd_")),
     *(f"{joint}_{axis}" for joint in JOINTS for axis in ("x_m", "y_m", "z_m", "u_px", "v_px")),
     *("similarity", "walk"),
 )

@@ -186,13 +186,12 @@ def contours_of_run(
     """Visible contours of the model, (n, 2, 2) pixels of the video, for each row of a track.
 
     They are those of `Track.contours`. `path` is the folder of a run or a table in it, `columns` are those of
-    the table. A row with an unknown position or phase has none.
+    the table. A row of a frame that the run did not track has none.
     """
     folder = Path(path) if Path(path).is_dir() else Path(path).parent
     run = read_run(folder)
     contours: list[npt.NDArray[np.float64]] = [np.empty((0, 2, 2))] * len(columns["walk"])
-    torso_m = np.column_stack([np.asarray(columns[name], np.float64) for name in ("x_m", "y_m", "z_m")])
-    phase = np.asarray(columns["phase"], np.float64)
+    frames = np.asarray(columns["frame"], np.int64)
     for walk in np.unique(columns["walk"]).tolist():
         if not 0 <= walk < len(run["walks"]):
             raise RunError(
@@ -200,8 +199,7 @@ def contours_of_run(
             )
         rows = np.flatnonzero(columns["walk"] == walk)
         try:
-            tracker = _memo.Tracker(**run["options"])
-            found = _memo.recorded_contours(tracker, run["walks"][walk], torso_m[rows], phase[rows])
+            found = _memo.recorded_contours(run["walks"][walk], frames[rows].tolist())
         except (TypeError, ValueError, OverflowError) as error:
             raise RunError(f"{folder / NAME}: {error}") from None
         for row, (segments, _) in zip(rows.tolist(), found, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
-from memo.files import ANGLES, JOINTS, SIDES
+from memo.files import JOINTS, SIDES
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -135,7 +135,8 @@ def _truth(
         "speed_mps": np.full(len(rows), scene.speed_mps),
     }
     columns |= {f"{axis}_m": torso[:, k] for k, axis in enumerate("xyz")}
-    names = [f"{side}_{angle}_deg" for side in SIDES for angle in ANGLES]
+    drawn = ("hip", "knee", "shoulder", "elbow")
+    names = [f"{side}_{angle}_deg" for side in SIDES for angle in drawn]
     columns |= {name: angles[:, k] for k, name in enumerate(names)}
     for k, joint in enumerate(JOINTS):
         columns |= {f"{joint}_{axis}_m": joints[:, k, i] for i, axis in enumerate("xyz")}

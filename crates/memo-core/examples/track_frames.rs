@@ -56,7 +56,7 @@ fn report(walk: &TrackedWalk) {
         walk.direction(),
         start.p_other_direction,
         walk.p_swapped(),
-        walk.person_fit
+        walk.fit.as_ref().map(|fit| fit.as_ref().map(|fit| fit.quality))
     );
     for event in walk.events() {
         eprintln!("{:.4} s, frame {:.2}: {:?}, {:?}", event.time_s, event.frame, event.kind, event.side);

@@ -3,7 +3,6 @@
 
 use crate::array::{
     frame_from_numpy, numpy_from_column, numpy_from_image, numpy_from_rows, numpy_from_segments,
-    points_from_numpy,
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
@@ -11,12 +10,14 @@ use crate::tracker::{PyTracker, SegmentsWithParts, segments_with_parts};
 use crate::wait::pooled;
 use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
-use memo_core::model::{Camera, VisibilityOptions, Walker};
+use memo_core::model::visibility::visible_contours;
+use memo_core::model::{
+    Body, Camera, Gait, GaitStyle, PosedBody, Posture, Proportions, VisibilityOptions, Walker,
+};
 use memo_core::track::evidence::{Evidence, EvidenceStream};
 use memo_core::track::explain::{Explanation, explain};
 use memo_core::track::options::TrackerOptions;
-use memo_core::track::person::Deviation;
-use memo_core::track::result::TrackedWalk;
+use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::search::{Axis, Hypothesis, POSITION_STEP_M, Path, Scene};
 use memo_core::track::walk::Look;
 use memo_core::wording::counted;
@@ -26,26 +27,30 @@ use pyo3::types::PyDict;
 use std::collections::{HashMap, HashSet};
 
 /// The record of a walk, as plain numbers: with the video, it is enough to compare the walk's frames again.
-pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk) -> PyResult<Bound<'py, PyDict>> {
+pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyResult<Bound<'py, PyDict>> {
     let steps = walk.steps();
-    let deviation =
-        walk.person_fit.filter(|fit| fit.is_believed).map(|fit| fit.deviation).unwrap_or_default();
-    let Deviation { hip_rad, knee_rad, shoulder_height, hip_height } = deviation;
+    let Walker { body, gait, style } = &walk.walk.walker;
     let window = |r: &Rectangle| [r.left, r.top, r.right, r.bottom];
     let dict = PyDict::new(py);
     dict.set_item("camera", PyCamera(walk.camera.clone()).parameters(py)?)?;
     dict.set_item("origin_m", walk.walk.path.origin.to_array())?;
     dict.set_item("heading_rad", walk.walk.path.heading_rad)?;
-    dict.set_item("gait_speed_mps", walk.gait_speed_mps)?;
-    dict.set_item("deviation", [hip_rad, knee_rad, shoulder_height, hip_height])?;
+    dict.set_item("height_m", body.height_m)?;
+    dict.set_item("proportions", body.proportions.to_array())?;
+    dict.set_item("curves_rad", gait.sampled(style))?;
     dict.set_item("frame", steps.iter().map(|s| s.frame).collect::<Vec<_>>())?;
     dict.set_item("window_px", steps.iter().map(|s| window(&s.look.window)).collect::<Vec<_>>())?;
     dict.set_item("middle_height_m", steps.iter().map(|s| s.look.heights.centre).collect::<Vec<_>>())?;
     dict.set_item("heights", steps.iter().map(|s| s.look.heights.count).collect::<Vec<_>>())?;
     dict.set_item("along_m", steps.iter().map(|s| s.look.best.along_m).collect::<Vec<_>>())?;
-    dict.set_item("height_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
+    dict.set_item("height_of_torso_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
     dict.set_item("similarity", steps.iter().map(|s| s.similarity).collect::<Vec<_>>())?;
     dict.set_item("phase", steps.iter().map(|s| s.look.best.phase).collect::<Vec<_>>())?;
+    let drawn = walk.fitted().map_or(body.proportions, |fit| fit.body.proportions);
+    dict.set_item("drawn_proportions", drawn.to_array())?;
+    dict.set_item("drawn_torso_m", rows.iter().map(|r| r.torso_centre.to_array()).collect::<Vec<_>>())?;
+    dict.set_item("drawn_heading_rad", rows.iter().map(|r| r.heading_rad).collect::<Vec<_>>())?;
+    dict.set_item("drawn_posture_rad", rows.iter().map(|r| r.posture.to_array()).collect::<Vec<_>>())?;
     Ok(dict)
 }
 
@@ -55,25 +60,32 @@ struct Recorded {
     walker: Walker,
     path: Path,
     looks: HashMap<usize, Look>,
+    drawn: HashMap<usize, PosedBody>,
 }
 
 /// Maximum number of heights of a grid; the tracker's own has eleven.
 const MOST_HEIGHTS: usize = 1000;
+/// Maximum number of samples of a curve; memo's own have fifty.
+const MOST_SAMPLES: usize = 10_000;
 
 impl Recorded {
-    fn read(record: &Bound<'_, PyDict>, options: &TrackerOptions) -> PyResult<Self> {
+    fn read(record: &Bound<'_, PyDict>) -> PyResult<Self> {
         let camera: Bound<'_, PyDict> = value(record, "camera")?;
-        let speed: f64 = number(record, "gait_speed_mps")?;
-        let average = options.walker(speed).map_err(value_error)?;
-        let [hip_rad, knee_rad, shoulder_height, hip_height] =
-            finite("deviation", value(record, "deviation")?)?;
-        let deviation = Deviation { hip_rad, knee_rad, shoulder_height, hip_height };
+        let mut body = Body::from_height(number(record, "height_m")?).map_err(value_error)?;
+        let curves: [Vec<f64>; 4] = value(record, "curves_rad")?;
+        if !curves.iter().all(|c| (3..=MOST_SAMPLES).contains(&c.len()) && c.iter().all(|x| x.is_finite())) {
+            return Err(refused("curves_rad", format!("must be four curves of 3 to {MOST_SAMPLES} numbers")));
+        }
+        let gait = Gait::from_samples(curves.each_ref().map(Vec::as_slice));
+        let drawn = drawn(record, body.height_m)?;
+        body.proportions = Proportions::from_array(&finite("proportions", value(record, "proportions")?)?);
         let origin = DVec2::from_array(finite("origin_m", value(record, "origin_m")?)?);
         Ok(Self {
             camera: PyCamera::from_parameters(&camera)?.0,
-            walker: deviation.apply(&average),
+            walker: Walker { body, gait, style: GaitStyle::default() },
             path: Path { origin, heading_rad: number(record, "heading_rad")? },
             looks: looks(record)?,
+            drawn,
         })
     }
 
@@ -82,33 +94,46 @@ impl Recorded {
     }
 }
 
-/// Visible contours of a recorded walk, as returned by `Walk.contours`. The rows of a table have the centre of
-/// the torso, (N, 3) metres, and the gait phase, (N,); a row without them has no contours. `tracker` has the
-/// options of the run.
+/// Visible contours of a recorded walk in these frames, as returned by `Walk.contours`; none in a frame that is not
+/// part of the walk.
 #[pyfunction]
 pub fn recorded_contours<'py>(
     py: Python<'py>,
-    tracker: &Bound<'py, PyTracker>,
     record: &Bound<'py, PyDict>,
-    torso_m: &Bound<'py, PyAny>,
-    phases: Vec<f64>,
+    frames: Vec<i64>,
 ) -> PyResult<Vec<SegmentsWithParts<'py>>> {
-    let walk = Recorded::read(record, &options_of(tracker)?)?;
-    let torso_m = points_from_numpy(torso_m)?;
-    if torso_m.len() != phases.len() {
-        let message =
-            format!("{} for {}", counted(torso_m.len(), "torso centre"), counted(phases.len(), "phase"));
-        return Err(PyValueError::new_err(message));
-    }
-    let scene = walk.scene();
-    let contours = |(centre, phase): (DVec3, f64)| {
-        if !(centre.is_finite() && phase.is_finite()) {
-            return segments_with_parts(py, &[], scene.camera);
+    let walk = Recorded::read(record)?;
+    let mut visible = Vec::new();
+    let contours = |frame: i64| {
+        visible.clear();
+        if let Some(posed) = usize::try_from(frame).ok().and_then(|frame| walk.drawn.get(&frame)) {
+            visible_contours(
+                &posed.cylinders,
+                walk.camera.position(),
+                &VisibilityOptions::DRAWN,
+                &mut visible,
+            );
         }
-        let at = scene.hypothesis_at(centre, phase.rem_euclid(1.0));
-        segments_with_parts(py, &scene.visible(&at, &VisibilityOptions::DRAWN), scene.camera)
+        segments_with_parts(py, &visible, &walk.camera)
     };
-    torso_m.into_iter().map(DVec3::from_array).zip(phases).map(contours).collect()
+    frames.into_iter().map(contours).collect()
+}
+
+/// The bodies that a record draws, by frame.
+fn drawn(record: &Bound<'_, PyDict>, height_m: f64) -> PyResult<HashMap<usize, PosedBody>> {
+    let frames: Vec<usize> = value(record, "frame")?;
+    let proportions =
+        Proportions::from_array(&finite("drawn_proportions", value(record, "drawn_proportions")?)?);
+    let body = Body { height_m, proportions };
+    let torsos: Vec<[f64; 3]> = column(record, "drawn_torso_m", frames.len())?;
+    let headings = numbers(record, "drawn_heading_rad", frames.len())?;
+    let postures: Vec<[f64; Posture::COUNT]> = column(record, "drawn_posture_rad", frames.len())?;
+    let posed = |k: usize| {
+        let torso = DVec3::from_array(finite("drawn_torso_m", torsos[k])?);
+        let posture = Posture::from_array(&finite("drawn_posture_rad", postures[k])?);
+        Ok((frames[k], body.pose(torso, headings[k], &posture)))
+    };
+    (0..frames.len()).map(posed).collect()
 }
 
 /// The options of a tracker.
@@ -123,7 +148,7 @@ fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
     let [middles, alongs, heights, phases] = [
         numbers(record, "middle_height_m", frames.len())?,
         numbers(record, "along_m", frames.len())?,
-        numbers(record, "height_m", frames.len())?,
+        numbers(record, "height_of_torso_m", frames.len())?,
         numbers(record, "phase", frames.len())?,
     ];
     let look = |k: usize| {
@@ -209,7 +234,7 @@ impl PyExplainer {
         wanted: HashSet<usize>,
     ) -> PyResult<Self> {
         let options = options_of(tracker)?;
-        let walks = records.iter().map(|r| Recorded::read(r, &options)).collect::<PyResult<_>>()?;
+        let walks = records.iter().map(|r| Recorded::read(r)).collect::<PyResult<_>>()?;
         let stream = Some(EvidenceStream::new(options.evidence));
         Ok(Self { options, walks, wanted, stream })
     }

@@ -6,6 +6,7 @@ mod calibrate;
 mod camera;
 mod error;
 mod explain;
+mod fit;
 mod image;
 mod keypoints;
 mod planar;
@@ -35,6 +36,8 @@ mod _memo {
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
     use super::explain::{PyExplainer, recorded_contours};
+    #[pymodule_export]
+    use super::fit::WalkFit;
     #[pymodule_export]
     use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
     #[pymodule_export]

@@ -22,7 +22,7 @@ macro_rules! result {
         pub struct $name { $($(#[$meaning])* pub $field: $type,)* }
 
         impl $name {
-            fn of($py: Python<'_>, $core: $of $(, $given: $kind)*) -> PyResult<Self> {
+            pub(crate) fn of($py: Python<'_>, $core: $of $(, $given: $kind)*) -> PyResult<Self> {
                 Ok(Self { $($field: crate::result::result!(@value $core $field $($value)?).into()),* })
             }
         }

@@ -4,14 +4,16 @@ use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_f
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::explain::record_of;
+use crate::fit::WalkFit;
 use crate::wait::{LOOK, watched};
 use glam::DVec2;
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
+use memo_core::model::visibility::visible_contours;
 use memo_core::model::{Camera, SideJoints, VisibilityOptions, VisibleSegment};
+use memo_core::track::fit::FitOptions;
 use memo_core::track::gait_parameters::GaitParameter;
 use memo_core::track::options::{GaitChoice, TrackerOptions};
-use memo_core::track::person::PersonOptions;
 use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
@@ -167,7 +169,7 @@ impl PyTracker {
         similarity.full_gradient = full_gradient;
         similarity.full_velocity = full_velocity;
         similarity.part_weights = part_weights.unwrap_or(similarity.part_weights);
-        options.person = adapt.then(PersonOptions::default);
+        options.fit = adapt.then(FitOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
         let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
         Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
@@ -274,10 +276,17 @@ impl PyWalk {
         }
         for side in ["right", "left"] {
             let angles = |r: &Row| if side == "right" { r.posture.right } else { r.posture.left };
-            set(&format!("{side}_hip_deg"), self.column(|r| angles(r).hip.to_degrees()))?;
-            set(&format!("{side}_knee_deg"), self.column(|r| angles(r).knee.to_degrees()))?;
-            set(&format!("{side}_shoulder_deg"), self.column(|r| angles(r).shoulder.to_degrees()))?;
-            set(&format!("{side}_elbow_deg"), self.column(|r| angles(r).elbow.to_degrees()))?;
+            let index = usize::from(side == "left");
+            for (joint, name) in ["hip", "knee", "ankle", "shoulder", "elbow"].into_iter().enumerate() {
+                let plain =
+                    |r: &Row| [angles(r).hip, angles(r).knee, f64::NAN, angles(r).shoulder, angles(r).elbow];
+                let measured = |r: &Row| match r.measured {
+                    Some(sides) => sides[index].angles[joint].unwrap_or([f64::NAN; 2]),
+                    None => [plain(r)[joint], f64::NAN],
+                };
+                set(&format!("{side}_{name}_deg"), self.column(|r| measured(r)[0].to_degrees()))?;
+                set(&format!("sd_{side}_{name}_deg"), self.column(|r| measured(r)[1].to_degrees()))?;
+            }
             for (i, joint) in SideJoints::NAMES.into_iter().enumerate() {
                 let at = |r: &Row| if side == "right" { r.right.to_array()[i] } else { r.left.to_array()[i] };
                 let pixel = |r: &Row| self.walk.camera.project(at(r)).unwrap_or(DVec2::NAN);
@@ -305,7 +314,7 @@ impl PyWalk {
 
     /// The record of the walk, as plain numbers: see `Explainer`.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        record_of(py, &self.walk)
+        record_of(py, &self.walk, &self.rows)
     }
 
     /// Gait events: (time_s, frame, event, side).
@@ -330,15 +339,14 @@ impl PyWalk {
     /// Visible contours of the model in a row, in image pixels: (segments, 2, 2), and the body part of each
     /// segment.
     fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
-        let Some(row) = self.rows.get(row) else {
+        if row >= self.rows.len() {
             let message = format!("row {row} of a walk with {}", counted(self.rows.len(), "row"));
             return Err(PyIndexError::new_err(message));
-        };
-        segments_with_parts(
-            py,
-            &self.walk.scene().visible(&row.hypothesis, &VisibilityOptions::DRAWN),
-            &self.walk.camera,
-        )
+        }
+        let mut visible = Vec::new();
+        let cylinders = self.walk.pose_of(row, &self.rows[row]).cylinders;
+        visible_contours(&cylinders, self.walk.camera.position(), &VisibilityOptions::DRAWN, &mut visible);
+        segments_with_parts(py, &visible, &self.walk.camera)
     }
 
     /// The starting phase: frames, best phase of each, similarity (frames, phases), and the lines chosen by the
@@ -390,14 +398,16 @@ impl PyWalk {
         self.walk.p_swapped()
     }
 
-    /// Fitted deviation from the average: hip and knee (radians), shoulder and hip height (fractions of body
-    /// height), relative gain of similarity, and whether the fit was accepted and used. None if no fit was made.
+    /// The measured person; None if there was no fit, or if it failed.
     #[getter]
-    fn deviation(&self) -> Option<(f64, f64, f64, f64, f64, bool)> {
-        self.walk.person_fit.map(|fit| {
-            let (d, gain) = (fit.deviation, fit.similarity_after / fit.similarity_before - 1.0);
-            (d.hip_rad, d.knee_rad, d.shoulder_height, d.hip_height, gain, fit.is_believed)
-        })
+    fn fit(&self, py: Python<'_>) -> PyResult<Option<WalkFit>> {
+        self.walk.fitted().map(|fit| WalkFit::of(py, fit)).transpose()
+    }
+
+    /// Why no person was measured; None if there is a fit, or if none was asked for.
+    #[getter]
+    fn fit_problem(&self) -> Option<String> {
+        self.walk.fit.as_ref()?.as_ref().err().map(ToString::to_string)
     }
 
     fn __len__(&self) -> usize {

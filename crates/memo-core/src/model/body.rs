@@ -5,11 +5,11 @@
 //! does not print it. [`Proportions::default`] holds thicknesses chosen here for a person of average build in
 //! light clothing.
 //!
-//! Limits: limbs swing in planes parallel to the walking direction; hands and feet are rigid continuations of
-//! forearm and shank.
+//! Limits: limbs swing in planes parallel to the walking direction; hands are rigid continuations of the
+//! forearms.
 
 use super::cylinder::EllipticCylinder;
-use super::gait::{Gait, GaitStyle, Posture, SideAngles};
+use super::gait::{Gait, GaitStyle, Posture};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use thiserror::Error;
 
@@ -86,6 +86,8 @@ impl Part {
 /// Sizes as fractions of body height. Lengths and widths: Drillis and Contini 1966.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proportions {
+    /// Height of the crown: 1 unless the stated body height is off.
+    pub crown_height: f64,
     /// Height of the chin, the lower end of the head.
     pub chin_height: f64,
     /// Height of the shoulder joints.
@@ -103,6 +105,8 @@ pub struct Proportions {
     /// Wrist to finger tips; the hand swings loosely curled, so this is less than the length of a straight
     /// hand.
     pub hand: f64,
+    /// Distance of the head's axis in front of the trunk's.
+    pub head_forward: f64,
     /// Heel to toe.
     pub foot: f64,
     /// Distance of the heel behind the ankle.
@@ -119,6 +123,7 @@ pub struct Proportions {
 impl Default for Proportions {
     fn default() -> Self {
         Self {
+            crown_height: 1.0,
             chin_height: 0.870,
             shoulder_height: 0.818,
             hip_height: 0.530,
@@ -127,6 +132,7 @@ impl Default for Proportions {
             upper_arm: 0.186,
             forearm: 0.146,
             hand: 0.070,
+            head_forward: 0.0,
             foot: 0.152,
             heel: 0.035,
             shoulder_half_width: 0.110,
@@ -141,6 +147,55 @@ impl Default for Proportions {
                 (0.030, 0.030),
                 (0.020, 0.026),
             ],
+        }
+    }
+}
+
+impl Proportions {
+    /// Number of values of [`Proportions::to_array`].
+    pub const COUNT: usize = 30;
+
+    /// All values in the order of the fields.
+    pub fn to_array(&self) -> [f64; Self::COUNT] {
+        let lengths = [
+            self.crown_height,
+            self.chin_height,
+            self.shoulder_height,
+            self.hip_height,
+            self.knee_height,
+            self.ankle_height,
+            self.upper_arm,
+            self.forearm,
+            self.hand,
+            self.head_forward,
+            self.foot,
+            self.heel,
+            self.shoulder_half_width,
+            self.hip_half_width,
+        ];
+        let axes = self.semi_axes.iter().flat_map(|&(a, b)| [a, b]);
+        let mut all = lengths.into_iter().chain(axes);
+        std::array::from_fn(|_| all.next().unwrap_or(0.0))
+    }
+
+    /// The proportions of these values.
+    pub fn from_array(values: &[f64; Self::COUNT]) -> Self {
+        Self {
+            crown_height: values[0],
+            chin_height: values[1],
+            shoulder_height: values[2],
+            hip_height: values[3],
+            knee_height: values[4],
+            ankle_height: values[5],
+            upper_arm: values[6],
+            forearm: values[7],
+            hand: values[8],
+            head_forward: values[9],
+            foot: values[10],
+            heel: values[11],
+            shoulder_half_width: values[12],
+            hip_half_width: values[13],
+            semi_axes: std::array::from_fn(|n| (values[14 + 2 * n], values[15 + 2 * n])),
         }
     }
 }
@@ -222,8 +277,8 @@ impl Body {
         let world_from_torso = world_from_body * DAffine3::from_rotation_y(posture.trunk_lean);
         let mut cylinders = [self.torso(world_from_torso); PART_COUNT];
         cylinders[Part::Head as usize] = self.head(world_from_torso);
-        let right = self.side(world_from_torso, -1.0, &posture.right, posture.trunk_lean, &mut cylinders);
-        let left = self.side(world_from_torso, 1.0, &posture.left, posture.trunk_lean, &mut cylinders);
+        let right = self.side(world_from_torso, -1.0, posture, &mut cylinders);
+        let left = self.side(world_from_torso, 1.0, posture, &mut cylinders);
         PosedBody { cylinders, right, left, torso_centre }
     }
 
@@ -233,10 +288,11 @@ impl Body {
 
     fn head(&self, world_from_torso: DAffine3) -> EllipticCylinder {
         let p = &self.proportions;
-        let half_length = 0.5 * (1.0 - p.chin_height) * self.height_m;
+        let half_length = 0.5 * (p.crown_height - p.chin_height) * self.height_m;
         let centre =
             (p.chin_height - p.shoulder_height) * self.height_m + 0.5 * self.torso_length_m() + half_length;
-        self.cylinder(0, world_from_torso * up(centre), half_length)
+        let centre = DVec3::new(p.head_forward * self.height_m, 0.0, centre);
+        self.cylinder(0, world_from_torso * DAffine3::from_translation(centre), half_length)
     }
 
     /// The six limb parts and the joints of one side; `side` is +1 left, -1 right. Thigh angles are relative
@@ -245,11 +301,11 @@ impl Body {
         &self,
         world_from_torso: DAffine3,
         side: f64,
-        angles: &SideAngles,
-        trunk_lean: f64,
+        posture: &Posture,
         cylinders: &mut [EllipticCylinder; PART_COUNT],
     ) -> SideJoints {
         let (p, h) = (&self.proportions, self.height_m);
+        let angles = if side > 0.0 { &posture.left } else { &posture.right };
         let half_torso = 0.5 * self.torso_length_m();
         let at = |lateral: f64, z: f64| DAffine3::from_translation(DVec3::new(0.0, side * lateral * h, z));
         let flexed = |angle: f64| DAffine3::from_rotation_y(-angle);
@@ -257,9 +313,15 @@ impl Body {
         let shoulder = world_from_torso * at(p.shoulder_half_width, half_torso) * flexed(angles.shoulder);
         let elbow = shoulder * up(-p.upper_arm * h) * flexed(angles.elbow);
         let wrist = elbow * up(-p.forearm * h);
-        let hip = world_from_torso * at(p.hip_half_width, -half_torso) * flexed(angles.hip + trunk_lean);
+        let (across, back) = posture.pelvis_rotation.sin_cos();
+        let (across, back) = (back * side * p.hip_half_width * h, -across * side * p.hip_half_width * h);
+        let hip = world_from_torso
+            * DAffine3::from_translation(DVec3::new(back, across, -half_torso))
+            * flexed(posture.trunk_lean)
+            * DAffine3::from_rotation_x(side * angles.abduction)
+            * flexed(angles.hip);
         let knee = hip * up(-(p.hip_height - p.knee_height) * h) * flexed(-angles.knee);
-        let ankle = knee * up(-(p.knee_height - p.ankle_height) * h);
+        let ankle = knee * up(-(p.knee_height - p.ankle_height) * h) * flexed(angles.ankle);
 
         let first_arm = if side > 0.0 { Part::LeftUpperArm } else { Part::RightUpperArm } as usize;
         let first_leg = if side > 0.0 { Part::LeftThigh } else { Part::RightThigh } as usize;
@@ -279,7 +341,7 @@ impl Body {
         self.cylinder(row, world_from_joint * up(-0.5 * length), 0.5 * length)
     }
 
-    /// The foot points forward at a right angle to the shank; its sole is as far below the ankle as the
+    /// The foot points forward, at a right angle to the shank unless the ankle is bent; its sole is as far below the ankle as the
     /// proportions specify.
     fn foot(&self, world_from_ankle: DAffine3) -> EllipticCylinder {
         let (p, h) = (&self.proportions, self.height_m);
@@ -345,10 +407,23 @@ impl Walker {
 
 #[cfg(test)]
 mod tests {
+    use super::super::gait::SideAngles;
     use super::*;
 
     fn walker() -> Walker {
         Walker { body: Body::from_height(1.8).unwrap(), gait: Gait::dense(), style: GaitStyle::default() }
+    }
+
+    #[test]
+    fn proportions_and_postures_are_the_same_after_a_round_trip() {
+        let values = std::array::from_fn(|n| 0.01 * (n + 1) as f64);
+        let proportions = Proportions::from_array(&values);
+        assert_eq!(proportions.to_array(), values);
+        assert_eq!((proportions.heel, proportions.semi_axes[7]), (0.12, (0.29, 0.3)));
+        let values = std::array::from_fn(|n| 0.1 * (n + 1) as f64);
+        let posture = Posture::from_array(&values);
+        assert_eq!(posture.to_array(), values);
+        assert_eq!((posture.left.hip, posture.pelvis_rotation), (values[6], values[13]));
     }
 
     #[test]
@@ -376,7 +451,7 @@ mod tests {
     #[test]
     fn flexion_moves_each_limb_the_anatomical_way() {
         let body = Body::from_height(1.8).unwrap();
-        let bent = SideAngles { hip: 0.3, knee: 0.5, shoulder: 0.3, elbow: 0.5 };
+        let bent = SideAngles { hip: 0.3, knee: 0.5, shoulder: 0.3, elbow: 0.5, ..SideAngles::default() };
         let posed = body.pose(DVec3::Z, 0.0, &Posture { right: bent, ..Posture::default() });
         let r = posed.right;
         assert!(r.knee.x > r.hip.x && r.elbow.x > r.shoulder.x, "hip and shoulder flex forward");
@@ -518,8 +593,8 @@ mod tests {
     /// Whatever the flexion of a limb, the ends of its parts are its joints.
     #[test]
     fn bent_limbs_hang_from_their_joints() {
-        let bent = SideAngles { hip: 0.4, knee: 0.9, shoulder: -0.3, elbow: 1.1 };
-        let posture = Posture { right: bent, left: bent, trunk_lean: 0.2 };
+        let bent = SideAngles { hip: 0.4, knee: 0.9, shoulder: -0.3, elbow: 1.1, ..SideAngles::default() };
+        let posture = Posture { right: bent, left: bent, trunk_lean: 0.2, pelvis_rotation: 0.0 };
         let body = Body::from_height(1.7).unwrap().pose(DVec3::new(1.0, -2.0, 0.9), 0.8, &posture);
         let right = [
             (Part::RightUpperArm, body.right.shoulder, Some(body.right.elbow)),

@@ -86,6 +86,10 @@ pub struct SideAngles {
     pub shoulder: f64,
     /// Elbow flexion, forward bend positive.
     pub elbow: f64,
+    /// Dorsiflexion of the ankle, toes up positive; 0 = foot at a right angle to the shank.
+    pub ankle: f64,
+    /// Tilt of the whole leg in the frontal plane, outwards positive.
+    pub abduction: f64,
 }
 
 /// All joint angles of the body at one instant.
@@ -97,6 +101,40 @@ pub struct Posture {
     pub left: SideAngles,
     /// Forward lean of the trunk relative to the vertical, radians.
     pub trunk_lean: f64,
+    /// Rotation of the pelvis about the vertical, the right hip forward positive.
+    pub pelvis_rotation: f64,
+}
+
+impl Posture {
+    /// Number of values of [`Posture::to_array`].
+    pub const COUNT: usize = 14;
+
+    /// Hip, knee, shoulder, elbow, ankle and abduction of the right side, then of the left, then the lean of the
+    /// trunk and the rotation of the pelvis.
+    pub fn to_array(&self) -> [f64; Self::COUNT] {
+        let [r, l] =
+            [&self.right, &self.left].map(|s| [s.hip, s.knee, s.shoulder, s.elbow, s.ankle, s.abduction]);
+        let mut all = r.into_iter().chain(l).chain([self.trunk_lean, self.pelvis_rotation]);
+        std::array::from_fn(|_| all.next().unwrap_or(0.0))
+    }
+
+    /// The posture of these values.
+    pub fn from_array(values: &[f64; Self::COUNT]) -> Self {
+        let side = |v: &[f64]| SideAngles {
+            hip: v[0],
+            knee: v[1],
+            shoulder: v[2],
+            elbow: v[3],
+            ankle: v[4],
+            abduction: v[5],
+        };
+        Self {
+            right: side(&values[..6]),
+            left: side(&values[6..12]),
+            trunk_lean: values[12],
+            pelvis_rotation: values[13],
+        }
+    }
 }
 
 /// How one person's gait deviates from the average curves; the default is the average itself.
@@ -201,13 +239,29 @@ impl Gait {
         1.346 * leg_length_m * (speed_mps / leg_length_m).sqrt() / speed_mps
     }
 
+    /// A gait of equally spaced samples of hip, knee, shoulder and elbow, radians; the first is at right heel strike.
+    ///
+    /// # Panics
+    ///
+    /// With fewer than three samples.
+    pub fn from_samples(curves: [&[f64]; 4]) -> Self {
+        let degrees = curves.map(|curve| curve.iter().map(|angle| angle.to_degrees()).collect::<Vec<_>>());
+        Self::from_degrees(degrees.map(|curve| PeriodicCubic::spline(&curve)))
+    }
+
     fn from_degrees(curves: [PeriodicCubic; 4]) -> Self {
         let [hip, knee, shoulder, elbow] =
             curves.map(|curve| curve.affine(std::f64::consts::PI / 180.0, 0.0));
         let mean =
             |curve: &PeriodicCubic| (0..100).map(|i| curve.at(f64::from(i) / 100.0)).sum::<f64>() / 100.0;
-        let mean =
-            SideAngles { hip: mean(&hip), knee: mean(&knee), shoulder: mean(&shoulder), elbow: mean(&elbow) };
+        let mean = SideAngles {
+            hip: mean(&hip),
+            knee: mean(&knee),
+            shoulder: mean(&shoulder),
+            elbow: mean(&elbow),
+            ankle: 0.0,
+            abduction: 0.0,
+        };
         Self { hip, knee, shoulder, elbow, vertical_amplitude_m: VERTICAL_AMPLITUDE_M, mean }
     }
 
@@ -217,7 +271,16 @@ impl Gait {
             right: self.side(phase, style),
             left: self.side(phase + 0.5, style),
             trunk_lean: style.trunk_lean,
+            pelvis_rotation: 0.0,
         }
+    }
+
+    /// Hip, knee, shoulder and elbow of a person of this style at fifty equally spaced phases from heel strike,
+    /// radians; [`Gait::from_samples`] reads them.
+    pub fn sampled(&self, style: &GaitStyle) -> [Vec<f64>; 4] {
+        let at = |k: usize| self.side(k as f64 / 50.0, style);
+        let curve = |angle: fn(&SideAngles) -> f64| (0..50).map(|k| angle(&at(k))).collect();
+        [curve(|a| a.hip), curve(|a| a.knee), curve(|a| a.shoulder), curve(|a| a.elbow)]
     }
 
     /// Angles of the side whose heel strike is at phase 0.
@@ -229,6 +292,8 @@ impl Gait {
             knee: scaled(&self.knee, self.mean.knee, style.leg_amplitude) + style.knee_offset,
             shoulder: scaled(&self.shoulder, self.mean.shoulder, style.arm_amplitude) + style.shoulder_offset,
             elbow: scaled(&self.elbow, self.mean.elbow, style.arm_amplitude) + style.elbow_offset,
+            ankle: 0.0,
+            abduction: 0.0,
         }
     }
 
@@ -286,6 +351,19 @@ mod tests {
         }
         assert!(matches!(Gait::boulic(4.0, 0.9), Err(GaitError::Speed { .. })));
         assert!(Gait::boulic(f64::NAN, 0.9).is_err());
+    }
+
+    #[test]
+    fn samples_of_a_gait_are_the_gait() {
+        let style = GaitStyle { hip_offset: 0.1, leg_amplitude: 0.7, ..GaitStyle::default() };
+        let gait = Gait::dense();
+        let samples = gait.sampled(&style);
+        let again = Gait::from_samples(samples.each_ref().map(Vec::as_slice));
+        for phase in [0.0, 0.13, 0.77] {
+            let [a, b] = [gait.posture(phase, &style), again.posture(phase, &GaitStyle::default())];
+            let angles = a.to_array().into_iter().zip(b.to_array());
+            angles.for_each(|(a, b)| assert!((a - b).abs() < 1e-3, "{phase}: {a} {b}"));
+        }
     }
 
     #[test]

@@ -1,12 +1,15 @@
-//! The current walk: whether it continues, and the fit of path, person and distance to its first frames.
+//! The current walk: whether it continues, its path, and the fit of the person at its end.
 
+use super::fit::edge_search::View;
+use super::fit::views::{Backdrop, Piece};
+use super::fit::{FitError, FitFrame, Problem, WalkFit};
 use super::locate::{Sighting, locate_slanting};
 use super::options::TrackerOptions;
-use super::person::{PersonFit, PersonOptions, fit_distance, fit_person};
-use super::search::{Hypothesis, Scene};
+use super::result::smoothed_hypotheses;
+use super::search::Hypothesis;
 use super::start::{StartReport, start};
-use super::walk::{Beginning, FrameEdges, Walk};
-use crate::model::Camera;
+use super::walk::{Beginning, FrameEdges, Step, Walk};
+use crate::model::{Camera, Walker};
 
 /// Nobody walks slower than this, m/s.
 pub(super) const SLOWEST_MPS: f64 = 0.25;
@@ -18,6 +21,9 @@ const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
 /// Relative gain of similarity that an oblique path needs over a path parallel to the image plane. Seen from
 /// above, a walk can look oblique, but then it fits worse.
 const SLANT_GAIN: f64 = 0.02;
+/// A person whose fit to the first frames misses more of the outline is not followed: on walks that were fitted
+/// well, 0.08 and less was missed, in wrong fits 0.11 and more.
+const MOST_MISSED_TO_ADOPT: f64 = 0.1;
 /// Number of last frames that decide whether a walk continues.
 const RECENT_FRAMES: usize = 12;
 /// A walk ends if the mean similarity of those frames is below this share of the walk's mean.
@@ -33,11 +39,15 @@ pub(super) struct Active {
     pub(super) depth_sd_m: f64,
     pub(super) start: StartReport,
     pub(super) walk: Walk,
-    /// Evidence kept until the person is fitted.
+    /// The average walker of the person's height.
+    pub(super) average: Walker,
+    /// Evidence kept until an oblique path was looked for.
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
     pub(super) gait_speed_mps: f64,
-    pub(super) person_fit: Option<PersonFit>,
-    pub(super) fitted: bool,
+    /// Whether an oblique path was looked for.
+    pub(super) turned: bool,
+    /// What the fit needs of each frame.
+    pub(super) pieces: Vec<Piece>,
 }
 
 impl Active {
@@ -89,24 +99,63 @@ impl Active {
         self.walk.keep(absent.min(end)..end);
     }
 
-    /// Fits the person to the kept frames and, if the fit is accepted, follows them again. This happens once per
-    /// walk.
-    pub(super) fn refit(&mut self, options: &TrackerOptions) {
-        if std::mem::replace(&mut self.fitted, true) {
+    /// Starts again on an oblique path if the kept frames show one, and with the person's own body and gait. This
+    /// happens once per walk.
+    pub(super) fn turn(&mut self, backdrop: &Backdrop, options: &TrackerOptions) {
+        if !std::mem::replace(&mut self.turned, true) {
+            let kept = std::mem::take(&mut self.kept);
+            self.turn_path(&kept, options);
+            self.adopt_person(&kept, backdrop, options);
+        }
+    }
+
+    /// Fits the person to the frames so far, from the smoothed track; `None` without the option. With the
+    /// probability of exchanged sides, the sides are decided anew.
+    pub(super) fn fit(
+        &self,
+        backdrop: &Backdrop,
+        options: &TrackerOptions,
+        p_swapped: Option<f64>,
+    ) -> Option<Result<WalkFit, FitError>> {
+        let fit = options.fit.as_ref()?;
+        let Walk { walker, path, .. } = &self.walk;
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let first = steps.first().map_or(usize::MAX, |step| step.frame);
+        let last = steps.last().map_or(0, |step| step.frame);
+        let pieces = self.pieces.iter().filter(|piece| (first..=last).contains(&piece.frame));
+        let views = backdrop.views(pieces);
+        let half_torso_m = 0.5 * walker.body.torso_length_m();
+        let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
+            let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
+            FitFrame { time_s: step.time_s, view, start: Hypothesis { height_m, ..place } }
+        };
+        let places = smoothed_hypotheses(steps, &options.walk.filter);
+        let frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
+        Some(Problem::new(&self.camera, &self.average, path, &frames, fit).fit(p_swapped))
+    }
+
+    /// Follows the kept frames again, and from then on the person instead of the average, if the person could be
+    /// fitted to them and is nearer to the edges than the average.
+    pub(super) fn adopt_person(&mut self, kept: &Kept, backdrop: &Backdrop, options: &TrackerOptions) {
+        let Some(Ok(fit)) = self.fit(backdrop, options, None) else { return };
+        if fit.quality.missed > MOST_MISSED_TO_ADOPT {
             return;
         }
-        let kept = std::mem::take(&mut self.kept);
-        self.turn_path(&kept, options);
-        let Some(person) = &options.person else { return };
-        let Walk { walker, path, beginning, .. } = &self.walk;
-        let fit =
-            fit_person(&self.frames(&kept), walker, &self.camera, path, &options.walk.similarity, person);
-        self.person_fit = Some(fit);
-        if fit.is_believed {
-            let walk = Walk::new(fit.deviation.apply(walker), *path, *beginning);
-            self.follow_again(walk, &kept, options);
-        } else {
-            self.refit_distance(&kept, options, person);
+        let [first, last] = [&fit.frames[0], &fit.frames[fit.frames.len() - 1]];
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let elapsed_s = steps[steps.len() - 1].time_s - steps[0].time_s;
+        let beginning = Beginning {
+            time_s: steps[0].time_s,
+            along_m: first.along_m,
+            phase: first.phase,
+            speed_mps: (last.along_m - first.along_m) / elapsed_s,
+            rate_hz: (last.phase - first.phase) / elapsed_s,
+        };
+        let average = self.walk.clone();
+        self.follow_again(Walk::new(fit.walker(), fit.path, beginning), kept, options);
+        let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
+        if summed(&self.walk) <= summed(&average) {
+            self.walk = average;
         }
     }
 
@@ -129,27 +178,6 @@ impl Active {
         }
     }
 
-    /// For a body assumed average, the apparent size determines the distance. A body that differs could as well
-    /// be nearer or farther.
-    fn refit_distance(&mut self, kept: &Kept, options: &TrackerOptions, person: &PersonOptions) {
-        let Walk { walker, path, beginning, .. } = &self.walk;
-        let scene = Scene { walker, camera: &self.camera, path };
-        let distance = fit_distance(&self.frames(kept), &scene, &options.walk.similarity, person);
-        let beginning = Beginning {
-            along_m: distance.along(beginning.along_m),
-            speed_mps: beginning.speed_mps * distance.factor,
-            ..*beginning
-        };
-        let walk = Walk::new(walker.clone(), distance.path, beginning);
-        self.follow_again(walk, kept, options);
-    }
-
-    /// The kept frames with the better twin's hypothesis of each.
-    fn frames<'a>(&self, kept: &'a Kept) -> Vec<(&'a FrameEdges, Hypothesis)> {
-        let twin = &self.walk.twins[self.walk.best()];
-        kept.iter().zip(&twin.steps).map(|((_, e), step)| (e, step.state.hypothesis())).collect()
-    }
-
     fn follow_again(&mut self, mut walk: Walk, kept: &Kept, options: &TrackerOptions) {
         for (_, edges) in kept {
             walk.follow(edges, &self.camera, &options.walk);
@@ -161,7 +189,7 @@ impl Active {
 #[cfg(test)]
 mod tests {
     use super::super::search::tests::{camera, edges_of, walker};
-    use super::super::search::{Axis, Path};
+    use super::super::search::{Axis, Path, Scene};
     use super::super::start::Direction;
     use super::super::start::tests::report;
     use super::super::walk::{Look, State, Step};
@@ -187,10 +215,11 @@ mod tests {
             depth_sd_m: 0.1,
             start: report(PATH, BEGINNING, Direction::Forward),
             walk,
+            average: walker(),
             kept: Vec::new(),
             gait_speed_mps: 1.2,
-            person_fit: None,
-            fitted: false,
+            turned: false,
+            pieces: Vec::new(),
         }
     }
 
@@ -338,18 +367,18 @@ mod tests {
     }
 
     fn options() -> TrackerOptions {
-        TrackerOptions { start_frames: 5, person: None, ..TrackerOptions::for_height(1.75) }
+        TrackerOptions { start_frames: 5, fit: None, ..TrackerOptions::for_height(1.75) }
     }
 
-    /// A walk followed through the kept frames on a path parallel to the image plane, then fitted.
+    /// A walk followed through the kept frames on a path parallel to the image plane, then turned.
     fn refitted(kept: Vec<(Option<Sighting>, FrameEdges)>) -> Active {
         let mut active = active(Vec::new());
         for (_, edges) in &kept {
             active.walk.follow(edges, &active.camera, &options().walk);
         }
         active.kept = kept;
-        active.refit(&options());
-        assert!(active.fitted && active.kept.is_empty());
+        active.turn(&Backdrop::default(), &options());
+        assert!(active.turned && active.kept.is_empty());
         active
     }
 
@@ -371,11 +400,11 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_is_fitted_once() {
+    fn a_path_is_turned_once() {
         let mut active = active(Vec::new());
-        active.fitted = true;
+        active.turned = true;
         active.kept = kept(&PATH, &PATH);
-        active.refit(&options());
+        active.turn(&Backdrop::default(), &options());
         assert_eq!(active.kept.len(), 12, "left alone");
     }
 }

@@ -1,11 +1,11 @@
 //! Gait parameters of a walk with 95 % intervals: cadence, speed, stride and steps, side by side.
 //!
-//! Two things are measured in every frame: the gait phase and the position of the trunk. Cadence and speed use
-//! all frames. A heel strike (initial contact) is the time at which the measured phase passes 0 (right) or 1/2
-//! (left). A step length is the displacement of the trunk between two strikes. The model's feet land at the same
-//! distance ahead of the trunk on both sides and are in stance for the same share of the cycle. So stance and
-//! double support are the values of average adults, not measurements, and a reach asymmetry of the two feet is
-//! not visible: the intervals of the sides contain its spread over people.
+//! Cadence and speed use the gait phase and the position of the trunk in all frames. With a fit of the person
+//! ([`fit`](super::fit)) heel strikes (initial contacts) and toe-offs are those of the fitted feet, and stance, swing
+//! and supports, ranges of motion and the peak flexion of the knee are measured. Without one, a heel strike is the
+//! time at which the measured phase passes 0 (right) or 1/2 (left), and these parameters are unknown: the average
+//! gait has them, not the person. A step length is the displacement of the trunk between two strikes, so a
+//! difference in the reach of the two feet is not visible: the intervals of the sides contain its spread over people.
 //!
 //! The intervals are for the person's gait, of which the observed steps are a sample. They are wider than
 //! intervals for the observed steps alone. Four terms enter:
@@ -35,7 +35,8 @@
 //! together over the cycle), shadows and reflections at the feet, for which the scale leaves room, and a tilted
 //! camera if none is given.
 
-use super::result::{Row, Side, TrackedWalk};
+use super::fit::contacts::Contact;
+use super::result::{EventKind, Row, Side, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
 use crate::estimate::line::line_through;
@@ -72,9 +73,11 @@ const LEAST_CYCLES: f64 = 0.5;
 const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 const Z: f64 = 1.959_964;
-/// Stance and double support, per cent of the cycle: adults at free speed.
-const STANCE_PERCENT: f64 = 61.0;
-const DOUBLE_SUPPORT_PERCENT: f64 = 22.0;
+/// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
+const CONTACT_SD_S: f64 = 0.012;
+const CONTACT_COMMON_SD_S: f64 = 0.015;
+/// A fitted strike this much later than the one before is not its next, strides.
+const LONGEST_STEP: f64 = 0.8;
 
 /// A gait parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,10 +98,20 @@ pub enum GaitQuantity {
     StepTimeSymmetry,
     /// 100 (right - left) / mean of the step lengths, per cent.
     StepLengthSymmetry,
-    /// Stance of one foot, per cent of the cycle: assumed, not measured.
+    /// Stance of one foot, per cent of the cycle.
     Stance,
-    /// Stance of both feet, per cent of the cycle: assumed, not measured.
+    /// Swing of one foot, per cent of the cycle.
+    Swing,
+    /// Stance of one foot alone, per cent of the cycle, both feet together.
+    SingleSupport,
+    /// Stance of both feet, per cent of the cycle.
     DoubleSupport,
+    /// Largest less smallest angle of the thigh against the vertical, degrees.
+    HipRange,
+    /// Largest less smallest flexion of the knee, degrees.
+    KneeRange,
+    /// Largest flexion of the knee, degrees.
+    KneePeak,
 }
 
 impl GaitQuantity {
@@ -114,7 +127,12 @@ impl GaitQuantity {
             Self::StepTimeSymmetry => "step_time_symmetry",
             Self::StepLengthSymmetry => "step_length_symmetry",
             Self::Stance => "stance",
+            Self::Swing => "swing",
+            Self::SingleSupport => "single_support",
             Self::DoubleSupport => "double_support",
+            Self::HipRange => "hip_range",
+            Self::KneeRange => "knee_range",
+            Self::KneePeak => "knee_peak",
         }
     }
 
@@ -125,6 +143,7 @@ impl GaitQuantity {
             Self::Speed => "m/s",
             Self::StrideTime | Self::StepTime => "s",
             Self::StrideLength | Self::StepLength => "m",
+            Self::HipRange | Self::KneeRange | Self::KneePeak => "deg",
             _ => "%",
         }
     }
@@ -139,9 +158,9 @@ pub struct GaitParameter {
     pub side: Option<Side>,
     /// The value in the quantity's unit; `None` if it is not known.
     pub value: Option<f64>,
-    /// 95 % interval; `None` if the value is not known or not measured.
+    /// 95 % interval; `None` if the value is not known.
     pub interval: Option<[f64; 2]>,
-    /// Number of steps used; 0 if the value is not known or not measured.
+    /// Number of steps used, or of cycles; 0 if the value is not known.
     pub n: usize,
 }
 
@@ -156,8 +175,8 @@ impl TrackedWalk {
             table.push(GaitParameter { quantity, side, value, interval, n: estimate.map_or(0, |e| e.n) });
         };
         use GaitQuantity::{
-            Cadence, DoubleSupport, Speed, Stance, StepLength, StepLengthSymmetry, StepTime,
-            StepTimeSymmetry, StrideLength, StrideTime,
+            Cadence, DoubleSupport, HipRange, KneePeak, KneeRange, SingleSupport, Speed, Stance, StepLength,
+            StepLengthSymmetry, StepTime, StepTimeSymmetry, StrideLength, StrideTime, Swing,
         };
         add(Cadence, None, whole.map(|w| w.rate_hz.times(120.0)));
         add(Speed, None, whole.map(|w| w.speed_mps));
@@ -171,12 +190,77 @@ impl TrackedWalk {
         }
         add(StepTimeSymmetry, None, sides.and_then(|s| s.time_s.symmetry));
         add(StepLengthSymmetry, None, sides.and_then(|s| s.length_m.symmetry));
-        let stands = whole.is_some() && self.direction() == Direction::Forward;
-        for (quantity, percent) in [(Stance, STANCE_PERCENT), (DoubleSupport, DOUBLE_SUPPORT_PERCENT)] {
-            let value = stands.then_some(percent);
-            table.push(GaitParameter { quantity, side: None, value, interval: None, n: 0 });
+        let stance = whole.as_ref().and_then(|whole| self.stance(whole));
+        let rest = |e: Estimate| Estimate { value: 100.0 - e.value, ..e };
+        let double = stance.map(|e| Estimate { value: 2.0 * e.value - 100.0, half: 2.0 * e.half, ..e });
+        add(Stance, None, stance);
+        add(Swing, None, stance.map(rest));
+        add(SingleSupport, None, double.map(rest));
+        add(DoubleSupport, None, double);
+        for side in [Side::Right, Side::Left] {
+            add(HipRange, Some(side), self.motion(side, 0).map(|m| m.range));
+            add(KneeRange, Some(side), self.motion(side, 1).map(|m| m.range));
+            add(KneePeak, Some(side), self.motion(side, 1).map(|m| m.peak));
         }
         table
+    }
+
+    /// Stance from the contacts of the fitted feet, both sides together: from a strike to the toe-off of that foot.
+    fn stance(&self, whole: &Whole) -> Option<Estimate> {
+        if self.direction() == Direction::Backward {
+            return None;
+        }
+        let contacts = &self.fitted()?.contacts;
+        let stride_s = 1.0 / whole.rate_hz.value;
+        let until_off = |strike: &Contact| {
+            let offs = contacts.iter().filter(|c| c.kind == EventKind::ToeOff && c.side == strike.side);
+            let next = offs.map(|c| c.time_s - strike.time_s).find(|&elapsed_s| elapsed_s > 0.0)?;
+            (next < LONGEST_STEP * stride_s).then_some(next)
+        };
+        let strikes = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike);
+        let stances: Vec<f64> = strikes.filter_map(until_off).collect();
+        let n = stances.len();
+        if n == 0 {
+            return None;
+        }
+        let mean = stances.iter().sum::<f64>() / n as f64;
+        let sum_sq: f64 = stances.iter().map(|s| (s - mean).powi(2)).sum();
+        let prior_variance = 2.0 * CONTACT_SD_S.powi(2);
+        let freedom = n as f64 - 1.0;
+        let variance = (PRIOR_STEPS * prior_variance + sum_sq) / (PRIOR_STEPS + freedom);
+        let scatter = student_quantile(PRIOR_STEPS + freedom) * (variance / n as f64).sqrt();
+        let half = scatter.hypot(Z * std::f64::consts::SQRT_2 * CONTACT_COMMON_SD_S);
+        Some(Estimate { value: mean, half, n }.times(100.0 / stride_s))
+    }
+
+    /// Range and peak of a measured joint over at least a cycle, degrees; joint 0 is the hip, 1 the knee.
+    fn motion(&self, side: Side, joint: usize) -> Option<JointMotion> {
+        let fit = self.fitted()?;
+        if self.p_swapped() > LIKELY_MISTAKEN {
+            return None;
+        }
+        let index = usize::from(side == Side::Left);
+        let (first, last) = (fit.frames.first()?, fit.frames.last()?);
+        let cycles = (last.phase - first.phase).abs();
+        let measured: Vec<[f64; 2]> =
+            fit.frames.iter().filter_map(|f| f.measured[index].angles[joint]).collect();
+        if cycles < 1.0 || measured.len() < fit.frames.len() {
+            return None;
+        }
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        for [angle, _] in &measured {
+            (least, most) = (least.min(*angle), most.max(*angle));
+        }
+        let sd = (measured.iter().map(|[_, sd]| sd * sd).sum::<f64>() / measured.len() as f64).sqrt();
+        let estimate = |value: f64, sd: f64| Estimate {
+            value: value.to_degrees(),
+            half: Z * sd.to_degrees(),
+            n: cycles as usize,
+        };
+        Some(JointMotion {
+            range: estimate(most - least, std::f64::consts::SQRT_2 * sd),
+            peak: estimate(most, sd),
+        })
     }
 
     /// Steps by side; `None` if the sides are ambiguous or the walk is backward.
@@ -185,7 +269,11 @@ impl TrackedWalk {
         if !is_sure || self.direction() == Direction::Backward {
             return None;
         }
-        let steps = steps_between(&strikes(self.steps(), whole.rate_hz.value), &self.rows());
+        let strikes = match self.fitted() {
+            Some(fit) => fitted_strikes(&fit.contacts, whole.rate_hz.value),
+            None => strikes(self.steps(), whole.rate_hz.value),
+        };
+        let steps = steps_between(&strikes, &self.rows());
         let (rate_hz, speed_mps) = (whole.rate_hz.value, whole.speed_mps.value.abs());
         let strike_sd_s = STRIKE_SD_CYCLES / rate_hz;
         let noise_sq = steps.iter().map(|s| s.variance_s2).sum::<f64>() / steps.len().max(1) as f64;
@@ -215,11 +303,11 @@ impl TrackedWalk {
     /// Relative standard deviation of lengths along the path, from distance and posture. For an assumed camera
     /// also from the focal length, which scales displacement along the line of sight.
     fn scale_sd(&self) -> f64 {
-        let eye = self.camera.position().truncate();
-        let nearest = self.walk.path.point(self.walk.path.along(eye), 0.0).truncate();
+        let (eye, path) = (self.camera.position().truncate(), self.path());
+        let nearest = path.point(path.along(eye), 0.0).truncate();
         let distance = (self.depth_sd_m / (nearest - eye).length()).hypot(POSTURE_SD);
         let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
-        let along_view_sq = self.walk.path.direction().dot(view).powi(2);
+        let along_view_sq = path.direction().dot(view).powi(2);
         if self.camera_is_guessed { distance.hypot(FOCAL_SD * along_view_sq) } else { distance }
     }
 }
@@ -255,9 +343,7 @@ struct Whole {
 
 impl Whole {
     fn of(walk: &TrackedWalk) -> Option<Self> {
-        let measured =
-            walk.steps().iter().filter_map(|s| Some((s.time_s, unwrapped(s)?, s.measured?.along_m)));
-        let (phases, places): (Vec<_>, Vec<_>) = measured.map(|(t, p, a)| ((t, p), (t, a))).unzip();
+        let (phases, places) = measured(walk);
         if phases.len() < LEAST_FRAMES {
             return None;
         }
@@ -307,6 +393,21 @@ fn half_slope(points: &[(f64, f64)], steps: f64) -> f64 {
     Z * sd * 12f64.sqrt() / (duration_s * steps.max(1.0).sqrt())
 }
 
+/// Time and phase, and time and place, of each frame of the fit, or else of each measured frame of the tracker.
+fn measured(walk: &TrackedWalk) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+    let steps = walk.steps();
+    match walk.fitted() {
+        Some(fit) => {
+            let timed = steps.iter().zip(&fit.frames);
+            timed.map(|(s, f)| ((s.time_s, f.phase), (s.time_s, f.along_m))).unzip()
+        }
+        None => {
+            let seen = steps.iter().filter_map(|s| Some((s.time_s, unwrapped(s)?, s.measured?.along_m)));
+            seen.map(|(t, p, a)| ((t, p), (t, a))).unzip()
+        }
+    }
+}
+
 /// The measured phase in the cycle nearest to the filtered phase, not wrapped, cycles.
 fn unwrapped(step: &Step) -> Option<f64> {
     let (filtered, measured) = (step.state.phase.position, step.measured?.phase);
@@ -352,6 +453,20 @@ fn strikes(steps: &[Step], rate_hz: f64) -> Vec<Strike> {
     ((2.0 * first).ceil() as i64..=(2.0 * last).floor() as i64).filter_map(strike).collect()
 }
 
+/// The heel strikes of the fitted feet, numbered so that only successive ones make a step.
+fn fitted_strikes(contacts: &[Contact], rate_hz: f64) -> Vec<Strike> {
+    let mut strikes: Vec<Strike> = Vec::new();
+    for contact in contacts.iter().filter(|c| c.kind == EventKind::HeelStrike) {
+        let follows = strikes.last().is_some_and(|last| {
+            last.side != contact.side && (contact.time_s - last.time_s) * rate_hz < LONGEST_STEP
+        });
+        let index = strikes.last().map_or(0, |last| last.index + if follows { 1 } else { 2 });
+        let variance_s2 = CONTACT_SD_S.powi(2);
+        strikes.push(Strike { side: contact.side, index, time_s: contact.time_s, variance_s2 });
+    }
+    strikes
+}
+
 /// A step from the other side's strike to the strike of `side`.
 #[derive(Debug, Clone, Copy)]
 struct StepTaken {
@@ -379,6 +494,13 @@ fn place_at(rows: &[Row], time_s: f64) -> f64 {
     let (a, b) = (&rows[after - 1], &rows[after]);
     let t = (time_s - a.time_s) / (b.time_s - a.time_s);
     a.hypothesis.along_m + t * (b.hypothesis.along_m - a.hypothesis.along_m)
+}
+
+/// Range and peak of an angle, degrees.
+#[derive(Debug, Clone, Copy)]
+struct JointMotion {
+    range: Estimate,
+    peak: Estimate,
 }
 
 /// Steps by side.

@@ -1,7 +1,7 @@
 //! Options of the tracker.
 
 use super::evidence::EvidenceOptions;
-use super::person::PersonOptions;
+use super::fit::FitOptions;
 use super::start::CadenceRange;
 use super::walk::WalkOptions;
 use crate::model::body::BodyError;
@@ -48,11 +48,11 @@ pub struct TrackerOptions {
     pub gait: GaitChoice,
     /// Number of frames of the starting phase. The paper uses images 2 to 14.
     pub start_frames: usize,
-    /// Fit of the person's deviation from the average gait and body; `None` keeps the average.
-    pub person: Option<PersonOptions>,
-    /// Number of frames that must be followed before the person is fitted. 40: one and a half strides at 25
-    /// frames per second.
-    pub person_frames: usize,
+    /// Fit of the person's body and motion to all frames of a walk; `None` keeps the average.
+    pub fit: Option<FitOptions>,
+    /// Number of frames that must be followed before an oblique path is looked for. 40: one and a half strides at
+    /// 25 frames per second.
+    pub path_frames: usize,
     /// Range of cadences to consider.
     pub cadence: CadenceRange,
     /// Options of the stages from pixels to regions and edges.
@@ -70,8 +70,8 @@ impl TrackerOptions {
             field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
             gait: GaitChoice::default(),
             start_frames: 13,
-            person: Some(PersonOptions::default()),
-            person_frames: 40,
+            fit: Some(FitOptions::default()),
+            path_frames: 40,
             cadence: CadenceRange::default(),
             evidence: EvidenceOptions::default(),
             walk: WalkOptions::default(),
@@ -85,18 +85,7 @@ impl TrackerOptions {
         OptionError::unless(is_seen, "field of view", "between 5 and 170 degrees", fov_deg)?;
         let is_enough = (5..=100).contains(&self.start_frames);
         OptionError::unless(is_enough, "start_frames", "between 5 and 100", self.start_frames as f64)?;
-        if let Some(person) = &self.person {
-            for (name, got) in [
-                ("angle_sd_rad", person.angle_sd_rad),
-                ("height_sd", person.height_sd),
-                ("distance_sd_m", person.distance_sd_m),
-                ("frames of the fit", person.frames as f64),
-            ] {
-                OptionError::unless_positive(name, got)?;
-            }
-            OptionError::unless_at_least_0("loss_per_sd", person.loss_per_sd)?;
-            OptionError::unless_at_least_0("min_gain", person.min_gain)?;
-        }
+        self.fit.map_or(Ok(()), |fit| fit.check())?;
         OptionError::unless_positive("low_hz", self.cadence.low_hz)?;
         let is_above = self.cadence.high_hz >= self.cadence.low_hz && self.cadence.high_hz <= 100.0;
         OptionError::unless(is_above, "high_hz", "at least low_hz and at most 100", self.cadence.high_hz)?;

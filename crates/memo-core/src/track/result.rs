@@ -1,16 +1,17 @@
 //! The result of tracking: one row of position, phase, joint angles and joints per frame, and gait events.
 //!
-//! Rows come from the smoothed states of the better twin: each row uses all frames of the walk, later ones
-//! included. The noise that the paper gives for the filter is generous, so standard deviations are scaled by the
+//! Rows come from the fit of the person ([`fit`](super::fit)) if one was made. Otherwise they come from the smoothed
+//! states of the better twin: each row uses all frames of the walk, later ones included. The noise that the paper gives for the filter is generous, so standard deviations are scaled by the
 //! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
 //! the difference between the person's body and the model, and the distance.
 
-use super::person::PersonFit;
-use super::search::{Hypothesis, Scene};
+use super::fit::contacts::Contact;
+use super::fit::{FitError, FittedFrame, Measured, WalkFit};
+use super::search::{Hypothesis, Path, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
-use crate::estimate::kalman::{ConstantVelocity, Noise, smooth};
-use crate::model::{Camera, Posture, SideJoints};
+use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
+use crate::model::{Camera, PosedBody, Posture, SideJoints};
 use glam::DVec3;
 
 pub use crate::model::skeleton::Side;
@@ -30,8 +31,8 @@ pub struct TrackedWalk {
     pub start: StartReport,
     /// The speed for which the average gait was made, m/s.
     pub gait_speed_mps: f64,
-    /// The fit of the person, if one was made.
-    pub person_fit: Option<PersonFit>,
+    /// The fit of the person, or why there is none; `None` if none was asked for.
+    pub fit: Option<Result<WalkFit, FitError>>,
     /// The options used.
     pub options: WalkOptions,
 }
@@ -55,15 +56,17 @@ pub struct Row {
     pub speed_mps: f64,
     /// Standard deviations of x, y, z (metres) and phase.
     pub sd: [f64; 4],
-    /// Joint angles, radians.
+    /// Joint angles, radians: those of the fitted person, or of the average gait.
     pub posture: Posture,
+    /// The angles that were measured, right then left; `None` without a fit.
+    pub measured: Option<[Measured; 2]>,
     /// Joints of the right side, metres.
     pub right: SideJoints,
     /// Joints of the left side, metres.
     pub left: SideJoints,
     /// Similarity of the best hypothesis of the frame; 0 for frames without a measurement.
     pub similarity: f64,
-    /// The hypothesis of the row; it is enough to draw the contours again.
+    /// Place along the path, level height and phase.
     pub hypothesis: Hypothesis,
 }
 
@@ -109,9 +112,31 @@ const COMMON_SD: [f64; 3] = [0.015, 0.02, 0.015];
 const TOE_OFF_PHASE: f64 = 0.61;
 
 impl TrackedWalk {
-    /// Probability that left and right are swapped in the whole walk.
+    /// The measured person, if the fit succeeded.
+    pub fn fitted(&self) -> Option<&WalkFit> {
+        self.fit.as_ref()?.as_ref().ok()
+    }
+
+    /// Probability that left and right are swapped in the whole walk: of the fit, or of the twins' similarities.
     pub fn p_swapped(&self) -> f64 {
-        self.walk.swap_probability(&self.options.swap)
+        self.fitted().map_or_else(|| self.walk.swap_probability(&self.options.swap), |fit| fit.p_swapped)
+    }
+
+    /// The path walked: that of the fit, or the tracker's.
+    pub fn path(&self) -> &Path {
+        self.fitted().map_or(&self.walk.path, |fit| &fit.path)
+    }
+
+    /// The body in a row of [`TrackedWalk::rows`], placed in the world.
+    ///
+    /// # Panics
+    ///
+    /// There is no such row in the fit.
+    pub fn pose_of(&self, index: usize, row: &Row) -> PosedBody {
+        match self.fitted() {
+            Some(fit) => fit.pose(index),
+            None => self.scene().pose(&row.hypothesis),
+        }
     }
 
     /// Forward or backward walking.
@@ -132,23 +157,50 @@ impl TrackedWalk {
     /// One row per frame.
     pub fn rows(&self) -> Vec<Row> {
         let steps = self.steps();
-        let dt_s: Vec<f64> = steps.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
-        let filter = &self.options.filter;
-        let along = Coordinate::new(steps, &dt_s, &filter.along, |s| s.state.along, |h, _| h.along_m);
-        let height = Coordinate::new(steps, &dt_s, &filter.vertical, |s| s.state.height, |h, _| h.height_m);
-        let phase = Coordinate::new(
-            steps,
-            &dt_s,
-            &filter.phase,
-            |s| s.state.phase,
-            |h, p| h.phase - (h.phase - p).round(),
-        );
+        match self.fitted() {
+            Some(fit) => (0..fit.frames.len()).map(|k| self.fitted_row(&steps[k], fit, k)).collect(),
+            None => self.tracked_rows(steps),
+        }
+    }
+
+    fn tracked_rows(&self, steps: &[Step]) -> Vec<Row> {
+        let coordinates = coordinates(steps, &self.options.filter);
         let p_swapped = self.p_swapped();
-        (0..steps.len())
-            .map(|k| {
-                self.row(&steps[k], p_swapped, [&along, &height, &phase].map(|c| (c.smoothed[k], c.sd_scale)))
-            })
-            .collect()
+        let at = |k: usize| coordinates.each_ref().map(|c| (c.smoothed[k], c.sd_scale));
+        steps.iter().enumerate().map(|(k, step)| self.row(step, p_swapped, at(k))).collect()
+    }
+
+    fn fitted_row(&self, step: &Step, fit: &WalkFit, k: usize) -> Row {
+        let frame = &fit.frames[k];
+        let posed = fit.pose(k);
+        let ahead = fit.path.direction();
+        let [along, across, height, phase] = frame.sd;
+        let phase_at = frame.phase.rem_euclid(1.0);
+        Row {
+            frame: step.frame,
+            time_s: step.time_s,
+            torso_centre: posed.torso_centre,
+            heading_rad: fit.path.heading_rad,
+            phase: phase_at,
+            p_swapped: fit.p_swapped,
+            speed_mps: speed(&fit.frames, self.steps(), k),
+            sd: [
+                (ahead.x * along).hypot(ahead.y * across),
+                (ahead.y * along).hypot(ahead.x * across),
+                height,
+                phase,
+            ],
+            posture: frame.posture,
+            measured: Some(frame.measured),
+            right: posed.right,
+            left: posed.left,
+            similarity: f64::from(step.similarity),
+            hypothesis: Hypothesis {
+                along_m: frame.along_m,
+                height_m: posed.torso_centre.z - self.walk.walker.gait.vertical_m(phase_at),
+                phase: phase_at,
+            },
+        }
     }
 
     fn row(&self, step: &Step, p_swapped: f64, [along, height, phase]: [(ConstantVelocity, f64); 3]) -> Row {
@@ -184,6 +236,7 @@ impl TrackedWalk {
                 sd(phase, COMMON_SD[2]),
             ],
             posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),
+            measured: None,
             right: posed.right,
             left: posed.left,
             similarity: f64::from(step.similarity),
@@ -191,13 +244,23 @@ impl TrackedWalk {
         }
     }
 
-    /// Heel strikes (initial contacts) and toe-offs, at the times when the phase passes them, in order of time.
-    /// Empty for backward walking, where toes land first and the phases of contact are not known.
+    /// Heel strikes (initial contacts) and toe-offs in order of time: those of the fitted feet, or the times when the
+    /// phase of the average gait passes them. Empty for backward walking, where toes land first and the phases of
+    /// contact are not known.
     pub fn events(&self) -> Vec<Event> {
         if self.direction() == Direction::Backward {
             return Vec::new();
         }
         let rows = self.rows();
+        if let Some(fit) = self.fitted() {
+            let event = |c: &Contact| Event {
+                time_s: c.time_s,
+                frame: frame_at(&rows, c.time_s),
+                kind: c.kind,
+                side: c.side,
+            };
+            return fit.contacts.iter().map(event).collect();
+        }
         let marks = [
             (0.0, EventKind::HeelStrike, Side::Right),
             (0.5, EventKind::HeelStrike, Side::Left),
@@ -218,6 +281,46 @@ impl TrackedWalk {
         events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         events
     }
+}
+
+/// The fractional frame number at a time within the rows.
+fn frame_at(rows: &[Row], time_s: f64) -> f64 {
+    let after = rows.partition_point(|row| row.time_s < time_s).clamp(1, rows.len() - 1);
+    let (a, b) = (&rows[after - 1], &rows[after]);
+    a.frame as f64 + (time_s - a.time_s) / (b.time_s - a.time_s) * (b.frame - a.frame) as f64
+}
+
+/// Speed along the path at a frame, m/s: the difference between its neighbours.
+fn speed(frames: &[FittedFrame], steps: &[Step], k: usize) -> f64 {
+    let (before, after) = (k.saturating_sub(1), (k + 1).min(frames.len() - 1));
+    (frames[after].along_m - frames[before].along_m) / (steps[after].time_s - steps[before].time_s)
+}
+
+/// The smoothed place, level height and phase (not wrapped) of each step.
+pub(super) fn smoothed_hypotheses(steps: &[Step], filter: &FilterOptions) -> Vec<Hypothesis> {
+    let [along, height, phase] = coordinates(steps, filter).map(|c| c.smoothed);
+    let at = |k: usize| Hypothesis {
+        along_m: along[k].position,
+        height_m: height[k].position,
+        phase: phase[k].position,
+    };
+    (0..steps.len()).map(at).collect()
+}
+
+/// Place, height and phase of the steps, smoothed.
+fn coordinates(steps: &[Step], filter: &FilterOptions) -> [Coordinate; 3] {
+    let dt_s: Vec<f64> = steps.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
+    [
+        Coordinate::new(steps, &dt_s, &filter.along, |s| s.state.along, |h, _| h.along_m),
+        Coordinate::new(steps, &dt_s, &filter.vertical, |s| s.state.height, |h, _| h.height_m),
+        Coordinate::new(
+            steps,
+            &dt_s,
+            &filter.phase,
+            |s| s.state.phase,
+            |h, p| h.phase - (h.phase - p).round(),
+        ),
+    ]
 }
 
 /// Fraction of the interval between two rows, in [0, 1), at which the phase passes a mark, in either direction.

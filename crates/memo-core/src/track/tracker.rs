@@ -3,14 +3,17 @@
 //! 1. It looks for a moving region that could be a person.
 //! 2. It starts on 13 frames of that region ([`TrackerOptions::start_frames`]).
 //! 3. It follows both half-cycle twins with filters.
-//! 4. It fits the person's deviation once [`TrackerOptions::person_frames`] frames are followed.
-//! 5. It ends the walk when the person leaves the image or stops walking, and looks for a person again.
+//! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed.
+//! 5. It ends the walk when the person leaves the image or stops walking, fits the person to all its frames
+//!    ([`fit`](super::fit)), and looks for a person again.
 //!
 //! It tracks one person at a time: the largest moving region that is fully visible.
 //!
 //! Memory does not grow with the length of the stream. The tracker keeps two frames, the edges of at most
-//! [`TrackerOptions::person_frames`] or `start_frames` frames, whichever is more, and the rows of the current
-//! walk. A walk longer than [`LONGEST_WALK`] frames is returned in pieces of that length.
+//! [`TrackerOptions::path_frames`] or `start_frames` frames, whichever is more, the rows of the current walk and, for
+//! the fit, 32 frames of the stream and the part of each frame of the walk that shows the person. A walk longer than
+//! [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`] without a fit, is returned in
+//! pieces of that length.
 //!
 //! Edges are matched within a few pixels, whatever the image size. Shrink images whose longer side exceeds about
 //! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as
@@ -18,15 +21,16 @@
 
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
+use super::fit::views::{Backdrop, Piece};
 use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
 use super::options::TrackerOptions;
 use super::result::TrackedWalk;
 use super::search::{Hypothesis, Scene};
-use super::start::start;
+use super::start::{StartReport, start};
 use super::walk::{FrameEdges, Walk};
 use crate::image::{Frame, Rectangle};
 use crate::model::body::BodyError;
-use crate::model::{Body, Camera};
+use crate::model::{Body, Camera, GaitStyle, Walker};
 use crate::option_error::OptionError;
 use glam::{DVec2, DVec3};
 use thiserror::Error;
@@ -74,6 +78,19 @@ const FASTEST_MPS: f64 = 3.0;
 /// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
 /// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
 const LEAST_CONTRAST: f64 = 1.22;
+/// Gaits other than the average with which a walk can start: crouched, thighs 22 and knees 40 degrees more flexed, as
+/// in the crouch gait of Rodda and others (J Bone Joint Surg Br 86:251, 2004).
+const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle {
+    hip_offset: 0.384,
+    knee_offset: 0.698,
+    shoulder_offset: 0.0,
+    elbow_offset: 0.0,
+    trunk_lean: 0.0,
+    leg_amplitude: 1.0,
+    arm_amplitude: 1.0,
+}];
+/// Another gait starts if it is more similar than the average one by this factor.
+const OTHER_GAIN: f64 = 1.05;
 /// A walk ends when this share of the body's height or width is outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
 /// Edges are searched this far around the predicted body, pixels.
@@ -117,6 +134,9 @@ pub struct Tracker {
     options: TrackerOptions,
     stream: EvidenceStream,
     seen: Vec<(Sighting, FrameEdges)>,
+    /// The pictures of `seen`, kept only for a fit.
+    seen_pieces: Vec<Piece>,
+    backdrop: Backdrop,
     missed: usize,
     walking: Option<Active>,
     finished: Vec<TrackedWalk>,
@@ -132,16 +152,19 @@ impl Tracker {
         Body::from_height(options.height_m)?;
         options.check()?;
         let stream = EvidenceStream::new(options.evidence);
+        let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
         Ok(Self {
             options,
             stream,
             seen: Vec::new(),
+            seen_pieces: Vec::new(),
+            backdrop: Backdrop::default(),
             missed: 0,
             walking: None,
             finished: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
-            longest_walk: LONGEST_WALK,
+            longest_walk,
         })
     }
 
@@ -213,6 +236,9 @@ impl Tracker {
     }
 
     fn advance(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
+        if self.options.fit.is_some() {
+            self.backdrop.push(evidence.frame, &evidence.grey);
+        }
         if self.walking.is_some() { self.follow(evidence) } else { self.seek(evidence) }
     }
 
@@ -226,7 +252,10 @@ impl Tracker {
                     .last()
                     .is_some_and(|(last, _)| !same_person(&last.rectangle, &sighting.rectangle))
                 {
-                    self.seen.clear();
+                    self.forget();
+                }
+                if self.options.fit.is_some() {
+                    self.seen_pieces.push(Piece::new(evidence.frame, &evidence.grey, sighting.rectangle));
                 }
                 self.seen.push((sighting, edges));
                 self.missed = 0;
@@ -234,7 +263,7 @@ impl Tracker {
             None => {
                 self.missed += 1;
                 if self.missed > MISSED_FRAMES {
-                    self.seen.clear();
+                    self.forget();
                 }
             }
         }
@@ -242,6 +271,12 @@ impl Tracker {
             self.try_start(evidence);
         }
         Ok(())
+    }
+
+    /// Drops the candidate.
+    fn forget(&mut self) {
+        self.seen.clear();
+        self.seen_pieces.clear();
     }
 
     /// The candidate if it is fully visible: the largest region, or the one that overlaps `expected`.
@@ -267,38 +302,42 @@ impl Tracker {
     fn try_start(&mut self, evidence: &Evidence) {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         match self.begin(size) {
-            Some(active) => {
-                self.seen.clear();
+            Some(mut active) => {
+                active.pieces = std::mem::take(&mut self.seen_pieces);
+                self.forget();
                 self.walking = Some(active);
             }
             None => {
                 self.report.refused_starts += 1;
-                self.seen.drain(..self.options.start_frames / 3);
+                let dropped = self.options.start_frames / 3;
+                self.seen.drain(..dropped);
+                self.seen_pieces.drain(..dropped.min(self.seen_pieces.len()));
             }
         }
     }
 
     /// 1. Camera and course from the rectangles.
-    /// 2. Lines of phase over the whole cycle.
+    /// 2. Lines of phase over the whole cycle, of several gaits; the most similar gait starts.
     /// 3. Both twins followed through the start frames.
     fn begin(&self, size: [u32; 2]) -> Option<Active> {
         let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
         if feet_cut_off(&sightings, size[1] as usize) {
             return None;
         }
-        let crown_m = self.options.walker(COMFORTABLE_MPS).ok()?.level_crown_height_m();
-        let (camera, course) = self.course(&sightings, size, crown_m).ok()?;
-        if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
-            return None;
-        }
-        let walker = self.options.walker(course.speed_mps).ok()?;
-        let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
-        let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
+        let average = self.started(&sightings, size, &GaitStyle::default())?;
+        let similarity = |started: &Started| started.start.lines.best.similarity;
+        let others = if self.options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
+        let Started { camera, course, walker, start } = others
+            .iter()
+            .filter_map(|style| self.started(&sightings, size, style))
+            .filter(|other| similarity(other) > OTHER_GAIN * similarity(&average))
+            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
+            .unwrap_or(average);
         // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
         if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
             return None;
         }
-        let mut walk = Walk::new(walker, start.path, start.beginning);
+        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         let kept: Vec<_> = self.seen.iter().map(|(s, e)| (Some(*s), e.clone())).collect();
         for (_, edges) in &kept {
             walk.follow(edges, &camera, &self.options.walk);
@@ -308,11 +347,26 @@ impl Tracker {
             depth_sd_m: course.depth_sd_m,
             start,
             walk,
+            average: Walker { style: GaitStyle::default(), ..walker },
             kept,
             gait_speed_mps: course.speed_mps,
-            person_fit: None,
-            fitted: false,
+            turned: false,
+            pieces: Vec::new(),
         })
+    }
+
+    /// The course and the lines of phase of one gait; `None` for things that do not move like a walker.
+    fn started(&self, sightings: &[Sighting], size: [u32; 2], style: &GaitStyle) -> Option<Started> {
+        let styled = |speed_mps: f64| Some(Walker { style: *style, ..self.options.walker(speed_mps).ok()? });
+        let (camera, course) =
+            self.course(sightings, size, styled(COMFORTABLE_MPS)?.level_crown_height_m()).ok()?;
+        if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
+            return None;
+        }
+        let walker = styled(course.speed_mps)?;
+        let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
+        let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
+        Some(Started { camera, course, walker, start })
     }
 
     fn course(
@@ -339,14 +393,17 @@ impl Tracker {
         let edges = self.edges(evidence, &window)?;
         let Some(active) = &mut self.walking else { return Ok(()) };
         active.walk.follow(&edges, &active.camera, &self.options.walk);
-        if !active.fitted {
+        if self.options.fit.is_some() {
+            active.pieces.push(Piece::new(evidence.frame, &evidence.grey, window));
+        }
+        if !active.turned {
             active.kept.push((sighting, edges));
-            if active.kept.len() >= self.options.person_frames {
-                active.refit(&self.options);
+            if active.kept.len() >= self.options.path_frames {
+                active.turn(&self.backdrop, &self.options);
             }
         }
-        // On a wrong path a walk can seem to be over, so the person is fitted first.
-        if active.fitted && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
+        // On a wrong path a walk can seem to be over, so the path is looked for first.
+        if active.turned && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
             self.end_walk();
         }
         Ok(())
@@ -379,12 +436,14 @@ impl Tracker {
 
     fn end_walk(&mut self) {
         if let Some(mut active) = self.walking.take() {
-            active.refit(&self.options);
+            active.turn(&self.backdrop, &self.options);
             active.trim();
             if !active.is_walk() {
                 self.report.refused_starts += 1;
                 return;
             }
+            let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
+            let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
             self.finished.push(TrackedWalk {
                 walk: active.walk,
                 camera: active.camera,
@@ -392,11 +451,19 @@ impl Tracker {
                 start: active.start,
                 camera_is_guessed: self.options.camera.is_none(),
                 gait_speed_mps: active.gait_speed_mps,
-                person_fit: active.person_fit,
+                fit,
                 options: self.options.walk,
             });
         }
     }
+}
+
+/// A start with one gait.
+struct Started {
+    camera: Camera,
+    course: Course,
+    walker: Walker,
+    start: StartReport,
 }
 
 /// Bounding box of the body in the image, pixels.

@@ -372,6 +372,8 @@ impl ClothedScene {
                 knee: thigh - elevation(j.knee, j.ankle),
                 shoulder: upper_arm - trunk,
                 elbow: elevation(j.elbow, j.wrist) - upper_arm,
+                ankle: 0.0,
+                abduction: 0.0,
             }
         })
     }

@@ -56,7 +56,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
         depth_sd_m: 0.0,
         start: report(path, beginning, Direction::Forward),
         gait_speed_mps: 1.2,
-        person_fit: None,
+        fit: None,
         options,
     }
 }

@@ -12,12 +12,12 @@ use crate::estimate::kalman::ConstantVelocity;
 use crate::image::flow::FlowOptions;
 use crate::image::{BackgroundOptions, CleanOptions, Image};
 use crate::model::body::PART_COUNT;
-use crate::track::person::PersonOptions;
+use crate::track::fit::FitOptions;
 
 const SIZE: [usize; 2] = [640, 480];
 
 fn options() -> TrackerOptions {
-    TrackerOptions { camera: Some(camera()), person: None, ..TrackerOptions::for_height(1.75) }
+    TrackerOptions { camera: Some(camera()), fit: None, ..TrackerOptions::for_height(1.75) }
 }
 
 fn tracker() -> Tracker {
@@ -154,9 +154,9 @@ fn every_wrong_option() -> Vec<Wrong> {
         (|o| o.walk.swap.glimpse_s = 0.0, "glimpse_s"),
         (|o| o.cadence.low_hz = 0.0, "low_hz"),
         (|o| o.cadence.high_hz = 0.1, "high_hz"),
-        (|o| o.person = Some(PersonOptions { frames: 0, ..Default::default() }), "frames of the fit"),
-        (|o| o.person = Some(PersonOptions { angle_sd_rad: 0.0, ..Default::default() }), "angle_sd_rad"),
-        (|o| o.person = Some(PersonOptions { min_gain: f64::NAN, ..Default::default() }), "min_gain"),
+        (|o| o.fit = Some(FitOptions { longest: 3, ..Default::default() }), "frames of the longest fit"),
+        (|o| o.fit = Some(FitOptions { frame_sd_rad: 0.0, ..Default::default() }), "frame_sd_rad"),
+        (|o| o.fit = Some(FitOptions { height_sd: f64::NAN, ..Default::default() }), "height_sd"),
         (|o| o.evidence.change.threshold = Some(f64::NAN), "threshold"),
         (|o| o.evidence.change.false_rate = 1.0, "false_rate"),
         (|o| o.evidence.change.min_threshold = -1.0, "min_threshold"),
@@ -276,8 +276,9 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         walk,
         kept: Vec::new(),
         gait_speed_mps: 1.25,
-        person_fit: None,
-        fitted: true,
+        average: walker(),
+        turned: true,
+        pieces: Vec::new(),
     });
     tracker
 }
@@ -312,13 +313,13 @@ fn following_to_a_stop() -> Tracker {
 }
 
 #[test]
-fn who_stands_still_is_let_go_once_the_person_is_fitted() {
-    for fitted in [true, false] {
+fn who_stands_still_is_let_go_once_the_path_is_known() {
+    for turned in [true, false] {
         let mut tracker = following_to_a_stop();
-        tracker.walking.as_mut().unwrap().fitted = fitted;
+        tracker.walking.as_mut().unwrap().turned = turned;
         tracker.advance(&evidence(60, &[])).unwrap();
-        assert_eq!(tracker.walking.is_none(), fitted);
-        assert_eq!(tracker.take_finished().len(), usize::from(fitted));
+        assert_eq!(tracker.walking.is_none(), turned);
+        assert_eq!(tracker.take_finished().len(), usize::from(turned));
         assert_eq!(tracker.seek_report().refused_starts, 0);
     }
     let mut walks_on = following(40, 0.0, 1.2);
@@ -337,14 +338,14 @@ fn who_never_got_on_is_refused_at_the_end() {
 }
 
 #[test]
-fn frames_are_kept_until_there_are_enough_for_the_fit() {
+fn frames_are_kept_until_there_are_enough_for_the_path() {
     let mut tracker = following(20, -0.5, 1.2);
-    tracker.options.person_frames = 3;
-    tracker.walking.as_mut().unwrap().fitted = false;
-    for (k, (kept, fitted)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
+    tracker.options.path_frames = 3;
+    tracker.walking.as_mut().unwrap().turned = false;
+    for (k, (kept, turned)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
         tracker.advance(&evidence(20 + k, &[])).unwrap();
         let active = tracker.walking.as_ref().unwrap();
-        assert_eq!((active.kept.len(), active.fitted), (kept, fitted), "frame {k}");
+        assert_eq!((active.kept.len(), active.turned), (kept, turned), "frame {k}");
     }
 }
 
@@ -435,7 +436,7 @@ fn what_is_handed_out_is_trimmed_and_knows_its_camera() {
     tracker.finish().unwrap();
     let walk = tracker.take_finished().remove(0);
     assert_eq!((walk.steps().len(), walk.steps()[0].frame), (28, 2));
-    assert!(!walk.camera_is_guessed && walk.camera == camera() && walk.person_fit.is_none());
+    assert!(!walk.camera_is_guessed && walk.camera == camera() && walk.fit.is_none());
     assert_eq!((walk.depth_sd_m, walk.gait_speed_mps, walk.options), (0.1, 1.25, options().walk));
     let mut guessed = following(30, 0.0, 1.2);
     guessed.options.camera = None;
@@ -496,7 +497,7 @@ fn a_walker_is_started_with_both_twins_through_the_start_frames() {
     let active = begun(seen.clone()).expect("a walker");
     assert!((active.start.beginning.speed_mps - 1.3).abs() < 0.1 && active.start.contrast() > 1.22);
     assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
-    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.fitted);
+    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.turned);
     let sightings: Vec<Sighting> = seen.iter().map(|(s, _)| *s).collect();
     let course = locate(&sightings, &camera(), walker().level_crown_height_m()).unwrap();
     assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));

@@ -1,0 +1,302 @@
+//! Least squares over a sequence whose frames share some unknowns: normal equations in block-arrow form.
+//!
+//! The unknowns are those of each frame, which touch at most the two frames before and after, and those of the whole
+//! sequence, which touch every frame: H = [[F, C], [Cᵀ, W]] with F banded. With F = L Lᵀ and Y = L⁻¹ C, the part of
+//! the whole solves (W - Yᵀ Y) x_w = b_w - Yᵀ L⁻¹ b_f, and L Lᵀ x_f = b_f - C x_w. Time and memory are linear in the
+//! number of frames.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Normal equations H x = b, to which terms are added.
+#[derive(Debug, Clone)]
+pub struct Arrow {
+    /// Unknowns per frame.
+    block: usize,
+    frames: Banded,
+    /// Cᵀ: one column per unknown of a frame.
+    coupling: DMatrix<f64>,
+    whole: DMatrix<f64>,
+    right_frames: Vec<f64>,
+    right_whole: DVector<f64>,
+}
+
+/// A symmetric matrix, or its factor L, as the lower band by rows: row i holds columns i - width to i.
+#[derive(Debug, Clone)]
+struct Banded {
+    width: usize,
+    values: Vec<f64>,
+}
+
+impl Banded {
+    fn zeros(size: usize, width: usize) -> Self {
+        Self { width, values: vec![0.0; size * (width + 1)] }
+    }
+
+    /// The first column of a row that is in the band.
+    fn first(&self, row: usize) -> usize {
+        row.saturating_sub(self.width)
+    }
+
+    fn index(&self, row: usize, column: usize) -> usize {
+        row * (self.width + 1) + self.width + column - row
+    }
+
+    /// The entries of a row from its first column in the band to the diagonal.
+    fn row(&self, row: usize) -> &[f64] {
+        &self.values[self.index(row, self.first(row))..=self.index(row, row)]
+    }
+
+    /// Replaces the matrix by its Cholesky factor; `None` if it is not positive definite.
+    fn factored(mut self, size: usize) -> Option<Self> {
+        for i in 0..size {
+            let first = self.first(i);
+            for j in first..=i {
+                let from = first.max(self.first(j));
+                let (a, b) = (self.index(i, from), self.index(j, from));
+                let count = j - from;
+                let dot: f64 = self.values[a..a + count]
+                    .iter()
+                    .zip(&self.values[b..b + count])
+                    .map(|(x, y)| x * y)
+                    .sum();
+                let at = self.index(i, j);
+                let left = self.values[at] - dot;
+                self.values[at] = if j < i {
+                    left / self.values[self.index(j, j)]
+                } else if left > 0.0 {
+                    left.sqrt()
+                } else {
+                    return None;
+                };
+            }
+        }
+        Some(self)
+    }
+}
+
+impl Arrow {
+    /// Equations without terms: `frames` frames of `block` unknowns, and `whole` unknowns of the whole sequence.
+    pub fn new(frames: usize, block: usize, whole: usize) -> Self {
+        let count = frames * block;
+        Self {
+            block,
+            frames: Banded::zeros(count, (3 * block).saturating_sub(1)),
+            coupling: DMatrix::zeros(whole, count),
+            whole: DMatrix::zeros(whole, whole),
+            right_frames: vec![0.0; count],
+            right_whole: DVector::zeros(whole),
+        }
+    }
+
+    /// Index of an unknown of a frame, for [`Arrow::add_row`] and [`Solution::variance`].
+    pub fn index(&self, frame: usize, unknown: usize) -> usize {
+        frame * self.block + unknown
+    }
+
+    /// Adds normal equations over the unknowns of the whole, followed by those of one frame.
+    pub fn add_frame(&mut self, frame: usize, normal: &DMatrix<f64>, right: &DVector<f64>) {
+        let (whole, block) = (self.right_whole.len(), self.block);
+        self.whole += normal.view((0, 0), (whole, whole));
+        self.right_whole += right.rows(0, whole);
+        for i in 0..block {
+            let at = frame * block + i;
+            let mut column = self.coupling.column_mut(at);
+            column += normal.view((0, whole + i), (whole, 1));
+            for j in 0..=i {
+                let index = self.frames.index(at, frame * block + j);
+                self.frames.values[index] += normal[(whole + i, whole + j)];
+            }
+            self.right_frames[at] += right[whole + i];
+        }
+    }
+
+    /// Adds `weight` (Σ coefficient x - `right`)² over unknowns of at most three neighbouring frames.
+    pub fn add_row(&mut self, terms: &[(usize, f64)], right: f64, weight: f64) {
+        for (n, &(i, a)) in terms.iter().enumerate() {
+            for &(j, b) in &terms[..=n] {
+                let index = self.frames.index(i.max(j), i.min(j));
+                self.frames.values[index] += weight * a * b;
+            }
+            self.right_frames[i] += weight * a * right;
+        }
+    }
+
+    /// Adds `weight` (Σ coefficient x - `right`)² over unknowns of the whole.
+    pub fn add_whole_row(&mut self, terms: &[(usize, f64)], right: f64, weight: f64) {
+        for &(i, a) in terms {
+            for &(j, b) in terms {
+                self.whole[(i, j)] += weight * a * b;
+            }
+            self.right_whole[i] += weight * a * right;
+        }
+    }
+
+    /// The solution; `None` if the terms do not determine it.
+    pub fn solve(self) -> Option<Solution> {
+        let Self { frames, mut coupling, mut whole, mut right_frames, right_whole, .. } = self;
+        let (count, shared) = (right_frames.len(), right_whole.len());
+        let factor = frames.factored(count)?;
+        // Y and L⁻¹ b_f, forwards.
+        for i in 0..count {
+            let first = factor.first(i);
+            let row = factor.row(i);
+            let (done, rest) = coupling.as_mut_slice().split_at_mut(i * shared);
+            let column = &mut rest[..shared];
+            for (k, &l) in (first..i).zip(row) {
+                if l != 0.0 {
+                    let before = &done[k * shared..(k + 1) * shared];
+                    column.iter_mut().zip(before).for_each(|(x, y)| *x -= l * y);
+                    right_frames[i] -= l * right_frames[k];
+                }
+            }
+            let scale = 1.0 / row[row.len() - 1];
+            column.iter_mut().for_each(|x| *x *= scale);
+            right_frames[i] *= scale;
+        }
+        let half = DVector::from_vec(right_frames);
+        whole.gemm(-1.0, &coupling, &coupling.transpose(), 1.0);
+        let schur = Cholesky::new(whole)?;
+        let x_whole = schur.solve(&(right_whole - &coupling * &half));
+        // L Lᵀ x_f = b_f - C x_w, backwards.
+        let mut x = half - coupling.tr_mul(&x_whole);
+        for i in (0..count).rev() {
+            let (first, row) = (factor.first(i), factor.row(i));
+            x[i] /= row[row.len() - 1];
+            let value = x[i];
+            for (k, &l) in (first..i).zip(row) {
+                x[k] -= l * value;
+            }
+        }
+        Some(Solution { whole: x_whole, frames: x, factor, coupling, schur })
+    }
+}
+
+/// A solution with the factors that its covariance needs.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Unknowns of the whole.
+    pub whole: DVector<f64>,
+    /// Unknowns of the frames.
+    pub frames: DVector<f64>,
+    factor: Banded,
+    coupling: DMatrix<f64>,
+    schur: Cholesky<f64, Dyn>,
+}
+
+impl Solution {
+    /// Variance of a linear form of the unknowns; `frames` has indices by [`Arrow::index`].
+    ///
+    /// With e the form's part over the frames, a that over the whole, v = L⁻¹ e: |v|² + (a - Yᵀ v)ᵀ S⁻¹ (a - Yᵀ v).
+    pub fn variance(&self, whole: &[(usize, f64)], frames: &[(usize, f64)]) -> f64 {
+        let count = self.frames.len();
+        let mut left = DVector::zeros(self.whole.len());
+        for &(i, a) in whole {
+            left[i] += a;
+        }
+        let mut v = vec![0.0; count];
+        for &(i, a) in frames {
+            v[i] += a;
+        }
+        let first = frames.iter().map(|f| f.0).min().unwrap_or(count);
+        let mut sum_sq = 0.0;
+        for i in first..count {
+            let row = self.factor.row(i);
+            let before = &v[self.factor.first(i)..i];
+            let dot: f64 = row.iter().zip(before).map(|(l, x)| l * x).sum();
+            v[i] = (v[i] - dot) / row[row.len() - 1];
+            sum_sq += v[i] * v[i];
+            if v[i] != 0.0 {
+                left.axpy(-v[i], &self.coupling.column(i), 1.0);
+            }
+        }
+        sum_sq + left.dot(&self.schur.solve(&left))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+    /// A uniform number in [-1, 1).
+    fn draw(random: &mut Xoshiro256PlusPlus) -> f64 {
+        (random.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Random terms of every kind, as arrow equations and as one dense system.
+    fn both(frames: usize, block: usize, whole: usize) -> (Arrow, DMatrix<f64>, DVector<f64>) {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64((frames * 100 + block * 10 + whole) as u64);
+        let size = whole + frames * block;
+        let (mut arrow, mut h, mut b) =
+            (Arrow::new(frames, block, whole), DMatrix::zeros(size, size), DVector::zeros(size));
+        let mut add = |row: DVector<f64>, right: f64, weight: f64| {
+            h += weight * &row * row.transpose();
+            b += weight * right * row;
+        };
+        for frame in 0..frames {
+            // More observations than unknowns of a frame.
+            let (mut normal, mut right) =
+                (DMatrix::zeros(whole + block, whole + block), DVector::zeros(whole + block));
+            for _ in 0..block + 2 {
+                let row = DVector::from_fn(whole + block, |_, _| draw(&mut random));
+                let value = draw(&mut random);
+                normal += &row * row.transpose();
+                right += value * &row;
+                let mut dense = DVector::zeros(size);
+                dense.rows_mut(0, whole).copy_from(&row.rows(0, whole));
+                dense.rows_mut(whole + frame * block, block).copy_from(&row.rows(whole, block));
+                add(dense, value, 1.0);
+            }
+            arrow.add_frame(frame, &normal, &right);
+            if frame >= 2 {
+                let unknown = frame % block;
+                let terms: Vec<_> =
+                    (0..3).map(|k| (arrow.index(frame - 2 + k, unknown), draw(&mut random))).collect();
+                arrow.add_row(&terms, 0.3, 2.5);
+                let mut dense = DVector::zeros(size);
+                terms.iter().for_each(|&(i, a)| dense[whole + i] += a);
+                add(dense, 0.3, 2.5);
+            }
+        }
+        let terms: Vec<_> = (0..whole).map(|i| (i, draw(&mut random))).collect();
+        arrow.add_whole_row(&terms, -0.7, 1.5);
+        let mut dense = DVector::zeros(size);
+        terms.iter().for_each(|&(i, a)| dense[i] += a);
+        add(dense, -0.7, 1.5);
+        (arrow, h, b)
+    }
+
+    #[test]
+    fn solutions_and_variances_are_those_of_the_dense_system() {
+        for (frames, block, whole) in [(1, 3, 2), (2, 2, 4), (7, 3, 5), (12, 4, 1)] {
+            let (arrow, h, b) = both(frames, block, whole);
+            let last = arrow.index(frames - 1, block - 1);
+            let solution = arrow.solve().expect("enough terms");
+            let inverse = h.clone().try_inverse().unwrap();
+            let expected = &inverse * &b;
+            assert!((&solution.whole - expected.rows(0, whole)).norm() < 1e-8);
+            assert!((&solution.frames - expected.rows(whole, frames * block)).norm() < 1e-8);
+            for (of_whole, of_frames) in [
+                (vec![(0, 1.0)], vec![]),
+                (vec![], vec![(0, 1.0)]),
+                (vec![(whole - 1, 0.4)], vec![(0, -1.2), (last, 0.7)]),
+            ] {
+                let mut form = DVector::zeros(whole + frames * block);
+                of_whole.iter().for_each(|&(i, a): &(usize, f64)| form[i] += a);
+                of_frames.iter().for_each(|&(i, a): &(usize, f64)| form[whole + i] += a);
+                let dense = form.dot(&(&inverse * &form));
+                let found = solution.variance(&of_whole, &of_frames);
+                assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_terms_do_not_determine_has_no_solution() {
+        let mut arrow = Arrow::new(3, 1, 1);
+        arrow.add_row(&[(0, 1.0), (1, -1.0)], 0.0, 1.0);
+        arrow.add_whole_row(&[(0, 1.0)], 1.0, 1.0);
+        assert!(arrow.solve().is_none());
+    }
+}

@@ -1,0 +1,145 @@
+//! Initial contacts and toe-offs from the motion of the fitted feet.
+//!
+//! In stance a foot stands still, in swing it is faster than the body. Contact is the time at which the heel's speed
+//! along the path falls below a share of the walking speed, toe-off the time at which the ball's speed rises above
+//! one. Both are searched near the phases at which they happen in everybody, and interpolated between frames.
+
+use crate::model::skeleton::Side;
+use crate::track::result::EventKind;
+use glam::{DVec2, DVec3};
+
+/// An initial contact or toe-off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Time, seconds.
+    pub time_s: f64,
+    /// Initial contact or toe-off.
+    pub kind: EventKind,
+    /// Which foot.
+    pub side: Side,
+}
+
+/// The shares of the walking speed that separate stance from swing, of the heel at contact and of the ball at toe-off.
+/// Between 0.25 and 0.4 of the heel the times move by 25 ms; 0.33 is late on an annotated video and on drawn people in
+/// clothes by a few milliseconds, and early by 20 ms against contacts by the ankle's speed.
+const HEEL_SHARE: f64 = 0.33;
+const BALL_SHARE: f64 = 0.4;
+/// Contacts lie this near to phase 0 of the side, toe-offs to the end of stance, cycles.
+const NEAR: f64 = 0.2;
+const TOE_OFF_PHASE: f64 = 0.61;
+
+/// The contacts of a walk. `feet` has ankle, heel and ball of the right and the left foot in each frame, metres.
+pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 3]; 2]], ahead: DVec2) -> Vec<Contact> {
+    let count = times_s.len();
+    if count < 3 {
+        return Vec::new();
+    }
+    let place = |k: usize, side: usize, point: usize| feet[k][side][point].truncate().dot(ahead);
+    let elapsed_s = times_s[count - 1] - times_s[0];
+    let middle = |k: usize| 0.5 * (place(k, 0, 0) + place(k, 1, 0));
+    let walking_mps = (middle(count - 1) - middle(0)) / elapsed_s;
+    let mut contacts = Vec::new();
+    for (side, name) in [Side::Right, Side::Left].into_iter().enumerate() {
+        let later = 0.5 * side as f64;
+        for (kind, point, at, share, rises) in [
+            (EventKind::HeelStrike, 1, 0.0, HEEL_SHARE, false),
+            (EventKind::ToeOff, 2, TOE_OFF_PHASE, BALL_SHARE, true),
+        ] {
+            // Speed over the walking speed, between frames.
+            let speed = |k: usize| {
+                let by_m = place(k + 1, side, point) - place(k, side, point);
+                by_m / (times_s[k + 1] - times_s[k]) / walking_mps
+            };
+            let half =
+                |k: usize| [0.5 * (times_s[k] + times_s[k + 1]), 0.5 * (phases[k] + phases[k + 1]) + later];
+            let mut found: Vec<(i64, f64, f64)> = Vec::new();
+            for k in 1..count - 1 {
+                let (before, after) = (speed(k - 1), speed(k));
+                let crosses =
+                    if rises { before < share && after >= share } else { before >= share && after < share };
+                if !crosses {
+                    continue;
+                }
+                let t = (share - before) / (after - before);
+                let ([t0, p0], [t1, p1]) = (half(k - 1), half(k));
+                let off = p0 + t * (p1 - p0) - at;
+                let cycle = off.round();
+                if (off - cycle).abs() <= NEAR {
+                    found.push((cycle as i64, (off - cycle).abs(), t0 + t * (t1 - t0)));
+                }
+            }
+            // Of several crossings in one cycle, the one nearest to the usual phase.
+            found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            found.dedup_by_key(|f| f.0);
+            contacts.extend(found.into_iter().map(|(_, _, time_s)| Contact { time_s, kind, side: name }));
+        }
+    }
+    contacts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    contacts
+}
+
+/// The mean phase of the initial contacts of both sides, each against its own heel strike, cycles; 0 without one.
+pub fn mean_phase(contacts: &[Contact], times_s: &[f64], phases: &[f64]) -> f64 {
+    let strikes = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike);
+    let off = |c: &Contact| {
+        let after = times_s.partition_point(|&t| t < c.time_s).clamp(1, times_s.len() - 1);
+        let t = (c.time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1]);
+        let phase = phases[after - 1] + t * (phases[after] - phases[after - 1]);
+        let later = if c.side == Side::Left { 0.5 } else { 0.0 };
+        phase + later - (phase + later).round()
+    };
+    let side_mean = |side: Side| {
+        let offs: Vec<f64> = strikes.clone().filter(|c| c.side == side).map(off).collect();
+        (!offs.is_empty()).then(|| offs.iter().sum::<f64>() / offs.len() as f64)
+    };
+    let means: Vec<f64> = [Side::Right, Side::Left].into_iter().filter_map(side_mean).collect();
+    means.iter().sum::<f64>() / means.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Feet that stand for 0.6 of each cycle of a second and move by the stride of 1.2 m in the rest, at a steady
+    /// speed; the ball leaves later than the ankle by 0.02 s.
+    fn feet(time_s: f64) -> [[DVec3; 3]; 2] {
+        let place = |t: f64| {
+            let (cycle, at) = (t.floor(), t - t.floor());
+            1.2 * (cycle + ((at - 0.6) / 0.4).clamp(0.0, 1.0))
+        };
+        [0.0, 0.5].map(|later| {
+            let [ankle, ball] = [0.0, 0.02].map(|late| {
+                let t = time_s + later;
+                let end = if (t - t.floor()) > 0.8 { 0.0 } else { late };
+                place(t - end) - 1.2 * later
+            });
+            [DVec3::X * ankle, DVec3::X * ankle, DVec3::X * ball]
+        })
+    }
+
+    #[test]
+    fn contacts_are_where_the_feet_begin_and_end_to_stand() {
+        let times_s: Vec<f64> = (0..150).map(|k| 0.02 * f64::from(k) + 0.003).collect();
+        let phases: Vec<f64> = times_s.iter().map(|t| t + 0.03).collect();
+        let all: Vec<_> = times_s.iter().map(|&t| feet(t)).collect();
+        let found = contacts(&times_s, &phases, &all, DVec2::X);
+        for (kind, side, expected) in [
+            (EventKind::HeelStrike, Side::Right, vec![1.0, 2.0]),
+            (EventKind::HeelStrike, Side::Left, vec![0.5, 1.5, 2.5]),
+            (EventKind::ToeOff, Side::Right, vec![0.62, 1.62, 2.62]),
+            (EventKind::ToeOff, Side::Left, vec![0.12, 1.12, 2.12]),
+        ] {
+            let times: Vec<f64> =
+                found.iter().filter(|c| (c.kind, c.side) == (kind, side)).map(|c| c.time_s).collect();
+            assert_eq!(times.len(), expected.len(), "{kind:?} {side:?}: {times:?}");
+            times
+                .iter()
+                .zip(expected)
+                .for_each(|(t, e)| assert!((t - e).abs() < 0.02, "{kind:?} {side:?}: {t} {e}"));
+        }
+        // The phases are ahead by 0.03; ankles stop at 0 and 0.5.
+        assert!((mean_phase(&found, &times_s, &phases) - 0.03).abs() < 0.01);
+        assert_eq!(mean_phase(&[], &times_s, &phases), 0.0);
+        assert!(contacts(&times_s[..2], &phases[..2], &all[..2], DVec2::X).is_empty());
+    }
+}

@@ -1,0 +1,355 @@
+//! Sample points on the visible contours of the figure, and how they move with its coordinates.
+//!
+//! A contour point moves along its normal in the image as the point of the surface does on which it lies: the contour
+//! slips over the surface only in the direction of sight, which the image does not show. So with X that point of the
+//! surface, J the derivative of the projection and n the normal, the derivative by a coordinate q is n · J ∂X/∂q,
+//! exactly. ∂X/∂q is a translation, a rotation a × (X - c) about a joint, or a stretch along a limb.
+//!
+//! Limbs taper: a contour point at the height z of a cylinder, -1 to 1, is moved outwards by the share z · taper of
+//! its radius. Hidden-line removal uses the cylinders without taper.
+
+use super::unknowns::{
+    ACROSS, ALONG, ANGLES, ANKLE, BODY, CROWN, FOOT, FOREARM, HEAD_FORWARD, HEADING, HEEL, HEIGHT, HIP_WIDTH,
+    JOINTS, LEAN, PELVIS, SHANK, SHOULDER_WIDTH, TAPERS, THIGH, TILT, TORSO, UPPER_ARM, WIDTHS,
+};
+use crate::model::body::Part;
+use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
+use crate::model::{Body, Camera, ContourKind, Distortion, EllipticCylinder, PosedBody, side_lines};
+use glam::{DMat2, DMat3, DVec2, DVec3};
+
+/// The figure of one frame in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    pub body: Body,
+    pub posed: PosedBody,
+    /// Middle of the hips.
+    pub pelvis: DVec3,
+    /// Unit vector in which the body faces.
+    pub ahead: DVec2,
+    /// The point of the ground about which the heading turns the path.
+    pub origin: DVec2,
+}
+
+/// A point on a visible contour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    pub part: Part,
+    /// In the image, pixels.
+    pub point_px: DVec2,
+    /// Unit normal in the image, outwards.
+    pub normal: DVec2,
+    /// Whether the background lies beyond it, and not another part.
+    pub is_outer: bool,
+    /// The point of the surface, metres.
+    pub world: DVec3,
+    /// From the axis of the part to the surface, without taper; 0 at an end of the part.
+    pub radius: DVec3,
+    /// Height in the cylinder, from -1 to 1.
+    pub z: f64,
+}
+
+/// What [`samples`] needs again and again.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    view: PreparedView,
+    visible: Vec<VisibleSegment>,
+    pub samples: Vec<Sample>,
+    pub motion: Vec<(usize, DVec3)>,
+    pub looks: Vec<[f64; 2]>,
+}
+
+/// The kind of a part: the row of its thickness in the body's table.
+pub fn row_of(part: Part) -> usize {
+    match part {
+        Part::Head => 0,
+        Part::Torso => 1,
+        Part::RightUpperArm | Part::LeftUpperArm => 2,
+        Part::RightForearm | Part::LeftForearm => 3,
+        Part::RightHand | Part::LeftHand => 4,
+        Part::RightThigh | Part::LeftThigh => 5,
+        Part::RightShank | Part::LeftShank => 6,
+        Part::RightFoot | Part::LeftFoot => 7,
+    }
+}
+
+/// The taper of a part, counted from `TAPERS`.
+fn taper_of(part: Part) -> Option<usize> {
+    match row_of(part) {
+        1 => Some(0),
+        2 => Some(1),
+        3 => Some(2),
+        5 => Some(3),
+        6 => Some(4),
+        _ => None,
+    }
+}
+
+/// 0 for the right side and the trunk, 1 for the left.
+fn side_of(part: Part) -> usize {
+    let index = part as usize;
+    usize::from((5..8).contains(&index) || index >= 11)
+}
+
+/// Outlines of the head are compared only in the middle of its sides and of its top: real heads are round.
+const HEAD_PART: f64 = 0.4;
+const CROWN_PART: f64 = 0.5;
+/// End ellipses are drawn with this many chords.
+const RIM_CHORDS: usize = 12;
+
+/// Writes sample points into the workspace, about `spacing_px` apart.
+pub fn samples(figure: &Figure, camera: &Camera, whole: &[f64], spacing_px: f64, work: &mut Workspace) {
+    let Workspace { view, visible, samples, .. } = work;
+    samples.clear();
+    let (cylinders, eye) = (&figure.posed.cylinders, camera.position());
+    let options = VisibilityOptions { rims: true, rim_chords: RIM_CHORDS };
+    view.visible_contours(cylinders, eye, &options, visible);
+    let outlines = cylinders.map(|cylinder| outline_px(&cylinder, camera, eye));
+    for segment in visible.iter() {
+        let part = Part::ALL[segment.part];
+        let Some(line) = Line::new(segment, part, &cylinders[segment.part], whole, camera) else { continue };
+        let count = (line.length_px / spacing_px).round().max(1.0) as usize;
+        for n in 0..count {
+            let on_cylinder = segment.start.lerp(segment.end, (n as f64 + 0.5) / count as f64);
+            let Some(mut sample) = line.sample(on_cylinder, camera) else { continue };
+            let beyond = sample.point_px + 0.75 * spacing_px * sample.normal;
+            let covers = |(other, outline): (usize, &Option<[DVec2; 4]>)| {
+                other != segment.part && outline.is_some_and(|corners| contains(&corners, beyond))
+            };
+            sample.is_outer = !outlines.iter().enumerate().any(covers);
+            samples.push(sample);
+        }
+    }
+}
+
+/// A visible piece of a contour in the image.
+struct Line<'a> {
+    part: Part,
+    cylinder: &'a EllipticCylinder,
+    is_rim: bool,
+    taper: f64,
+    normal: DVec2,
+    length_px: f64,
+}
+
+impl<'a> Line<'a> {
+    /// `None` for contours that are not compared, and for those that the camera does not see as lines.
+    fn new(
+        segment: &VisibleSegment,
+        part: Part,
+        cylinder: &'a EllipticCylinder,
+        whole: &[f64],
+        camera: &Camera,
+    ) -> Option<Self> {
+        let is_rim = matches!(segment.kind, ContourKind::TopRim | ContourKind::BottomRim);
+        let has_ends = match row_of(part) {
+            0 => segment.kind == ContourKind::TopRim,
+            7 => true,
+            _ => false,
+        };
+        if is_rim && !has_ends {
+            return None;
+        }
+        let taper = taper_of(part).map_or(0.0, |taper| whole[TAPERS + taper]);
+        let mut line = Self { part, cylinder, is_rim, taper, normal: DVec2::ZERO, length_px: 0.0 };
+        let ends = [segment.start, segment.end].map(|end| camera.project(line.on_surface(end).0));
+        let across = ends[1]? - ends[0]?;
+        line.length_px = across.length();
+        let axis = cylinder.world_from_cylinder.matrix3.z_axis;
+        let middle = segment.start.midpoint(segment.end);
+        let outwards = match segment.kind {
+            ContourKind::TopRim => axis,
+            ContourKind::BottomRim => -axis,
+            _ => line.on_surface(middle).1,
+        };
+        let outwards_px = camera.project(middle + 0.05 * outwards)? - camera.project(middle)?;
+        let normal = across.perp().try_normalize()?;
+        line.normal = if normal.dot(outwards_px) < 0.0 { -normal } else { normal };
+        Some(line)
+    }
+
+    /// The point of the tapered surface, its radius without taper, and its height from -1 to 1.
+    fn on_surface(&self, on_cylinder: DVec3) -> (DVec3, DVec3, f64) {
+        let axis = self.cylinder.world_from_cylinder.matrix3.z_axis;
+        let from_centre = on_cylinder - self.cylinder.centre();
+        let z = from_centre.dot(axis) / self.cylinder.half_length;
+        let radius = from_centre - axis * (z * self.cylinder.half_length);
+        (on_cylinder + radius * (self.taper * z), radius, z)
+    }
+
+    fn sample(&self, on_cylinder: DVec3, camera: &Camera) -> Option<Sample> {
+        let (world, radius, z) = self.on_surface(on_cylinder);
+        let depth = radius.dot(self.cylinder.world_from_cylinder.matrix3.x_axis).abs();
+        let is_round = match (self.part, self.is_rim) {
+            (Part::Head, true) => depth > CROWN_PART * self.cylinder.semi_axes.x,
+            (Part::Head, false) => z.abs() > HEAD_PART,
+            _ => false,
+        };
+        if is_round {
+            return None;
+        }
+        let radius = if self.is_rim { DVec3::ZERO } else { radius };
+        let point_px = camera.project(world)?;
+        Some(Sample { part: self.part, point_px, normal: self.normal, is_outer: true, world, radius, z })
+    }
+}
+
+/// The quadrangle between the side lines of a part, pixels.
+fn outline_px(cylinder: &EllipticCylinder, camera: &Camera, eye: DVec3) -> Option<[DVec2; 4]> {
+    let [left, right] = side_lines(cylinder, eye)?;
+    let corners = [left.start, left.end, right.end, right.start];
+    let [a, b, c, d] = corners.map(|corner| camera.project(corner));
+    Some([a?, b?, c?, d?])
+}
+
+/// Whether a convex quadrangle contains a point.
+fn contains(corners: &[DVec2; 4], point: DVec2) -> bool {
+    let turns = (0..4).map(|n| (corners[(n + 1) % 4] - corners[n]).perp_dot(point - corners[n]) > 0.0);
+    let left = turns.filter(|&is_left| is_left).count();
+    left == 0 || left == 4
+}
+
+impl Figure {
+    /// Writes ∂X/∂q of a sample for every coordinate q of the figure on which it depends.
+    pub fn motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
+        out.clear();
+        let (ahead, left) = (self.ahead.extend(0.0), self.ahead.perp().extend(0.0));
+        let x = sample.world;
+        out.extend([
+            (ALONG, ahead),
+            (ACROSS, left),
+            (HEIGHT, DVec3::Z),
+            (HEADING, DVec3::Z.cross(x - self.origin.extend(0.0))),
+            (BODY + WIDTHS + row_of(sample.part), sample.radius),
+        ]);
+        out.extend(taper_of(sample.part).map(|taper| (BODY + TAPERS + taper, sample.radius * sample.z)));
+        if sample.part.is_leg() { self.leg_motion(sample, out) } else { self.trunk_motion(sample, out) }
+    }
+
+    fn axes(&self, part: usize) -> DMat3 {
+        self.posed.cylinders[part].world_from_cylinder.matrix3
+    }
+
+    /// Trunk, head and arms turn with the lean about the hips and rise with the length of the torso.
+    fn trunk_motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
+        let (row, height_m) = (row_of(sample.part), self.body.height_m);
+        let left = self.ahead.perp().extend(0.0);
+        let trunk = self.axes(Part::Torso as usize);
+        // Share of the part from its upper end down, 0 to 1.
+        let down = 0.5 * (1.0 - sample.z);
+        let share = if row == 1 { 1.0 - down } else { 1.0 };
+        out.push((LEAN, left.cross(sample.world - self.pelvis)));
+        out.push((BODY + TORSO, trunk.z_axis * (height_m * share)));
+        if row == 0 {
+            out.push((BODY + CROWN, trunk.z_axis * (height_m * (1.0 - down))));
+            out.push((BODY + HEAD_FORWARD, trunk.x_axis * height_m));
+        }
+        if row < 2 {
+            return;
+        }
+        let side = side_of(sample.part);
+        let (joints, outwards) =
+            if side == 0 { (&self.posed.right, -left) } else { (&self.posed.left, left) };
+        let upper = if side == 0 { Part::RightUpperArm } else { Part::LeftUpperArm } as usize;
+        let angle = |joint: usize| ANGLES + side * JOINTS + joint;
+        let bend = self.axes(sample.part as usize).y_axis;
+        out.push((BODY + SHOULDER_WIDTH, outwards * height_m));
+        out.push((angle(3), -bend.cross(sample.world - joints.shoulder)));
+        let share = if row == 2 { down } else { 1.0 };
+        out.push((BODY + UPPER_ARM, -self.axes(upper).z_axis * (height_m * share)));
+        if row >= 3 {
+            let share = if row == 3 { down } else { 1.0 };
+            out.push((angle(4), -bend.cross(sample.world - joints.elbow)));
+            out.push((BODY + FOREARM, -self.axes(upper + 1).z_axis * (height_m * share)));
+        }
+    }
+
+    /// Legs turn about the hips, which the pelvis carries along.
+    fn leg_motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
+        let (row, height_m) = (row_of(sample.part), self.body.height_m);
+        let ahead = self.ahead.extend(0.0);
+        let down = 0.5 * (1.0 - sample.z);
+        let side = side_of(sample.part);
+        let (joints, sign) = if side == 0 { (&self.posed.right, -1.0) } else { (&self.posed.left, 1.0) };
+        let thigh = if side == 0 { Part::RightThigh } else { Part::LeftThigh } as usize;
+        let angle = |joint: usize| ANGLES + side * JOINTS + joint;
+        let axes = self.axes(sample.part as usize);
+        let (bend, x) = (axes.y_axis, sample.world);
+        let hip = joints.hip - self.pelvis;
+        out.push((PELVIS, DVec3::Z.cross(hip)));
+        out.push((BODY + HIP_WIDTH, hip / self.body.proportions.hip_half_width));
+        out.push((BODY + TILT, sign * ahead.cross(x - joints.hip)));
+        out.push((angle(0), -bend.cross(x - joints.hip)));
+        let share = if row == 5 { down } else { 1.0 };
+        out.push((BODY + THIGH, -self.axes(thigh).z_axis * (height_m * share)));
+        if row >= 6 {
+            let share = if row == 6 { down } else { 1.0 };
+            out.push((angle(1), bend.cross(x - joints.knee)));
+            out.push((BODY + SHANK, -self.axes(thigh + 1).z_axis * (height_m * share)));
+        }
+        if row == 7 {
+            // The foot's axis points to the toes, its x axis away from or to the sole.
+            let sole = axes.x_axis * -axes.x_axis.dot(self.axes(thigh + 1).z_axis).signum();
+            out.push((angle(2), -bend.cross(x - joints.ankle)));
+            out.push((BODY + FOOT, axes.z_axis * (height_m * (1.0 - down))));
+            out.push((BODY + HEEL, -axes.z_axis * height_m));
+            out.push((BODY + ANKLE, sole * height_m));
+        }
+    }
+
+    /// The lowest point of the lower foot: the heel, or the ball under the toes, and which it is.
+    pub fn lowest_point(&self) -> (usize, DVec3) {
+        let side = usize::from(self.posed.left.ankle.z < self.posed.right.ankle.z);
+        let [heel, ball] = self.sole(side);
+        (side, if heel.z < ball.z { heel } else { ball })
+    }
+
+    /// Heel and ball of a foot: the ends of its sole, the front one above the joints of the toes.
+    pub fn sole(&self, side: usize) -> [DVec3; 2] {
+        let part = if side == 0 { Part::RightFoot } else { Part::LeftFoot };
+        let foot = &self.posed.cylinders[part as usize];
+        let axes = foot.world_from_cylinder.matrix3;
+        let down = axes.x_axis * (-axes.x_axis.z.signum() * foot.semi_axes.x);
+        let end = |share: f64| foot.centre() + axes.z_axis * (share * foot.half_length) + down;
+        [end(-1.0), end(BALL)]
+    }
+
+    /// Derivatives by the figure of the height of a point under a foot.
+    pub fn height_slopes(&self, side: usize, x: DVec3) -> [(usize, f64); 4] {
+        let joints = if side == 0 { &self.posed.right } else { &self.posed.left };
+        let left = self.ahead.perp().extend(0.0);
+        let angle = ANGLES + side * JOINTS;
+        [
+            (HEIGHT, 1.0),
+            (angle, -left.cross(x - joints.hip).z),
+            (angle + 1, left.cross(x - joints.knee).z),
+            (angle + 2, -left.cross(x - joints.ankle).z),
+        ]
+    }
+}
+
+/// Where the ball of the foot is on its axis, -1 at the heel, 1 at the toes: at 0.8 of the foot's length.
+const BALL: f64 = 0.6;
+
+/// n · J: how far the image of a world point moves along the normal, pixels per metre in each direction.
+pub fn gradient(camera: &Camera, world: DVec3, normal: DVec2) -> DVec3 {
+    let p = camera.camera_from_world(world);
+    let ideal_px = p.truncate() / p.z * camera.focal_px + camera.centre_px;
+    let n = lens(camera, ideal_px).transpose() * normal * camera.focal_px / p.z;
+    camera.rotation.transpose() * DVec3::new(n.x, n.y, -n.dot(p.truncate()) / p.z)
+}
+
+/// The derivative of the lens distortion at an ideal pixel, by central differences over one pixel, within which a
+/// lens is linear to 1e-6.
+fn lens(camera: &Camera, ideal_px: DVec2) -> DMat2 {
+    if camera.distortion == Distortion::None {
+        return DMat2::IDENTITY;
+    }
+    let slope = |axis: DVec2| {
+        let [low, high] = [-0.5, 0.5].map(|by| camera.distort(ideal_px + by * axis));
+        Some(high? - low?)
+    };
+    match (slope(DVec2::X), slope(DVec2::Y)) {
+        (Some(x), Some(y)) => DMat2::from_cols(x, y),
+        _ => DMat2::IDENTITY,
+    }
+}

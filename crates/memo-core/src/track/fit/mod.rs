@@ -1,0 +1,724 @@
+//! The person, measured: one fit of body, path and joint curves to all frames of a walk.
+//!
+//! Rohr's conclusion (section 7) proposes adaptively estimated motion curves and additional parameters for the body.
+//! Tracking finds where somebody is and in which phase of an average gait. The fit starts there and asks what body
+//! and what motion put the contours where the frames show them:
+//!
+//! 1. Unknowns start at their means over people ([`unknowns`]), place and phase of each frame at the tracker's.
+//! 2. Visible contours are sampled ([`lines`]), and the nearest edge on each sample's normal is searched
+//!    ([`edge_search`]).
+//! 3. A Gauss-Newton step moves all unknowns at once; large distances count less (Geman and McClure). Distances that
+//!    count become smaller from step to step.
+//! 4. The first steps are made from several gaits; the one whose contours are nearest goes on.
+//! 5. The joint curves are fitted first, then what each frame deviates from them.
+//! 6. Everything is done again with left and right exchanged, and the evidence decides ([`sides`]).
+//! 7. Standard deviations follow from the normal equations.
+//!
+//! The normal equations have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time is
+//! linear in the number of frames.
+
+pub mod contacts;
+pub(crate) mod edge_search;
+mod lines;
+mod sides;
+mod unknowns;
+pub(crate) mod views;
+
+use super::search::{Hypothesis, Path};
+use crate::estimate::arrow::{Arrow, Solution};
+use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Posture, Walker};
+use crate::option_error::OptionError;
+use contacts::Contact;
+use edge_search::{Border, View};
+use glam::{DVec2, DVec3};
+use lines::{Figure, Sample, Workspace, gradient, row_of, samples};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use thiserror::Error;
+use unknowns::{
+    ANGLES, FIGURE, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE,
+    Slope, TORSO, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_HEADING, WHOLE_LEAN, body, flatten, mean_of, posture,
+    priors, slopes,
+};
+
+/// Options of the fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitOptions {
+    /// Standard deviation of the stated body height, as a share of it.
+    pub height_sd: f64,
+    /// Standard deviation of hip and knee about the person's own curves, radians. Ankle and arms vary twice as much.
+    pub frame_sd_rad: f64,
+    /// A walk that lasts longer is fitted in pieces of this many frames. The frames of the current piece are kept in
+    /// memory where the person is, about 0.2 MB each for a person of 400 pixels.
+    pub longest: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self { height_sd: 0.012, frame_sd_rad: 3f64.to_radians(), longest: 1000 }
+    }
+}
+
+impl FitOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless_positive("height_sd", self.height_sd)?;
+        OptionError::unless_positive("frame_sd_rad", self.frame_sd_rad)?;
+        let is_enough = (LEAST_FRAMES..=100_000).contains(&self.longest);
+        OptionError::unless(
+            is_enough,
+            "frames of the longest fit",
+            "between 15 and 100000",
+            self.longest as f64,
+        )
+    }
+}
+
+/// Fewer frames do not show a walk.
+pub const LEAST_FRAMES: usize = 15;
+
+/// Why no person was measured. The tracked walk is not affected.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// The walk is too short.
+    #[error("{got} frames do not suffice to measure a person: {LEAST_FRAMES} are needed")]
+    TooFewFrames {
+        /// Frames given.
+        got: usize,
+    },
+    /// The frames do not determine the unknowns.
+    #[error("the frames do not show enough of the person")]
+    Undetermined,
+    /// The fit ended in a place where the contours are not those of the frames.
+    #[error(
+        "the model does not fit the person: {:.0} % of its outline found no edge, the rest is {:.1} % of the height off",
+        100.0 * .missed,
+        100.0 * .residual
+    )]
+    Misfit {
+        /// Share of the outline without an edge.
+        missed: f64,
+        /// Mean distance of the other edges, as a share of the body height.
+        residual: f64,
+    },
+}
+
+/// How well the contours of the fitted person lie on the edges of the frames.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FitQuality {
+    /// Mean distance of edges from the outline, pixels.
+    pub residual_px: f64,
+    /// Height of the person in the middle of the walk, pixels.
+    pub height_px: f64,
+    /// Share of the outline on whose normal no edge was found.
+    pub missed: f64,
+    /// The same of the lines inside the body.
+    pub missed_inside: f64,
+    /// The farthest that a length of the body is from its mean over people, standard deviations.
+    pub worst_length_sd: f64,
+}
+
+/// Angles of one side with their standard deviations, radians; `None` where the frames do not show the limb.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Measured {
+    /// Hip, knee, ankle, shoulder, elbow: angle and standard deviation.
+    pub angles: [Option<[f64; 2]>; JOINTS],
+}
+
+/// One frame of the fitted walk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedFrame {
+    /// Centre of the torso, metres.
+    pub torso_centre: DVec3,
+    /// Place along the path, metres.
+    pub along_m: f64,
+    /// Gait phase, cycles, not wrapped; 0 = right initial contact.
+    pub phase: f64,
+    /// All angles of the model, measured or not, radians.
+    pub posture: Posture,
+    /// The angles that were measured, right then left.
+    pub measured: [Measured; 2],
+    /// Standard deviations of the torso's centre along the path, across it and in height (metres), and of the phase.
+    pub sd: [f64; 4],
+}
+
+/// The measured person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WalkFit {
+    /// The person's body.
+    pub body: Body,
+    /// The fitted path.
+    pub path: Path,
+    /// The person's curves at fifty equally spaced phases from the side's own initial contact: hip, knee, ankle,
+    /// shoulder and elbow of the right side, then of the left, radians.
+    pub curves: [Vec<f64>; 2 * JOINTS],
+    /// One entry per frame of the walk.
+    pub frames: Vec<FittedFrame>,
+    /// Initial contacts and toe-offs, in order of time.
+    pub contacts: Vec<Contact>,
+    /// Probability that left and right are exchanged.
+    pub p_swapped: f64,
+    /// How well the model fits.
+    pub quality: FitQuality,
+}
+
+impl WalkFit {
+    /// A walker with this body and the mean of both sides' curves.
+    pub(crate) fn walker(&self) -> Walker {
+        let mean = |joint: usize| {
+            let sides = self.curves[joint].iter().zip(&self.curves[JOINTS + joint]);
+            sides.map(|(right, left)| 0.5 * (right + left)).collect::<Vec<_>>()
+        };
+        let [hip, knee, shoulder, elbow] = [0, 1, 3, 4].map(mean);
+        let gait = Gait::from_samples([&hip, &knee, &shoulder, &elbow]);
+        Walker { body: self.body, gait, style: GaitStyle::default() }
+    }
+
+    /// The body in a frame, placed in the world.
+    pub fn pose(&self, frame: usize) -> PosedBody {
+        let FittedFrame { torso_centre, posture, .. } = &self.frames[frame];
+        self.body.pose(*torso_centre, self.path.heading_rad, posture)
+    }
+}
+
+/// A frame to be fitted: its time, its picture around the person, and where the tracker found the person.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FitFrame {
+    pub time_s: f64,
+    pub view: View,
+    /// Where the pelvis is: along the path and above the ground; and the phase, not wrapped.
+    pub start: Hypothesis,
+}
+
+/// What stays the same during a fit.
+pub(crate) struct Problem<'a> {
+    pub camera: &'a Camera,
+    /// The average walker of the stated height.
+    pub walker: &'a Walker,
+    /// The tracker's path.
+    pub path: &'a Path,
+    pub frames: &'a [FitFrame],
+    pub options: &'a FitOptions,
+    pub priors: Vec<Prior>,
+    /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
+    pub origin: DVec2,
+    pub origin_along_m: f64,
+}
+
+/// A gait from which the fit starts. People who walk unlike the average are not always reached from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum StartGait {
+    Average,
+    /// Thighs 22 and knees 40 degrees more flexed.
+    Crouched,
+    /// One knee, of the side 0 or 1, flexes by 0.4 of the average's swing.
+    StiffKnee(usize),
+}
+
+impl StartGait {
+    const ALL: [Self; 4] = [Self::Average, Self::Crouched, Self::StiffKnee(0), Self::StiffKnee(1)];
+
+    fn mirrored(self) -> Self {
+        match self {
+            Self::StiffKnee(side) => Self::StiffKnee(1 - side),
+            same => same,
+        }
+    }
+
+    fn apply(self, gait: &Gait, whole: &mut [f64]) {
+        match self {
+            Self::Average => {}
+            Self::Crouched => {
+                whole[mean_of(0)] += 22f64.to_radians();
+                whole[mean_of(1)] += 40f64.to_radians();
+            }
+            Self::StiffKnee(side) => flatten(gait, whole, 1, side, 0.6),
+        }
+    }
+}
+
+/// Steps from every starting gait, then steps with the person's curves, then with what single frames deviate.
+const STEPS: [usize; 3] = [4, 4, 4];
+/// How far edges are searched, and the distance at which an edge counts a quarter: shares of the person's height at
+/// the first and at the last step.
+const REACH: [f64; 2] = [0.06, 0.02];
+const SCALE: [f64; 2] = [0.03, 0.008];
+/// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
+/// distance from each other.
+const SAMPLES_PER_HEIGHT: f64 = 75.0;
+const LEAST_SPACING_PX: f64 = 2.0;
+const LEAST_REACH_PX: f64 = 4.0;
+
+impl<'a> Problem<'a> {
+    pub fn new(
+        camera: &'a Camera,
+        walker: &'a Walker,
+        path: &'a Path,
+        frames: &'a [FitFrame],
+        options: &'a FitOptions,
+    ) -> Self {
+        let origin_along_m = frames.get(frames.len() / 2).map_or(0.0, |frame| frame.start.along_m);
+        let origin = path.point(origin_along_m, 0.0).truncate();
+        Self { camera, walker, path, frames, options, priors: priors(), origin, origin_along_m }
+    }
+
+    /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
+    /// sides are exchanged; without it, the sides stay as tracked.
+    pub fn fit(&self, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
+        if self.frames.len() < LEAST_FRAMES {
+            return Err(FitError::TooFewFrames { got: self.frames.len() });
+        }
+        let (as_tracked, gait) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
+        let as_tracked = self.finished(as_tracked).ok_or(FitError::Undetermined)?;
+        let exchanged = p_tracked_swapped.and_then(|_| {
+            let start = self.started(0.5, gait.mirrored())?.1;
+            self.finished(start)
+        });
+        let p_tracked = p_tracked_swapped.unwrap_or(0.0);
+        let p_exchanged =
+            exchanged.as_ref().map_or(0.0, |other| sides::p_other(&as_tracked.seen, &other.seen, p_tracked));
+        let (best, p_swapped) = match exchanged {
+            Some(other) if p_exchanged > 0.5 => (other, 1.0 - p_exchanged),
+            _ => (as_tracked, p_exchanged),
+        };
+        let quality = self.quality(&best);
+        let residual = quality.residual_px / quality.height_px;
+        if quality.missed > MOST_MISSED || residual > MOST_RESIDUAL {
+            return Err(FitError::Misfit { missed: quality.missed, residual });
+        }
+        Ok(self.result(&best, p_swapped, quality))
+    }
+
+    /// The start whose first steps come nearest to the edges, with the tracker's phase shifted by some cycles.
+    fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
+        let starts = StartGait::ALL.into_iter().filter_map(|gait| Some((self.started(phase, gait)?, gait)));
+        let ((_, unknowns), gait) = starts.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
+        Some((unknowns, gait))
+    }
+
+    /// The first steps from one gait, and their cost.
+    fn started(&self, phase: f64, gait: StartGait) -> Option<(f64, Unknowns)> {
+        let mut unknowns = self.start(phase);
+        gait.apply(&self.walker.gait, &mut unknowns.whole);
+        let height_px = self.height_px(&unknowns)?;
+        let mut cost = f64::INFINITY;
+        for n in 0..STEPS[0] {
+            cost = self.step(&mut unknowns, &Width::of_step(n, height_px), false)?.0.cost;
+        }
+        Some((cost, unknowns))
+    }
+
+    /// The other steps.
+    fn finished(&self, mut unknowns: Unknowns) -> Option<Fitted> {
+        let height_px = self.height_px(&unknowns)?;
+        let mut last = None;
+        for n in STEPS[0]..STEPS.iter().sum() {
+            last = Some(self.step(&mut unknowns, &Width::of_step(n, height_px), n >= STEPS[0] + STEPS[1])?);
+        }
+        let (seen, solution) = last?;
+        Some(Fitted { unknowns, seen, solution, height_px })
+    }
+
+    /// Means over people, at the places and phases that the tracker found.
+    fn start(&self, phase: f64) -> Unknowns {
+        let frame = |f: &FitFrame| {
+            let mut frame = [0.0; FRAME];
+            frame[FRAME_ALONG] = f.start.along_m - self.origin_along_m;
+            frame[FRAME_HEIGHT] = f.start.height_m;
+            frame[FRAME_PHASE] = f.start.phase + phase;
+            frame
+        };
+        Unknowns {
+            whole: self.priors.iter().map(|prior| prior.mean).collect(),
+            frames: self.frames.iter().map(frame).collect(),
+        }
+    }
+
+    /// The figure of a frame.
+    fn figure(&self, unknowns: &Unknowns, frame: usize) -> Figure {
+        let (whole, frame) = (&unknowns.whole, &unknowns.frames[frame]);
+        let body = body(&self.walker.body, whole);
+        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
+        let ahead = DVec2::from_angle(heading_rad);
+        let ground = self.origin + frame[FRAME_ALONG] * ahead + whole[WHOLE_ACROSS] * ahead.perp();
+        let pelvis = ground.extend(frame[FRAME_HEIGHT]);
+        let (sin, cos) = whole[WHOLE_LEAN].sin_cos();
+        let torso_centre = pelvis + 0.5 * body.torso_length_m() * (sin * ahead).extend(cos);
+        let posed = body.pose(torso_centre, heading_rad, &posture(&self.walker.gait, whole, frame));
+        Figure { body, posed, pelvis, ahead, origin: self.origin }
+    }
+
+    /// Height of the person in the middle frame, pixels.
+    fn height_px(&self, unknowns: &Unknowns) -> Option<f64> {
+        let figure = self.figure(unknowns, unknowns.frames.len() / 2);
+        self.camera.pixel_height_at(figure.pelvis.with_z(0.0), figure.body.height_m)
+    }
+
+    /// One Gauss-Newton step of all unknowns; with `free` frames, what they deviate from the curves is fitted too.
+    fn step(&self, unknowns: &mut Unknowns, width: &Width, free: bool) -> Option<(Seen, Solution)> {
+        let mut arrow = Arrow::new(self.frames.len(), FRAME, WHOLE);
+        let terms: Vec<_> = (0..self.frames.len())
+            .into_par_iter()
+            .map_init(Room::default, |room, frame| self.frame_terms(unknowns, frame, width, room))
+            .collect();
+        let mut seen = Seen::default();
+        for (frame, (normal, right, of_frame)) in terms.iter().enumerate() {
+            arrow.add_frame(frame, normal, right);
+            seen.add(of_frame);
+        }
+        self.add_priors(unknowns, free, &mut arrow);
+        let solution = arrow.solve()?;
+        for (x, step) in unknowns.whole.iter_mut().zip(solution.whole.iter()) {
+            *x += step;
+        }
+        for (x, step) in unknowns.frames.iter_mut().flatten().zip(solution.frames.iter()) {
+            *x += step;
+        }
+        Some((seen, solution))
+    }
+
+    /// The normal equations of one frame over the unknowns of the whole and of the frame, and what was seen.
+    fn frame_terms(
+        &self,
+        unknowns: &Unknowns,
+        frame: usize,
+        width: &Width,
+        room: &mut Room,
+    ) -> (DMatrix<f64>, DVector<f64>, Seen) {
+        let figure = self.figure(unknowns, frame);
+        let Room { work, slopes: room_slopes } = room;
+        samples(&figure, self.camera, &unknowns.whole, width.spacing_px(), work);
+        let mut normal = DMatrix::<f64>::zeros(FIGURE, FIGURE);
+        let mut right = DVector::<f64>::zeros(FIGURE);
+        let mut seen = Seen::default();
+        let Workspace { samples, motion, looks, .. } = work;
+        let view = &self.frames[frame].view;
+        for sample in samples.iter() {
+            let border = if sample.is_outer { Border::Outer } else { Border::Inner };
+            let Some(edge) = view.search(sample.point_px, sample.normal, width.reach_px, border, looks)
+            else {
+                continue;
+            };
+            let importance = importance(sample);
+            let far = 1.0 / (1.0 + (edge.offset_px / width.scale_px).powi(2));
+            seen.count(sample, &edge, importance * (1.0 - far));
+            if edge.strength < LEAST_STEP {
+                continue;
+            }
+            let clear = edge.strength / (edge.strength + CLEAR_STEP);
+            let weight = importance * far * far * clear / width.sd_px().powi(2);
+            figure.motion(sample, motion);
+            let n_j = gradient(self.camera, sample.world, sample.normal);
+            add_terms(
+                &mut normal,
+                &mut right,
+                motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))),
+                edge.offset_px,
+                weight,
+            );
+        }
+        // The lower foot stands on the ground, with an error common to about ten independent frames.
+        let (side, lowest) = figure.lowest_point();
+        let weight = GROUND_SD_M.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
+        add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], room_slopes);
+        let (normal, right) = of_unknowns(&normal, &right, room_slopes);
+        (normal, right, seen)
+    }
+
+    /// Priors of people, of the stated height and of smooth motion.
+    fn add_priors(&self, unknowns: &Unknowns, free: bool, arrow: &mut Arrow) {
+        for (n, prior) in self.priors.iter().enumerate() {
+            arrow.add_whole_row(&[(n, 1.0)], prior.mean - unknowns.whole[n], prior.sd.powi(-2));
+        }
+        let excess: f64 = STATURE.iter().map(|&n| unknowns.whole[n]).sum();
+        arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), -excess, self.options.height_sd.powi(-2));
+        let joint_of = |unknown: usize| (unknown - FRAME_ANGLES) % JOINTS;
+        for (k, frame) in unknowns.frames.iter().enumerate() {
+            for unknown in FRAME_ANGLES..FRAME {
+                let sd = match (free, joint_of(unknown)) {
+                    (false, _) => HELD_SD_RAD,
+                    (true, 0 | 1) => self.options.frame_sd_rad,
+                    (true, _) => 2.0 * self.options.frame_sd_rad,
+                };
+                arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -frame[unknown], sd.powi(-2));
+            }
+        }
+        // Velocities change as in a random walk: their change between two intervals has a variance in proportion to
+        // the time between their middles.
+        for k in 1..unknowns.frames.len().saturating_sub(1) {
+            let time = |k: usize| self.frames[k].time_s;
+            let (before_s, after_s) = (time(k) - time(k - 1), time(k + 1) - time(k));
+            let factors = [1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s];
+            for (unknown, rate) in RATES.iter().enumerate() {
+                let terms = [0, 1, 2].map(|n| (arrow.index(k - 1 + n, unknown), factors[n]));
+                let now: f64 = (0..3).map(|n| factors[n] * unknowns.frames[k - 1 + n][unknown]).sum();
+                arrow.add_row(&terms, -now, 1.0 / (rate * rate * 0.5 * (before_s + after_s)));
+            }
+        }
+    }
+
+    fn quality(&self, fitted: &Fitted) -> FitQuality {
+        let seen = &fitted.seen;
+        let lengths = STATURE.iter().map(|&n| {
+            let Prior { mean, sd } = self.priors[n];
+            ((fitted.unknowns.whole[n] - mean) / sd).abs()
+        });
+        FitQuality {
+            residual_px: seen.distance_px / (seen.outer - seen.outer_missed).max(1.0),
+            height_px: fitted.height_px,
+            missed: seen.outer_missed / seen.outer.max(1.0),
+            missed_inside: seen.inner_missed / seen.inner.max(1.0),
+            worst_length_sd: lengths.fold(0.0, f64::max),
+        }
+    }
+
+    /// Step 7.
+    fn result(&self, fitted: &Fitted, p_swapped: f64, quality: FitQuality) -> WalkFit {
+        let Unknowns { whole, frames } = &fitted.unknowns;
+        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
+        let across = whole[WHOLE_ACROSS] * DVec2::from_angle(heading_rad).perp();
+        let path = Path { origin: self.origin + across, heading_rad };
+        let frame = |k: usize| {
+            let figure = self.figure(&fitted.unknowns, k);
+            FittedFrame {
+                torso_centre: figure.posed.torso_centre,
+                along_m: path.along(figure.posed.torso_centre.truncate()),
+                phase: frames[k][FRAME_PHASE],
+                posture: posture(&self.walker.gait, whole, &frames[k]),
+                measured: self.measured(fitted, k),
+                sd: self.place_sd(fitted, k),
+            }
+        };
+        let mut all: Vec<FittedFrame> = (0..frames.len()).into_par_iter().map(frame).collect();
+        let feet: Vec<[[DVec3; 3]; 2]> = (0..frames.len())
+            .map(|k| {
+                let figure = self.figure(&fitted.unknowns, k);
+                [0, 1].map(|side| {
+                    let [heel, ball] = figure.sole(side);
+                    let joints = if side == 0 { &figure.posed.right } else { &figure.posed.left };
+                    [joints.ankle, heel, ball]
+                })
+            })
+            .collect();
+        let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
+        let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
+        let contacts = contacts::contacts(&times_s, &phases, &feet, path.direction());
+        // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
+        let zero = contacts::mean_phase(&contacts, &times_s, &phases);
+        all.iter_mut().for_each(|frame| frame.phase -= zero);
+        let curves = unknowns::curves(&self.walker.gait, whole, zero);
+        WalkFit {
+            body: body(&self.walker.body, whole),
+            path,
+            curves,
+            frames: all,
+            contacts,
+            p_swapped,
+            quality,
+        }
+    }
+
+    /// The angles of a frame that the pictures determine, with standard deviations.
+    fn measured(&self, fitted: &Fitted, frame: usize) -> [Measured; 2] {
+        let unknowns = &fitted.unknowns;
+        let angles = unknowns::angles(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame]);
+        let mut all = Vec::new();
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut all);
+        let measured = |at: usize| {
+            let (mut whole, mut frames) = (Vec::new(), Vec::new());
+            for &(_, unknown, slope) in all.iter().filter(|s| s.0 == ANGLES + at) {
+                match unknown.checked_sub(WHOLE) {
+                    None => whole.push((unknown, slope)),
+                    Some(unknown) => frames.push((frame * FRAME + unknown, slope)),
+                }
+            }
+            let [sd, most] =
+                [SD_FACTOR * fitted.solution.variance(&whole, &frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
+            let sd = sd.hypot(MODEL_SD_RAD[at % JOINTS]);
+            (sd <= most).then_some([angles[at], sd])
+        };
+        [0, 1].map(|side| Measured { angles: std::array::from_fn(|joint| measured(side * JOINTS + joint)) })
+    }
+
+    /// Standard deviations of the torso's centre along, across and up, and of the phase.
+    fn place_sd(&self, fitted: &Fitted, frame: usize) -> [f64; 4] {
+        let (height_m, lean) = (self.walker.body.height_m, fitted.unknowns.whole[WHOLE_LEAN]);
+        let half_m = 0.5 * body(&self.walker.body, &fitted.unknowns.whole).torso_length_m();
+        let along_m = fitted.unknowns.frames[frame][FRAME_ALONG];
+        let at = |unknown: usize| [(frame * FRAME + unknown, 1.0)];
+        let sd = |whole: &[(usize, f64)], frames: &[(usize, f64)], common: f64| {
+            (SD_FACTOR * fitted.solution.variance(whole, frames).sqrt()).hypot(common)
+        };
+        let half_torso = 0.5 * height_m;
+        [
+            sd(
+                &[(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())],
+                &at(FRAME_ALONG),
+                PLACE_SD[0],
+            ),
+            sd(&[(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)], &[], PLACE_SD[1]),
+            sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), PLACE_SD[2]),
+            sd(&[], &at(FRAME_PHASE), PLACE_SD[3]),
+        ]
+    }
+}
+
+/// Search width and weights of one step.
+#[derive(Debug, Clone, Copy)]
+struct Width {
+    reach_px: f64,
+    scale_px: f64,
+    height_px: f64,
+}
+
+impl Width {
+    fn of_step(n: usize, height_px: f64) -> Self {
+        let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
+        let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
+        Self { reach_px: at(REACH).max(LEAST_REACH_PX), scale_px: at(SCALE).max(1.0), height_px }
+    }
+
+    fn spacing_px(&self) -> f64 {
+        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
+    }
+
+    /// Standard deviation of the edge of one sample.
+    fn sd_px(&self) -> f64 {
+        (self.height_px / SAMPLES_PER_HEIGHT).max(1.0)
+    }
+}
+
+/// Working memory of a thread.
+#[derive(Debug, Default)]
+struct Room {
+    work: Workspace,
+    slopes: Vec<Slope>,
+}
+
+/// A fit with one choice of sides.
+struct Fitted {
+    unknowns: Unknowns,
+    seen: Seen,
+    solution: Solution,
+    height_px: f64,
+}
+
+/// Sums over samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Seen {
+    /// Samples of the outline, and those without an edge; the same of inner lines.
+    pub outer: f64,
+    pub outer_missed: f64,
+    pub inner: f64,
+    pub inner_missed: f64,
+    /// Distances of the outline's edges, pixels.
+    pub distance_px: f64,
+    /// Robust cost of all distances.
+    pub cost: f64,
+}
+
+impl Seen {
+    fn count(&mut self, sample: &Sample, edge: &edge_search::FoundEdge, cost: f64) {
+        let missed = f64::from(u8::from(edge.strength < LEAST_STEP));
+        if sample.is_outer {
+            self.outer += 1.0;
+            self.outer_missed += missed;
+            self.distance_px += (1.0 - missed) * edge.offset_px.abs();
+        } else {
+            self.inner += 1.0;
+            self.inner_missed += missed;
+        }
+        self.cost += (1.0 - missed) * cost;
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.outer += other.outer;
+        self.outer_missed += other.outer_missed;
+        self.inner += other.inner;
+        self.inner_missed += other.inner_missed;
+        self.distance_px += other.distance_px;
+        self.cost += other.cost;
+    }
+}
+
+/// An outline counts fully, a foot half, because shoes have edges of their own, and so do clothes inside the body.
+/// The top of the thigh belongs to buttock and pelvis as much.
+fn importance(sample: &Sample) -> f64 {
+    let row = row_of(sample.part);
+    let of_border = match (sample.is_outer, row) {
+        (true, 7) => 0.5,
+        (true, _) => 1.0,
+        (false, _) => 0.25,
+    };
+    let is_top_of_thigh = row == 5 && sample.z > 1.0 - 2.0 * 0.28;
+    let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
+    of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
+}
+
+/// Steps of less grey levels are noise.
+const LEAST_STEP: f64 = 3.0;
+/// A step of this many grey levels counts half as much as a large one.
+const CLEAR_STEP: f64 = 15.0;
+/// Standard deviation of the height of a standing foot, metres, and the number of independent feet in a walk.
+const GROUND_SD_M: f64 = 0.015;
+const GROUND_FRAMES: f64 = 10.0;
+/// What frames deviate from the curves while only curves are fitted.
+const HELD_SD_RAD: f64 = 1e-6;
+/// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,
+/// cycles/s of the phase, rad/s of the angles. Motion-captured walks change by half of that.
+const RATES: [f64; FRAME] = {
+    let mut rates = [75.0 * std::f64::consts::PI / 180.0; FRAME];
+    rates[FRAME_ALONG] = 0.5;
+    rates[FRAME_HEIGHT] = 0.75;
+    rates[FRAME_PHASE] = 0.19;
+    rates
+};
+/// Errors that the equations do not contain, because edges of neighbouring samples and frames err together, and
+/// because people are no cylinders: a factor, and standard deviations to add.
+const SD_FACTOR: f64 = 1.3;
+const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
+const PLACE_SD: [f64; 4] = [0.01, 0.035, 0.022, 0.012];
+/// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
+const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
+/// A fit that misses more of its outline, or is farther from the edges, is no fit.
+const MOST_MISSED: f64 = 0.2;
+const MOST_RESIDUAL: f64 = 0.012;
+
+/// Adds weight (Σ slope q - offset)² to normal equations over the figure.
+fn add_terms(
+    normal: &mut DMatrix<f64>,
+    right: &mut DVector<f64>,
+    slopes: impl Iterator<Item = (usize, f64)> + Clone,
+    offset: f64,
+    weight: f64,
+) {
+    for (i, a) in slopes.clone() {
+        for (j, b) in slopes.clone() {
+            normal[(i, j)] += weight * a * b;
+        }
+        right[i] += weight * a * offset;
+    }
+}
+
+/// Normal equations over the figure as those over the unknowns: Aᵀ H A and Aᵀ b, with the slopes A.
+fn of_unknowns(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    slopes: &[Slope],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let count = WHOLE + FRAME;
+    let mut half = DMatrix::<f64>::zeros(FIGURE, count);
+    let mut of_right = DVector::<f64>::zeros(count);
+    for &(q, unknown, slope) in slopes {
+        half.column_mut(unknown).axpy(slope, &normal.column(q), 1.0);
+        of_right[unknown] += slope * right[q];
+    }
+    let half = half.transpose();
+    let mut of_unknowns = DMatrix::<f64>::zeros(count, count);
+    for &(q, unknown, slope) in slopes {
+        of_unknowns.column_mut(unknown).axpy(slope, &half.column(q), 1.0);
+    }
+    (of_unknowns, of_right)
+}

@@ -1,0 +1,54 @@
+//! Which side is which: the fit with the sides as tracked against the fit with the sides exchanged.
+//!
+//! With wrong sides the outline can be the same, but then the far limbs are drawn in front of the near ones: their
+//! lines inside the body, where the frames have edges, are hidden. So the right sides explain more of these lines.
+
+use super::Seen;
+
+/// Log odds per unit of evidence.
+const LOG_ODDS: f64 = 8.0;
+/// The tracker's log odds come from the same frames, so they count half.
+const OF_TRACKER: f64 = 0.5;
+/// Weight of the share of inner lines that found no edge.
+const LOST: f64 = 3.0;
+
+/// Evidence for one choice of sides against another: logarithms of the ratios of explained inner lines and of costs,
+/// and the difference of the shares of lost inner lines.
+pub fn evidence(chosen: &Seen, other: &Seen) -> f64 {
+    let explained = |seen: &Seen| (seen.inner - seen.inner_missed).max(1.0);
+    let lost = |seen: &Seen| seen.inner_missed / seen.inner.max(1.0);
+    let cost = |seen: &Seen| seen.cost.max(1e-9);
+    (explained(chosen) / explained(other)).ln()
+        + (cost(other) / cost(chosen)).ln()
+        + LOST * (lost(other) - lost(chosen))
+}
+
+/// Probability of the `other` choice of sides; `p_tracked` is that by the tracker.
+pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64) -> f64 {
+    let p = p_tracked.clamp(1e-6, 1.0 - 1e-6);
+    let log_odds = LOG_ODDS * evidence(chosen, other) + OF_TRACKER * ((1.0 - p) / p).ln();
+    1.0 / (1.0 + log_odds.exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(cost: f64, inner_missed: f64) -> Seen {
+        Seen { inner: 100.0, inner_missed, cost, outer: 500.0, ..Seen::default() }
+    }
+
+    #[test]
+    fn what_lies_nearer_and_loses_fewer_inner_lines_is_likelier() {
+        assert!((p_other(&seen(10.0, 5.0), &seen(10.0, 5.0), 0.5) - 0.5).abs() < 1e-12);
+        let by_cost = p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5);
+        let by_lines = p_other(&seen(10.0, 5.0), &seen(10.0, 15.0), 0.5);
+        let fewer = Seen { inner: 50.0, ..seen(10.0, 2.5) };
+        let by_count = p_other(&seen(10.0, 5.0), &fewer, 0.5);
+        assert!([by_cost, by_lines, by_count].iter().all(|&p| p < 0.05), "{by_cost} {by_lines} {by_count}");
+        for (a, b) in [(seen(10.0, 5.0), seen(12.0, 1.0)), (seen(8.0, 0.0), seen(7.0, 9.0))] {
+            assert!((p_other(&a, &b, 0.5) + p_other(&b, &a, 0.5) - 1.0).abs() < 1e-12);
+        }
+        assert!(p_other(&Seen::default(), &Seen::default(), 0.5).is_finite());
+    }
+}

@@ -1,0 +1,178 @@
+//! The pictures that a fit needs: the frames around the person, and the empty scene.
+//!
+//! The empty scene is the median of frames spread evenly over the stream, where the person is not. Memory does not
+//! grow with the stream: when there are too many frames, every second one is dropped.
+
+use super::edge_search::View;
+use crate::image::{Image, Rectangle};
+use rayon::prelude::*;
+
+/// The empty scene is the median of half this many frames to this many.
+const MOST_FRAMES: usize = 32;
+/// Without the person the median needs this many frames.
+const LEAST_EMPTY: usize = 5;
+
+/// Frames spread evenly over a stream.
+#[derive(Debug, Clone, Default)]
+pub struct Backdrop {
+    frames: Vec<(usize, Image<u8>)>,
+    /// Only frames with a multiple of this number are kept.
+    every: usize,
+}
+
+/// Part of a frame around the person.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// Number of the frame.
+    pub frame: usize,
+    /// Where the person is.
+    pub window: Rectangle,
+    /// The part of the image that was kept.
+    pub kept: Rectangle,
+    /// Its grey values.
+    pub grey: Image<u8>,
+}
+
+impl Piece {
+    /// The part of a frame within a margin about a window.
+    pub fn new(frame: usize, image: &Image<u8>, window: Rectangle) -> Self {
+        let margin = (window.height() as f64 * MARGIN).ceil() as usize;
+        let kept = Rectangle {
+            left: window.left.saturating_sub(margin),
+            top: window.top.saturating_sub(margin),
+            right: (window.right + margin).min(image.width() - 1),
+            bottom: (window.bottom + margin).min(image.height() - 1),
+        };
+        Self { frame, window, kept, grey: cut(image, &kept) }
+    }
+}
+
+/// Margin about the window of the person, as a share of its height: edges are searched beyond the outline.
+const MARGIN: f64 = 0.12;
+
+fn cut(image: &Image<u8>, part: &Rectangle) -> Image<u8> {
+    let mut out = Image::filled(part.width(), part.height(), 0);
+    for y in 0..part.height() {
+        out.row_mut(y).copy_from_slice(&image.row(part.top + y)[part.left..=part.right]);
+    }
+    out
+}
+
+impl Backdrop {
+    /// Adds the next frame of the stream.
+    pub fn push(&mut self, frame: usize, image: &Image<u8>) {
+        let every = self.every.max(1);
+        if !frame.is_multiple_of(every) {
+            return;
+        }
+        self.frames.push((frame, image.clone()));
+        if self.frames.len() > MOST_FRAMES {
+            self.every = 2 * every;
+            self.frames.retain(|(frame, _)| frame.is_multiple_of(2 * every));
+        }
+    }
+
+    /// The pieces with the empty scene behind them.
+    pub fn views<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
+        let pieces: Vec<&Piece> = pieces.collect();
+        let Some(whole) = pieces.iter().map(|p| p.kept).reduce(|a, b| a.union(&b)) else { return Vec::new() };
+        let windows: Vec<Option<&Rectangle>> = self
+            .frames
+            .iter()
+            .map(|(frame, _)| pieces.iter().find(|p| p.frame == *frame).map(|p| &p.window))
+            .collect();
+        let rows: Vec<Vec<u8>> =
+            (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole, &windows)).collect();
+        let behind = |piece: &Piece| {
+            let kept = piece.kept;
+            let mut background = Image::filled(kept.width(), kept.height(), 0);
+            for y in 0..kept.height() {
+                let row = &rows[kept.top - whole.top + y];
+                background.row_mut(y).copy_from_slice(&row[kept.left - whole.left..=kept.right - whole.left]);
+            }
+            View { corner: [kept.left, kept.top], grey: piece.grey.clone(), background }
+        };
+        pieces.into_iter().map(behind).collect()
+    }
+
+    /// One row of the empty scene: the median of the frames in which the person is elsewhere, or of all frames where
+    /// these are too few.
+    fn empty_row(&self, y: usize, whole: &Rectangle, windows: &[Option<&Rectangle>]) -> Vec<u8> {
+        let mut values = Vec::with_capacity(self.frames.len());
+        let mut median = |x: usize| {
+            let is_free = |window: &Option<&Rectangle>| {
+                window.is_none_or(|w| !((w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y)))
+            };
+            values.clear();
+            let of = self.frames.iter().zip(windows);
+            values.extend(of.filter(|(_, w)| is_free(w)).map(|((_, image), _)| image.row(y)[x]));
+            if values.len() < LEAST_EMPTY {
+                values.clear();
+                values.extend(self.frames.iter().map(|(_, image)| image.row(y)[x]));
+            }
+            let middle = values.len() / 2;
+            if values.is_empty() { 0 } else { *values.select_nth_unstable(middle).1 }
+        };
+        (whole.left..=whole.right).map(&mut median).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wall of stripes, and a bright box of 20 columns that moves by 3 columns a frame from column 10.
+    fn frame(k: usize) -> Image<u8> {
+        let mut image = Image::filled(200, 60, 0u8);
+        for y in 0..60 {
+            image.row_mut(y).iter_mut().enumerate().for_each(|(x, v)| *v = (40 + 10 * (x / 8 % 3)) as u8);
+            if (10..50).contains(&y) {
+                image.row_mut(y)[10 + 3 * k..30 + 3 * k].fill(250);
+            }
+        }
+        image
+    }
+
+    fn window(k: usize) -> Rectangle {
+        Rectangle { left: 10 + 3 * k, top: 10, right: 29 + 3 * k, bottom: 49 }
+    }
+
+    #[test]
+    fn behind_the_person_is_the_empty_scene() {
+        for frames in [8, 50] {
+            let mut backdrop = Backdrop::default();
+            (0..frames).for_each(|k| backdrop.push(k, &frame(k)));
+            let pieces: Vec<Piece> = (0..frames).map(|k| Piece::new(k, &frame(k), window(k))).collect();
+            let views = backdrop.views(pieces.iter());
+            assert_eq!(views.len(), frames);
+            let mut wrong = 0;
+            for (view, piece) in views.iter().zip(&pieces) {
+                assert_eq!((view.corner, &view.grey), ([piece.kept.left, piece.kept.top], &piece.grey));
+                for y in 0..view.background.height() {
+                    let expected = |x: usize| (40 + 10 * ((x + piece.kept.left) / 8 % 3)) as u8;
+                    let row = view.background.row(y).iter().enumerate();
+                    wrong += row.filter(|(x, v)| **v != expected(*x)).count();
+                }
+            }
+            // In eight frames the box hardly leaves its place: columns that it always covers stay unknown.
+            assert!(if frames == 50 { wrong == 0 } else { wrong > 0 }, "{frames}: {wrong}");
+        }
+    }
+
+    #[test]
+    fn frames_of_a_long_stream_are_thinned_evenly() {
+        let mut backdrop = Backdrop::default();
+        (0..1000).for_each(|k| backdrop.push(k, &Image::filled(2, 2, 0)));
+        let kept: Vec<usize> = backdrop.frames.iter().map(|f| f.0).collect();
+        assert!((MOST_FRAMES / 2..=MOST_FRAMES).contains(&kept.len()), "{}", kept.len());
+        assert!(kept.windows(2).all(|w| w[1] - w[0] == backdrop.every), "{kept:?}");
+        assert!(*kept.last().unwrap() + backdrop.every >= 1000 && kept[0] == 0);
+    }
+
+    #[test]
+    fn pieces_stay_within_the_image() {
+        let piece = Piece::new(3, &frame(0), Rectangle { left: 0, top: 2, right: 199, bottom: 59 });
+        assert_eq!((piece.kept.left, piece.kept.top, piece.kept.right, piece.kept.bottom), (0, 0, 199, 59));
+        assert!(Backdrop::default().views([].iter()).is_empty());
+    }
+}

@@ -1,0 +1,56 @@
+//! The measured person of a walk.
+
+use crate::result::result;
+use memo_core::model::Body;
+use memo_core::track::fit;
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
+use pyo3::prelude::*;
+use std::collections::HashMap;
+
+result! {
+    /// The measured person of a walk: how well the model fits, and the person's own body and curves.
+    WalkFit |py, fit: &fit::WalkFit| {
+        /// Mean distance of the edges from the outline of the model, pixels.
+        residual_px: f64 = fit.quality.residual_px,
+        /// Height of the person in the middle of the walk, pixels.
+        height_px: f64 = fit.quality.height_px,
+        /// Share of the outline without an edge in the frames.
+        missed: f64 = fit.quality.missed,
+        /// The same of the lines inside the body.
+        missed_inside: f64 = fit.quality.missed_inside,
+        /// The farthest that a length of the body is from its mean over people, standard deviations.
+        worst_length_sd: f64 = fit.quality.worst_length_sd,
+        /// Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm.
+        lengths_m: HashMap<String, f64> = lengths_m(&fit.body),
+        /// The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and
+        /// left; hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured.
+        curves_deg: Py<PyArrayDyn<f64>> = curves_deg(py, fit)?,
+    }
+    |fit| format!("outline within {:.2} px, {:.1} % missed", fit.residual_px, 100.0 * fit.missed)
+}
+
+/// Lengths between the joints, metres.
+fn lengths_m(body: &Body) -> HashMap<String, f64> {
+    let p = &body.proportions;
+    let lengths = [
+        ("ankle_height", p.ankle_height),
+        ("shank", p.knee_height - p.ankle_height),
+        ("thigh", p.hip_height - p.knee_height),
+        ("torso", p.shoulder_height - p.hip_height),
+        ("stature", p.crown_height),
+        ("upper_arm", p.upper_arm),
+        ("forearm", p.forearm),
+    ];
+    lengths.into_iter().map(|(name, share)| (name.to_owned(), share * body.height_m)).collect()
+}
+
+fn curves_deg(py: Python<'_>, fit: &fit::WalkFit) -> PyResult<Py<PyArrayDyn<f64>>> {
+    let seen = |n: usize| fit.frames.iter().any(|f| f.measured[n / 5].angles[n % 5].is_some());
+    let curve = |(n, c): (usize, &Vec<f64>)| {
+        let is_seen = seen(n);
+        c.iter().map(move |x| if is_seen { x.to_degrees() } else { f64::NAN }).collect::<Vec<_>>()
+    };
+    let values: Vec<f64> = fit.curves.iter().enumerate().flat_map(curve).collect();
+    let samples = values.len() / 10;
+    Ok(PyArray1::from_vec(py, values).reshape([2, 5, samples])?.to_dyn().clone().unbind())
+}
