@@ -287,8 +287,8 @@ class WalkFit:
     lengths_m: Final[dict[str, float]]
     """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
     curves_deg: Final[npt.NDArray[np.float64]]
-    """The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and left;
-    hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured."""
+    """The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and
+    left; hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured."""
 
     def __new__(cls, *fields: Any) -> Self: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...

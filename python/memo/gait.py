@@ -42,7 +42,8 @@ DEFINITIONS: dict[str, str] = {
     "stride_length": "Distance covered by the trunk in a cycle, speed times stride time. Measured; interval "
     "with the scale.",
     "step_time": "From the other foot's heel strike to this side's; without a side, half the stride "
-    "time. Measured between the initial contacts of the fitted feet, as in events.csv. Interval: scatter over the steps (Student's t, with a prior scatter of 3 % "
+    "time. Measured between the initial contacts of the fitted feet, as in events.csv. Interval: scatter "
+    "over the steps (Student's t, with a prior scatter of 3 % "
     "that counts as 4 steps), and the asymmetry of people's heel strikes relative to the average gait.",
     "step_length": "Distance covered by the trunk from the other foot's heel strike to this side's; without "
     "a side, half the stride length. The model's feet land equally far ahead of the trunk, so a difference "
@@ -53,14 +54,14 @@ DEFINITIONS: dict[str, str] = {
     "step_length_symmetry": "100 (right - left) / mean of the two step lengths; 0 is symmetric, positive "
     "when the right step is longer. Only the part of a difference that affects the timing of the steps is "
     "measured.",
-    "stance": "Share of the cycle in which a foot is on the ground: from the initial contact to the toe-off of the "
-    "fitted foot, both sides together. Interval: scatter over the steps, and 15 ms of error that contacts have in "
-    "common.",
+    "stance": "Share of the cycle in which a foot is on the ground: from the initial contact to the toe-off "
+    "of the fitted foot, both sides together. Interval: scatter over the steps, and 15 ms of error that "
+    "contacts have in common.",
     "swing": "Share of the cycle in which a foot is off the ground, 100 - stance.",
     "single_support": "Share of the cycle in which one foot alone is on the ground, 100 - double_support.",
     "double_support": "Share of the cycle in which both feet are on the ground, 2 stance - 100.",
-    "hip_range": "Range of the thigh's angle against the vertical over the walk, at least one cycle, degrees.",
-    "knee_range": "Range of the knee's flexion over the walk, at least one cycle, degrees.",
+    "hip_range": "Range of the thigh's angle against the vertical over at least one cycle, degrees.",
+    "knee_range": "Range of the knee's flexion over at least one cycle, degrees.",
     "knee_peak": "Largest flexion of the knee, degrees.",
 }
 """Definition of every parameter: what it is, whether it is measured, and what its interval covers."""

@@ -37,7 +37,7 @@ __all__ = ["SCHEMA", "RunError", "Source", "contours_of_run", "read_run", "write
 
 NAME = "run.json"
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the files in the folder of a run; docs/reference/files.md says what changed with each."""
 
 

@@ -472,7 +472,7 @@ def _fit(walk: _memo.Walk | StoredWalk) -> dict[str, Any]:
 
 
 def _fits_well(fit: _memo.WalkFit) -> bool:
-    """Limits between fits with errors of a few degrees and fits in a wrong place, on drawn walks of nine people."""
+    """Limits between fits with errors of a few degrees and fits in a wrong place, on drawn walks."""
     return fit.missed < 0.1 and fit.residual_px < 0.007 * fit.height_px and fit.worst_length_sd < 3
 
 

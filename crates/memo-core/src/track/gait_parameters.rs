@@ -393,8 +393,11 @@ fn half_slope(points: &[(f64, f64)], steps: f64) -> f64 {
     Z * sd * 12f64.sqrt() / (duration_s * steps.max(1.0).sqrt())
 }
 
+/// Times and values.
+type OverTime = Vec<(f64, f64)>;
+
 /// Time and phase, and time and place, of each frame of the fit, or else of each measured frame of the tracker.
-fn measured(walk: &TrackedWalk) -> (Vec<(f64, f64)>, Vec<(f64, f64)>) {
+fn measured(walk: &TrackedWalk) -> (OverTime, OverTime) {
     let steps = walk.steps();
     match walk.fitted() {
         Some(fit) => {

@@ -436,13 +436,13 @@ impl<'a> Problem<'a> {
         arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), -excess, self.options.height_sd.powi(-2));
         let joint_of = |unknown: usize| (unknown - FRAME_ANGLES) % JOINTS;
         for (k, frame) in unknowns.frames.iter().enumerate() {
-            for unknown in FRAME_ANGLES..FRAME {
+            for (unknown, value) in frame.iter().enumerate().skip(FRAME_ANGLES) {
                 let sd = match (free, joint_of(unknown)) {
                     (false, _) => HELD_SD_RAD,
                     (true, 0 | 1) => self.options.frame_sd_rad,
                     (true, _) => 2.0 * self.options.frame_sd_rad,
                 };
-                arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -frame[unknown], sd.powi(-2));
+                arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -value, sd.powi(-2));
             }
         }
         // Velocities change as in a random walk: their change between two intervals has a variance in proportion to

@@ -226,13 +226,13 @@ pub fn angles(gait: &Gait, whole: &[f64], frame: &[f64; FRAME]) -> [f64; 2 * JOI
     for (side, (later, sign)) in SIDES.into_iter().enumerate() {
         let phase = frame[FRAME_PHASE] + later;
         let ([terms_at, _], average) = (fourier(phase), average(gait, phase));
-        for joint in 0..JOINTS {
+        for (joint, average) in average.into_iter().enumerate() {
             let (common, count) = (mean_of(joint), terms(joint));
             let series: f64 = (0..count)
                 .map(|n| terms_at[n] * (whole[common + n] + sign * whole[common + count + n]))
                 .sum();
             let at = side * JOINTS + joint;
-            angles[at] = average[joint] + series + frame[FRAME_ANGLES + at];
+            angles[at] = average + series + frame[FRAME_ANGLES + at];
         }
     }
     angles
@@ -276,9 +276,8 @@ pub fn slopes(gait: &Gait, whole: &[f64], frame: &[f64; FRAME], slopes: &mut Vec
     for (side, (later, sign)) in SIDES.into_iter().enumerate() {
         let phase = frame[FRAME_PHASE] + later;
         let ([terms_at, rates_at], average) = (fourier(phase), average_slope(gait, phase));
-        for joint in 0..JOINTS {
+        for (joint, mut rate) in average.into_iter().enumerate() {
             let (common, count, at) = (mean_of(joint), terms(joint), side * JOINTS + joint);
-            let mut rate = average[joint];
             for n in 0..count {
                 slopes.push((ANGLES + at, common + n, terms_at[n]));
                 slopes.push((ANGLES + at, common + count + n, sign * terms_at[n]));
