@@ -355,7 +355,7 @@ def memo_lengths() -> dict[str, float]:
 def memo_tree(rays: Any, neck: Vector, lengths: dict[str, float]) -> Any:
     from memo import _memo
 
-    return _memo.posture_tree(rays, neck, lengths, strength="paper")
+    return _memo.posture_tree(rays, neck, lengths, rules="physical", strength="paper")
 
 
 def memo_postures(camera: Any, pixels: Any, distance_m: float, **options: Any) -> dict[str, Any]:

@@ -740,6 +740,11 @@ def _(d):
     return _memo.recorded_contours(d.choice(TRACKER, TRACKER), record(d), centres, d.numbers(0, 1, count))
 
 
+@case("defaults")
+def _(d):
+    return _memo.defaults(d.choice("edge_segments", "planar", "pointlight", "posture", "walker_motion"))
+
+
 @case("change_mask")
 def _(d):
     a, b = d.frames(2)

@@ -492,7 +492,7 @@ def test_mistakes_in_python(scene, options, reason):
         ({"distance_m": "a"}, "distance_m must be a number or one per frame, got a"),
         ({"distance_m": [[4.0], [5.0, 6.0]]}, "distance_m must be a number or one"),
         ({"distance_m": 4.0, "distance_sd_m": "b"}, "distance_sd_m must be a number, got b"),
-        ({"rules": None}, "rules must be a name, one of physical"),
+        ({"rules": 1}, "rules must be a name, one of physical"),
         ({"noise_px": "much"}, "noise_px must be a number, got much"),
         ({"height_m": [1.8]}, "height_m must be a number"),
         ({"moving_direction": "north"}, "moving_direction must be"),

@@ -44,6 +44,7 @@ __all__ = [
     "calibrate_points",
     "calibrate_walker",
     "change_mask",
+    "defaults",
     "edge_segments",
     "follow_person",
     "gait_curves",
@@ -97,6 +98,7 @@ class InternalError(RuntimeError):
     """A bug in memo, not a mistake in the input; standard error gives its place."""
 
 def _panic(message: str, way: str) -> None: ...
+def defaults(function: str) -> dict[str, Any]: ...
 
 @final
 class Camera:
@@ -323,7 +325,7 @@ def change_mask(
 ) -> npt.NDArray[np.bool_]: ...
 def moving_regions(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]: ...
 def silhouettes(
-    frames: Sequence[npt.NDArray[np.uint8]] | npt.NDArray[np.uint8], threshold: float = 25.0
+    frames: Sequence[npt.NDArray[np.uint8]] | npt.NDArray[np.uint8], threshold: float | None = None
 ) -> list[npt.NDArray[np.bool_]]: ...
 def similarity(
     lines: npt.NDArray[np.float64],
@@ -338,10 +340,10 @@ def edge_segments(
     frame: npt.NDArray[np.uint8],
     mask: npt.NDArray[np.bool_] | None = None,
     *,
-    sigma_px: float = 1.0,
-    low: float = 5.0,
-    high: float = 12.0,
-    min_length_px: float = 8.0,
+    sigma_px: float | None = None,
+    low: float | None = None,
+    high: float | None = None,
+    min_length_px: float | None = None,
 ) -> npt.NDArray[np.float64]: ...
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
@@ -370,42 +372,42 @@ class PointLightDisplay:
     times_s: Final[npt.NDArray[np.float64]]
 
 def walker_motion(
-    frames: int = 60,
+    frames: int | None = None,
     *,
-    rate_hz: float = 60.0,
-    speed_mps: float = 1.3,
-    heading_deg: float = 0.0,
-    phase: float = 0.0,
-    height_m: float = 1.75,
+    rate_hz: float | None = None,
+    speed_mps: float | None = None,
+    heading_deg: float | None = None,
+    phase: float | None = None,
+    height_m: float | None = None,
 ) -> WalkerMotion: ...
 def pointlight(
     positions: npt.NDArray[np.float64],
     times_s: Sequence[float] | npt.NDArray[np.float64],
     names: Sequence[str],
     *,
-    azimuth_deg: float = 0.0,
-    elevation_deg: float = 0.0,
-    px_per_m: float = 200.0,
+    azimuth_deg: float | None = None,
+    elevation_deg: float | None = None,
+    px_per_m: float | None = None,
     camera: Camera | None = None,
-    locomotion: str = "treadmill",
+    locomotion: str | None = None,
     inverted: bool = False,
     mirrored: bool = False,
     reversed: bool = False,
     scramble_position: bool = False,
     scramble_phase: str | None = None,
     period_s: float | None = None,
-    max_shift_s: float = 0.5,
+    max_shift_s: float | None = None,
     lifetime_frames: int | None = None,
-    life_dots: int = 8,
-    life_sites: str = "limbs",
+    life_dots: int | None = None,
+    life_sites: str | None = None,
     limbs: Sequence[tuple[int, int]] | None = None,
     synchronous: bool = False,
-    noise_dots: int = 0,
-    noise_kind: str = "scrambled",
-    noise_area: float = 1.5,
-    noise_speed_px_s: float = 60.0,
-    noise_sd_px: float = 0.0,
-    seed: int = 0,
+    noise_dots: int | None = None,
+    noise_kind: str | None = None,
+    noise_area: float | None = None,
+    noise_speed_px_s: float | None = None,
+    noise_sd_px: float | None = None,
+    seed: int | None = None,
 ) -> PointLightDisplay: ...
 
 @final
@@ -466,13 +468,13 @@ class PlanarInterpretation:
 def planar(
     tracks: npt.NDArray[np.float64],
     times_s: Sequence[float] | npt.NDArray[np.float64],
-    noise_px: float = 0.0,
+    noise_px: float | None = None,
     *,
-    window_s: float = 1.2,
+    window_s: float | None = None,
     size_px: float | None = None,
     carry: bool = False,
-    false_target_rate: float = 0.01,
-    max_tilt_deg: float = 80.0,
+    false_target_rate: float | None = None,
+    max_tilt_deg: float | None = None,
     names: Sequence[str] | None = None,
     scales: Sequence[float] | npt.NDArray[np.float64] | None = None,
     focal_px: float | None = None,
@@ -572,16 +574,16 @@ def posture(
     *,
     lengths: dict[str, float] | None = None,
     height_m: float | None = None,
-    noise_px: float = 2.0,
-    rules: str = "walking",
-    strength: str = "measured",
-    anchor: str = "auto",
+    noise_px: float | None = None,
+    rules: str | None = None,
+    strength: str | None = None,
+    anchor: str | None = None,
     distance_m: float | Sequence[float] | npt.NDArray[np.float64] | None = None,
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
     head_points: npt.NDArray[np.float64] | None = None,
-    group_m: float = 0.10,
-    max_groups: int = 64,
+    group_m: float | None = None,
+    max_groups: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> PostureSequence: ...
 def posture_tree(
@@ -589,8 +591,8 @@ def posture_tree(
     neck: Sequence[float],
     lengths: dict[str, float],
     *,
-    rules: str = "physical",
-    strength: str = "measured",
+    rules: str | None = None,
+    strength: str | None = None,
     noise_rad: float = 0.0,
 ) -> npt.NDArray[np.float64]: ...
 
@@ -782,7 +784,7 @@ class WalkSimilarity:
 def image_stages(
     before: npt.NDArray[np.uint8], frame: npt.NDArray[np.uint8], after: npt.NDArray[np.uint8]
 ) -> ImageStages | None: ...
-def search_windows(lines: npt.NDArray[np.float64], c_r: float = 0.25) -> npt.NDArray[np.float64]: ...
+def search_windows(lines: npt.NDArray[np.float64], c_r: float = ...) -> npt.NDArray[np.float64]: ...
 def walk_filtered(walk: Walk) -> npt.NDArray[np.float64]: ...
 def walk_lines(
     walk: Walk, row: int, phase: float | None = None

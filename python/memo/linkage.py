@@ -177,18 +177,21 @@ class PlanarFigure:
 def planar(
     tracks: Array,
     times_s: Sequence[float] | Array,
-    noise_px: float = 0.0,
+    noise_px: float | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> PlanarFigure:
     """Links unnamed tracks (T, K, 2) into limbs that swing in planes.
 
-    `noise_px`: standard deviation of each coordinate. Options: `window_s` (1.2), `size_px` (size of the
-    figure, by default that of the points), `carry` (lengths through windows in which the figure is lost),
-    `false_target_rate` (0.01 or 0.05), `max_tilt_deg` (80), `names` of the points if they are joints
-    (`RKN`, `right_knee`): joint limits then tell limbs from their mirror images; `scales` (T,) of the frames;
-    `focal_px`, to report the error due to perspective. `progress` is called with the windows done and in all.
+    `noise_px`: standard deviation of each coordinate. Options: `window_s`, length of the windows; `size_px`
+    of the figure, by default that of the points; `carry`: lengths through windows in which the figure is
+    lost; `false_target_rate`, 0.01 or 0.05; `max_tilt_deg` of a plane from the image; `names` of the points
+    if they are joints (`RKN`, `right_knee`): joint limits then tell limbs from their mirror images; `scales`
+    (T,) of the frames; `focal_px`, to report the error due to perspective. `progress` is called with the
+    windows done and in all.
+
+    Defaults: `noise_px` 0.5, `window_s` 1.2, `false_target_rate` 0.01, `max_tilt_deg` 80.
     """
     tracks = np.ascontiguousarray(tracks, dtype=np.float64)
     at_s = np.asarray(times_s, dtype=np.float64)

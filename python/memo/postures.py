@@ -287,16 +287,16 @@ def posture(
     lengths: Mapping[str, float] | str | PathLike[str] | None = None,
     height_m: float | None = None,
     *,
-    rules: str = "walking",
-    strength: str = "measured",
-    anchor: str = "auto",
+    rules: str | None = None,
+    strength: str | None = None,
+    anchor: str | None = None,
     distance_m: float | Sequence[float] | Array | None = None,
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
     unswap: bool = True,
-    noise_px: float = 2.0,
-    group_m: float = 0.10,
-    max_groups: int = 64,
+    noise_px: float | None = None,
+    group_m: float | None = None,
+    max_groups: int | None = None,
     fps: float | None = None,
     layout: str | None = None,
     person: int | None = None,
@@ -314,19 +314,23 @@ def posture(
     walking); `strength`: "measured" limits or those of the "paper".
     `anchor`: source of the distance of the neck, "auto", "ground", "trunk", "extent", "head" or
     "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN if unknown, with its standard
-    deviation `distance_sd_m` (0.05).
+    deviation `distance_sd_m`.
     `moving_direction`: (3,) world, direction of walking; by default taken from the motion.
     `unswap`: first exchange right and left where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures form one group if no joint differs by
     more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
     `progress` is called at intervals with the work done and the total.
 
+    Defaults: `rules` "walking", `strength` "measured", `anchor` "auto", `distance_sd_m` 0.05, `noise_px` 2,
+    `group_m` 0.1, `max_groups` 64.
+
     Raises ValueError or TypeError, with one line, for unusable input.
     """
     _check_known("rules", rules, RULES)
     _check_known("strength", strength, STRENGTHS)
     _check_known("anchor", anchor, (*ANCHORS, "given"))
-    max_groups = _checked_count("max_groups", max_groups)
+    if max_groups is not None:
+        max_groups = _checked_count("max_groups", max_groups)
     for name, value in (("height_m", height_m), ("noise_px", noise_px), ("group_m", group_m)):
         if value is not None:
             _checked_numbers(name, value, dimensions=0)
@@ -337,7 +341,7 @@ def posture(
         raise ValueError("give either lengths or a height")
     if distance_m is None and anchor == "given":
         raise ValueError("the anchor 'given' needs a distance")
-    if distance_m is not None and anchor not in ("auto", "given"):
+    if distance_m is not None and anchor not in (None, "auto", "given"):
         raise ValueError(f"a distance is given: leave the anchor {anchor} out")
     if isinstance(lengths, str | PathLike):
         lengths = read_lengths(lengths)
@@ -361,7 +365,7 @@ def posture(
         lengths=lengths,
         height_m=height_m,
         noise_px=noise_px,
-        rules=rules.replace("-", "_"),
+        rules=rules and rules.replace("-", "_"),
         strength=strength,
         anchor="given" if distance_m is not None else anchor,
         distance_m=distance_m,
@@ -378,7 +382,9 @@ def posture(
     return postures
 
 
-def _check_known(what: str, value: str, known: Sequence[str]) -> None:
+def _check_known(what: str, value: str | None, known: Sequence[str]) -> None:
+    if value is None:
+        return
     if not isinstance(value, str):
         raise TypeError(f"{what} must be a name, one of {', '.join(known)}, got {_shown(value)}")
     if value.replace("_", "-") not in known:

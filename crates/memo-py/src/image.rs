@@ -1,16 +1,19 @@
 //! Image evidence: changed pixels, background, edges, velocities.
 
 use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_from_rows};
+use crate::defaults::dict;
 use crate::error::value_error;
 use crate::wait::interruptible;
 use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
-    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, Image, LineOptions, clean,
-    edge_segments as core_edge_segments, fill_holes, group_regions, pair_changes, regions,
+    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, Image, LineOptions,
+    SILHOUETTE_THRESHOLD, clean, edge_segments as core_edge_segments, fill_holes, group_regions,
+    pair_changes, regions,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// Mask of pixels that changed between two frames (eq. 1); `threshold` in grey levels, by default from the noise.
 #[pyfunction]
@@ -45,14 +48,15 @@ pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResul
 }
 
 /// Silhouettes of moving regions for a static camera, for a clip of frames (T, H, W): eq. (1) against the
-/// temporal median, restricted to pixels that differ from it by `threshold` grey levels.
+/// temporal median, restricted to pixels that differ from it by `threshold` grey levels. Defaults: `threshold` 25.
 #[pyfunction]
-#[pyo3(signature = (frames, threshold=25.0))]
+#[pyo3(signature = (frames, threshold=None))]
 pub fn silhouettes<'py>(
     py: Python<'py>,
     frames: Vec<Bound<'py, PyAny>>,
-    threshold: f64,
+    threshold: Option<f64>,
 ) -> PyResult<Vec<Bound<'py, PyArray2<bool>>>> {
+    let threshold = threshold.unwrap_or(SILHOUETTE_THRESHOLD);
     let images =
         frames.iter().map(|frame| frame_from_numpy(frame)?.into_image()).collect::<PyResult<Vec<_>>>()?;
     let found = move || core_silhouettes(&images.iter().map(Image::as_frame).collect::<Vec<_>>(), threshold);
@@ -61,21 +65,27 @@ pub fn silhouettes<'py>(
 }
 
 /// Straight edges of a frame: (n, 6) of u0, v0, u1, v1, mean gradient, residual RMS.
+/// Defaults: `sigma_px` 1, `low` 5, `high` 12, `min_length_px` 8.
 #[pyfunction]
-#[pyo3(signature = (frame, mask=None, *, sigma_px=1.0, low=5.0, high=12.0, min_length_px=8.0))]
+#[pyo3(signature = (frame, mask=None, *, sigma_px=None, low=None, high=None, min_length_px=None))]
 pub fn edge_segments<'py>(
     py: Python<'py>,
     frame: &Bound<'py, PyAny>,
     mask: Option<&Bound<'py, PyAny>>,
-    sigma_px: f32,
-    low: f32,
-    high: f32,
-    min_length_px: f64,
+    sigma_px: Option<f32>,
+    low: Option<f32>,
+    high: Option<f32>,
+    min_length_px: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let image = frame_from_numpy(frame)?.into_image()?;
     let mask = mask.map(mask_from_numpy).transpose()?;
-    let edge = EdgeOptions { sigma_px, low, high };
-    let line = LineOptions { min_length_px, ..LineOptions::default() };
+    let (edge, line) = (EdgeOptions::default(), LineOptions::default());
+    let edge = EdgeOptions {
+        sigma_px: sigma_px.unwrap_or(edge.sigma_px),
+        low: low.unwrap_or(edge.low),
+        high: high.unwrap_or(edge.high),
+    };
+    let line = LineOptions { min_length_px: min_length_px.unwrap_or(line.min_length_px), ..line };
     let segments = move || {
         let domain = EdgeDomain { mask: mask.as_ref(), window: None };
         core_edge_segments(&image.as_frame(), &domain, &edge, &line)
@@ -117,6 +127,20 @@ pub fn velocity_field<'py>(
     let image = |data| memo_core::image::Image::from_vec(width, height, data).map_err(value_error);
     let [u, v] = components;
     Ok((numpy_from_image(py, image(u)?)?, numpy_from_image(py, image(v)?)?))
+}
+
+pub fn silhouette_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    dict!(py, { threshold: SILHOUETTE_THRESHOLD, })
+}
+
+pub fn edge_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let EdgeOptions { sigma_px, low, high } = EdgeOptions::default();
+    dict!(py, {
+        sigma_px: sigma_px,
+        low: low,
+        high: high,
+        min_length_px: LineOptions::default().min_length_px,
+    })
 }
 
 fn not_negative(name: &str, value: f64) -> PyResult<f64> {

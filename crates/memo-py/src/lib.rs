@@ -4,6 +4,7 @@
 mod array;
 mod calibrate;
 mod camera;
+mod defaults;
 mod error;
 mod explain;
 mod fit;
@@ -34,6 +35,8 @@ mod _memo {
     };
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
+    #[pymodule_export]
+    use super::defaults::defaults;
     #[pymodule_export]
     use super::explain::{PyExplainer, recorded_contours};
     #[pymodule_export]

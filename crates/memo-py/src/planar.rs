@@ -1,6 +1,7 @@
 //! Figures from planar motion.
 
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat, rows_from_numpy};
+use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::{objects, result};
 use crate::wait::watched;
@@ -15,6 +16,7 @@ use memo_core::wording::counted;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::sync::Arc;
 
 result! {
@@ -150,38 +152,38 @@ pub fn planar_hinges<'py>(
 /// length in pixels. `progress` is called with the number of windows done and the number of all windows.
 #[pyfunction]
 #[pyo3(signature = (
-    tracks, times_s, noise_px=0.0, *, window_s=1.2, size_px=None, carry=false, false_target_rate=0.01,
-    max_tilt_deg=80.0, names=None, scales=None, focal_px=None, progress=None
+    tracks, times_s, noise_px=None, *, window_s=None, size_px=None, carry=false, false_target_rate=None,
+    max_tilt_deg=None, names=None, scales=None, focal_px=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "keyword options")]
 pub fn planar(
     py: Python<'_>,
     tracks: &Bound<'_, PyAny>,
     times_s: Vec<f64>,
-    noise_px: f64,
-    window_s: f64,
+    noise_px: Option<f64>,
+    window_s: Option<f64>,
     size_px: Option<f64>,
     carry: bool,
-    false_target_rate: f64,
-    max_tilt_deg: f64,
+    false_target_rate: Option<f64>,
+    max_tilt_deg: Option<f64>,
     names: Option<Vec<String>>,
     scales: Option<Vec<f64>>,
     focal_px: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PlanarInterpretation> {
     let (points, frames, count) = motion_from_numpy::<2>(tracks)?;
-    let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
-    let Some(rate) = rates.into_iter().find(|rate| rate.fraction() == false_target_rate) else {
-        let message = format!("false_target_rate must be 0.01 or 0.05, got {false_target_rate}");
-        return Err(PyValueError::new_err(message));
-    };
+    let usual = FigureOptions::default();
     let options = FigureOptions {
-        fit: FitOptions { noise_sd: noise_px, max_tilt_deg, ..FigureOptions::default().fit },
-        evidence: EvidenceOptions { rate, ..EvidenceOptions::default() },
+        fit: FitOptions {
+            noise_sd: noise_px.unwrap_or(usual.fit.noise_sd),
+            max_tilt_deg: max_tilt_deg.unwrap_or(usual.fit.max_tilt_deg),
+            ..usual.fit
+        },
+        evidence: false_target_rate.map_or(Ok(usual.evidence), evidence_at)?,
         size: size_px,
-        window_s,
+        window_s: window_s.unwrap_or(usual.window_s),
         carries_structure: carry,
-        ..FigureOptions::default()
+        ..usual
     };
     let mut tracks: Vec<Vec<DVec2>> =
         (0..count).map(|k| (0..frames).map(|t| DVec2::from(points[t * count + k])).collect()).collect();
@@ -198,6 +200,26 @@ pub fn planar(
     };
     let found = watched(py, progress, interpret)?.map_err(value_error)?;
     PlanarInterpretation::of(py, found, &tracks, focal_px)
+}
+
+pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let usual = FigureOptions::default();
+    dict!(py, {
+        noise_px: usual.fit.noise_sd,
+        window_s: usual.window_s,
+        carry: usual.carries_structure,
+        false_target_rate: usual.evidence.rate.fraction(),
+        max_tilt_deg: usual.fit.max_tilt_deg,
+    })
+}
+
+fn evidence_at(false_target_rate: f64) -> PyResult<EvidenceOptions> {
+    let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
+    let Some(rate) = rates.into_iter().find(|rate| rate.fraction() == false_target_rate) else {
+        let message = format!("false_target_rate must be 0.01 or 0.05, got {false_target_rate}");
+        return Err(PyValueError::new_err(message));
+    };
+    Ok(EvidenceOptions { rate, ..FigureOptions::default().evidence })
 }
 
 fn status(window: &FigureWindow, tracks: &[Vec<DVec2>]) -> &'static str {

@@ -2,18 +2,20 @@
 
 use crate::array::{motion_from_numpy, numpy_from_column, numpy_from_flat};
 use crate::camera::PyCamera;
+use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::result;
 use glam::DVec3;
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::synth::{
     self, DotSource, LifeSites, LimitedLife, Locomotion, Motion, NoiseDots, NoiseKind, PhaseScramble,
-    PointLightOptions, View, WalkOptions, point_light_display, sampled_walk,
+    PointLightOptions, View, WALKER_HEIGHT_M, WalkOptions, point_light_display, sampled_walk,
 };
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 result! {
     /// Motion of the body model.
@@ -59,32 +61,51 @@ result! {
 }
 
 /// Motion of the body model walking through the origin.
+///
+/// Defaults: `frames` 60, `rate_hz` 60, `speed_mps` 1.3, `heading_deg` 0, `phase` 0, `height_m` 1.75.
 #[pyfunction]
-#[pyo3(signature = (frames=60, *, rate_hz=60.0, speed_mps=1.3, heading_deg=0.0, phase=0.0, height_m=1.75))]
+#[pyo3(signature = (frames=None, *, rate_hz=None, speed_mps=None, heading_deg=None, phase=None, height_m=None))]
 pub fn walker_motion(
     py: Python<'_>,
-    frames: usize,
-    rate_hz: f64,
-    speed_mps: f64,
-    heading_deg: f64,
-    phase: f64,
-    height_m: f64,
+    frames: Option<usize>,
+    rate_hz: Option<f64>,
+    speed_mps: Option<f64>,
+    heading_deg: Option<f64>,
+    phase: Option<f64>,
+    height_m: Option<f64>,
 ) -> PyResult<WalkerMotion> {
-    let body = Body::from_height(height_m).map_err(value_error)?;
+    let body = Body::from_height(height_m.unwrap_or(WALKER_HEIGHT_M)).map_err(value_error)?;
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let options = WalkOptions { frames, rate_hz, speed_mps, heading_rad: heading_deg.to_radians(), phase };
+    let usual = WalkOptions::default();
+    let options = WalkOptions {
+        frames: frames.unwrap_or(usual.frames),
+        rate_hz: rate_hz.unwrap_or(usual.rate_hz),
+        speed_mps: speed_mps.unwrap_or(usual.speed_mps),
+        heading_rad: heading_deg.map_or(usual.heading_rad, f64::to_radians),
+        phase: phase.unwrap_or(usual.phase),
+    };
     let motion = py.detach(|| sampled_walk(&walker, &options)).map_err(value_error)?;
     WalkerMotion::of(py, motion, options.cycle_s(&walker))
 }
 
+const LOCOMOTIONS: [(&str, Locomotion); 3] = [
+    ("treadmill", Locomotion::Treadmill),
+    ("translating", Locomotion::Translating),
+    ("pelvis", Locomotion::PelvisFixed),
+];
+
 /// A point-light display of points over time (T, K, 3), world metres, Z up, NaN if unknown.
+///
+/// Defaults: `azimuth_deg` 0, `elevation_deg` 0, `px_per_m` 200, `locomotion` "treadmill", `max_shift_s` 0.5,
+/// `life_dots` 8, `life_sites` "limbs", `noise_dots` 0, `noise_kind` "scrambled", `noise_area` 1.5,
+/// `noise_speed_px_s` 60, `noise_sd_px` 0, `seed` 0.
 #[pyfunction]
 #[pyo3(signature = (
-    positions, times_s, names, *, azimuth_deg=0.0, elevation_deg=0.0, px_per_m=200.0, camera=None,
-    locomotion="treadmill", inverted=false, mirrored=false, reversed=false, scramble_position=false,
-    scramble_phase=None, period_s=None, max_shift_s=0.5, lifetime_frames=None, life_dots=8,
-    life_sites="limbs", limbs=None, synchronous=false, noise_dots=0, noise_kind="scrambled", noise_area=1.5,
-    noise_speed_px_s=60.0, noise_sd_px=0.0, seed=0
+    positions, times_s, names, *, azimuth_deg=None, elevation_deg=None, px_per_m=None, camera=None,
+    locomotion=None, inverted=false, mirrored=false, reversed=false, scramble_position=false,
+    scramble_phase=None, period_s=None, max_shift_s=None, lifetime_frames=None, life_dots=None,
+    life_sites=None, limbs=None, synchronous=false, noise_dots=None, noise_kind=None, noise_area=None,
+    noise_speed_px_s=None, noise_sd_px=None, seed=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "each is one of the usual conditions of a display")]
 pub fn pointlight(
@@ -92,30 +113,53 @@ pub fn pointlight(
     positions: &Bound<'_, PyAny>,
     times_s: Vec<f64>,
     names: Vec<String>,
-    azimuth_deg: f64,
-    elevation_deg: f64,
-    px_per_m: f64,
+    azimuth_deg: Option<f64>,
+    elevation_deg: Option<f64>,
+    px_per_m: Option<f64>,
     camera: Option<PyCamera>,
-    locomotion: &str,
+    locomotion: Option<&str>,
     inverted: bool,
     mirrored: bool,
     reversed: bool,
     scramble_position: bool,
     scramble_phase: Option<&str>,
     period_s: Option<f64>,
-    max_shift_s: f64,
+    max_shift_s: Option<f64>,
     lifetime_frames: Option<usize>,
-    life_dots: usize,
-    life_sites: &str,
+    life_dots: Option<usize>,
+    life_sites: Option<&str>,
     limbs: Option<Vec<[usize; 2]>>,
     synchronous: bool,
-    noise_dots: usize,
-    noise_kind: &str,
-    noise_area: f64,
-    noise_speed_px_s: f64,
-    noise_sd_px: f64,
-    seed: u64,
+    noise_dots: Option<usize>,
+    noise_kind: Option<&str>,
+    noise_area: Option<f64>,
+    noise_speed_px_s: Option<f64>,
+    noise_sd_px: Option<f64>,
+    seed: Option<u64>,
 ) -> PyResult<PointLightDisplay> {
+    let motion = motion_of(positions, times_s, names)?;
+    let usual = PointLightOptions::default();
+    let parallel = parallel(&usual.view, azimuth_deg, elevation_deg, px_per_m);
+    let locomotion = locomotion.map(|name| chosen("locomotion", name, LOCOMOTIONS)).transpose()?;
+    let life = |frames| limited_life(frames, life_dots, life_sites, limbs, synchronous);
+    let options = PointLightOptions {
+        seed: seed.unwrap_or(usual.seed),
+        view: camera.map_or(parallel, |camera| View::Perspective(Box::new(camera.0))),
+        locomotion: locomotion.unwrap_or(usual.locomotion),
+        is_inverted: inverted,
+        is_mirrored: mirrored,
+        is_reversed: reversed,
+        scrambles_position: scramble_position,
+        scrambles_phase: scramble_phase.map(|kind| shifts(kind, period_s, max_shift_s)).transpose()?,
+        limited_life: lifetime_frames.map(life).transpose()?,
+        noise_dots: noise(noise_dots, noise_kind, noise_area, noise_speed_px_s)?,
+        noise_sd_px: noise_sd_px.unwrap_or(usual.noise_sd_px),
+    };
+    let shown = py.detach(|| point_light_display(&motion, &options)).map_err(value_error)?;
+    PointLightDisplay::of(py, shown)
+}
+
+fn motion_of(positions: &Bound<'_, PyAny>, times_s: Vec<f64>, names: Vec<String>) -> PyResult<Motion> {
     let (points, frames, count) = motion_from_numpy::<3>(positions)?;
     if times_s.len() != frames || names.len() != count {
         let given = format!("{} and {}", counted(times_s.len(), "time"), counted(names.len(), "name"));
@@ -123,49 +167,115 @@ pub fn pointlight(
             "positions are ({frames}, {count}, 3), but there are {given}"
         )));
     }
-    let motion =
-        Motion::new(points.into_iter().map(DVec3::from).collect(), names, times_s).map_err(value_error)?;
-    let (azimuth_rad, elevation_rad) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
-    let parallel = View::Orthographic { azimuth_rad, elevation_rad, px_per_m };
-    let limited = |frames| -> PyResult<LimitedLife> {
-        let sites = match life_sites {
-            "limbs" => LifeSites::Limbs(limbs.unwrap_or_default()),
-            "joints" => LifeSites::Joints,
-            other => return Err(unknown("life_sites", other, "limbs, joints")),
-        };
-        Ok(LimitedLife { dots: life_dots, frames, sites, synchronous })
-    };
-    let kind = match noise_kind {
-        "scrambled" => NoiseKind::ScrambledWalker,
-        "linear" => NoiseKind::Linear { speed_px_s: noise_speed_px_s },
-        "flicker" => NoiseKind::Flicker,
-        other => return Err(unknown("noise_kind", other, "scrambled, linear, flicker")),
-    };
-    let options = PointLightOptions {
-        seed,
-        view: camera.map_or(parallel, |camera| View::Perspective(Box::new(camera.0))),
-        locomotion: match locomotion {
-            "treadmill" => Locomotion::Treadmill,
-            "translating" => Locomotion::Translating,
-            "pelvis" => Locomotion::PelvisFixed,
-            other => return Err(unknown("locomotion", other, "treadmill, translating, pelvis")),
+    Motion::new(points.into_iter().map(DVec3::from).collect(), names, times_s).map_err(value_error)
+}
+
+/// A parallel projection; what is not given is as in `usual`.
+fn parallel(usual: &View, azimuth: Option<f64>, elevation: Option<f64>, scale: Option<f64>) -> View {
+    match usual {
+        &View::Orthographic { azimuth_rad, elevation_rad, px_per_m } => View::Orthographic {
+            azimuth_rad: azimuth.map_or(azimuth_rad, f64::to_radians),
+            elevation_rad: elevation.map_or(elevation_rad, f64::to_radians),
+            px_per_m: scale.unwrap_or(px_per_m),
         },
-        is_inverted: inverted,
-        is_mirrored: mirrored,
-        is_reversed: reversed,
-        scrambles_position: scramble_position,
-        scrambles_phase: match scramble_phase {
-            None => None,
-            Some("periodic") => Some(PhaseScramble::Periodic { period_s }),
-            Some("shortened") => Some(PhaseScramble::Shortened { max_shift_s }),
-            Some(other) => return Err(unknown("scramble_phase", other, "periodic, shortened")),
-        },
-        limited_life: lifetime_frames.map(limited).transpose()?,
-        noise_dots: (noise_dots > 0).then_some(NoiseDots { count: noise_dots, kind, area_scale: noise_area }),
-        noise_sd_px,
+        View::Perspective(_) => usual.clone(),
+    }
+}
+
+fn shifts(kind: &str, period_s: Option<f64>, max_shift_s: Option<f64>) -> PyResult<PhaseScramble> {
+    let max_shift_s = max_shift_s.unwrap_or(PhaseScramble::MAX_SHIFT_S);
+    let kinds = [
+        ("periodic", PhaseScramble::Periodic { period_s }),
+        ("shortened", PhaseScramble::Shortened { max_shift_s }),
+    ];
+    chosen("scramble_phase", kind, kinds)
+}
+
+fn limited_life(
+    frames: usize,
+    dots: Option<usize>,
+    sites: Option<&str>,
+    limbs: Option<Vec<[usize; 2]>>,
+    synchronous: bool,
+) -> PyResult<LimitedLife> {
+    let usual = LimitedLife::default();
+    let limbs = LifeSites::Limbs(limbs.unwrap_or_default());
+    let kinds = [("limbs", limbs), ("joints", LifeSites::Joints)];
+    let sites = sites.unwrap_or(sites_name(&usual.sites));
+    let sites = chosen("life_sites", sites, kinds)?;
+    Ok(LimitedLife { dots: dots.unwrap_or(usual.dots), frames, sites, synchronous })
+}
+
+fn sites_name(sites: &LifeSites) -> &'static str {
+    match sites {
+        LifeSites::Limbs(_) => "limbs",
+        LifeSites::Joints => "joints",
+    }
+}
+
+fn noise(
+    count: Option<usize>,
+    kind: Option<&str>,
+    area: Option<f64>,
+    speed_px_s: Option<f64>,
+) -> PyResult<Option<NoiseDots>> {
+    let usual = NoiseDots::default();
+    let kinds = noise_kinds(speed_px_s.unwrap_or(NoiseKind::SPEED_PX_S));
+    let kind = kind.map(|name| chosen("noise_kind", name, kinds)).transpose()?.unwrap_or(usual.kind);
+    let area_scale = area.unwrap_or(usual.area_scale);
+    Ok(count.filter(|&count| count > 0).map(|count| NoiseDots { count, kind, area_scale }))
+}
+
+fn noise_kinds(speed_px_s: f64) -> [(&'static str, NoiseKind); 3] {
+    [
+        ("scrambled", NoiseKind::ScrambledWalker),
+        ("linear", NoiseKind::Linear { speed_px_s }),
+        ("flicker", NoiseKind::Flicker),
+    ]
+}
+
+pub fn walker_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = WalkOptions::default();
+    dict!(py, {
+        frames: frames,
+        rate_hz: rate_hz,
+        speed_mps: speed_mps,
+        heading_deg: heading_rad.to_degrees(),
+        phase: phase,
+        height_m: WALKER_HEIGHT_M,
+    })
+}
+
+pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let (usual, life, noise) = (PointLightOptions::default(), LimitedLife::default(), NoiseDots::default());
+    let [azimuth_rad, elevation_rad, px_per_m] = match usual.view {
+        View::Orthographic { azimuth_rad, elevation_rad, px_per_m } => [azimuth_rad, elevation_rad, px_per_m],
+        View::Perspective(_) => [f64::NAN; 3],
     };
-    let shown = py.detach(|| point_light_display(&motion, &options)).map_err(value_error)?;
-    PointLightDisplay::of(py, shown)
+    dict!(py, {
+        azimuth_deg: azimuth_rad.to_degrees(),
+        elevation_deg: elevation_rad.to_degrees(),
+        px_per_m: px_per_m,
+        locomotion: name_of(&usual.locomotion, &LOCOMOTIONS),
+        inverted: usual.is_inverted,
+        mirrored: usual.is_mirrored,
+        reversed: usual.is_reversed,
+        scramble_position: usual.scrambles_position,
+        max_shift_s: PhaseScramble::MAX_SHIFT_S,
+        life_dots: life.dots,
+        life_sites: sites_name(&life.sites),
+        synchronous: life.synchronous,
+        noise_dots: usual.noise_dots.map_or(0, |noise| noise.count),
+        noise_kind: name_of(&noise.kind, &noise_kinds(NoiseKind::SPEED_PX_S)),
+        noise_area: noise.area_scale,
+        noise_speed_px_s: NoiseKind::SPEED_PX_S,
+        noise_sd_px: usual.noise_sd_px,
+        seed: usual.seed,
+    })
+}
+
+fn name_of<T: PartialEq>(value: &T, all: &[(&'static str, T)]) -> Option<&'static str> {
+    all.iter().find(|(_, other)| other == value).map(|(name, _)| *name)
 }
 
 /// The point or the limb's first end, the limb's second end, and the place along the limb.
@@ -185,6 +295,11 @@ fn per_dot<'py, T: numpy::Element>(
     numpy_from_flat(py, values.collect(), vec![shown.times_s.len(), shown.dots])
 }
 
-fn unknown(option: &str, given: &str, known: &str) -> PyErr {
-    PyValueError::new_err(format!("{option} must be one of {known}; got {given}"))
+/// The value of this name.
+fn chosen<T, const N: usize>(option: &str, given: &str, all: [(&'static str, T); N]) -> PyResult<T> {
+    let known = all.each_ref().map(|(name, _)| *name).join(", ");
+    all.into_iter()
+        .find(|(name, _)| *name == given)
+        .map(|(_, value)| value)
+        .ok_or_else(|| PyValueError::new_err(format!("{option} must be one of {known}; got {given}")))
 }

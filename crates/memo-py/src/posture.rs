@@ -5,6 +5,7 @@ use crate::array::{
     scores_from_numpy, times_from_numpy, track_from_numpy,
 };
 use crate::camera::PyCamera;
+use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::result;
 use crate::wait::watched;
@@ -144,9 +145,9 @@ pub enum Distances {
 /// all.
 #[pyfunction]
 #[pyo3(signature = (
-    times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=2.0, rules="walking",
-    strength="measured", anchor="auto", distance_m=None, distance_sd_m=None, moving_direction=None,
-    head_points=None, group_m=0.10, max_groups=64, progress=None
+    times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=None, rules=None,
+    strength=None, anchor=None, distance_m=None, distance_sd_m=None, moving_direction=None,
+    head_points=None, group_m=None, max_groups=None, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn posture(
@@ -157,16 +158,16 @@ pub fn posture(
     camera: &PyCamera,
     lengths: Option<HashMap<String, f64>>,
     height_m: Option<f64>,
-    noise_px: f64,
-    rules: &str,
-    strength: &str,
-    anchor: &str,
+    noise_px: Option<f64>,
+    rules: Option<&str>,
+    strength: Option<&str>,
+    anchor: Option<&str>,
     distance_m: Option<Distances>,
     distance_sd_m: Option<f64>,
     moving_direction: Option<[f64; 3]>,
     head_points: Option<&Bound<'_, PyAny>>,
-    group_m: f64,
-    max_groups: usize,
+    group_m: Option<f64>,
+    max_groups: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PostureSequence> {
     let times_s = times_from_numpy(times_s)?;
@@ -178,17 +179,18 @@ pub fn posture(
     let weights = per_joint(&scores_from_numpy(weights, &track)?);
     let points_px: Vec<PerJoint<DVec2>> = per_joint(&track.points_px);
     let head_points_px = head_points.map(head_points_from_numpy).transpose()?;
+    let usual = SequenceOptions::default();
     let options = SequenceOptions {
         lengths: lengths.map(lengths_from_names).transpose()?,
         height_m,
-        noise_px,
-        motion: named("rules", rules, Motion::from_name, &Motion::ALL.map(Motion::name))?,
-        strength: named("strength", strength, Strength::from_name, &["measured", "paper"])?,
+        noise_px: noise_px.unwrap_or(usual.noise_px),
+        motion: motion_of(rules)?,
+        strength: strength_of(strength)?,
         anchor: anchor_choice(anchor, distance_m, distance_sd_m)?,
         moving_direction: moving_direction.map(DVec3::from),
-        group_m,
-        max_groups,
-        ..SequenceOptions::default()
+        group_m: group_m.unwrap_or(usual.group_m),
+        max_groups: max_groups.unwrap_or(usual.max_groups),
+        ..usual
     };
     let camera = camera.0.clone();
     let interpret = move |progress: &Progress| {
@@ -208,14 +210,14 @@ pub fn posture(
 /// not seen; the neck's position (3,) is in metres. Returns the surviving postures (N, 14, 3), camera axes,
 /// metres, in depth-first order. Upward and forward directions are those of the trunk.
 #[pyfunction]
-#[pyo3(signature = (rays, neck, lengths, *, rules="physical", strength="measured", noise_rad=0.0))]
+#[pyo3(signature = (rays, neck, lengths, *, rules=None, strength=None, noise_rad=0.0))]
 pub fn posture_tree<'py>(
     py: Python<'py>,
     rays: &Bound<'py, PyAny>,
     neck: [f64; 3],
     lengths: HashMap<String, f64>,
-    rules: &str,
-    strength: &str,
+    rules: Option<&str>,
+    strength: Option<&str>,
     noise_rad: f64,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let rays = points_from_numpy(rays)?;
@@ -224,10 +226,9 @@ pub fn posture_tree<'py>(
     };
     let rays =
         JointRays { ray: PerJoint(ray.map(DVec3::from)), weight: PerJoint([1.0; JOINT_COUNT]), noise_rad };
-    let motion = named("rules", rules, Motion::from_name, &Motion::ALL.map(Motion::name))?;
-    let strength = named("strength", strength, Strength::from_name, &["measured", "paper"])?;
     let view = View::new(rays, DVec3::from(neck), lengths_from_names(lengths)?);
-    let interpret = || view.interpret(&motion.tree(strength)).map(|found| found.figures());
+    let tree = motion_of(rules)?.tree(strength_of(strength)?);
+    let interpret = || view.interpret(&tree).map(|found| found.figures());
     numpy_from_figures(py, &py.detach(interpret).map_err(value_error)?)
 }
 
@@ -237,6 +238,31 @@ fn per_joint<T: Copy>(flat: &[T]) -> Vec<PerJoint<T>> {
 
 fn named<T>(what: &str, name: &str, of: impl Fn(&str) -> Option<T>, all: &[&str]) -> PyResult<T> {
     of(name).ok_or_else(|| PyValueError::new_err(format!("wanted {what} as one of {all:?}; got {name:?}")))
+}
+
+pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let usual = SequenceOptions::default();
+    dict!(py, {
+        rules: usual.motion.name(),
+        strength: usual.strength.name(),
+        anchor: usual.anchor.name(),
+        distance_sd_m: DEFAULT_DISTANCE_SD_M,
+        noise_px: usual.noise_px,
+        group_m: usual.group_m,
+        max_groups: usual.max_groups,
+    })
+}
+
+fn motion_of(rules: Option<&str>) -> PyResult<Motion> {
+    rules.map_or(Ok(SequenceOptions::default().motion), |name| {
+        named("rules", name, Motion::from_name, &Motion::ALL.map(Motion::name))
+    })
+}
+
+fn strength_of(strength: Option<&str>) -> PyResult<Strength> {
+    strength.map_or(Ok(SequenceOptions::default().strength), |name| {
+        named("strength", name, Strength::from_name, &["measured", "paper"])
+    })
 }
 
 /// All 17 lengths from their names.
@@ -256,14 +282,19 @@ fn lengths_from_names(named: HashMap<String, f64>) -> PyResult<SegmentLengths> {
     Ok(lengths)
 }
 
-fn anchor_choice(name: &str, distance_m: Option<Distances>, sd_m: Option<f64>) -> PyResult<AnchorChoice> {
+fn anchor_choice(
+    name: Option<&str>,
+    distance_m: Option<Distances>,
+    sd_m: Option<f64>,
+) -> PyResult<AnchorChoice> {
     let of_source = |name: &str| match name {
         "auto" => Some(AnchorChoice::Auto),
         "given" => Some(AnchorChoice::Given { distance_m: Vec::new(), sd_m: DEFAULT_DISTANCE_SD_M }),
         _ => AnchorSource::from_name(name).map(AnchorChoice::Source),
     };
     let names = ["auto", "ground", "trunk", "extent", "head", "combined", "given"];
-    let choice = named("anchor", name, of_source, &names)?;
+    let usual = Ok(SequenceOptions::default().anchor);
+    let choice = name.map_or(usual, |name| named("anchor", name, of_source, &names))?;
     if let (None, Some(sd_m)) = (&distance_m, sd_m) {
         return Err(PyValueError::new_err(format!("distance_sd_m goes with distance_m; got {sd_m} alone")));
     }
@@ -278,9 +309,10 @@ fn anchor_choice(name: &str, distance_m: Option<Distances>, sd_m: Option<f64>) -
         (AnchorChoice::Given { .. }, None) => {
             Err(PyValueError::new_err("anchor \"given\" wants distance_m, a number or one for each frame"))
         }
-        (_, Some(_)) => {
-            Err(PyValueError::new_err(format!("distance_m goes with anchor \"given\", not with {name:?}")))
-        }
+        (choice, Some(_)) => Err(PyValueError::new_err(format!(
+            "distance_m goes with anchor \"given\", not with {:?}",
+            choice.name()
+        ))),
         (choice, None) => Ok(choice),
     }
 }

@@ -28,6 +28,8 @@ Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 def add_planar(app: "typer.Typer") -> None:
     import typer
 
+    usual = memo._memo.defaults("planar")
+
     @app.command(epilog=EPILOG)
     def planar(
         tracks: Annotated[
@@ -37,8 +39,12 @@ def add_planar(app: "typer.Typer") -> None:
                 help="CSV of NAME_u_px, NAME_v_px and time_s (or --fps), or keypoints as for memo posture.",
             ),
         ],
-        noise_px: Annotated[float, typer.Option(help="Standard deviation of a coordinate, pixels.")] = 0.5,
-        window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = 1.2,
+        noise_px: Annotated[float, typer.Option(help="Standard deviation of a coordinate, pixels.")] = usual[
+            "noise_px"
+        ],
+        window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = usual[
+            "window_s"
+        ],
         fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has no time_s.")] = None,
         carry: Annotated[
             bool, typer.Option("--carry", help="Carry lengths through windows that no plane fits.")

@@ -32,9 +32,13 @@ Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage
 FEWEST_FRAMES = 8
 """`memo planar` does not link fewer dots."""
 
+_SECONDS = 2.4
+
 
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
+
+    usual = memo._memo.defaults("pointlight")
 
     @app.command(epilog=EPILOG)
     def pointlight(
@@ -48,10 +52,14 @@ def add_pointlight(app: "typer.Typer") -> None:
         ] = None,
         azimuth_deg: Annotated[
             float, typer.Option(help="Azimuth of the viewer, degrees; 90 looks from +x.")
-        ] = 0.0,
-        elevation_deg: Annotated[float, typer.Option(help="Elevation of the viewer, degrees.")] = 0.0,
-        px_per_m: Annotated[float, typer.Option(help="Scale, pixels per metre.")] = 200.0,
-        locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = "treadmill",
+        ] = usual["azimuth_deg"],
+        elevation_deg: Annotated[float, typer.Option(help="Elevation of the viewer, degrees.")] = usual[
+            "elevation_deg"
+        ],
+        px_per_m: Annotated[float, typer.Option(help="Scale, pixels per metre.")] = usual["px_per_m"],
+        locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = usual[
+            "locomotion"
+        ],
         inverted: Annotated[bool, typer.Option("--inverted", help="Upside down.")] = False,
         mirrored: Annotated[bool, typer.Option("--mirrored", help="Facing the other way.")] = False,
         reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
@@ -65,21 +73,30 @@ def add_pointlight(app: "typer.Typer") -> None:
             float | None, typer.Option(help="Period of the motion, seconds; default: its whole length.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
-        dots: Annotated[int | None, typer.Option(help="With --lifetime: dots shown; default: 8.")] = None,
-        on: Annotated[
-            str | None, typer.Option(help="With --lifetime: limbs or joints; default: limbs.", metavar="TEXT")
+        dots: Annotated[
+            int | None, typer.Option(help=f"With --lifetime: dots shown; default: {usual['life_dots']}.")
         ] = None,
-        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = 0,
+        on: Annotated[
+            str | None,
+            typer.Option(
+                help=f"With --lifetime: limbs or joints; default: {usual['life_sites']}.", metavar="TEXT"
+            ),
+        ] = None,
+        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = usual["noise_dots"],
         noise_kind: Annotated[
             str | None,
-            typer.Option(help="With --noise-dots: scrambled, linear or flicker; default: scrambled."),
+            typer.Option(
+                help=f"With --noise-dots: scrambled, linear or flicker; default: {usual['noise_kind']}."
+            ),
         ] = None,
-        noise_px: Annotated[float, typer.Option(help="Standard deviation of the dots' noise, pixels.")] = 0.0,
+        noise_px: Annotated[
+            float, typer.Option(help="Standard deviation of the dots' noise, pixels.")
+        ] = usual["noise_sd_px"],
         seconds: Annotated[
-            float | None, typer.Option(help="Without MOTION: duration, seconds; default: 2.4.")
+            float | None, typer.Option(help=f"Without MOTION: duration, seconds; default: {_SECONDS:g}.")
         ] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has none.")] = None,
-        seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = usual["seed"],
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -97,10 +114,10 @@ def add_pointlight(app: "typer.Typer") -> None:
             "scramble_phase": "periodic" if scramble_phase else None,
             "period_s": period,
             "lifetime_frames": lifetime,
-            "life_dots": 8 if dots is None else dots,
-            "life_sites": "limbs" if on is None else on,
+            "life_dots": dots,
+            "life_sites": on,
             "noise_dots": noise_dots,
-            "noise_kind": "scrambled" if noise_kind is None else noise_kind,
+            "noise_kind": noise_kind,
             "noise_sd_px": noise_px,
             "seed": seed,
         }
@@ -116,7 +133,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             for says, is_so in idle.items():
                 if is_so:
                     raise InputError(says)
-            return _pointlight(motion, 2.4 if seconds is None else seconds, fps, options, delivery)
+            return _pointlight(motion, _SECONDS if seconds is None else seconds, fps, options, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -130,7 +147,9 @@ def _pointlight(
     notes: Sequence[str] = ()
     _check_period(options["period_s"], options["scramble_phase"] is not None)
     if motion is None:
-        points = _walker_points(seconds, 60.0 if fps is None else fps)
+        points = _walker_points(
+            seconds, memo._memo.defaults("walker_motion")["rate_hz"] if fps is None else fps
+        )
     else:
         points, notes = _read_points(motion, fps)
     out = delivery.out

@@ -83,6 +83,10 @@ def add_posture(app: "typer.Typer") -> None:
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
     from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
 
+    usual = memo._memo.defaults("posture")
+    usual_rules, usual_strength = Rules(usual["rules"]), Strength(usual["strength"])
+    usual_anchor = Anchor(usual["anchor"])
+
     @app.command(epilog=EPILOG)
     def posture(
         keypoints: KeypointsPath,
@@ -97,17 +101,17 @@ def add_posture(app: "typer.Typer") -> None:
         height: Annotated[
             float | None, typer.Option(help="Without --lengths: height of the person, metres.")
         ] = None,
-        rules: Annotated[Rules, typer.Option(help="Constraints for what the person does.")] = Rules.WALKING,
+        rules: Annotated[Rules, typer.Option(help="Constraints for what the person does.")] = usual_rules,
         strength: Annotated[
             Strength, typer.Option(help="Limits as measured on people, or as printed in the paper.")
-        ] = Strength.MEASURED,
-        anchor: Annotated[Anchor, typer.Option(help="Source of the distance.")] = Anchor.AUTO,
+        ] = usual_strength,
+        anchor: Annotated[Anchor, typer.Option(help="Source of the distance.")] = usual_anchor,
         distance: Annotated[
             float | None, typer.Option(help="Distance of the neck from the camera, metres, if known.")
         ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
-        ] = 2.0,
+        ] = usual["noise_px"],
         fps: Fps = None,
         layout: LayoutName = None,
         person: Person = None,

@@ -30,4 +30,4 @@ pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from
 pub use outline::{Outline, outlines};
 pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};
 pub use runs::Run;
-pub use silhouette::{SilhouetteError, silhouettes};
+pub use silhouette::{SILHOUETTE_THRESHOLD, SilhouetteError, silhouettes};

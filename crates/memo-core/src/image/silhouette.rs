@@ -32,6 +32,9 @@ pub enum SilhouetteError {
     Option(#[from] OptionError),
 }
 
+/// Default threshold, grey levels.
+pub const SILHOUETTE_THRESHOLD: f64 = 25.0;
+
 /// The silhouette of the largest candidate in each frame; an empty mask where there is no candidate.
 ///
 /// `threshold` in grey levels, as in [`Background::silhouette`].

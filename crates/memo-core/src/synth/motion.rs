@@ -223,6 +223,9 @@ pub fn limbs_of(names: &[String]) -> Vec<[usize; 2]> {
     WALKER_LIMBS.iter().filter_map(|[a, b]| Some([index(a)?, index(b)?])).collect()
 }
 
+/// Default height of a walker, metres.
+pub const WALKER_HEIGHT_M: f64 = 1.75;
+
 /// Options of [`sampled_walk`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WalkOptions {

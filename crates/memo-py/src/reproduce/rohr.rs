@@ -15,7 +15,7 @@ use memo_core::model::body::Part;
 use memo_core::model::{Body, Gait, GaitStyle, VisibilityOptions, VisibleSegment, Walker, visible_contours};
 use memo_core::reproduce::rohr;
 use memo_core::track::evidence::{Evidence, EvidenceOptions, EvidenceStream, WindowEdges};
-use memo_core::track::score::EdgeLine;
+use memo_core::track::score::{EdgeLine, SimilarityOptions};
 use memo_core::track::search::Hypothesis;
 use memo_core::track::search::{Axis, Grid, SearchResult, search};
 use memo_core::wording::counted;
@@ -192,7 +192,7 @@ fn edge_row(edge: &EdgeLine) -> [f64; 5] {
 
 /// The search windows of contours (N, 2, 2): their corners (N, 4, 2), pixels.
 #[pyfunction]
-#[pyo3(signature = (lines, c_r=0.25))]
+#[pyo3(signature = (lines, c_r=f64::from(SimilarityOptions::DEFAULT.c_r)))]
 pub fn search_windows<'py>(
     py: Python<'py>,
     lines: &Bound<'py, PyAny>,

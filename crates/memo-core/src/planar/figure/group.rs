@@ -397,7 +397,7 @@ mod tests {
     fn pieces_cost_residual_length_and_what_they_are() {
         let (tracks, ..) = walker(66, |_| 0.0, 1.0);
         let (part, rods) = rods_of(&tracks, 100.0);
-        let options = FigureOptions::default();
+        let options = options(0.0);
         let costs = options.costs;
         let found = candidates(&part, &rods, 100.0, &options);
         let cost = |points: &[usize]| found.iter().find(|c| c.points == points).unwrap().cost;

@@ -148,7 +148,7 @@ impl Default for Costs {
 /// Options of [`interpret_figure`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FigureOptions {
-    /// Options of the fits; `noise_sd` in the unit of the tracks. Single wrong positions are removed from the
+    /// Options of the fits; `noise_sd` in the unit of the tracks, by default 0.5: dots placed to the pixel. Single wrong positions are removed from the
     /// tracks first, so by default the fits do not look for outliers.
     pub fit: FitOptions,
     /// Options of the verdicts, with the false-target rate.
@@ -170,7 +170,7 @@ pub struct FigureOptions {
 impl Default for FigureOptions {
     fn default() -> Self {
         Self {
-            fit: FitOptions { max_outlier_fraction: 0.0, ..FitOptions::default() },
+            fit: FitOptions { noise_sd: 0.5, max_outlier_fraction: 0.0, ..FitOptions::default() },
             evidence: EvidenceOptions::default(),
             costs: Costs::default(),
             size: None,

@@ -116,6 +116,17 @@ pub enum AnchorChoice {
     },
 }
 
+impl AnchorChoice {
+    /// The name in files and messages.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Source(source) => source.name(),
+            Self::Given { .. } => "given",
+        }
+    }
+}
+
 /// Default standard deviation of a given distance, metres: a tape measure to where the person stands.
 pub const DEFAULT_DISTANCE_SD_M: f64 = 0.05;
 

@@ -131,6 +131,11 @@ pub enum LifeSites {
     Limbs(Vec<[usize; 2]>),
 }
 
+impl PhaseScramble {
+    /// Default of the largest shift, seconds: half a cycle of a slow walk.
+    pub const MAX_SHIFT_S: f64 = 0.5;
+}
+
 /// Dots that jump after a number of frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitedLife {
@@ -164,6 +169,11 @@ pub enum NoiseKind {
     },
     /// At a new random position in every frame.
     Flicker,
+}
+
+impl NoiseKind {
+    /// Default speed of dots that move in a straight line, pixels per second.
+    pub const SPEED_PX_S: f64 = 60.0;
 }
 
 /// Dots that belong to no figure. A limited lifetime applies to them too.

@@ -1,0 +1,71 @@
+"""Defaults are those of the core, in calls, in docstrings and in the help of commands."""
+
+import ast
+import inspect
+import re
+
+import memo
+import pytest
+from memo import _memo
+
+FUNCTIONS = {
+    name: getattr(memo, name)
+    for name in ("edge_segments", "planar", "pointlight", "posture", "silhouettes", "walker_motion")
+}
+OPTIONS = {
+    ("planar", "noise_px"): "noise_px",
+    ("planar", "window"): "window_s",
+    ("pointlight", "azimuth_deg"): "azimuth_deg",
+    ("pointlight", "elevation_deg"): "elevation_deg",
+    ("pointlight", "px_per_m"): "px_per_m",
+    ("pointlight", "locomotion"): "locomotion",
+    ("pointlight", "dots"): "life_dots",
+    ("pointlight", "on"): "life_sites",
+    ("pointlight", "noise_dots"): "noise_dots",
+    ("pointlight", "noise_kind"): "noise_kind",
+    ("pointlight", "noise_px"): "noise_sd_px",
+    ("pointlight", "seed"): "seed",
+    ("posture", "rules"): "rules",
+    ("posture", "strength"): "strength",
+    ("posture", "anchor"): "anchor",
+    ("posture", "noise_px"): "noise_px",
+}
+"""Options of commands that have the default of the core."""
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_call_leaves_defaults_to_the_core(name):
+    signatures = [inspect.signature(FUNCTIONS[name]), inspect.signature(getattr(_memo, name))]
+    for option, value in _memo.defaults(name).items():
+        for parameters in (signature.parameters for signature in signatures):
+            if option in parameters:
+                given = parameters[option].default
+                assert given is (value if isinstance(value, bool) else None), option
+        assert any(option in signature.parameters for signature in signatures), option
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_docstring_states_the_defaults(name):
+    (stated,) = re.findall(r"Defaults: (.*?)\.(?:\s|$)", FUNCTIONS[name].__doc__, re.DOTALL)
+    found = dict(re.findall(r"`(\w+)` ([^,\s]+)", stated))
+    expected = {key: value for key, value in _memo.defaults(name).items() if not isinstance(value, bool)}
+    assert {key: ast.literal_eval(value) for key, value in found.items()} == expected
+
+
+@pytest.mark.parametrize(("command", "option"), OPTIONS)
+def test_the_help_of_a_command_states_the_defaults(command, option):
+    typer = pytest.importorskip("typer")
+    from memo.cli import _app
+
+    (found,) = (
+        parameter
+        for parameter in typer.main.get_command(_app()).commands[command].params
+        if parameter.name == option
+    )
+    value = _memo.defaults(command)[OPTIONS[command, option]]
+    assert found.default == value if found.default is not None else f"default: {value}." in found.help
+
+
+def test_a_function_without_options_of_the_core_has_no_defaults():
+    with pytest.raises(ValueError, match="no_function"):
+        _memo.defaults("no_function")
