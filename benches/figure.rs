@@ -4,9 +4,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec2;
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::planar::{
-    EvidenceOptions, FigureOptions, FitOptions, interpret_figure, test_pairs, test_triples,
+    FigureOptions, FitOptions, PlanarEvidenceOptions, interpret_figure, test_pairs, test_triples,
 };
-use memo_core::synth::{Random, View, WalkOptions, sampled_walk};
+use memo_core::synth::{DisplayView, Random, SampledWalkOptions, sampled_walk};
 use std::hint::black_box;
 
 /// Tracks of `points` points over a walk at 60 Hz, 1 px of noise: the walker's joints and head, then
@@ -14,9 +14,9 @@ use std::hint::black_box;
 fn tracks(points: usize, frames: usize) -> (Vec<Vec<DVec2>>, Vec<f64>) {
     let body = Body::from_height(1.75).expect("a plausible height");
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let motion =
-        sampled_walk(&walker, &WalkOptions { frames, ..WalkOptions::default() }).expect("a plausible walk");
-    let view = View::Orthographic { azimuth_rad: 0.6, elevation_rad: 0.0, px_per_m: 200.0 };
+    let motion = sampled_walk(&walker, &SampledWalkOptions { frames, ..SampledWalkOptions::default() })
+        .expect("a plausible walk");
+    let view = DisplayView::Orthographic { azimuth_rad: 0.6, elevation_rad: 0.0, px_per_m: 200.0 };
     let mut random = Random::new(1);
     let mut track = |k: usize| {
         let place = |frame| motion.at(frame, k.min(12)).and_then(|p| view.project(p)).unwrap_or(DVec2::NAN);
@@ -31,7 +31,7 @@ fn tracks(points: usize, frames: usize) -> (Vec<Vec<DVec2>>, Vec<f64>) {
 
 fn figure(c: &mut Criterion) {
     let fit = FitOptions { noise_sd: 1.0, ..FigureOptions::default().fit };
-    let evidence = EvidenceOptions::default();
+    let evidence = PlanarEvidenceOptions::default();
     let options = FigureOptions { fit, ..FigureOptions::default() };
     for points in [12, 14, 16] {
         let (tracks, times_s) = tracks(points, 60);

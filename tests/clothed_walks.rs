@@ -4,7 +4,7 @@
 //! The bounds are floors under what was measured on other seeds, not aims; `--nocapture` prints the figures, and
 //! `MEMO_FULL=1` draws eight times as many. Not tested is what is known to fail: the steps of somebody who limps.
 
-use memo_core::synth::{ClothedOptions, ClothedScene, Contact, Mover};
+use memo_core::synth::{ClothedOptions, ClothedScene, FootContact, Mover};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
 use memo_core::track::options::TrackerOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
@@ -103,9 +103,9 @@ impl Followed {
     }
 
     /// By how much each contact was found late, seconds; `None` for those that were not found within 0.15 s.
-    fn late_s(&self) -> Vec<(Contact, Option<f64>)> {
+    fn late_s(&self) -> Vec<(FootContact, Option<f64>)> {
         let events = self.walks[0].events();
-        let of = |contact: Contact| {
+        let of = |contact: FootContact| {
             let late = events
                 .iter()
                 .filter(|event| event.kind == contact.kind && event.side == contact.side)
@@ -180,7 +180,7 @@ fn hips_and_knees_are_as_near_as_the_average_gait_allows() {
 fn contacts_are_found_within_a_frame_or_two() {
     for (kind, most_s) in [(EventKind::HeelStrike, 0.035), (EventKind::ToeOff, 0.035)] {
         let sure = FOLLOWED.iter().filter(|person| person.walks[0].p_swapped() <= OPEN);
-        let all: Vec<(Contact, Option<f64>)> =
+        let all: Vec<(FootContact, Option<f64>)> =
             sure.flat_map(Followed::late_s).filter(|(contact, _)| contact.kind == kind).collect();
         let late: Vec<f64> = all.iter().filter_map(|(_, late)| *late).collect();
         let mean = late.iter().sum::<f64>() / late.len() as f64;

@@ -6,7 +6,7 @@
 use crate::mocap;
 
 use glam::DVec2;
-use memo_core::planar::{EvidenceOptions, FalseTargetRate, FitOptions, Verdict, fit_hinge, link_three};
+use memo_core::planar::{FalseTargetRate, FitOptions, PlanarEvidenceOptions, Verdict, fit_hinge, link_three};
 use memo_core::synth::Random;
 use mocap::stride::{LIMBS, noisy, quantile, walks};
 
@@ -85,7 +85,8 @@ fn the_knee_is_the_pivot_of_a_mocap_leg() {
     for noise_px in [0.0, 1.0] {
         let noise_sd = noise_px * PIXEL_M;
         let options = FitOptions { noise_sd, max_outlier_fraction: 0.0, ..FitOptions::default() };
-        let evidence = EvidenceOptions { rate: FalseTargetRate::FivePercent, ..EvidenceOptions::default() };
+        let evidence =
+            PlanarEvidenceOptions { rate: FalseTargetRate::FivePercent, ..PlanarEvidenceOptions::default() };
         let (mut count, mut knees, mut others) = (0, 0, 0);
         for walk in &walks {
             for azimuth_deg in [15.0, 30.0, 45.0, 60.0, -15.0, -30.0, -45.0, -60.0] {
@@ -129,7 +130,8 @@ fn the_knee_is_the_pivot_of_a_synthetic_leg() {
             [0, 1, 2].map(|i| noisy(&views.iter().map(|v| v[i]).collect::<Vec<_>>(), PIXEL_M, &mut random));
         let options = FitOptions { noise_sd: PIXEL_M, ..FitOptions::default() };
         let linkage =
-            link_three([&points[0], &points[1], &points[2]], &options, &EvidenceOptions::default()).unwrap();
+            link_three([&points[0], &points[1], &points[2]], &options, &PlanarEvidenceOptions::default())
+                .unwrap();
         assert_eq!(linkage.pivot, Some(1), "{:?}", linkage.evidence);
         assert_eq!(linkage.evidence[0].verdict, Verdict::NotPlanar);
         assert_eq!(linkage.evidence[2].verdict, Verdict::NotPlanar);

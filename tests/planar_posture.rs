@@ -8,10 +8,10 @@ use crate::mocap;
 use glam::{DVec2, DVec3};
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::planar::{
-    EvidenceOptions, FigureOptions, FitOptions, Verdict, fit_hinge, hinge_evidence, interpret_figure,
+    FigureOptions, FitOptions, PlanarEvidenceOptions, Verdict, fit_hinge, hinge_evidence, interpret_figure,
     interpret_named_figure, joint_of,
 };
-use memo_core::synth::{Random, View, WalkOptions, limbs_of, sampled_walk};
+use memo_core::synth::{DisplayView, Random, SampledWalkOptions, limbs_of, sampled_walk};
 use mocap::JOINTS;
 use mocap::stride::{LIMBS, noisy, walks};
 
@@ -115,7 +115,7 @@ fn punching_arms_get_no_interpretation() {
                         noisy(&track, noise_px, &mut random)
                     });
                     let fit = fit_hinge(&a, &o, &b, &options).unwrap();
-                    let evidence = hinge_evidence(&fit, noise_px, &EvidenceOptions::default());
+                    let evidence = hinge_evidence(&fit, noise_px, &PlanarEvidenceOptions::default());
                     let is_planar = usize::from(evidence.verdict == Verdict::Planar);
                     if leaves {
                         out += 1;
@@ -140,8 +140,9 @@ fn punching_arms_get_no_interpretation() {
 fn seen_from(azimuth_rad: f64, elevation_rad: f64, random: &mut Random) -> (usize, Vec<f64>, f64) {
     let body = Body::from_height(1.75).unwrap();
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let motion = sampled_walk(&walker, &WalkOptions { frames: 66, ..WalkOptions::default() }).unwrap();
-    let view = View::Orthographic { azimuth_rad, elevation_rad, px_per_m: PX_PER_M };
+    let motion =
+        sampled_walk(&walker, &SampledWalkOptions { frames: 66, ..SampledWalkOptions::default() }).unwrap();
+    let view = DisplayView::Orthographic { azimuth_rad, elevation_rad, px_per_m: PX_PER_M };
     let at = |t: usize, k: usize| view.project(motion.at(t, k).unwrap()).unwrap();
     let clean: Vec<Vec<DVec2>> = (0..12).map(|k| (0..66).map(|t| at(t, k)).collect()).collect();
     let tracks: Vec<Vec<DVec2>> = clean.iter().map(|track| noisy(track, 1.0, random)).collect();

@@ -9,8 +9,8 @@ use crate::mocap;
 
 use glam::DVec2;
 use memo_core::planar::{
-    EvidenceOptions, FalseTargetRate, FitOptions, Undecided, Verdict, fit_hinge, fit_rod, hinge_evidence,
-    rod_evidence,
+    FalseTargetRate, FitOptions, PlanarEvidenceOptions, Undecided, Verdict, fit_hinge, fit_rod,
+    hinge_evidence, rod_evidence,
 };
 use memo_core::synth::Random;
 use mocap::JOINTS;
@@ -58,7 +58,7 @@ fn shares(groups: &[Vec<Track>], noise_px: f64, random: &mut Random) -> [Shares;
         for (share, rate) in
             shares.iter_mut().zip([FalseTargetRate::OnePercent, FalseTargetRate::FivePercent])
         {
-            let options = EvidenceOptions { rate, ..EvidenceOptions::default() };
+            let options = PlanarEvidenceOptions { rate, ..PlanarEvidenceOptions::default() };
             let evidence = if let [first, pivot, second] = &seen[..] {
                 hinge_evidence(&fit_hinge(first, pivot, second, &fit_options).unwrap(), noise_sd, &options)
             } else {

@@ -6,7 +6,7 @@
 use crate::recordings;
 
 use memo_core::keypoints::unswap::{
-    Keypoints, Level, LimbGroup, Reason, UnswapOptions, Unswapped, Verdict, unswap,
+    Keypoints, Level, LimbGroup, Reason, SideVerdict, UnswapOptions, Unswapped, unswap,
 };
 use memo_core::synth::Random;
 
@@ -168,7 +168,7 @@ struct Count {
 }
 
 impl Count {
-    fn add(&mut self, flips: &[bool], verdicts: &[Verdict]) {
+    fn add(&mut self, flips: &[bool], verdicts: &[SideVerdict]) {
         for (&flip, verdict) in flips.iter().zip(verdicts) {
             if verdict.reason == Reason::NothingSeen {
                 self.unseen += 1;
@@ -227,7 +227,7 @@ struct Calibration(Vec<(f64, bool)>);
 impl Calibration {
     const EDGES: [f64; 8] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0];
 
-    fn add(&mut self, flips: &[bool], verdicts: &[Verdict]) {
+    fn add(&mut self, flips: &[bool], verdicts: &[SideVerdict]) {
         for (&flip, v) in flips.iter().zip(verdicts).filter(|(_, v)| v.reason != Reason::NothingSeen) {
             let says = v.probability > 0.5;
             self.0.push((if says { v.probability } else { 1.0 - v.probability }, says == flip));
@@ -357,7 +357,7 @@ fn unseen_crossings_are_undecided_rather_than_wrong() {
                             }
                             calibration.add(&flips, verdicts);
                             runs += answer.groups[0].runs.len();
-                            let unseen = |v: &&Verdict| matches!(v.reason, Reason::UnseenCrossing { .. });
+                            let unseen = |v: &&SideVerdict| matches!(v.reason, Reason::UnseenCrossing { .. });
                             reasons += verdicts.iter().filter(unseen).count();
                         }
                     }

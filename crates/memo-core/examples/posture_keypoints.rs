@@ -10,7 +10,7 @@
 use memo_core::glam::DVec2;
 use memo_core::model::CameraFileOptions;
 use memo_core::model::skeleton::JOINT_COUNT;
-use memo_core::synth::{Random, WalkOptions, sampled_walk};
+use memo_core::synth::{Random, SampledWalkOptions, sampled_walk};
 use memo_core::{
     Camera, Detector, Joint, KeypointSequence, PerJoint, PostureSequence, SequenceOptions, TrackerOptions,
     postures,
@@ -95,7 +95,10 @@ fn read(csv: &str) -> Result<Keypoints, Box<dyn Error>> {
 fn synthetic(frames: usize) -> Result<(Keypoints, Camera), Box<dyn Error>> {
     let camera = Camera::level([1920, 1080], 0.9273, 1.2, 6.0)?;
     let walker = TrackerOptions::for_height(HEIGHT_M).walker(1.3)?;
-    let walk = sampled_walk(&walker, &WalkOptions { frames, rate_hz: 25.0, ..WalkOptions::default() })?;
+    let walk = sampled_walk(
+        &walker,
+        &SampledWalkOptions { frames, rate_hz: 25.0, ..SampledWalkOptions::default() },
+    )?;
     let detector = Detector::from_names(walk.names())?;
     let mut random = Random::new(1);
     let mut points_px = vec![];

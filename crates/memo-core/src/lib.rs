@@ -44,7 +44,7 @@
 //!
 //! ```
 //! use memo_core::glam::DVec2;
-//! use memo_core::synth::{WalkOptions, sampled_walk};
+//! use memo_core::synth::{SampledWalkOptions, sampled_walk};
 //! use memo_core::{
 //!     Camera, Detector, Joint, KeypointSequence, PerJoint, SequenceOptions, TrackerOptions, postures,
 //! };
@@ -52,7 +52,8 @@
 //! // A walk seen from its side. Its points are named RSH, REL and so on; for a known detector use
 //! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
-//! let walk = sampled_walk(&walker, &WalkOptions { frames: 30, rate_hz: 25.0, ..WalkOptions::default() })?;
+//! let options = SampledWalkOptions { frames: 30, rate_hz: 25.0, ..SampledWalkOptions::default() };
+//! let walk = sampled_walk(&walker, &options)?;
 //! let camera = Camera::level([1280, 720], 1.0, 1.2, 6.0)?;
 //! let detector = Detector::from_names(walk.names())?;
 //! let (mut points_px, mut weights) = (Vec::new(), Vec::new());
@@ -87,11 +88,11 @@
 //! [`planar::interpret_figure`] finds which dots are linked, and in which planes they swing.
 //!
 //! ```
-//! use memo_core::synth::{PointLightOptions, WalkOptions, limbs_of, point_light_display, sampled_walk};
+//! use memo_core::synth::{PointLightOptions, SampledWalkOptions, limbs_of, point_light_display, sampled_walk};
 //! use memo_core::{FigureOptions, TrackerOptions, interpret_figure};
 //!
 //! let walker = TrackerOptions::for_height(1.75).walker(1.3)?;
-//! let walk = sampled_walk(&walker, &WalkOptions::default())?;
+//! let walk = sampled_walk(&walker, &SampledWalkOptions::default())?;
 //! let shown = point_light_display(&walk, &PointLightOptions::default())?;
 //!
 //! let read = interpret_figure(&shown.tracks(), &shown.times_s, &FigureOptions::default())?;
@@ -171,7 +172,7 @@ mod tests {
         sent_and_shared::<crate::track::result::TrackedWalk>();
         sent_and_shared::<crate::posture::sequence::PostureSequence>();
         sent_and_shared::<crate::posture::sequence::SequenceError>();
-        sent_and_shared::<crate::planar::Interpretation>();
+        sent_and_shared::<crate::planar::FigureInterpretation>();
         sent_and_shared::<crate::planar::FigureError>();
         sent_and_shared::<crate::calibrate::PointCalibration>();
         sent_and_shared::<crate::calibrate::WalkerCalibration>();

@@ -8,7 +8,7 @@ use crate::error::value_error;
 use crate::result::result;
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::{
-    Estimate, KnownLens, PointOptions, Sighting, WalkerOptions, camera_from_points, camera_from_walker,
+    Estimate, KnownLens, PointOptions, WalkerOptions, WalkerSighting, camera_from_points, camera_from_walker,
     points, sightings_from_joints, walker,
 };
 use memo_core::wording::counted;
@@ -117,13 +117,13 @@ pub fn calibrate_walker(
         );
         return Err(PyValueError::new_err(message));
     }
-    let sighting = |i: usize| Sighting {
+    let sighting = |i: usize| WalkerSighting {
         foot_px: feet[i],
         head_px: heads[i],
         foot_share: foot_share[i],
         head_share: head_share[i],
     };
-    let sightings: Vec<Sighting> = (0..feet.len()).map(sighting).collect();
+    let sightings: Vec<WalkerSighting> = (0..feet.len()).map(sighting).collect();
     let options = WalkerOptions { size: size.into(), height_m, lens: known_lens(focal_px, lens)? };
     let found = py.detach(|| camera_from_walker(&sightings, &options)).map_err(value_error)?;
     WalkerCalibration::of(py, found)
@@ -155,8 +155,8 @@ pub fn walker_sightings<'py>(
         flat.chunks(joints.max(1)).map(|row| row.iter().copied().map(DVec2::from).collect()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let found = sightings_from_joints(&names, &rows);
-    let rows = |of: fn(&Sighting) -> DVec2| found.iter().map(|s| of(s).to_array()).collect();
-    let column = |of: fn(&Sighting) -> f64| found.iter().map(of).collect();
+    let rows = |of: fn(&WalkerSighting) -> DVec2| found.iter().map(|s| of(s).to_array()).collect();
+    let column = |of: fn(&WalkerSighting) -> f64| found.iter().map(of).collect();
     Ok((
         numpy_from_rows(py, rows(|s| s.foot_px))?,
         numpy_from_rows(py, rows(|s| s.head_px))?,

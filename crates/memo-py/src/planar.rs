@@ -7,8 +7,8 @@ use crate::result::{objects, result};
 use crate::wait::watched;
 use glam::DVec2;
 use memo_core::planar::{
-    Chain, DepthSource, EvidenceOptions, FalseTargetRate, FigureOptions, FigureWindow, FitOptions,
-    Interpretation, Link, Method, Status, Undecided, Verdict, at_one_scale, hinge_depths,
+    Chain, DepthSource, FalseTargetRate, FigureInterpretation, FigureOptions, FigureWindow, FitOptions, Link,
+    Method, PlanarEvidenceOptions, Status, Undecided, Verdict, at_one_scale, hinge_depths,
     interpret_with_progress, joint_of, perspective_of_figure_px, rod_depths,
 };
 use memo_core::progress::Progress;
@@ -107,7 +107,7 @@ result! {
 
 result! {
     /// What `memo.PlanarFigure` is made of.
-    PlanarInterpretation |py, found: Interpretation, tracks: &[Vec<DVec2>], focal_px: Option<f64>| {
+    PlanarInterpretation |py, found: FigureInterpretation, tracks: &[Vec<DVec2>], focal_px: Option<f64>| {
         windows: Vec<Py<PlanarWindow>> =
             objects(py, found.windows.iter().map(|window| PlanarWindow::of(py, window, tracks)))?,
         perspective_px: Option<f64> = focal_px.map(|px| perspective_of_figure_px(tracks, &found.depth, px)),
@@ -213,13 +213,13 @@ pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     })
 }
 
-fn evidence_at(false_target_rate: f64) -> PyResult<EvidenceOptions> {
+fn evidence_at(false_target_rate: f64) -> PyResult<PlanarEvidenceOptions> {
     let rates = [FalseTargetRate::OnePercent, FalseTargetRate::FivePercent];
     let Some(rate) = rates.into_iter().find(|rate| rate.fraction() == false_target_rate) else {
         let message = format!("false_target_rate must be 0.01 or 0.05, got {false_target_rate}");
         return Err(PyValueError::new_err(message));
     };
-    Ok(EvidenceOptions { rate, ..FigureOptions::default().evidence })
+    Ok(PlanarEvidenceOptions { rate, ..FigureOptions::default().evidence })
 }
 
 fn status(window: &FigureWindow, tracks: &[Vec<DVec2>]) -> &'static str {

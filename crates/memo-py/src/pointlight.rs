@@ -8,8 +8,8 @@ use crate::result::result;
 use glam::DVec3;
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::synth::{
-    self, DotSource, LifeSites, LimitedLife, Locomotion, Motion, NoiseDots, NoiseKind, PhaseScramble,
-    PointLightOptions, View, WALKER_HEIGHT_M, WalkOptions, point_light_display, sampled_walk,
+    self, DisplayView, DotSource, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble,
+    PointLightOptions, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, point_light_display, sampled_walk,
 };
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArrayDyn, PyUntypedArrayMethods};
@@ -19,7 +19,7 @@ use pyo3::types::PyDict;
 
 result! {
     /// Motion of the body model.
-    WalkerMotion |py, motion: Motion, cycle: f64| {
+    WalkerMotion |py, motion: PointMotion, cycle: f64| {
         /// Points (T, 13, 3), metres, Z up.
         positions: Py<PyArrayDyn<f64>> = {
             let flat = motion.positions().iter().flat_map(|p| p.to_array()).collect();
@@ -76,8 +76,8 @@ pub fn walker_motion(
 ) -> PyResult<WalkerMotion> {
     let body = Body::from_height(height_m.unwrap_or(WALKER_HEIGHT_M)).map_err(value_error)?;
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let usual = WalkOptions::default();
-    let options = WalkOptions {
+    let usual = SampledWalkOptions::default();
+    let options = SampledWalkOptions {
         frames: frames.unwrap_or(usual.frames),
         rate_hz: rate_hz.unwrap_or(usual.rate_hz),
         speed_mps: speed_mps.unwrap_or(usual.speed_mps),
@@ -144,7 +144,7 @@ pub fn pointlight(
     let life = |frames| limited_life(frames, life_dots, life_sites, limbs, synchronous);
     let options = PointLightOptions {
         seed: seed.unwrap_or(usual.seed),
-        view: camera.map_or(parallel, |camera| View::Perspective(Box::new(camera.0))),
+        view: camera.map_or(parallel, |camera| DisplayView::Perspective(Box::new(camera.0))),
         locomotion: locomotion.unwrap_or(usual.locomotion),
         is_inverted: inverted,
         is_mirrored: mirrored,
@@ -159,7 +159,7 @@ pub fn pointlight(
     PointLightDisplay::of(py, shown)
 }
 
-fn motion_of(positions: &Bound<'_, PyAny>, times_s: Vec<f64>, names: Vec<String>) -> PyResult<Motion> {
+fn motion_of(positions: &Bound<'_, PyAny>, times_s: Vec<f64>, names: Vec<String>) -> PyResult<PointMotion> {
     let (points, frames, count) = motion_from_numpy::<3>(positions)?;
     if times_s.len() != frames || names.len() != count {
         let given = format!("{} and {}", counted(times_s.len(), "time"), counted(names.len(), "name"));
@@ -167,18 +167,23 @@ fn motion_of(positions: &Bound<'_, PyAny>, times_s: Vec<f64>, names: Vec<String>
             "positions are ({frames}, {count}, 3), but there are {given}"
         )));
     }
-    Motion::new(points.into_iter().map(DVec3::from).collect(), names, times_s).map_err(value_error)
+    PointMotion::new(points.into_iter().map(DVec3::from).collect(), names, times_s).map_err(value_error)
 }
 
 /// A parallel projection; what is not given is as in `usual`.
-fn parallel(usual: &View, azimuth: Option<f64>, elevation: Option<f64>, scale: Option<f64>) -> View {
+fn parallel(
+    usual: &DisplayView,
+    azimuth: Option<f64>,
+    elevation: Option<f64>,
+    scale: Option<f64>,
+) -> DisplayView {
     match usual {
-        &View::Orthographic { azimuth_rad, elevation_rad, px_per_m } => View::Orthographic {
+        &DisplayView::Orthographic { azimuth_rad, elevation_rad, px_per_m } => DisplayView::Orthographic {
             azimuth_rad: azimuth.map_or(azimuth_rad, f64::to_radians),
             elevation_rad: elevation.map_or(elevation_rad, f64::to_radians),
             px_per_m: scale.unwrap_or(px_per_m),
         },
-        View::Perspective(_) => usual.clone(),
+        DisplayView::Perspective(_) => usual.clone(),
     }
 }
 
@@ -235,7 +240,7 @@ fn noise_kinds(speed_px_s: f64) -> [(&'static str, NoiseKind); 3] {
 }
 
 pub fn walker_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = WalkOptions::default();
+    let SampledWalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = SampledWalkOptions::default();
     dict!(py, {
         frames: frames,
         rate_hz: rate_hz,
@@ -249,8 +254,10 @@ pub fn walker_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let (usual, life, noise) = (PointLightOptions::default(), LimitedLife::default(), NoiseDots::default());
     let [azimuth_rad, elevation_rad, px_per_m] = match usual.view {
-        View::Orthographic { azimuth_rad, elevation_rad, px_per_m } => [azimuth_rad, elevation_rad, px_per_m],
-        View::Perspective(_) => [f64::NAN; 3],
+        DisplayView::Orthographic { azimuth_rad, elevation_rad, px_per_m } => {
+            [azimuth_rad, elevation_rad, px_per_m]
+        }
+        DisplayView::Perspective(_) => [f64::NAN; 3],
     };
     dict!(py, {
         azimuth_deg: azimuth_rad.to_degrees(),

@@ -15,7 +15,7 @@ pub mod walker;
 
 pub use points::{KnownLens, PointCalibration, PointError, PointOptions, camera_from_points};
 pub use walker::{
-    Sighting, WalkerCalibration, WalkerError, WalkerOptions, camera_from_walker, sightings_from_joints,
+    WalkerCalibration, WalkerError, WalkerOptions, WalkerSighting, camera_from_walker, sightings_from_joints,
 };
 
 /// A fitted parameter.

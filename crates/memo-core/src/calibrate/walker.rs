@@ -125,7 +125,7 @@ pub enum WalkerError {
 
 /// A person in one frame, from head to feet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sighting {
+pub struct WalkerSighting {
     /// The lower point, pixels.
     pub foot_px: DVec2,
     /// The upper point, pixels.
@@ -136,7 +136,7 @@ pub struct Sighting {
     pub head_share: f64,
 }
 
-impl Sighting {
+impl WalkerSighting {
     /// A sighting from the midpoints of the lower and the upper side of a rectangle.
     pub fn from_rectangle(foot_px: DVec2, head_px: DVec2) -> Self {
         Self { foot_px, head_px, foot_share: 0.0, head_share: 1.0 }
@@ -187,7 +187,7 @@ pub struct WalkerCalibration {
 /// Sightings that are too few, not finite or upside down; walks that do not determine the camera; sightings
 /// that are not consistent with any camera.
 pub fn camera_from_walker(
-    sightings: &[Sighting],
+    sightings: &[WalkerSighting],
     options: &WalkerOptions,
 ) -> Result<WalkerCalibration, WalkerError> {
     let problem = Problem::new(sightings, options)?;
@@ -213,7 +213,7 @@ pub fn camera_from_walker(
 
 struct Problem {
     /// In ideal pixels, relative to the principal point, with square pixels.
-    sightings: Vec<Sighting>,
+    sightings: Vec<WalkerSighting>,
     options: WalkerOptions,
     centre_px: DVec2,
     known_focal_px: Option<f64>,
@@ -222,7 +222,7 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(sightings: &[Sighting], options: &WalkerOptions) -> Result<Self, WalkerError> {
+    fn new(sightings: &[WalkerSighting], options: &WalkerOptions) -> Result<Self, WalkerError> {
         let height_m = options.height_m;
         if !(0.5..=2.5).contains(&height_m) {
             return Err(WalkerError::PersonHeight { height_m });
@@ -285,7 +285,7 @@ impl Problem {
     }
 
     /// Where the person stands, if the feet are below the horizon.
-    fn place(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &Sighting) -> Option<DVec3> {
+    fn place(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &WalkerSighting) -> Option<DVec3> {
         let ray = rotation.transpose() * sighting.foot_px.extend(parameters[FOCAL].exp());
         let drop_m = parameters[HEIGHT].exp() - sighting.foot_share * self.options.height_m;
         let share = -drop_m / ray.z;
@@ -293,7 +293,7 @@ impl Problem {
     }
 
     /// Fitted minus measured head, pixels.
-    fn residual(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &Sighting) -> Option<DVec2> {
+    fn residual(&self, parameters: &[f64; 4], rotation: &DMat3, sighting: &WalkerSighting) -> Option<DVec2> {
         let place = self.place(parameters, rotation, sighting)?;
         let rise_m = sighting.head_share * self.options.height_m - parameters[HEIGHT].exp();
         let p = *rotation * place.with_z(rise_m);
@@ -486,7 +486,7 @@ impl Problem {
         estimates: Vec<Estimate>,
     ) -> Result<WalkerCalibration, WalkerError> {
         let rotation = Self::rotation(parameters);
-        let place = |s: &Sighting| self.place(parameters, &rotation, s);
+        let place = |s: &WalkerSighting| self.place(parameters, &rotation, s);
         let mean =
             inliers.iter().filter_map(|&i| place(&self.sightings[i])).sum::<DVec3>() / inliers.len() as f64;
         let (focal_px, centre_px, distortion) = match self.options.lens {
@@ -545,11 +545,11 @@ const MAX_APART: f64 = 0.15;
 ///
 /// `names` of the joints in this project's spelling; `points_px` has one row per frame with one pixel
 /// position (u, v) per name, NaN where missing.
-pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Sighting> {
+pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<WalkerSighting> {
     let column = |name: &str| names.iter().position(|n| *n == name);
     let point =
         |row: &[DVec2], name: &str| column(name).and_then(|c| row.get(c)).copied().filter(|p| p.is_finite());
-    let mut seen: Vec<(f64, Sighting)> = Vec::new();
+    let mut seen: Vec<(f64, WalkerSighting)> = Vec::new();
     for row in points_px {
         let (Some(right), Some(left)) = (point(row, "right_ankle"), point(row, "left_ankle")) else {
             continue;
@@ -562,13 +562,14 @@ pub fn sightings_from_joints(names: &[&str], points_px: &[Vec<DVec2>]) -> Vec<Si
         // The foot on the ground is the lower one; horizontally the body is between both.
         let foot_px = DVec2::new((right.x + left.x) / 2.0, right.y.max(left.y));
         let apart = right.distance(left) / head_px.distance(foot_px).max(1e-9);
-        seen.push((apart, Sighting { foot_px, head_px, foot_share: ANKLE_SHARE, head_share }));
+        seen.push((apart, WalkerSighting { foot_px, head_px, foot_share: ANKLE_SHARE, head_share }));
     }
     let is_passing = |i: usize| {
         let near = seen[i.saturating_sub(3)..(i + 4).min(seen.len())].iter();
         seen[i].0 < MAX_APART && near.into_iter().all(|(apart, _)| *apart >= seen[i].0)
     };
-    let passing: Vec<Sighting> = (0..seen.len()).filter(|&i| is_passing(i)).map(|i| seen[i].1).collect();
+    let passing: Vec<WalkerSighting> =
+        (0..seen.len()).filter(|&i| is_passing(i)).map(|i| seen[i].1).collect();
     if passing.len() >= 2 * NEEDED { passing } else { seen.into_iter().map(|(_, s)| s).collect() }
 }
 

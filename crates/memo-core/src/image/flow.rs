@@ -17,7 +17,7 @@
 //! Existence and uniqueness (Schnörr 1991): on each connected component the smoothness term does not
 //! determine the constant vectors, so there is exactly one minimum if and only if the gradients in the
 //! component have two directions, that is, if the sum of grad I grad I^T over the component is regular.
-//! Components that fail this test get no velocity, and [`Evidence`] gives the reason.
+//! Components that fail this test get no velocity, and [`FlowEvidence`] gives the reason.
 //!
 //! The functional is minimised by conjugate gradients with a multigrid preconditioner, from coarse to fine
 //! over a pyramid; the second frame is warped by the motion found so far. Nagel's oriented smoothness is not
@@ -111,7 +111,7 @@ impl FlowOptions {
 
 /// What the grey values of a connected component determine about its motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Evidence {
+pub enum FlowEvidence {
     /// Gradients in two directions: the velocity field is unique.
     Determined,
     /// Gradients in one direction only: the motion along the edges is undetermined (aperture problem).
@@ -132,7 +132,7 @@ pub struct FlowComponent {
     /// RMS gradient along the weaker and the stronger principal direction, grey levels per pixel.
     pub gradient_rms: [f64; 2],
     /// Whether its motion is determined.
-    pub evidence: Evidence,
+    pub evidence: FlowEvidence,
 }
 
 /// Velocities of the pixels of a region.
@@ -246,14 +246,14 @@ fn refuse_undetermined(
         });
         let gradient_rms = principal_rms(gradients);
         let evidence = match gradient_rms {
-            [weaker, _] if weaker >= min_gradient => Evidence::Determined,
-            [_, stronger] if stronger >= min_gradient => Evidence::OneDirection,
-            _ => Evidence::Textureless,
+            [weaker, _] if weaker >= min_gradient => FlowEvidence::Determined,
+            [_, stronger] if stronger >= min_gradient => FlowEvidence::OneDirection,
+            _ => FlowEvidence::Textureless,
         };
         let (x, y) = place(start);
         let (x, y) = (window.x + x, window.y + y);
         components.push(FlowComponent { x, y, pixel_count: cells.len(), gradient_rms, evidence });
-        if evidence != Evidence::Determined {
+        if evidence != FlowEvidence::Determined {
             cells.iter().for_each(|&cell| domain.is_inside[cell] = false);
         }
     }

@@ -23,7 +23,7 @@ pub use change::{
 };
 pub use clean::{CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
-pub use flow::{Evidence, FlowComponent, FlowError, FlowField, FlowOptions, velocity_field};
+pub use flow::{FlowComponent, FlowError, FlowEvidence, FlowField, FlowOptions, velocity_field};
 pub use frame::{Frame, FrameError, Image, Mask};
 pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};

@@ -227,7 +227,7 @@ pub enum Reason {
 
 /// The result for one group in one frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct SideVerdict {
     /// Whether each level's entries were swapped.
     pub level_flipped: Vec<bool>,
     /// Posterior probability that each level was swapped in the input; a level that is not visible takes
@@ -248,7 +248,7 @@ pub struct Verdict {
 
 /// Frames whose labels are determined relative to one another.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct FrameRun {
     /// First frame.
     pub start: usize,
     /// Frame after the last one.
@@ -263,9 +263,9 @@ pub struct Run {
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupResult {
     /// One verdict per frame.
-    pub verdicts: Vec<Verdict>,
+    pub verdicts: Vec<SideVerdict>,
     /// Runs of frames, separated by places where the limbs may have crossed unobserved.
-    pub runs: Vec<Run>,
+    pub runs: Vec<FrameRun>,
     /// Probability that the global label is correct, as opposed to all output labels being swapped, judging
     /// by the majority of the input's labels.
     pub global_probability: f64,
@@ -286,7 +286,7 @@ pub struct Unswapped {
     pub groups: Vec<GroupResult>,
 }
 
-impl Verdict {
+impl SideVerdict {
     /// The reason in words, with the names of the group's levels.
     pub fn describe(&self, group: &LimbGroup) -> String {
         let done = match (self.partial, self.flipped) {
@@ -484,7 +484,7 @@ impl<'a> Limb<'a> {
         self.level_of.iter().map(of_track).collect()
     }
 
-    fn runs(&self, solution: &Solution) -> Vec<Run> {
+    fn runs(&self, solution: &Solution) -> Vec<FrameRun> {
         let starts = &solution.starts;
         let run = |(i, &first): (usize, &usize)| {
             let after = starts.get(i + 1).copied().unwrap_or(self.shown.len());
@@ -493,7 +493,7 @@ impl<'a> Limb<'a> {
                 self.probability_of_path(solution, k, level)
             });
             let end = starts.get(i + 1).map_or(self.times_s.len(), |&next| self.shown[next].0);
-            Run {
+            FrameRun {
                 start: if i == 0 { 0 } else { self.shown[first].0 },
                 end,
                 probability: right.sum::<f64>() / (after - first) as f64,
@@ -527,8 +527,8 @@ impl<'a> Limb<'a> {
         apart.fold((0, -1.0), |best, other| if other.1 > best.1 { other } else { best })
     }
 
-    fn verdicts(&self, solution: &Solution, runs: &[Run], options: &UnswapOptions) -> Vec<Verdict> {
-        let nothing = Verdict {
+    fn verdicts(&self, solution: &Solution, runs: &[FrameRun], options: &UnswapOptions) -> Vec<SideVerdict> {
+        let nothing = SideVerdict {
             level_flipped: vec![false; self.levels],
             level_probability: vec![0.5; self.levels],
             flipped: false,
@@ -562,7 +562,7 @@ impl<'a> Limb<'a> {
             let level_flipped: Vec<bool> =
                 sources.iter().map(|&l| if sure(l) { bits >> l & 1 == 1 } else { flipped }).collect();
             let differs = |level: usize| seen >> level & 1 == 1 && level_flipped[level] != flipped;
-            verdicts[t] = Verdict {
+            verdicts[t] = SideVerdict {
                 partial: (0..self.levels).any(differs),
                 level_flipped,
                 level_probability: sources.iter().map(|&level| p(level)).collect(),

@@ -39,7 +39,7 @@ impl FalseTargetRate {
 
 /// Options of the verdicts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EvidenceOptions {
+pub struct PlanarEvidenceOptions {
     /// False-target rate that is accepted.
     pub rate: FalseTargetRate,
     /// Minimum motion, in the unit of the points; below it the verdict is undecided. Default 0: if the noise is
@@ -47,7 +47,7 @@ pub struct EvidenceOptions {
     pub least_motion: f64,
 }
 
-impl Default for EvidenceOptions {
+impl Default for PlanarEvidenceOptions {
     fn default() -> Self {
         Self { rate: FalseTargetRate::OnePercent, least_motion: 0.0 }
     }
@@ -79,7 +79,7 @@ pub enum Undecided {
 
 /// A verdict with the numbers it is based on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evidence {
+pub struct PlanarEvidence {
     /// The verdict.
     pub verdict: Verdict,
     /// F; infinite without redundancy.
@@ -133,7 +133,7 @@ const ROD: Calibration = Calibration {
 };
 
 /// Evidence of a hinge; `noise_sd` is that given to the fit.
-pub fn hinge_evidence(fit: &HingeFit, noise_sd: f64, options: &EvidenceOptions) -> Evidence {
+pub fn hinge_evidence(fit: &HingeFit, noise_sd: f64, options: &PlanarEvidenceOptions) -> PlanarEvidence {
     let group = Group {
         residual_rms: fit.residual_rms,
         unknowns: 4,
@@ -146,7 +146,7 @@ pub fn hinge_evidence(fit: &HingeFit, noise_sd: f64, options: &EvidenceOptions) 
 }
 
 /// Evidence of a rod; `noise_sd` is that given to the fit.
-pub fn rod_evidence(fit: &RodFit, noise_sd: f64, options: &EvidenceOptions) -> Evidence {
+pub fn rod_evidence(fit: &RodFit, noise_sd: f64, options: &PlanarEvidenceOptions) -> PlanarEvidence {
     let group = Group {
         residual_rms: fit.residual_rms,
         unknowns: 3,
@@ -164,7 +164,7 @@ pub struct Linkage {
     /// Fit with point i as the pivot and the two others, in order, as ends.
     pub fits: [HingeFit; 3],
     /// Evidence for each role.
-    pub evidence: [Evidence; 3],
+    pub evidence: [PlanarEvidence; 3],
     /// The pivot, if exactly one role is planar; then the two other points are not linked.
     pub pivot: Option<usize>,
 }
@@ -177,7 +177,7 @@ pub struct Linkage {
 pub fn link_three(
     points: [&[DVec2]; 3],
     options: &FitOptions,
-    evidence: &EvidenceOptions,
+    evidence: &PlanarEvidenceOptions,
 ) -> Result<Linkage, FitError> {
     let [a, b, c] = points;
     let fits = [fit_hinge(b, a, c, options)?, fit_hinge(a, b, c, options)?, fit_hinge(a, c, b, options)?];
@@ -198,7 +198,12 @@ struct Group {
     at_tilt_limit: bool,
 }
 
-fn judge(group: &Group, calibration: &Calibration, noise_sd: f64, options: &EvidenceOptions) -> Evidence {
+fn judge(
+    group: &Group,
+    calibration: &Calibration,
+    noise_sd: f64,
+    options: &PlanarEvidenceOptions,
+) -> PlanarEvidence {
     let least_motion = options
         .least_motion
         .max(calibration.motion_by_noise * noise_sd)
@@ -228,7 +233,7 @@ fn judge(group: &Group, calibration: &Calibration, noise_sd: f64, options: &Evid
     } else {
         Verdict::Planar
     };
-    Evidence { verdict, statistic, threshold, motion: group.motion, least_motion, rate: options.rate }
+    PlanarEvidence { verdict, statistic, threshold, motion: group.motion, least_motion, rate: options.rate }
 }
 
 #[cfg(test)]
@@ -239,7 +244,7 @@ mod tests {
     fn verdict(points: [&[DVec2]; 3], noise_sd: f64) -> Verdict {
         let options = FitOptions { noise_sd, ..FitOptions::default() };
         let fit = fit_hinge(points[0], points[1], points[2], &options).unwrap();
-        hinge_evidence(&fit, noise_sd, &EvidenceOptions::default()).verdict
+        hinge_evidence(&fit, noise_sd, &PlanarEvidenceOptions::default()).verdict
     }
 
     /// The image of a leg that swings in an oblique plane.
@@ -303,12 +308,13 @@ mod tests {
         RodFit { residual_rms, redundancy, length: 0.5, motion: 0.3, at_tilt_limit: false, ..fit }
     }
 
-    const FIVE: EvidenceOptions = EvidenceOptions { rate: FalseTargetRate::FivePercent, least_motion: 0.0 };
+    const FIVE: PlanarEvidenceOptions =
+        PlanarEvidenceOptions { rate: FalseTargetRate::FivePercent, least_motion: 0.0 };
 
     /// The statistic of the module head, and the thresholds at which the rates were measured.
     #[test]
     fn statistic_and_thresholds_are_the_calibrated_ones() {
-        let (one, noise_sd) = (EvidenceOptions::default(), 0.004f64);
+        let (one, noise_sd) = (PlanarEvidenceOptions::default(), 0.004f64);
         for (redundancy, hinge_limit) in [(12, 1.0), (26, 1.0), (71, 1.075), (116, 1.15), (300, 1.15)] {
             let n = redundancy as f64;
             // u = 4 unknowns; r0 m is 0.09 times the motion of the rod that moves least.
@@ -339,7 +345,7 @@ mod tests {
             (f * (departure * 0.3).powi(2) * 40.0 / (40.0 + unknowns)).sqrt()
         };
         for (options, of_hinge, of_rod) in
-            [(EvidenceOptions::default(), 1.0 + 0.15 * 14.0 / 90.0, 0.65), (FIVE, 1.5, 1.25)]
+            [(PlanarEvidenceOptions::default(), 1.0 + 0.15 * 14.0 / 90.0, 0.65), (FIVE, 1.5, 1.25)]
         {
             for (share, verdict) in [(0.99, Verdict::Planar), (1.01, Verdict::NotPlanar)] {
                 let fit = hinge(residual(share * of_hinge, 0.09, 4.0), 40);
@@ -354,11 +360,11 @@ mod tests {
     /// requested.
     #[test]
     fn motion_must_be_more_than_noise_and_a_share_of_the_length() {
-        let one = EvidenceOptions::default();
+        let one = PlanarEvidenceOptions::default();
         for (noise_sd, asked, of_hinge, of_rod) in
             [(0.1, 0.0, 0.25, 0.4), (0.0, 0.0, 0.025, 0.075), (0.001, 0.28, 0.28, 0.28)]
         {
-            let options = EvidenceOptions { least_motion: asked, ..one };
+            let options = PlanarEvidenceOptions { least_motion: asked, ..one };
             let [found_hinge, found_rod] = [
                 hinge_evidence(&hinge(0.0, 40), noise_sd, &options),
                 rod_evidence(&rod(0.0, 40), noise_sd, &options),
@@ -375,7 +381,7 @@ mod tests {
     /// Good fits without a verdict: at the tilt limit, or with fewer views than the rates require.
     #[test]
     fn edge_on_and_few_views_are_undecided() {
-        let one = EvidenceOptions::default();
+        let one = PlanarEvidenceOptions::default();
         let edge_on = Verdict::Undecided(Undecided::EdgeOn);
         let steep = HingeFit { at_tilt_limit: true, ..hinge(0.001, 40) };
         assert_eq!(hinge_evidence(&steep, 0.0, &one).verdict, edge_on);
@@ -399,7 +405,7 @@ mod tests {
     fn the_pivot_is_the_only_one_that_fits() {
         let [hip, knee, ankle] = leg(30, 0.4);
         let (fit, one) =
-            (FitOptions { noise_sd: 0.002, ..FitOptions::default() }, EvidenceOptions::default());
+            (FitOptions { noise_sd: 0.002, ..FitOptions::default() }, PlanarEvidenceOptions::default());
         for (order, pivot) in
             [([&hip, &knee, &ankle], 1), ([&knee, &hip, &ankle], 0), ([&ankle, &hip, &knee], 2)]
         {

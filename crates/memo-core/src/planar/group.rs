@@ -5,8 +5,8 @@
 //! [`interpret_figure`](super::interpret_figure).
 
 use super::{
-    Evidence, EvidenceOptions, FitError, FitOptions, HingeFit, RodFit, fit_hinge, fit_rod, hinge_evidence,
-    rod_evidence,
+    FitError, FitOptions, HingeFit, PlanarEvidence, PlanarEvidenceOptions, RodFit, fit_hinge, fit_rod,
+    hinge_evidence, rod_evidence,
 };
 use glam::DVec2;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ pub struct Pair {
     /// The points, the lower index first; it is the pivot of the fit.
     pub points: [usize; 2],
     /// The fit and its evidence, or why there is none.
-    pub tested: Result<(RodFit, Evidence), FitError>,
+    pub tested: Result<(RodFit, PlanarEvidence), FitError>,
 }
 
 /// Three points fitted as a hinge.
@@ -26,11 +26,11 @@ pub struct Triple {
     /// End, pivot, end; the lower end first.
     pub points: [usize; 3],
     /// The fit and its evidence, or why there is none.
-    pub tested: Result<(HingeFit, Evidence), FitError>,
+    pub tested: Result<(HingeFit, PlanarEvidence), FitError>,
 }
 
 /// Tests all K (K - 1) / 2 pairs of K tracks, in order.
-pub fn test_pairs(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &EvidenceOptions) -> Vec<Pair> {
+pub fn test_pairs(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &PlanarEvidenceOptions) -> Vec<Pair> {
     let count = tracks.len();
     let pairs: Vec<[usize; 2]> = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j])).collect();
     let tested = |[i, j]: [usize; 2]| {
@@ -42,7 +42,7 @@ pub fn test_pairs(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &EvidenceOpti
 }
 
 /// Tests all triples of K tracks with every point as the pivot, K (K - 1) (K - 2) / 2 hinges, ordered by pivot.
-pub fn test_triples(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &EvidenceOptions) -> Vec<Triple> {
+pub fn test_triples(tracks: &[&[DVec2]], fit: &FitOptions, evidence: &PlanarEvidenceOptions) -> Vec<Triple> {
     let count = tracks.len();
     let ends = |pivot: usize| {
         let others = move || (0..count).filter(move |&i| i != pivot);
@@ -82,7 +82,7 @@ mod tests {
     fn every_group_is_answered_and_the_knee_is_the_pivot() {
         let tracks = points();
         let tracks: Vec<&[DVec2]> = tracks.iter().map(Vec::as_slice).collect();
-        let (fit, evidence) = (FitOptions::default(), EvidenceOptions::default());
+        let (fit, evidence) = (FitOptions::default(), PlanarEvidenceOptions::default());
         let (pairs, triples) = (test_pairs(&tracks, &fit, &evidence), test_triples(&tracks, &fit, &evidence));
         assert_eq!((pairs.len(), triples.len()), (6, 12));
         for triple in &triples {

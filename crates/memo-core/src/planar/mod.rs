@@ -23,12 +23,13 @@ pub use depth_change::{
     perspective_of_figure_px,
 };
 pub use evidence::{
-    Evidence, EvidenceOptions, FalseTargetRate, Linkage, Undecided, Verdict, hinge_evidence, link_three,
-    rod_evidence,
+    FalseTargetRate, Linkage, PlanarEvidence, PlanarEvidenceOptions, Undecided, Verdict, hinge_evidence,
+    link_three, rod_evidence,
 };
 pub use figure::{
-    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureOptions, FigureWindow, Interpretation,
-    Link, Method, Status, interpret_figure, interpret_named_figure, interpret_with_progress, joint_of,
+    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureInterpretation, FigureOptions,
+    FigureWindow, Link, Method, Status, interpret_figure, interpret_named_figure, interpret_with_progress,
+    joint_of,
 };
 pub use fit::{FitError, FitOptions};
 pub use group::{Pair, Triple, test_pairs, test_triples};

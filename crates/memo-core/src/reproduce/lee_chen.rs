@@ -11,7 +11,7 @@ use crate::posture::Bearings;
 use crate::posture::constraint::Constraint;
 use crate::posture::group::{DEFAULT_GROUP_M, PostureGroup, group};
 use crate::posture::rules::{MotionModel, Rule, Tolerance};
-use crate::posture::tree::{Interpretations, Path, TreeError, TreeOptions, View};
+use crate::posture::tree::{Interpretations, TreeError, TreeOptions, TreePath, View};
 use crate::reproduce::stick_walker::{StickCamera, StickWalker};
 use glam::{DMat3, DVec3};
 
@@ -254,7 +254,7 @@ pub fn table_walker() -> StickWalker {
 /// One view of the walker with its true posture, and the directions known to the camera.
 struct Scene {
     view: View,
-    truth: Path,
+    truth: TreePath,
     bearings: Bearings,
 }
 
@@ -279,13 +279,13 @@ impl Scene {
     }
 
     /// Paths to the leaves that satisfy a reading of rules 1 to 5.
-    fn survivors(&self, reading: Reading) -> Result<Vec<Path>, TreeError> {
+    fn survivors(&self, reading: Reading) -> Result<Vec<TreePath>, TreeError> {
         let left = self.interpret(Some(reading.motion()))?;
         let admitted = left.interpretations().filter(|leaf| reading.admits(&leaf.figure));
         Ok(admitted.map(|leaf| leaf.path).collect())
     }
 
-    fn figure(&self, path: Path) -> StickFigure {
+    fn figure(&self, path: TreePath) -> StickFigure {
         self.view.interpretation(path).figure
     }
 }

@@ -92,14 +92,14 @@ const MOST_FRAMES: usize = 1_000_000;
 
 /// Named points over time in the world, metres, Z up.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
+pub struct PointMotion {
     /// Positions, frame after frame; within a frame, the points are in the order of the names.
     positions: Vec<DVec3>,
     names: Vec<String>,
     times_s: Vec<f64>,
 }
 
-impl Motion {
+impl PointMotion {
     /// A motion from positions (frames x points, frame after frame; world axes, metres), names and times
     /// (seconds).
     ///
@@ -228,7 +228,7 @@ pub const WALKER_HEIGHT_M: f64 = 1.75;
 
 /// Options of [`sampled_walk`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WalkOptions {
+pub struct SampledWalkOptions {
     /// Number of frames.
     pub frames: usize,
     /// Frames per second. Default 60, a common display rate.
@@ -242,13 +242,13 @@ pub struct WalkOptions {
     pub phase: f64,
 }
 
-impl Default for WalkOptions {
+impl Default for SampledWalkOptions {
     fn default() -> Self {
         Self { frames: 60, rate_hz: 60.0, speed_mps: 1.3, heading_rad: 0.0, phase: 0.0 }
     }
 }
 
-impl WalkOptions {
+impl SampledWalkOptions {
     /// Duration of one gait cycle of this walker, seconds.
     pub fn cycle_s(&self, walker: &Walker) -> f64 {
         stride_length_m(walker) / self.speed_mps
@@ -264,8 +264,8 @@ impl WalkOptions {
 /// # Errors
 ///
 /// An option out of range, or a walker with a stride that is not positive.
-pub fn sampled_walk(walker: &Walker, options: &WalkOptions) -> Result<Motion, MotionError> {
-    let WalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = *options;
+pub fn sampled_walk(walker: &Walker, options: &SampledWalkOptions) -> Result<PointMotion, MotionError> {
+    let SampledWalkOptions { frames, rate_hz, speed_mps, heading_rad, phase } = *options;
     let positive = |value: f64| value > 0.0 && value.is_finite();
     let cycle_s = options.cycle_s(walker);
     for (parameter, value, is_possible) in [
@@ -288,7 +288,7 @@ pub fn sampled_walk(walker: &Walker, options: &WalkOptions) -> Result<Motion, Mo
         let centre = level + forward * (speed_mps * (time_s - middle_s));
         points_of(&walker.pose(centre, heading_rad, (phase + time_s / cycle_s).rem_euclid(1.0)))
     });
-    Motion::new(positions.collect(), WALKER_NAMES.map(String::from).to_vec(), times_s)
+    PointMotion::new(positions.collect(), WALKER_NAMES.map(String::from).to_vec(), times_s)
 }
 
 /// The points of a posed body in the order of [`WALKER_NAMES`].
@@ -306,14 +306,14 @@ mod tests {
     use super::*;
     use crate::model::{Body, Gait, GaitStyle};
 
-    fn walk(options: &WalkOptions) -> Result<Motion, MotionError> {
+    fn walk(options: &SampledWalkOptions) -> Result<PointMotion, MotionError> {
         let body = Body::from_height(1.75).unwrap();
         sampled_walk(&Walker { body, gait: Gait::dense(), style: GaitStyle::default() }, options)
     }
 
     #[test]
     fn limbs_keep_their_lengths_and_the_body_moves_at_its_speed() {
-        let motion = walk(&WalkOptions { heading_rad: 0.8, ..WalkOptions::default() }).unwrap();
+        let motion = walk(&SampledWalkOptions { heading_rad: 0.8, ..SampledWalkOptions::default() }).unwrap();
         for [a, b] in limbs_of(motion.names()) {
             let length = |t| motion.at(t, a).unwrap().distance(motion.at(t, b).unwrap());
             assert!((0..60).all(|t| (length(t) - length(0)).abs() < 1e-9));
@@ -326,7 +326,7 @@ mod tests {
 
     #[test]
     fn a_stance_ankle_stands_nearly_still() {
-        let motion = walk(&WalkOptions::default()).unwrap();
+        let motion = walk(&SampledWalkOptions::default()).unwrap();
         let ankle = motion.index_of("RAN").unwrap();
         // Phase 0.15 to 0.35 of a cycle of a little over a second.
         let moved = motion.at(20, ankle).unwrap() - motion.at(10, ankle).unwrap();
@@ -335,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_point_or_a_frame_that_does_not_exist_is_nowhere() {
-        let walk = walk(&WalkOptions::default()).unwrap();
+        let walk = walk(&SampledWalkOptions::default()).unwrap();
         let [frames, points] = [walk.frames(), walk.points()];
         assert!(walk.at(frames - 1, points - 1).is_some());
         assert_eq!([walk.at(0, points), walk.at(frames, 0), walk.at(usize::MAX, usize::MAX)], [None; 3]);
@@ -345,26 +345,32 @@ mod tests {
     fn what_is_no_motion_is_refused() {
         let names = vec!["a".to_owned(), "b".to_owned()];
         let at = |x: f64| vec![DVec3::splat(x); 4];
-        assert!(matches!(Motion::new(vec![], vec![], vec![]), Err(MotionError::Empty { .. })));
-        assert!(matches!(Motion::new(at(0.0), names.clone(), vec![0.0]), Err(MotionError::Shape { .. })));
+        assert!(matches!(PointMotion::new(vec![], vec![], vec![]), Err(MotionError::Empty { .. })));
+        assert!(matches!(
+            PointMotion::new(at(0.0), names.clone(), vec![0.0]),
+            Err(MotionError::Shape { .. })
+        ));
         for times in [vec![0.0, 0.0], vec![1.0, 0.5], vec![0.0, f64::NAN]] {
-            assert!(matches!(Motion::new(at(0.0), names.clone(), times), Err(MotionError::Times { .. })));
+            assert!(matches!(
+                PointMotion::new(at(0.0), names.clone(), times),
+                Err(MotionError::Times { .. })
+            ));
         }
         for far in [f64::INFINITY, 1e300] {
             assert!(matches!(
-                Motion::new(at(far), names.clone(), vec![0.0, 1.0]),
+                PointMotion::new(at(far), names.clone(), vec![0.0, 1.0]),
                 Err(MotionError::Position { .. })
             ));
         }
-        let unknown = Motion::new(at(f64::NAN), names, vec![0.0, 1.0]).unwrap();
+        let unknown = PointMotion::new(at(f64::NAN), names, vec![0.0, 1.0]).unwrap();
         assert_eq!(unknown.at(0, 0), None);
         assert_eq!(unknown.pelvis_path(), vec![DVec3::ZERO; 2]);
         for bad in [f64::NAN, 0.0, f64::INFINITY] {
-            assert!(walk(&WalkOptions { rate_hz: bad, ..WalkOptions::default() }).is_err());
-            assert!(walk(&WalkOptions { speed_mps: bad, ..WalkOptions::default() }).is_err());
+            assert!(walk(&SampledWalkOptions { rate_hz: bad, ..SampledWalkOptions::default() }).is_err());
+            assert!(walk(&SampledWalkOptions { speed_mps: bad, ..SampledWalkOptions::default() }).is_err());
         }
-        assert!(walk(&WalkOptions { frames: 0, ..WalkOptions::default() }).is_err());
-        assert!(walk(&WalkOptions { frames: usize::MAX, ..WalkOptions::default() }).is_err());
-        assert!(walk(&WalkOptions { phase: f64::NAN, ..WalkOptions::default() }).is_err());
+        assert!(walk(&SampledWalkOptions { frames: 0, ..SampledWalkOptions::default() }).is_err());
+        assert!(walk(&SampledWalkOptions { frames: usize::MAX, ..SampledWalkOptions::default() }).is_err());
+        assert!(walk(&SampledWalkOptions { phase: f64::NAN, ..SampledWalkOptions::default() }).is_err());
     }
 }

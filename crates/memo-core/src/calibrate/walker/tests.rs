@@ -10,7 +10,7 @@ const LEVEL: Camera = Camera {
 };
 
 /// A person of 1.8 m on a circle in front of a camera 3 m high that looks down.
-fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<Sighting> {
+fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<WalkerSighting> {
     let rotation = DMat3::from_rotation_z(roll_rad) * DMat3::from_rotation_x(pitch_rad) * LEVEL.rotation;
     let translation = rotation * DVec3::new(0.0, 0.0, -3.0);
     let camera = Camera { rotation, translation, ..LEVEL };
@@ -20,7 +20,7 @@ fn sightings(pitch_rad: f64, roll_rad: f64) -> Vec<Sighting> {
     };
     let sighting = |p: DVec3| {
         let [foot, head] = [p, p + DVec3::Z * 1.8].map(|p| camera.project(p).unwrap());
-        Sighting::from_rectangle(foot, head)
+        WalkerSighting::from_rectangle(foot, head)
     };
     (0..30).map(place).map(sighting).collect()
 }
@@ -73,10 +73,14 @@ fn looking_down(pitch_rad: f64, focal_px: DVec2) -> Camera {
 }
 
 /// A person of 1.8 m, from one fraction of the height to another.
-fn seen_at(camera: &Camera, places: &[DVec3], foot_share: f64, head_share: f64) -> Vec<Sighting> {
+fn seen_at(camera: &Camera, places: &[DVec3], foot_share: f64, head_share: f64) -> Vec<WalkerSighting> {
     let pixel = |p: &DVec3, share: f64| camera.project(*p + DVec3::Z * 1.8 * share).unwrap();
-    let sighting =
-        |p| Sighting { foot_px: pixel(p, foot_share), head_px: pixel(p, head_share), foot_share, head_share };
+    let sighting = |p| WalkerSighting {
+        foot_px: pixel(p, foot_share),
+        head_px: pixel(p, head_share),
+        foot_share,
+        head_share,
+    };
     places.iter().map(sighting).collect()
 }
 
@@ -129,7 +133,7 @@ fn a_known_lens_may_have_oblong_pixels() {
 /// derivatives of the camera's own ground point and projection. The priors on roll (2 degrees) and focal
 /// length (a factor of e about the image width) have the weight of a sighting with an error of half a
 /// hundredth.
-fn unit_deviations(camera: &Camera, sightings: &[Sighting]) -> [f64; 4] {
+fn unit_deviations(camera: &Camera, sightings: &[WalkerSighting]) -> [f64; 4] {
     let heights: Vec<f64> = sightings.iter().map(|s| s.head_px.distance(s.foot_px)).collect();
     let noise_px = 0.005 * median(heights);
     let heads = |change: [f64; 4]| -> Vec<f64> {
@@ -142,7 +146,7 @@ fn unit_deviations(camera: &Camera, sightings: &[Sighting]) -> [f64; 4] {
             translation: -(rotation * position),
             ..camera.clone()
         };
-        let head = |s: &Sighting| {
+        let head = |s: &WalkerSighting| {
             moved.project(moved.ground_point(s.foot_px).unwrap() + DVec3::Z * 1.8).unwrap().to_array()
         };
         let mut all: Vec<f64> = sightings.iter().flat_map(head).map(|v| v / 2f64.sqrt()).collect();
@@ -195,9 +199,9 @@ fn noise_makes_the_deviations_of_a_walk_back() {
     let exact = seen_at(&camera, &circle(), 0.0, 1.0);
     let mut random = crate::synth::Random::new(5);
     let mut noisy = || DVec2::from(random.normal_pair().map(f64::from));
-    let sightings: Vec<Sighting> = exact
+    let sightings: Vec<WalkerSighting> = exact
         .iter()
-        .map(|s| Sighting { foot_px: s.foot_px + noisy(), head_px: s.head_px + noisy(), ..*s })
+        .map(|s| WalkerSighting { foot_px: s.foot_px + noisy(), head_px: s.head_px + noisy(), ..*s })
         .collect();
     let found = camera_from_walker(&sightings, &options(KnownLens::Nothing)).unwrap();
     // Head and foot together have twice the variance, along both axes.
@@ -226,7 +230,8 @@ fn mistaken_sightings_are_left_out() {
 
 #[test]
 fn walks_that_do_not_tell_the_camera_are_refused() {
-    let refused = |sightings: &[Sighting], lens| camera_from_walker(sightings, &options(lens)).unwrap_err();
+    let refused =
+        |sightings: &[WalkerSighting], lens| camera_from_walker(sightings, &options(lens)).unwrap_err();
     // Walking parallel to the image plane of a level camera: closer with a shorter focal length looks the
     // same.
     let across: Vec<DVec3> = (0..20).map(|i| DVec3::new(-1.5 + 0.15 * f64::from(i), 8.0, 0.0)).collect();
@@ -242,10 +247,12 @@ fn walks_that_do_not_tell_the_camera_are_refused() {
 fn what_is_no_walk_is_refused() {
     let camera = looking_down(0.25, LEVEL.focal_px);
     let good = seen_at(&camera, &circle(), 0.0, 1.0);
-    let refused =
-        |sightings: &[Sighting]| camera_from_walker(sightings, &options(KnownLens::Nothing)).unwrap_err();
-    let turned = |count: usize| -> Vec<Sighting> {
-        let upside_down = |s: &Sighting| Sighting { foot_px: s.head_px, head_px: s.foot_px, ..*s };
+    let refused = |sightings: &[WalkerSighting]| {
+        camera_from_walker(sightings, &options(KnownLens::Nothing)).unwrap_err()
+    };
+    let turned = |count: usize| -> Vec<WalkerSighting> {
+        let upside_down =
+            |s: &WalkerSighting| WalkerSighting { foot_px: s.head_px, head_px: s.foot_px, ..*s };
         good.iter().enumerate().map(|(i, s)| if i < count { upside_down(s) } else { *s }).collect()
     };
     assert_eq!(refused(&turned(17)), WalkerError::UpsideDown { count: 17, total: 33 });
@@ -254,10 +261,13 @@ fn what_is_no_walk_is_refused() {
         Err(WalkerError::UpsideDown { .. })
     ));
     // Heights that vary between half and one and a half of a person's height are not a person.
-    let wild: Vec<Sighting> = good
+    let wild: Vec<WalkerSighting> = good
         .iter()
         .enumerate()
-        .map(|(i, s)| Sighting { head_px: s.foot_px.lerp(s.head_px, 0.5 + (i * 7 % 11) as f64 / 10.0), ..*s })
+        .map(|(i, s)| WalkerSighting {
+            head_px: s.foot_px.lerp(s.head_px, 0.5 + (i * 7 % 11) as f64 / 10.0),
+            ..*s
+        })
         .collect();
     let error = refused(&wild);
     assert!(matches!(error, WalkerError::NoCamera { rms_px, .. } if rms_px.is_finite()), "{error}");

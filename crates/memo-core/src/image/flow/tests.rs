@@ -148,7 +148,7 @@ fn translations_of_a_textured_ring_are_recovered() {
         let field =
             velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
         assert_eq!(field.components.len(), 1);
-        assert_eq!(field.components[0].evidence, Evidence::Determined);
+        assert_eq!(field.components[0].evidence, FlowEvidence::Determined);
         let mut worst = 0.0f64;
         for p in (0..region.pixels().len()).filter(|&p| region.pixels()[p]) {
             worst = worst.max(field.at(p % 120, p / 120).unwrap().distance(shift));
@@ -172,8 +172,8 @@ fn components_without_two_directions_are_refused_by_name() {
     }
     let frame = image.as_frame();
     let field = velocity_field(&frame, &frame, &region, &FlowOptions::default()).unwrap();
-    let evidence: Vec<Evidence> = field.components.iter().map(|c| c.evidence).collect();
-    assert_eq!(evidence, [Evidence::Determined, Evidence::OneDirection, Evidence::Textureless]);
+    let evidence: Vec<FlowEvidence> = field.components.iter().map(|c| c.evidence).collect();
+    assert_eq!(evidence, [FlowEvidence::Determined, FlowEvidence::OneDirection, FlowEvidence::Textureless]);
     assert_eq!((field.components[1].x, field.components[1].pixel_count), (35, 400));
     assert!(field.at(10, 10).unwrap().length() < 1e-3);
     assert_eq!(
@@ -214,7 +214,7 @@ fn regions_at_the_border_and_of_single_pixels_are_computed() {
     region.set(39, 29, true);
     let field =
         velocity_field(&first.as_frame(), &second.as_frame(), &region, &FlowOptions::default()).unwrap();
-    assert_ne!(field.components[0].evidence, Evidence::Determined);
+    assert_ne!(field.components[0].evidence, FlowEvidence::Determined);
 }
 
 proptest! {
@@ -376,10 +376,10 @@ fn evidence_begins_at_the_least_gradient() {
         (found.components[0].evidence, found.components[0].gradient_rms)
     };
     let (_, [weaker, stronger]) = evidence(0.1);
-    assert_eq!(evidence(0.999 * weaker).0, Evidence::Determined);
-    assert_eq!(evidence(1.001 * weaker).0, Evidence::OneDirection);
-    assert_eq!(evidence(0.999 * stronger).0, Evidence::OneDirection);
-    assert_eq!(evidence(1.001 * stronger).0, Evidence::Textureless);
+    assert_eq!(evidence(0.999 * weaker).0, FlowEvidence::Determined);
+    assert_eq!(evidence(1.001 * weaker).0, FlowEvidence::OneDirection);
+    assert_eq!(evidence(0.999 * stronger).0, FlowEvidence::OneDirection);
+    assert_eq!(evidence(1.001 * stronger).0, FlowEvidence::Textureless);
 }
 
 /// Iterations and residual are those of the full-size level, and a solution stopped early reports its

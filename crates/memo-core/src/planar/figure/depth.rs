@@ -339,8 +339,8 @@ mod tests {
     /// A window with one rod between points 0 and 1, with these depths and a known or unknown reflection.
     fn window(start: usize, depths: &[f64], margin: Option<f64>) -> FigureWindow {
         use crate::planar::figure::{Figure, Link, Method};
-        use crate::planar::{Evidence, FalseTargetRate, Plane};
-        let evidence = Evidence {
+        use crate::planar::{FalseTargetRate, PlanarEvidence, Plane};
+        let evidence = PlanarEvidence {
             verdict: Verdict::Planar,
             statistic: 0.0,
             threshold: 1.0,

@@ -2,7 +2,7 @@
 
 use super::Figure;
 use crate::model::{Body, Gait, GaitStyle, Walker};
-use crate::synth::{Random, View, WalkOptions, limbs_of, sampled_walk};
+use crate::synth::{DisplayView, Random, SampledWalkOptions, limbs_of, sampled_walk};
 use glam::{DVec2, DVec3};
 
 /// The body model walking for `frames` frames at 60 Hz, rotated about its pelvis by `turn(time)`, seen 35 degrees
@@ -14,9 +14,10 @@ pub(super) fn walker(
 ) -> (Vec<Vec<DVec2>>, Vec<f64>, Vec<f64>) {
     let body = Body::from_height(1.75).unwrap();
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let motion = sampled_walk(&walker, &WalkOptions { frames, ..WalkOptions::default() }).unwrap();
+    let motion =
+        sampled_walk(&walker, &SampledWalkOptions { frames, ..SampledWalkOptions::default() }).unwrap();
     let (azimuth_rad, px_per_m) = (0.6f64, 200.0);
-    let view = View::Orthographic { azimuth_rad, elevation_rad: 0.0, px_per_m };
+    let view = DisplayView::Orthographic { azimuth_rad, elevation_rad: 0.0, px_per_m };
     let away = DVec3::new(-azimuth_rad.sin(), azimuth_rad.cos(), 0.0);
     let (path, times_s) = (motion.pelvis_path(), motion.times_s().to_vec());
     let mut random = Random::new(9);

@@ -1,6 +1,6 @@
 //! A linkage of moving points: links, chains, and contacts between chains.
 
-use crate::planar::{Evidence, Plane, Verdict};
+use crate::planar::{PlanarEvidence, Plane, Verdict};
 
 /// Method by which the links were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub struct Chain {
     /// RMS of the residuals, in the unit of the tracks.
     pub residual_rms: f64,
     /// Evidence that its motion is planar.
-    pub evidence: Evidence,
+    pub evidence: PlanarEvidence,
     /// Depth of each point relative to the first, frame by frame in the order of `points`; NaN if not seen. All
     /// signs may be opposite.
     pub depth: Vec<Vec<f64>>,

@@ -32,7 +32,7 @@ pub use depth::DepthSource;
 pub use linkage::{Chain, Contact, Figure, Link, Method};
 pub use reflection::joint_of;
 
-use super::{EvidenceOptions, FitOptions, Verdict};
+use super::{FitOptions, PlanarEvidenceOptions, Verdict};
 use crate::model::skeleton::Joint;
 use crate::option_error::OptionError;
 use crate::progress::{Progress, Stopped};
@@ -148,11 +148,11 @@ impl Default for Costs {
 /// Options of [`interpret_figure`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FigureOptions {
-    /// Options of the fits; `noise_sd` in the unit of the tracks, by default 0.5: dots placed to the pixel. Single wrong positions are removed from the
-    /// tracks first, so by default the fits do not look for outliers.
+    /// Options of the fits; `noise_sd` in the unit of the tracks, by default 0.5: dots placed to the pixel. Single
+    /// wrong positions are removed from the tracks first, so by default the fits do not look for outliers.
     pub fit: FitOptions,
     /// Options of the verdicts, with the false-target rate.
-    pub evidence: EvidenceOptions,
+    pub evidence: PlanarEvidenceOptions,
     /// Costs of the groups.
     pub costs: Costs,
     /// Size of the figure in the unit of the tracks (RMS distance of its joints from their middle, about a
@@ -171,7 +171,7 @@ impl Default for FigureOptions {
     fn default() -> Self {
         Self {
             fit: FitOptions { noise_sd: 0.5, max_outlier_fraction: 0.0, ..FitOptions::default() },
-            evidence: EvidenceOptions::default(),
+            evidence: PlanarEvidenceOptions::default(),
             costs: Costs::default(),
             size: None,
             window_s: 1.2,
@@ -211,7 +211,7 @@ pub struct FigureWindow {
 
 /// Result for all tracks.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Interpretation {
+pub struct FigureInterpretation {
     /// The windows, in order; they overlap by half.
     pub windows: Vec<FigureWindow>,
     /// Depth of each point relative to the first point of its chain, T x K, in the unit of the tracks; NaN if not
@@ -230,7 +230,7 @@ pub fn interpret_figure(
     tracks: &[Vec<DVec2>],
     times_s: &[f64],
     options: &FigureOptions,
-) -> Result<Interpretation, FigureError> {
+) -> Result<FigureInterpretation, FigureError> {
     interpret_with_progress(tracks, None, times_s, options, &Progress::new())
 }
 
@@ -244,7 +244,7 @@ pub fn interpret_named_figure(
     joints: &[Option<Joint>],
     times_s: &[f64],
     options: &FigureOptions,
-) -> Result<Interpretation, FigureError> {
+) -> Result<FigureInterpretation, FigureError> {
     interpret_with_progress(tracks, Some(joints), times_s, options, &Progress::new())
 }
 
@@ -259,7 +259,7 @@ pub fn interpret_with_progress(
     times_s: &[f64],
     options: &FigureOptions,
     progress: &Progress,
-) -> Result<Interpretation, FigureError> {
+) -> Result<FigureInterpretation, FigureError> {
     if let Some(joints) = joints
         && joints.len() != tracks.len()
     {
@@ -288,7 +288,7 @@ pub fn interpret_with_progress(
         reflect_by_anatomy(&mut windows, tracks, joints);
     }
     let (depth, sources) = depth_over_time(tracks, &windows, options.carries_structure);
-    Ok(Interpretation { windows, depth, sources })
+    Ok(FigureInterpretation { windows, depth, sources })
 }
 
 impl FigureWindow {

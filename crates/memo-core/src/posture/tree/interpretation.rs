@@ -8,12 +8,12 @@ use crate::posture::placed::{HeadingSource, PlacedFigure};
 
 /// A path down the tree: near or far root for each joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-pub struct Path(
+pub struct TreePath(
     /// Bit n is set if the joint of level n is at the far root.
     pub u16,
 );
 
-impl Path {
+impl TreePath {
     /// True if a joint is at the far root; false if it has only one root.
     pub fn is_far(self, joint: Joint) -> bool {
         self.0 >> joint as u16 & 1 == 1
@@ -32,7 +32,7 @@ pub struct Interpretation {
     /// The joints, camera axes, metres; NaN where unknown.
     pub figure: StickFigure,
     /// Its path down the tree.
-    pub path: Path,
+    pub path: TreePath,
     /// Number of roots of each segment; `None` for the neck and unknown joints. For a segment without a real root
     /// it holds the gap.
     pub kinds: PerJoint<Option<RootKind>>,
@@ -81,7 +81,7 @@ pub struct CutCount {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     /// The path down to the level of the violation.
-    pub path: Path,
+    pub path: TreePath,
     /// The violation that cut it.
     pub violation: Violation,
 }
@@ -103,7 +103,7 @@ pub struct Interpretations {
     /// The view.
     pub view: View,
     /// Paths to the surviving leaves, in depth-first order, near root first.
-    pub survivors: Vec<Path>,
+    pub survivors: Vec<TreePath>,
     /// Nodes of each level.
     pub counts: PerJoint<LevelCount>,
     /// Number of branches cut, for each constraint that cut any, in the order of [`Constraint::ALL`].

@@ -1,7 +1,7 @@
 //! The posture that breaks the constraints least.
 
 use super::checks::{Asked, Tree};
-use super::{LeastViolating, Path};
+use super::{LeastViolating, TreePath};
 use crate::model::skeleton::{JOINT_COUNT, Joint};
 
 /// Branch and bound, depth first, for the leaf with the smallest sum of squared severities.
@@ -10,7 +10,7 @@ pub(super) fn least_violating(tree: &Tree) -> LeastViolating {
     let mut search = Search { tree, levels, best: (f64::INFINITY, 0) };
     search.descend(1, 0, 0.0);
     let (total, node) = search.best;
-    let path = Path((node as u16) << 1);
+    let path = TreePath((node as u16) << 1);
     LeastViolating {
         interpretation: tree.view.interpretation(path),
         violations: tree.view.violations(path, tree.options),

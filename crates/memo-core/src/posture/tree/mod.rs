@@ -31,7 +31,9 @@ use super::lift::{JointRays, roots};
 use super::placed::{Placed, PlacedFigure, Trunk, placed_points};
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 
-pub use interpretation::{Cut, CutCount, Interpretation, Interpretations, LeastViolating, LevelCount, Path};
+pub use interpretation::{
+    Cut, CutCount, Interpretation, Interpretations, LeastViolating, LevelCount, TreePath,
+};
 pub use options::TreeOptions;
 use walk::walk;
 
@@ -113,7 +115,7 @@ impl View {
     }
 
     /// The posture at the end of a path.
-    pub fn interpretation(&self, path: Path) -> Interpretation {
+    pub fn interpretation(&self, path: TreePath) -> Interpretation {
         let placed = self.place(path);
         let mut kinds = PerJoint([None; JOINT_COUNT]);
         let mut depth_sd_m = PerJoint([self.neck_sd_m; JOINT_COUNT]);
@@ -128,8 +130,8 @@ impl View {
 
     /// The path to the posture nearest to a figure: at every segment the root whose segment vector is nearer to
     /// the figure's (the near root if the figure's is unknown).
-    pub fn nearest_path(&self, figure: &StickFigure) -> Path {
-        let mut path = Path::default();
+    pub fn nearest_path(&self, figure: &StickFigure) -> TreePath {
+        let mut path = TreePath::default();
         let mut points = PerJoint([self.neck; JOINT_COUNT]);
         for joint in Joint::ALL.into_iter().skip(1) {
             let start = points[joint.start().unwrap_or(Joint::Neck)];
@@ -145,7 +147,7 @@ impl View {
     }
 
     /// All constraints that the posture at the end of a path breaks.
-    pub fn violations(&self, path: Path, options: &TreeOptions) -> Vec<Violation> {
+    pub fn violations(&self, path: TreePath, options: &TreeOptions) -> Vec<Violation> {
         all_violations(&PlacedFigure::of(&self.place(path)), &self.lengths, options)
     }
 
@@ -203,7 +205,7 @@ impl View {
         (points.map(placed), count)
     }
 
-    fn place(&self, path: Path) -> PerJoint<Placed> {
+    fn place(&self, path: TreePath) -> PerJoint<Placed> {
         let mut placed = PerJoint([Placed::UNKNOWN; JOINT_COUNT]);
         placed[Joint::Neck] = self.root();
         for joint in Joint::ALL.into_iter().skip(1) {

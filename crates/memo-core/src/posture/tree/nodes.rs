@@ -6,7 +6,7 @@
 //! of the node that is near in all other bits.
 
 use crate::model::skeleton::JOINT_COUNT;
-use crate::posture::tree::Path;
+use crate::posture::tree::TreePath;
 
 /// Number of roots that a path chooses.
 const CHOICES: usize = JOINT_COUNT - 1;
@@ -140,12 +140,12 @@ impl Nodes {
     }
 
     /// The paths to the nodes in depth-first order, near root first.
-    pub fn paths(&self) -> Vec<Path> {
+    pub fn paths(&self) -> Vec<TreePath> {
         // The first choice is the most significant: with reversed bits, the numbers ascend.
         let reversed = |number: usize| usize::from((number as u16).reverse_bits() >> (16 - CHOICES));
         let in_order = Self::of(self.numbers().map(reversed), CHOICES);
         let mut paths = Vec::with_capacity(self.count() as usize);
-        paths.extend(in_order.numbers().map(|number| Path((reversed(number) as u16) << 1)));
+        paths.extend(in_order.numbers().map(|number| TreePath((reversed(number) as u16) << 1)));
         paths
     }
 }

@@ -56,16 +56,16 @@ fn every_rule() -> MotionModel {
 /// path to it.
 #[derive(Default)]
 struct Plain {
-    survivors: BTreeSet<Path>,
-    reached: [BTreeSet<Path>; JOINT_COUNT],
-    survived: [BTreeSet<Path>; JOINT_COUNT],
-    cuts: BTreeMap<(usize, Path), String>,
+    survivors: BTreeSet<TreePath>,
+    reached: [BTreeSet<TreePath>; JOINT_COUNT],
+    survived: [BTreeSet<TreePath>; JOINT_COUNT],
+    cuts: BTreeMap<(usize, TreePath), String>,
 }
 
 fn plain(view: &View, options: &TreeOptions) -> Plain {
     let mut plain = Plain::default();
     'leaf: for bits in 0..1u16 << 13 {
-        let leaf = Path(bits << 1);
+        let leaf = TreePath(bits << 1);
         let mut placed = PerJoint([Placed::UNKNOWN; JOINT_COUNT]);
         placed[Joint::Neck] = view.root();
         let mut way = Vec::new();
@@ -75,7 +75,7 @@ fn plain(view: &View, options: &TreeOptions) -> Plain {
                 continue 'leaf;
             }
             placed[joint] = candidates[usize::from(leaf.is_far(joint))];
-            let path = Path(leaf.0 & ((1u32 << (joint as u32 + 1)) - 1) as u16);
+            let path = TreePath(leaf.0 & ((1u32 << (joint as u32 + 1)) - 1) as u16);
             let figure = PlacedFigure::of(&placed);
             let known = figure.known();
             let trunk = Trunk::of(&figure, &options.bearings);
@@ -103,7 +103,7 @@ fn plain(view: &View, options: &TreeOptions) -> Plain {
 fn assert_same(view: &View, options: &TreeOptions) -> usize {
     let found = view.interpret(options).unwrap();
     let plain = plain(view, options);
-    let survivors: BTreeSet<Path> = found.survivors.iter().copied().collect();
+    let survivors: BTreeSet<TreePath> = found.survivors.iter().copied().collect();
     assert_eq!(survivors, plain.survivors);
     assert_eq!(survivors.len(), found.survivors.len());
     for joint in Joint::ALL.into_iter().skip(1) {
@@ -115,7 +115,7 @@ fn assert_same(view: &View, options: &TreeOptions) -> usize {
     plain.cuts.values().for_each(|name| *reasons.entry(name.clone()).or_default() += 1);
     let found_reasons = found.reasons.iter().map(|r| (r.constraint.name(), r.branches)).collect();
     assert_eq!(reasons, found_reasons);
-    let cuts: BTreeMap<(usize, Path), String> = found
+    let cuts: BTreeMap<(usize, TreePath), String> = found
         .cuts
         .iter()
         .map(|cut| ((cut.violation.joint as usize, cut.path), cut.violation.constraint.name()))
@@ -190,7 +190,7 @@ fn the_least_violating_posture_has_no_better() {
         };
         tried += 1;
         let total = |path| view.violations(path, &options).iter().map(|v| v.severity().powi(2)).sum::<f64>();
-        let exhaustive = (0..1u16 << 13).map(|bits| total(Path(bits << 1))).fold(f64::MAX, f64::min);
+        let exhaustive = (0..1u16 << 13).map(|bits| total(TreePath(bits << 1))).fold(f64::MAX, f64::min);
         assert!((least.total - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
         assert!((total(least.interpretation.path) - exhaustive).abs() < 1e-9 * (1.0 + exhaustive));
         assert!(!least.violations.is_empty());
@@ -217,7 +217,7 @@ fn unseen_joints_are_left_open_with_all_that_hangs_on_them() {
 
     view.rays.ray = PerJoint([DVec3::NAN; JOINT_COUNT]);
     let nothing = view.interpret(&TreeOptions::physical()).unwrap();
-    assert_eq!(nothing.survivors, [Path::default()]);
+    assert_eq!(nothing.survivors, [TreePath::default()]);
     assert!(nothing.reasons.is_empty() && !nothing.open.is_empty());
 }
 
@@ -245,7 +245,7 @@ fn bad_input_is_refused_with_its_values() {
 #[test]
 fn depths_are_as_unsure_as_their_chain() {
     let view = View { neck_sd_m: 0.05, ..view_of(3, 1e-3) };
-    let found = view.interpretation(Path::default());
+    let found = view.interpretation(TreePath::default());
     for joint in Joint::ALL.into_iter().skip(1) {
         let mut variance = 0.05f64.powi(2);
         let mut end = joint;
@@ -256,7 +256,7 @@ fn depths_are_as_unsure_as_their_chain() {
         assert!((found.depth_sd_m[joint] - variance.sqrt()).abs() < 1e-12, "{joint:?}");
     }
     let quiet = View { length_sd_m: 0.02, ..view_of(3, 0.0) };
-    let found = quiet.interpretation(Path::default());
+    let found = quiet.interpretation(TreePath::default());
     for joint in Joint::ALL.into_iter().skip(1) {
         let ray = quiet.rays.ray[joint];
         let start = found.figure[joint.start().unwrap()];
@@ -272,7 +272,7 @@ fn depths_are_as_unsure_as_their_chain() {
 fn a_figure_elsewhere_has_the_same_path() {
     for seed in 0..10 {
         let view = view_of(seed, 0.0);
-        let path = Path((seed as u16 * 1237) << 1);
+        let path = TreePath((seed as u16 * 1237) << 1);
         let figure = view.interpretation(path).figure;
         let again = view.interpretation(view.nearest_path(&figure)).figure;
         let moved = PerJoint(figure.0.map(|p| p + DVec3::new(0.7, -0.2, 1.5)));

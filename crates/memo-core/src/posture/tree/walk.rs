@@ -9,7 +9,7 @@ use super::checks::{Asked, Tree};
 use super::least::least_violating;
 use super::nodes::{Nodes, all_choices};
 use super::places::CHAINS;
-use super::{Cut, CutCount, Interpretations, LevelCount, Path, TreeOptions, View};
+use super::{Cut, CutCount, Interpretations, LevelCount, TreeOptions, TreePath, View};
 use crate::model::skeleton::{Joint, PerJoint};
 use crate::posture::constraint::CONSTRAINT_COUNT;
 use crate::posture::lift::RootKind;
@@ -119,7 +119,7 @@ impl Pruned {
         let group = [asked];
         for node in cut.numbers() {
             let violations = tree.violations(&group, node);
-            cuts.extend(violations.map(|violation| Cut { path: Path((node as u16) << 1), violation }));
+            cuts.extend(violations.map(|violation| Cut { path: TreePath((node as u16) << 1), violation }));
         }
     }
 }

@@ -110,7 +110,7 @@ pub struct ClothedTruth {
 
 /// A foot contact event: a foot touches or leaves the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
+pub struct FootContact {
     /// Time, seconds.
     pub time_s: f64,
     /// Initial contact (heel strike) or toe-off.
@@ -230,7 +230,7 @@ impl ClothedScene {
 
     /// Initial contacts and toe-offs from the first to the last frame, in order; empty unless the mover is a
     /// walker.
-    pub fn contacts(&self) -> Vec<Contact> {
+    pub fn contacts(&self) -> Vec<FootContact> {
         if self.options.mover != Mover::Walker || self.is_empty() {
             return Vec::new();
         }
@@ -245,7 +245,7 @@ impl ClothedScene {
                 for turn in first..=(last - cycles).floor() as i64 {
                     let time_s = self.time_of(turn as f64 + cycles);
                     let heel = self.figure(time_s).feet[index][0];
-                    contacts.push(Contact { time_s, kind, side, heel });
+                    contacts.push(FootContact { time_s, kind, side, heel });
                 }
             }
         }

@@ -145,7 +145,8 @@ fn contacts_alternate_and_the_phase_passes_them() {
     for seed in 0..10 {
         let scene = of_seed(seed);
         let contacts = scene.contacts();
-        let strikes: Vec<&Contact> = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike).collect();
+        let strikes: Vec<&FootContact> =
+            contacts.iter().filter(|c| c.kind == EventKind::HeelStrike).collect();
         assert!(strikes.len() >= 4 && strikes.windows(2).all(|pair| pair[0].side != pair[1].side));
         for strike in strikes {
             let phase = scene.phase(strike.time_s);

@@ -5,7 +5,7 @@ use super::{
     DotSource, LifeSites, LimitedLife, NoiseDots, NoiseKind, PointLightDisplay, PointLightError, below,
 };
 use crate::synth::Random;
-use crate::synth::motion::{Motion, limbs_of};
+use crate::synth::motion::{PointMotion, limbs_of};
 use glam::DVec2;
 use std::f64::consts::TAU;
 
@@ -24,7 +24,7 @@ pub(super) fn all_points(figure: &Figure) -> Layer {
 }
 
 /// The limbs on which dots may be placed.
-pub(super) fn limbs(motion: &Motion, life: &LimitedLife) -> Result<Vec<[usize; 2]>, PointLightError> {
+pub(super) fn limbs(motion: &PointMotion, life: &LimitedLife) -> Result<Vec<[usize; 2]>, PointLightError> {
     let LifeSites::Limbs(given) = &life.sites else { return Ok(Vec::new()) };
     let limbs = if given.is_empty() { limbs_of(motion.names()) } else { given.clone() };
     let points = motion.points();

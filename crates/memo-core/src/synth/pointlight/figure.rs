@@ -1,8 +1,8 @@
 //! The points of a motion in the image, and the areas they cover.
 
-use super::{DotSource, PointLightError, View};
+use super::{DisplayView, DotSource, PointLightError};
 use crate::synth::Random;
-use crate::synth::motion::Motion;
+use crate::synth::motion::PointMotion;
 use glam::{DVec2, DVec3};
 
 /// A rectangle in the image.
@@ -58,7 +58,7 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    pub fn seen(motion: &Motion, view: &View) -> Result<Self, PointLightError> {
+    pub fn seen(motion: &PointMotion, view: &DisplayView) -> Result<Self, PointLightError> {
         let project =
             |p: &DVec3| if p.is_nan() { DVec2::NAN } else { view.project(*p).unwrap_or(DVec2::NAN) };
         let places = motion.pelvis_path();

@@ -17,11 +17,11 @@ mod motion;
 mod options;
 
 pub use options::{
-    LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble, PointLightError,
-    PointLightOptions, View,
+    DisplayView, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble, PointLightError,
+    PointLightOptions,
 };
 
-use super::motion::Motion;
+use super::motion::PointMotion;
 use super::random::Random;
 use crate::option_error::OptionError;
 use dots::{Layer, all_points, beside, limbs, limited, noise_layer};
@@ -83,7 +83,7 @@ impl PointLightDisplay {
 /// An option out of range, a motion that is too short for the phase scrambling, limbs or joints that the
 /// limited lifetime needs but the motion lacks, too many dots, or a motion of which no point is visible.
 pub fn point_light_display(
-    motion: &Motion,
+    motion: &PointMotion,
     options: &PointLightOptions,
 ) -> Result<PointLightDisplay, PointLightError> {
     checked(motion, options)?;
@@ -136,11 +136,11 @@ fn below(random: &mut Random, count: usize) -> usize {
     (random.uniform(0.0, count as f64) as usize).min(count - 1)
 }
 
-fn checked(motion: &Motion, options: &PointLightOptions) -> Result<(), PointLightError> {
+fn checked(motion: &PointMotion, options: &PointLightOptions) -> Result<(), PointLightError> {
     let refuse = |parameter, wanted, value| {
         Err(PointLightError::Option(OptionError { name: parameter, wanted, got: value }))
     };
-    if let View::Orthographic { azimuth_rad, elevation_rad, px_per_m } = options.view {
+    if let DisplayView::Orthographic { azimuth_rad, elevation_rad, px_per_m } = options.view {
         if !azimuth_rad.is_finite() {
             return refuse("azimuth", "finite radians", azimuth_rad);
         }

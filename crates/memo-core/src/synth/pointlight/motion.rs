@@ -3,11 +3,11 @@
 use super::{Locomotion, PhaseScramble, PointLightError, below};
 use crate::option_error::OptionError;
 use crate::synth::Random;
-use crate::synth::motion::Motion;
+use crate::synth::motion::PointMotion;
 use glam::DVec3;
 
 /// Removes the locomotion and keeps the position of the middle of the motion.
-pub(super) fn without_advance(motion: Motion, locomotion: Locomotion) -> Motion {
+pub(super) fn without_advance(motion: PointMotion, locomotion: Locomotion) -> PointMotion {
     let path = motion.pelvis_path();
     let mean = path.iter().sum::<DVec3>() / path.len() as f64;
     match locomotion {
@@ -27,10 +27,10 @@ pub(super) fn without_advance(motion: Motion, locomotion: Locomotion) -> Motion 
 /// p_k(t) = c(t) + r_k(t + s_k) with the horizontal path c of the body, r_k = p_k - c and one shift s_k per
 /// point.
 pub(super) fn phase_scrambled(
-    motion: &Motion,
+    motion: &PointMotion,
     scramble: &PhaseScramble,
     random: &mut Random,
-) -> Result<Motion, PointLightError> {
+) -> Result<PointMotion, PointLightError> {
     let (frames, interval_s) = (motion.frames(), motion.frame_interval_s());
     let in_frames = |parameter, seconds: f64| {
         if !(seconds >= 0.0 && seconds.is_finite()) {

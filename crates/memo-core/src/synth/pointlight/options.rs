@@ -57,7 +57,7 @@ pub enum PointLightError {
 
 /// The projection of the motion.
 #[derive(Debug, Clone, PartialEq)]
-pub enum View {
+pub enum DisplayView {
     /// Parallel projection. Pixel (0, 0) is the origin of the world, u points right, v down.
     Orthographic {
         /// Viewing direction about world Z, radians: at 0 the viewer looks along world +Y and sees world X to
@@ -73,7 +73,7 @@ pub enum View {
     Perspective(Box<Camera>),
 }
 
-impl View {
+impl DisplayView {
     /// The image of a world point, pixels; `None` where the camera does not see it.
     pub fn project(&self, point_in_world: DVec3) -> Option<DVec2> {
         match self {
@@ -200,7 +200,7 @@ pub struct PointLightOptions {
     /// Seed of all random numbers.
     pub seed: u64,
     /// The projection.
-    pub view: View,
+    pub view: DisplayView,
     /// Whether the forward motion is kept or removed.
     pub locomotion: Locomotion,
     /// Inverted: the display is flipped about the horizontal line through its middle; the facing direction
@@ -227,7 +227,7 @@ impl Default for PointLightOptions {
     fn default() -> Self {
         Self {
             seed: 0,
-            view: View::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: 200.0 },
+            view: DisplayView::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: 200.0 },
             locomotion: Locomotion::Treadmill,
             is_inverted: false,
             is_mirrored: false,

@@ -1,4 +1,4 @@
-use super::super::motion::{WalkOptions, sampled_walk};
+use super::super::motion::{SampledWalkOptions, sampled_walk};
 use super::figure::Extent;
 use super::*;
 use crate::model::Camera;
@@ -6,11 +6,12 @@ use crate::model::{Body, Gait, GaitStyle, Walker};
 use glam::DVec3;
 
 /// One whole cycle of the model walking along X.
-fn cycle() -> Motion {
+fn cycle() -> PointMotion {
     let body = Body::from_height(1.75).unwrap();
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
-    let cycle_s = WalkOptions::default().cycle_s(&walker);
-    sampled_walk(&walker, &WalkOptions { rate_hz: 60.0 / cycle_s, ..WalkOptions::default() }).unwrap()
+    let cycle_s = SampledWalkOptions::default().cycle_s(&walker);
+    sampled_walk(&walker, &SampledWalkOptions { rate_hz: 60.0 / cycle_s, ..SampledWalkOptions::default() })
+        .unwrap()
 }
 
 fn display(options: PointLightOptions) -> PointLightDisplay {
@@ -23,8 +24,11 @@ fn trajectory(display: &PointLightDisplay, dot: usize) -> Vec<DVec2> {
 
 #[test]
 fn views_have_the_documented_axes() {
-    let view =
-        |azimuth_rad, elevation_rad| View::Orthographic { azimuth_rad, elevation_rad, px_per_m: 100.0 };
+    let view = |azimuth_rad, elevation_rad| DisplayView::Orthographic {
+        azimuth_rad,
+        elevation_rad,
+        px_per_m: 100.0,
+    };
     let quarter = std::f64::consts::FRAC_PI_2;
     for (view, x, y, z) in [
         (view(0.0, 0.0), [100.0, 0.0], [0.0, 0.0], [0.0, -100.0]),
@@ -39,9 +43,9 @@ fn views_have_the_documented_axes() {
     let camera = Camera::level([640, 480], 0.02, 1.0, 60.0).unwrap();
     let (middle, scale) = (camera.centre_px, camera.focal_px.x / 60.0);
     let point = DVec3::new(0.4, 0.2, 1.3);
-    let parallel = View::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: scale };
+    let parallel = DisplayView::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: scale };
     let wanted = parallel.project(point).unwrap() - parallel.project(DVec3::Z).unwrap();
-    let seen = View::Perspective(Box::new(camera)).project(point).unwrap() - middle;
+    let seen = DisplayView::Perspective(Box::new(camera)).project(point).unwrap() - middle;
     assert!((seen - wanted).length() < 0.005 * wanted.length(), "{seen} {wanted}");
 }
 
@@ -55,7 +59,8 @@ fn the_treadmill_keeps_the_bob_and_the_fixed_pelvis_does_not() {
     let hip = 6;
     let translating = spread(&at(Locomotion::Translating), hip);
     assert!(
-        (translating.x - 200.0 * 1.3 * 59.0 / 60.0 * WalkOptions::default().cycle_s(&walker())).abs() < 1.0
+        (translating.x - 200.0 * 1.3 * 59.0 / 60.0 * SampledWalkOptions::default().cycle_s(&walker())).abs()
+            < 1.0
     );
     let treadmill = spread(&at(Locomotion::Treadmill), hip);
     assert!(treadmill.x < 1.0 && treadmill.y > 2.0, "{treadmill}");
@@ -226,14 +231,14 @@ fn seeds_repeat_and_options_do_not_disturb_each_other() {
 fn unknown_points_are_unseen_dots() {
     let mut positions = cycle().positions().to_vec();
     positions[2] = DVec3::NAN;
-    let motion = Motion::new(positions, cycle().names().to_vec(), cycle().times_s().to_vec()).unwrap();
+    let motion = PointMotion::new(positions, cycle().names().to_vec(), cycle().times_s().to_vec()).unwrap();
     let noise_dots = Some(NoiseDots::default());
     let options = PointLightOptions { scrambles_position: true, noise_dots, ..PointLightOptions::default() };
     let shown = point_light_display(&motion, &options).unwrap();
     assert!(shown.at(0, 2).is_none() && shown.at(1, 2).is_some() && shown.at(0, 3).is_some());
     let nothing = motion.map(|_, _, _| DVec3::NAN);
     assert_eq!(point_light_display(&nothing, &options), Err(PointLightError::NothingSeen));
-    let behind = View::Perspective(Box::new(Camera::level([64, 48], 1.0, 1.0, 5.0).unwrap()));
+    let behind = DisplayView::Perspective(Box::new(Camera::level([64, 48], 1.0, 1.0, 5.0).unwrap()));
     let away = motion.map(|_, _, p| p - DVec3::Y * 20.0);
     let options = PointLightOptions { view: behind, ..options };
     assert_eq!(point_light_display(&away, &options), Err(PointLightError::NothingSeen));
@@ -246,7 +251,7 @@ fn bad_options_are_refused_with_their_values() {
     let fresh = PointLightOptions::default;
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         assert!(refused(PointLightOptions { noise_sd_px: bad, ..fresh() }).contains("noise_sd_px"));
-        let view = View::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: bad };
+        let view = DisplayView::Orthographic { azimuth_rad: 0.0, elevation_rad: 0.0, px_per_m: bad };
         assert!(refused(PointLightOptions { view, ..fresh() }).contains("pixels per metre"));
         let noise_dots = Some(NoiseDots { area_scale: bad, ..NoiseDots::default() });
         assert!(refused(PointLightOptions { noise_dots, ..fresh() }).contains("area_scale"));
@@ -261,7 +266,7 @@ fn bad_options_are_refused_with_their_values() {
     assert!(refused(PointLightOptions { limited_life: Some(life), ..fresh() }).contains("99"));
     let noise_dots = Some(NoiseDots { count: usize::MAX, ..NoiseDots::default() });
     assert!(refused(PointLightOptions { noise_dots, ..fresh() }).contains("too many"));
-    let one = Motion::new(vec![DVec3::ZERO], vec!["dot".into()], vec![0.0]).unwrap();
+    let one = PointMotion::new(vec![DVec3::ZERO], vec!["dot".into()], vec![0.0]).unwrap();
     let everything = PointLightOptions {
         scrambles_position: true,
         is_inverted: true,
