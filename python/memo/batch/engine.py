@@ -145,22 +145,10 @@ def run(
         _record_problems(folder, to_do)
         processors = _processors()
         jobs = jobs or processors
-        tasks = [
-            Task(
-                name=row.name,
-                arguments=tuple(row.arguments),
-                fingerprint=fingerprints[row.name],
-                attempt=_attempt(known[row.name], fingerprints[row.name]),
-                folder=folder,
-                run=name,
-                timeout_s=timeout_s,
-                memory_mb=memory_mb,
-                threads=1 if executor is not None else max(1, processors // jobs),
-                command=None if command is None else tuple(command),
-            )
-            for row in to_do
-            if not row.problems
-        ]
+        threads = 1 if executor is not None else max(1, processors // jobs)
+        limits = {"timeout_s": timeout_s, "memory_mb": memory_mb, "threads": threads}
+        shared = {"folder": folder, "run": name, "command": tuple(command) if command else None, **limits}
+        tasks = _tasks([row for row in to_do if not row.problems], known, fingerprints, shared)
         teller = _Teller(read.rows, mine, folder, progress)
         teller.expect(tasks)
         try:
@@ -169,13 +157,38 @@ def run(
                 notes += _work(tasks, crew, folder, teller)
         finally:
             _write_tables(folder, read.rows, status_only=False)
-    found = [folder.record(row.name) for row in mine]
+    return _result(folder, mine, time.monotonic() - start, teller.told, notes)
+
+
+def _tasks(
+    rows: Iterable[Row],
+    known: Mapping[str, Record | None],
+    fingerprints: Mapping[str, dict[str, Any]],
+    shared: Mapping[str, Any],
+) -> list[Task]:
+    """A task for each row, with values that all share."""
+    return [
+        Task(
+            name=row.name,
+            arguments=tuple(row.arguments),
+            fingerprint=fingerprints[row.name],
+            attempt=_attempt(known[row.name], fingerprints[row.name]),
+            **shared,
+        )
+        for row in rows
+    ]
+
+
+def _result(
+    folder: OutFolder, rows: Sequence[Row], seconds: float, done_now: int, notes: list[str]
+) -> BatchResult:
+    found = {row.name: folder.record(row.name) for row in rows}
     return BatchResult(
         out=folder.out,
-        records=[record for record in found if record is not None],
-        left=[row.name for row, record in zip(mine, found, strict=True) if record is None],
-        seconds=time.monotonic() - start,
-        done_now=teller.told,
+        records=[record for record in found.values() if record is not None],
+        left=[name for name, record in found.items() if record is None],
+        seconds=seconds,
+        done_now=done_now,
         notes=notes,
     )
 

@@ -17,6 +17,7 @@ mod lengths;
 mod neck;
 mod options;
 mod warning;
+mod warning_text;
 
 use crate::option_error::OptionError;
 use glam::{DVec2, DVec3};

@@ -1,8 +1,5 @@
 //! Warnings about the postures of a sequence.
 
-use crate::wording::counted;
-use std::fmt;
-
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -145,109 +142,6 @@ pub enum Warning {
         /// Share of linked postures that break a rule.
         linked: f64,
     },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |part: usize, of: usize| 100.0 * part as f64 / of.max(1) as f64;
-        match self {
-            Self::LightJoints { light, all, min_weight } => {
-                let all = counted(*all, "point");
-                write!(f, "{light} of {all} taken as missing, for weights below {min_weight}")
-            }
-            Self::OutsideLens { outside, all } => {
-                let all = counted(*all, "point");
-                write!(f, "{outside} of {all} outside what this lens shows, taken as missing")
-            }
-            Self::OutsidePicture { beyond, all, size: [width, height], farthest_px } => write!(
-                f,
-                "{beyond} of {} ({:.0} %) outside the camera's picture of {width}x{height} pixels \
-                 (up to {:.0}, {:.0}): the calibration may be of another picture size",
-                counted(*all, "point"),
-                percent(*beyond, *all),
-                farthest_px.x,
-                farthest_px.y
-            ),
-            Self::NoGround { camera_height_m } => write!(
-                f,
-                "the camera is at a height of {camera_height_m:.2} m, not above the ground: the ground tells nothing"
-            ),
-            Self::LengthsNotSeen { reason } => {
-                write!(f, "lengths are those of average proportions, not of this person: {reason}")
-            }
-            Self::ScaleAssumed { scale_sd } => write!(
-                f,
-                "neither lengths, height nor distance are known: all sizes and distances may be wrong by \
-                 {:.0} % together",
-                100.0 * scale_sd
-            ),
-            Self::SegmentTooShort { segment, length_m, seen_m, frames, of } => write!(
-                f,
-                "{segment} is taken as {length_m:.3} m, but in {frames} of {} it looks at least \
-                 {seen_m:.3} m long: a wrong length or wrong points",
-                counted(*of, "frame")
-            ),
-            Self::Conflict(conflict) => conflict.fmt(f),
-            Self::NoTravel { travelled_m, from } if travelled_m.is_nan() => write!(
-                f,
-                "one frame, or none, has a place over the ground, so there is no way to take the moving direction \
-                 from: that of the {} stands for it",
-                from.name()
-            ),
-            Self::NoTravel { travelled_m, from } => write!(
-                f,
-                "the person begins and ends {travelled_m:.2} m apart, too little for a moving direction: that \
-                 of the {} stands for it",
-                from.name()
-            ),
-            Self::Turns { turn_deg } => {
-                write!(f, "the way turns by {turn_deg:.0} degrees; the rules are of straight walking")
-            }
-            Self::Backwards { frames, of } => write!(
-                f,
-                "in {frames} of {} the trunk faces against the way: the person walks backwards, or \
-                 right and left are exchanged in all frames",
-                counted(*of, "frame")
-            ),
-            Self::SilentFrames { silent, of, reason } => {
-                let of = counted(*of, "frame");
-                write!(f, "no posture from {silent} of {of}; in the first of them {reason}")
-            }
-            Self::WithoutRoot { share, usual } => write!(
-                f,
-                "{:.0} % of the segments look longer than they are (no real root; {:.0} % at most by noise): \
-                 points noisier than stated, wrong lengths or a wrong distance",
-                100.0 * share,
-                100.0 * usual
-            ),
-            Self::Noisy { seen_px, stated_px } => write!(
-                f,
-                "points jump from frame to frame as by a noise of {seen_px:.1} px, but noise_px is {stated_px:.1}"
-            ),
-            Self::NothingPossible { frames, of } => write!(
-                f,
-                "in {frames} of {} ({:.0} %) no posture is possible for a body: look at the violations",
-                counted(*of, "frame"),
-                percent(*frames, *of)
-            ),
-            Self::LinkedBreaks { frames, of } => write!(
-                f,
-                "in {frames} of {} ({:.0} %) the linked posture breaks a limit of bodies",
-                counted(*of, "frame"),
-                percent(*frames, *of)
-            ),
-            Self::AgainstRules { motion, strength, frames, of, linked } => write!(
-                f,
-                "the rules of {} ({}) leave no posture in {frames} of {} and {:.0} % of the linked \
-                 postures break one: this does not look like {}",
-                motion.name(),
-                strength.name(),
-                counted(*of, "frame"),
-                100.0 * linked,
-                motion.noun()
-            ),
-        }
-    }
 }
 
 /// Largest share of segments without real root that noise explains: 36 % at 8 px, measured on walks.
