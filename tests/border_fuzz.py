@@ -797,6 +797,14 @@ def _(d):
     return memo.velocity_field(first, second, d.mask(np.shape(first)[:2] if np.ndim(first) >= 2 else None))
 
 
+@case("euler_angles")
+def _(d):
+    return _memo.euler_angles(
+        d.numbers(-1, 1, d.size(), 3 if d.random.random() < 0.9 else d.size(4), 3),
+        d.choice("YXZ", "ZXY", "XYZ"),
+    )
+
+
 @case("walker_motion")
 def _(d):
     options = d.options(

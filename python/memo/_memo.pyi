@@ -46,6 +46,7 @@ __all__ = [
     "change_mask",
     "defaults",
     "edge_segments",
+    "euler_angles",
     "follow_person",
     "gait_curves",
     "guess_layout",
@@ -371,6 +372,7 @@ class PointLightDisplay:
     fractions: Final[npt.NDArray[np.float64]]
     times_s: Final[npt.NDArray[np.float64]]
 
+def euler_angles(rotations: npt.NDArray[np.float64], order: str) -> npt.NDArray[np.float64]: ...
 def walker_motion(
     frames: int | None = None,
     *,

@@ -6,6 +6,7 @@ mod calibrate;
 mod camera;
 mod defaults;
 mod error;
+mod euler;
 mod explain;
 mod fit;
 mod image;
@@ -37,6 +38,8 @@ mod _memo {
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
     use super::defaults::defaults;
+    #[pymodule_export]
+    use super::euler::euler_angles;
     #[pymodule_export]
     use super::explain::{PyExplainer, recorded_contours};
     #[pymodule_export]

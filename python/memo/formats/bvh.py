@@ -37,6 +37,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from memo import _memo
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found, listed
 from memo.formats.reading import METRIC_M, Given, unit_of_legs
@@ -500,23 +501,12 @@ def _order(name: str, up: Up) -> str:
 
 
 def _angles_deg(turns: Array, name: str, up: Up) -> Array:
-    """(T, 3) angles of the channels of a joint, in their order; without jumps of a full turn.
-
-    With R = R_i(a) R_j(b) R_k(c) and e = 1 for i, j, k cyclic, else -1:
-    sin b = e R_ik, tan a = -e R_jk / R_kk, tan c = -e R_ij / R_ii.
-    """
+    """(T, 3) angles of the channels of a joint, in their order; without jumps of a full turn."""
     if up == "z":
         axes = to_z_up(np.eye(3), "y").T
         turns = axes @ turns @ axes.T
-    i, j, k = ("XYZ".index(axis) for axis in _order(name, up))
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0
-    sine = np.clip(sign * turns[:, i, k], -1, 1)
-    a = np.arctan2(-sign * turns[:, j, k], turns[:, k, k])
-    c = np.arctan2(-sign * turns[:, i, j], turns[:, i, i])
-    locked = np.abs(sine) > 1 - 1e-12
-    a = np.where(locked, np.arctan2(sign * turns[:, k, j], turns[:, j, j]), a)
-    c = np.where(locked, 0, c)
-    return np.rad2deg(np.stack([np.unwrap(a), np.arcsin(sine), np.unwrap(c)], axis=-1))
+    a, b, c = _memo.euler_angles(turns, _order(name, up)).T
+    return np.rad2deg(np.stack([np.unwrap(a), b, np.unwrap(c)], axis=-1))
 
 
 def _hierarchy_lines(bones: list[_Bone], up: Up) -> Iterable[str]:

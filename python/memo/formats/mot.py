@@ -31,6 +31,7 @@ from pathlib import Path
 
 import numpy as np
 
+from memo import _memo
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joints_found
 from memo.formats.reading import Given, chosen_up
@@ -261,9 +262,7 @@ def _pelvis_of_legs(
         ups.append(np.sin(flexion) * np.cross(right, thigh) - np.cos(flexion) * thigh)
     up = _unit(np.where(np.isfinite(ups), ups, 0).sum(axis=0))
     turn = np.stack([np.cross(up, right), up, right], axis=-1)
-    tilt = np.arctan2(-turn[:, 0, 1], turn[:, 1, 1])
-    sideways = np.arcsin(np.clip(turn[:, 2, 1], -1, 1))
-    heading = np.arctan2(-turn[:, 2, 0], turn[:, 2, 2])
+    tilt, sideways, heading = _memo.euler_angles(turn, "ZXY").T
     known = np.isfinite(heading)
     heading[known] = np.unwrap(heading[known])
     middle = (points["right_hip"] + points["left_hip"]) / 2

@@ -6,6 +6,7 @@ pub mod camera;
 pub mod camera_file;
 pub mod cylinder;
 pub mod distortion;
+pub mod euler;
 pub mod gait;
 pub mod limits;
 pub mod position;
