@@ -18,6 +18,11 @@ pub use walker::{
     WalkerCalibration, WalkerError, WalkerOptions, WalkerSighting, camera_from_walker, sightings_from_joints,
 };
 
+/// The focal length is determined if its relative standard deviation is below this.
+const MAX_FOCAL_SD: f64 = 0.25;
+/// A point or sighting is left out if, by chance, the largest of all errors would be as large less often than this.
+const CHANCE: f64 = 0.01;
+
 /// A fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {

@@ -23,7 +23,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use thiserror::Error;
 
-use super::Estimate;
+use super::{CHANCE, Estimate, MAX_FOCAL_SD};
 use crate::estimate::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
@@ -34,14 +34,10 @@ const NEEDED: usize = 6;
 const NEEDED_IN_PLANE: usize = 4;
 /// Points are coplanar or collinear below this ratio of the singular values of their centred coordinates.
 const FLAT: f64 = 1e-4;
-/// The focal length is determined if its relative standard deviation is below this.
-const MAX_FOCAL_SD: f64 = 0.25;
 /// Lower bound of the noise in the test of what the points determine, pixels.
 const LEAST_NOISE_PX: f64 = 0.5;
 /// An additional parameter must lower Akaike's criterion by this much (odds of 20 to 1).
 const MARGIN: f64 = 6.0;
-/// A point is left out if, by chance, the largest of all errors would be as large less often than this.
-const CHANCE: f64 = 0.01;
 /// Largest accepted coordinate, metres or pixels.
 const MAX_COORDINATE: f64 = 1e6;
 

@@ -29,7 +29,7 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::DVector;
 use thiserror::Error;
 
-use super::{Estimate, KnownLens};
+use super::{CHANCE, Estimate, KnownLens, MAX_FOCAL_SD};
 use crate::estimate::least_squares::{Fit, MOST_ITERATIONS, minimise};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::distortion::Distortion;
@@ -43,16 +43,12 @@ const ROLL_SD_RAD: f64 = 0.035;
 const FOCAL_SD: f64 = 1.0;
 /// Lower bound of the sway of a walker and the error of a detector, as a fraction of the height.
 const LEAST_NOISE: f64 = 0.005;
-/// The focal length is determined if its relative standard deviation is below the first limit; the pitch is
-/// determined if its standard deviation is below the second, radians.
-const MAX_FOCAL_SD: f64 = 0.25;
+/// The pitch is determined if its standard deviation is below this, radians.
 const MAX_PITCH_SD_RAD: f64 = 0.09;
 /// Common error of head or feet in all sightings if a person only walks in one direction, as a fraction of
 /// the height. In three recorded walks the head was 0.03 to 0.04 in front of the midpoint of the feet; half
 /// of that is the standard deviation, so it depends on these three walks.
 const LEAN: f64 = 0.02;
-/// A sighting is left out if, by chance, the largest of all errors would be as large less often than this.
-const CHANCE: f64 = 0.01;
 const FOCAL: usize = 0;
 const PITCH: usize = 1;
 const ROLL: usize = 2;
