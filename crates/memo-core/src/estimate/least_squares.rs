@@ -1,11 +1,56 @@
-//! The method of Levenberg and Marquardt with numerical derivatives, for about a dozen parameters.
+//! The method of Levenberg and Marquardt: the damped step, scaled as by Marquardt (1963), and a search with
+//! numerical derivatives for about a dozen parameters.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, OMatrix, OVector};
 
 /// Maximum number of iterations in the search for a camera.
 pub(crate) const MOST_ITERATIONS: usize = 200;
 /// Relative decrease of the sum of squares below which the search ends.
 const TOLERANCE: f64 = 1e-14;
+/// Least square of a parameter's influence, in pixels: that of one without influence is a rounding error.
+const LEAST_SQUARE: f64 = 1e-12;
+
+/// The damping between two steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Damping {
+    share: f64,
+    least_square: f64,
+}
+
+impl Damping {
+    /// Before the first step; diag JᵀJ is taken as at least `least_square`.
+    pub(crate) fn start(least_square: f64) -> Self {
+        Self { share: 1e-3, least_square }
+    }
+
+    /// What the first step s of (JᵀJ + damping diag JᵀJ) s = -Jᵀr leads to that is accepted, with increasing
+    /// damping; `lead` returns `None` for a step that is not, since the sum of squares increases. `None` if no
+    /// step is accepted.
+    pub(crate) fn descend<D: Dim, T>(
+        &mut self,
+        normal: &OMatrix<f64, D, D>,
+        gradient: &OVector<f64, D>,
+        lead: impl Fn(&OVector<f64, D>) -> Option<T>,
+    ) -> Option<T>
+    where
+        DefaultAllocator: Allocator<D> + Allocator<D, D>,
+    {
+        while self.share < 1e12 {
+            let mut damped = normal.clone();
+            for i in 0..damped.nrows() {
+                damped[(i, i)] += self.share * normal[(i, i)].max(self.least_square);
+            }
+            let found = damped.cholesky().and_then(|factor| lead(&-factor.solve(gradient)));
+            if found.is_some() {
+                self.share = (self.share * 0.2).max(1e-14);
+                return found;
+            }
+            self.share *= 8.0;
+        }
+        None
+    }
+}
 
 /// The end of a search.
 #[derive(Debug, Clone)]
@@ -53,29 +98,16 @@ pub(crate) fn minimise(
     let mut parameters = start;
     let mut current = residuals(&parameters)?;
     let mut jacobian = derivatives(&parameters, steps, &residuals)?;
-    let mut damping = 1e-3;
+    let mut damping = Damping::start(LEAST_SQUARE);
     for _ in 0..iterations {
         let normal = jacobian.tr_mul(&jacobian);
         let gradient = jacobian.tr_mul(&current);
         let before = current.norm_squared();
-        let mut accepted = None;
-        while damping < 1e12 {
-            let mut damped = normal.clone();
-            for i in 0..damped.nrows() {
-                damped[(i, i)] += damping * normal[(i, i)].max(1e-12);
-            }
-            let tried = damped.cholesky().map(|c| &parameters - c.solve(&gradient));
-            let found = tried.and_then(|tried| residuals(&tried).map(|r| (tried, r)));
-            match found {
-                Some((tried, r)) if r.norm_squared() <= before => {
-                    accepted = Some((tried, r));
-                    damping = (damping * 0.2).max(1e-14);
-                    break;
-                }
-                _ => damping *= 8.0,
-            }
-        }
-        let Some((tried, r)) = accepted else { break };
+        let lead = |step: &DVector<f64>| {
+            let tried = &parameters + step;
+            residuals(&tried).filter(|r| r.norm_squared() <= before).map(|r| (tried, r))
+        };
+        let Some((tried, r)) = damping.descend(&normal, &gradient, lead) else { break };
         let decrease = before - r.norm_squared();
         (parameters, current) = (tried, r);
         jacobian = derivatives(&parameters, steps, &residuals)?;

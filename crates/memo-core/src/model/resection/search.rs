@@ -4,8 +4,7 @@
 //! q_i = R (p_i - c) + t_c,   u_i = fx q_x / q_z,   v_i = fy q_y / q_z,   least sum |(u_i, v_i) - measured|²
 //! ```
 //!
-//! with c the centroid of the head points, R -> R exp(w), by the method of Levenberg and Marquardt (scaling
-//! of Moré 1978). The sum has several minima: the flatter the head and the farther away it is, the more
+//! with c the centroid of the head points, R -> R exp(w), by the method of Levenberg and Marquardt. The sum has several minima: the flatter the head and the farther away it is, the more
 //! similar are the pose and its mirror (Necker's reversal). The search therefore starts from the linear
 //! solution, from all poses in which three of four widespread points lie on their rays, and from the mirror
 //! of each minimum found. It keeps all minima that the noise does not distinguish. With the focal length
@@ -27,6 +26,7 @@ use super::{
     Conditioning, MAX_COORDINATE, ResectedPose, ResectionError, Shape, checked_shape, linear_resection,
 };
 use super::{centroid_and_spread, right_svd};
+use crate::estimate::least_squares::Damping;
 use crate::model::Camera;
 use crate::option_error::OptionError;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -399,13 +399,15 @@ impl Problem<'_> {
     /// The method of Levenberg and Marquardt; `None` if it does not converge.
     fn minimum(&self, start: State) -> Option<Minimum> {
         let mut current = Minimum { state: start, sum_sq: self.sum_sq(&start) };
-        let mut damping = 1e-3;
+        let mut damping = Damping::start(0.0);
         for _ in 0..MAX_ITERATIONS {
             let residuals = self.residuals(&current.state)?;
             let (normal, gradient) = self.normal_equations(&current.state, &residuals);
             // Movements of the image smaller than this are rounding.
             let still_sq = (1e-12 * self.spread).powi(2).max(1e-20 * current.sum_sq);
-            let Some(descent) = self.descent(&current, &normal, &gradient, &mut damping) else {
+            let Some(descent) =
+                damping.descend(&normal, &gradient, |step| self.descent(&current, &normal, step))
+            else {
                 // No step helps: this is a minimum if the gradient is zero.
                 let diagonal = normal.diagonal();
                 let flat = |(slope, square): (&f64, &f64)| slope * slope <= square * 1e4 * still_sq;
@@ -419,33 +421,12 @@ impl Problem<'_> {
         None
     }
 
-    /// The first step (JᵀJ + damping diag JᵀJ) s = -Jᵀr that does not increase the sum, with increasing
-    /// damping.
-    fn descent(
-        &self,
-        from: &Minimum,
-        normal: &Matrix7,
-        gradient: &Vector7,
-        damping: &mut f64,
-    ) -> Option<Descent> {
-        while *damping < 1e8 {
-            let mut damped = *normal;
-            for k in 0..7 {
-                damped[(k, k)] *= 1.0 + *damping;
-            }
-            if let Some(factor) = damped.cholesky() {
-                let step = -factor.solve(gradient);
-                let state = from.state.moved(&step);
-                let sum_sq = self.sum_sq(&state);
-                if sum_sq <= from.sum_sq {
-                    *damping = (*damping * 0.1).max(1e-15);
-                    let moved_sq = step.iter().zip(&normal.diagonal()).map(|(s, n)| n * s * s).sum();
-                    return Some(Descent { to: Minimum { state, sum_sq }, moved_sq });
-                }
-            }
-            *damping *= 10.0;
-        }
-        None
+    /// Where a step leads, unless the sum increases.
+    fn descent(&self, from: &Minimum, normal: &Matrix7, step: &Vector7) -> Option<Descent> {
+        let state = from.state.moved(step);
+        let sum_sq = self.sum_sq(&state);
+        let moved_sq = step.iter().zip(&normal.diagonal()).map(|(s, n)| n * s * s).sum();
+        (sum_sq <= from.sum_sq).then_some(Descent { to: Minimum { state, sum_sq }, moved_sq })
     }
 
     /// Probabilities and covariances of the minima, which are sorted by their sums of squares.

@@ -15,6 +15,9 @@
 //! Starting values come from moments of (x^2, 2 x y, y^2), for which the cost of a plane takes constant time: a
 //! coarse grid of planes and the linear ellipse fit (footnote 14 of the paper, Horn).
 //!
+//! The search has its own damping, not that of `estimate::least_squares`: it counts rejected steps, because all
+//! starts are given a few steps before the best of them is followed, and it ends far from rounding.
+//!
 //! Limits: a rod cannot be distinguished from its mirror. Depth is not determined for a plane parallel to the
 //! image (the slope's variance grows without bound), and neither are directions within a plane seen edge-on
 //! (hence the tilt limit). For motion far from planar the cost has several minima, and the second best may be

@@ -15,6 +15,7 @@ use super::{
     Anchor, AnchorError, AnchorOptions, AnchorSource, DepthMode, check_lengths, check_up, neck_ray,
     pelvis_to_hip_line_m,
 };
+use crate::estimate::least_squares::Damping;
 use crate::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use crate::posture::lift::JointRays;
 
@@ -178,31 +179,23 @@ impl Problem<'_> {
     /// Levenberg-Marquardt over a rotation ω about the neck (R <- exp(ω) R) and its position t.
     fn refine(&self, mut rotation: DMat3, mut neck: DVec3) -> Option<Fit> {
         let (mut normal, mut gradient, mut chi_sq) = self.linearised(&rotation, neck);
-        let mut damping = 1e-2;
+        let mut damping = Damping::start(0.0);
         for _ in 0..ITERATIONS {
-            let mut damped = normal;
-            (0..6).for_each(|i| damped[(i, i)] *= 1.0 + damping);
-            let step = damped.cholesky()?.solve(&(-gradient));
-            let omega = DVec3::new(step[0], step[1], step[2]);
-            let next_rotation = match omega.try_normalize() {
-                Some(axis) => DMat3::from_axis_angle(axis, omega.length()) * rotation,
-                None => rotation,
+            let lead = |step: &Vector6<f64>| {
+                let omega = DVec3::new(step[0], step[1], step[2]);
+                let turned = omega
+                    .try_normalize()
+                    .map_or(rotation, |axis| DMat3::from_axis_angle(axis, omega.length()) * rotation);
+                let moved = neck + DVec3::new(step[3], step[4], step[5]);
+                let linearised = self.linearised(&turned, moved);
+                (linearised.2 <= chi_sq).then_some((turned, moved, linearised))
             };
-            let next_neck = neck + DVec3::new(step[3], step[4], step[5]);
-            let (next_normal, next_gradient, next_chi_sq) = self.linearised(&next_rotation, next_neck);
-            if next_chi_sq < chi_sq {
-                let gain = chi_sq - next_chi_sq;
-                (rotation, neck) = (next_rotation, next_neck);
-                (normal, gradient, chi_sq) = (next_normal, next_gradient, next_chi_sq);
-                damping = (damping * 0.2).max(1e-9);
-                if gain < 1e-9 {
-                    break;
-                }
-            } else {
-                damping *= 5.0;
-                if damping > 1e9 {
-                    break;
-                }
+            let Some((turned, moved, linearised)) = damping.descend(&normal, &gradient, lead) else { break };
+            let gain = chi_sq - linearised.2;
+            (rotation, neck) = (turned, moved);
+            (normal, gradient, chi_sq) = linearised;
+            if gain < 1e-9 {
+                break;
             }
         }
         let ray = self.rays.ray[Joint::Neck];
