@@ -293,6 +293,9 @@ impl Figure {
             out.push((BODY + FOOT, axes.z_axis * (height_m * (1.0 - down))));
             out.push((BODY + HEEL, -axes.z_axis * height_m));
             out.push((BODY + ANKLE, sole * height_m));
+            // The sole stays where it is when the foot is thicker, and the axis rises.
+            let thickness = self.posed.cylinders[sample.part as usize].semi_axes.x;
+            out.push((BODY + WIDTHS + 7, -sole * thickness));
         }
     }
 
@@ -351,5 +354,135 @@ fn lens(camera: &Camera, ideal_px: DVec2) -> DMat2 {
     match (slope(DVec2::X), slope(DVec2::Y)) {
         (Some(x), Some(y)) => DMat2::from_cols(x, y),
         _ => DMat2::IDENTITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::search::tests::camera;
+    use super::super::unknowns::{FIGURE, WHOLE};
+    use super::*;
+    use crate::model::{Posture, SideAngles};
+
+    /// A figure by its coordinates, away from symmetry.
+    fn figure(q: &[f64]) -> Figure {
+        let whole = &q[BODY..];
+        let body = super::super::unknowns::body(&Body::from_height(1.75).unwrap(), whole);
+        let ahead = DVec2::from_angle(q[HEADING]);
+        let pelvis = (q[ALONG] * ahead + q[ACROSS] * ahead.perp()).extend(q[HEIGHT]);
+        let side = |a: &[f64]| SideAngles {
+            hip: a[0],
+            knee: a[1],
+            ankle: a[2],
+            shoulder: a[3],
+            elbow: a[4],
+            abduction: whole[TILT],
+        };
+        let posture = Posture {
+            right: side(&q[ANGLES..]),
+            left: side(&q[ANGLES + JOINTS..]),
+            trunk_lean: q[LEAN],
+            pelvis_rotation: q[PELVIS],
+        };
+        let up = (q[LEAN].sin() * ahead).extend(q[LEAN].cos());
+        let posed = body.pose(pelvis + 0.5 * body.torso_length_m() * up, q[HEADING], &posture);
+        Figure { body, posed, pelvis, ahead, origin: DVec2::ZERO }
+    }
+
+    fn coordinates() -> Vec<f64> {
+        let mut q = vec![0.0; FIGURE];
+        q[ALONG] = 0.3;
+        q[ACROSS] = 0.2;
+        q[HEIGHT] = 0.93;
+        q[HEADING] = 0.35;
+        q[LEAN] = 0.06;
+        q[PELVIS] = 0.07;
+        let angles = [0.4, 0.2, 0.1, -0.3, 0.5, -0.2, 0.6, -0.15, 0.2, 0.7];
+        q[ANGLES..BODY].copy_from_slice(&angles);
+        q[BODY + TILT] = 0.04;
+        q[BODY + TAPERS + 3] = 0.2;
+        q[BODY + HEAD_FORWARD] = 0.02;
+        q
+    }
+
+    fn sampled(q: &[f64], spacing_px: f64) -> Vec<Sample> {
+        let mut work = Workspace::default();
+        let mut whole = q[BODY..].to_vec();
+        whole.resize(WHOLE, 0.0);
+        samples(&figure(q), &camera(), &whole, spacing_px, &mut work);
+        work.samples
+    }
+
+    /// How far the contour of the same part has moved along the normal of a sample: the line through the two samples
+    /// nearest to the normal.
+    fn moved(sample: &Sample, after: &[Sample]) -> Option<f64> {
+        let tangent = sample.normal.perp();
+        let mut same: Vec<DVec2> = after
+            .iter()
+            .filter(|s| s.part == sample.part && s.normal.dot(sample.normal) > 0.99)
+            .map(|s| s.point_px - sample.point_px)
+            .filter(|p| p.length() < 4.0)
+            .collect();
+        same.sort_by(|a, b| a.dot(tangent).abs().total_cmp(&b.dot(tangent).abs()));
+        let [a, b] = [*same.first()?, *same.get(1)?];
+        let t = a.dot(tangent) / (a - b).dot(tangent);
+        let on_normal = a + t * (b - a);
+        (a.distance(b) > 0.5).then_some(on_normal.dot(sample.normal))
+    }
+
+    #[test]
+    fn contours_move_along_their_normals_as_the_surface_under_them() {
+        let q = coordinates();
+        let (before, now) = (sampled(&q, 12.0), figure(&q));
+        let mut motion = Vec::new();
+        let mut seen = [0; FIGURE];
+        for (coordinate, seen) in seen.iter_mut().enumerate() {
+            // Steps of a few tenths of a pixel.
+            let step = if coordinate < 3 { 2e-3 } else { 4e-3 };
+            let [low, high] = [-step, step].map(|by| {
+                let mut q = q.clone();
+                q[coordinate] += by;
+                sampled(&q, 1.0)
+            });
+            for sample in &before {
+                // Ends of parts are not lines.
+                if sample.radius == DVec3::ZERO || sample.z.abs() > 0.9 {
+                    continue;
+                }
+                let (Some(from), Some(to)) = (moved(sample, &low), moved(sample, &high)) else { continue };
+                now.motion(sample, &mut motion);
+                let dx: DVec3 = motion.iter().filter(|m| m.0 == coordinate).map(|m| m.1).sum();
+                let slope = gradient(&camera(), sample.world, sample.normal).dot(dx);
+                let expected = (to - from) / (2.0 * step);
+                let scale = expected.abs().max(30.0);
+                assert!(
+                    (slope - expected).abs() < 0.06 * scale,
+                    "{coordinate} of {:?} at {:.2}: {slope:.1} for {expected:.1}",
+                    sample.part,
+                    sample.z
+                );
+                *seen += usize::from(expected.abs() > 3.0);
+            }
+        }
+        // Every coordinate but heel, foot and crown, which move ends of parts, moves some line.
+        for coordinate in
+            [ALONG, HEIGHT, HEADING, LEAN, ANGLES, ANGLES + 1, ANGLES + 8, BODY + THIGH, BODY + WIDTHS + 5]
+        {
+            assert!(seen[coordinate] > 0, "{coordinate}");
+        }
+    }
+
+    #[test]
+    fn the_lens_stretches_the_gradient() {
+        let sample_at = DVec3::new(1.4, 0.3, 1.6);
+        let mut camera = camera();
+        camera.distortion = Distortion::Brown { k1: -0.2, k2: 0.03, p1: 1e-3, p2: -2e-3, k3: 0.0 };
+        let normal = DVec2::from_angle(0.4);
+        let found = gradient(&camera, sample_at, normal);
+        for (n, axis) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            let at = |by: f64| camera.project(sample_at + by * axis).unwrap().dot(normal);
+            let expected = (at(1e-5) - at(-1e-5)) / 2e-5;
+            assert!((found[n] - expected).abs() < 1e-3 * expected.abs().max(10.0), "{n}: {found} {expected}");
+        }
     }
 }

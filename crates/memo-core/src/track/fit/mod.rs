@@ -722,3 +722,40 @@ fn of_unknowns(
     }
     (of_unknowns, of_right)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::tests::{camera, walker};
+    use super::*;
+    use crate::image::Image;
+
+    #[test]
+    fn a_short_walk_and_an_empty_picture_are_no_person() {
+        let (camera, walker, options) = (camera(), walker(), FitOptions::default());
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+        let grey = Image::filled(640, 480, 90u8);
+        let frame = |k: usize| FitFrame {
+            time_s: 0.04 * k as f64,
+            view: View { corner: [0, 0], grey: grey.clone(), background: grey.clone() },
+            start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
+        };
+        let fit = |count: usize| {
+            let frames: Vec<FitFrame> = (0..count).map(frame).collect();
+            Problem::new(&camera, &walker, &path, &frames, &options).fit(Some(0.1))
+        };
+        assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
+        assert_eq!(fit(15), Err(FitError::Undetermined));
+    }
+
+    #[test]
+    fn options_outside_their_ranges_are_refused() {
+        assert_eq!(FitOptions::default().check(), Ok(()));
+        for options in [
+            FitOptions { height_sd: 0.0, ..FitOptions::default() },
+            FitOptions { frame_sd_rad: f64::INFINITY, ..FitOptions::default() },
+            FitOptions { longest: 14, ..FitOptions::default() },
+        ] {
+            assert!(options.check().is_err(), "{options:?}");
+        }
+    }
+}
