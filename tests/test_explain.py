@@ -198,8 +198,8 @@ def test_a_folder_of_something_else_is_refused(tmp_path, text, said):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"schema": 3}, "schema must be 1 to 2, got 3: a newer memo may have written it"),
-        ({"schema": 0}, "schema must be 1 to 2, got 0"),
+        ({"schema": 4}, "schema must be 1 to 3, got 4: a newer memo may have written it"),
+        ({"schema": 0}, "schema must be 1 to 3, got 0"),
         ({"schema": "2"}, "schema must be int"),
         ({"video": 3}, "video must be str or null, got 3"),
         ({"frames": [0]}, r"frames must be \[first, stop\]"),

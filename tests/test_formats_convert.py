@@ -51,7 +51,7 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
         target = tmp_path / "out" / f"walk.{ending}"
         code, out, err = memo_command("convert", tmp_path / "run", target)
         assert (code, err) == (0, "")
-        assert "Read 55 frames, 12 points, 8 joint angles, 2 events, 0.40 to 2.96 s." in out
+        assert "Read 55 frames, 12 points, 10 joint angles, 2 events, 0.40 to 2.96 s." in out
         assert "2 walks: between them nobody was tracked." in out
         up = "Z" if ending in ("c3d", "csv", "parquet") else "Y"
         assert out.endswith(f"Written to {target}, {up} up.\n")

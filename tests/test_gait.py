@@ -80,7 +80,8 @@ def test_intervals_hold_what_was_motion_captured(name, knows_camera):
     for parameter, share in shares.items():
         line = lookup(table, 0, parameter)
         assert line["ci_high"] - line["ci_low"] < 2 * share * line["value"]
-    assert len(track.sentences) == 1, "healthy walkers are not called asymmetric"
+    assert len(track.sentences) == 2, "healthy walkers are not called asymmetric"
+    assert track.sentences[1].startswith("The model fits the person")
 
 
 def test_a_late_left_step_is_found_and_said():
@@ -94,12 +95,12 @@ def test_a_late_left_step_is_found_and_said():
     assert track.sentences[0] == track.summary["message"]
     assert "walks left to right" in track.sentences[0]
     assert (
-        track.sentences[1].startswith("The right step is 1")
-        and "shorter than the left (" in track.sentences[1]
+        track.sentences[2].startswith("The right step is 1")
+        and "shorter than the left (" in track.sentences[2]
     )
     assert (
-        track.sentences[2].startswith("The right step takes 0.1")
-        and "less than the left" in track.sentences[2]
+        track.sentences[3].startswith("The right step takes 0.1")
+        and "less than the left" in track.sentences[3]
     )
     assert track.summary["speed_mps"] == lookup(track.gait_parameters, 0, "speed")["value"]
 
@@ -172,11 +173,11 @@ def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):
         cli.main()
     assert not exited.value.code
     said = json.loads(capsys.readouterr().out)
-    assert said["sentences"] == [said["message"]]
+    assert said["sentences"][0] == said["message"] and len(said["sentences"]) == 2
     assert str(tmp_path / "gait_parameters.csv") in said["files"]
     table = read_gait_parameters_csv(tmp_path / "gait_parameters.csv")
     assert set(table["parameter"]) == set(DEFINITIONS), (
         "every line has its definition and the other way round"
     )
     assert lookup(table, 0, "speed")["value"] == pytest.approx(said["speed_mps"], abs=1e-4)
-    assert lookup(table, 0, "stance")["n"] == 0 and np.isnan(lookup(table, 0, "stance")["ci_low"])
+    assert 50 < lookup(table, 0, "stance")["ci_low"] < 65 and lookup(table, 0, "stance")["n"] >= 2

@@ -61,6 +61,9 @@ TRACK_COLUMNS = (
 )
 """Columns of `track.csv`, in order; `walk` counts the walks of a video from 0."""
 
+_SINCE_FIT = {name for name in TRACK_COLUMNS if name.endswith("_deg") and ("sd_" in name or "ankle" in name)}
+"""Columns that tables of run.json's schemas 1 and 2 do not have."""
+
 EVENT_COLUMNS = ("time_s", "frame", "event", "side")
 """Columns of `events.csv`, in order; `frame` has a fraction if the event is between two frames."""
 
@@ -149,8 +152,16 @@ def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
     Pixels are those of the video, even if an older version of memo wrote those of shrunk pictures and
     `run.json` beside the table records this.
     """
-    columns = read_typed_columns(path, TRACK_COLUMNS, whole=("frame", "walk"))
+    present = set(read_text_columns(path))
+    names = [name for name in TRACK_COLUMNS if name in present or name not in _SINCE_FIT]
+    columns = _with_absent(read_typed_columns(path, names, whole=("frame", "walk")))
     return columns_of_video(columns, shrink_of_table(path))
+
+
+def _with_absent(columns: Mapping[str, Column]) -> dict[str, Column]:
+    """All columns of a track; those that tables written before did not have are unknown."""
+    unknown = np.full(len(columns["frame"]), np.nan)
+    return {name: columns.get(name, unknown) for name in TRACK_COLUMNS}
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
@@ -169,9 +180,10 @@ def read_track(path: str | PathLike[str]) -> dict[str, Column]:
     from memo.formats.parquet import read_parquet
 
     columns = read_parquet(path)
-    absent = sorted(set(TRACK_COLUMNS) - set(columns))
+    absent = sorted(set(TRACK_COLUMNS) - set(columns) - _SINCE_FIT)
     if absent:
         raise ValueError(f"{path}: columns missing: {absent}")
+    columns = _with_absent(columns)
     texts = [name for name in TRACK_COLUMNS if columns[name].dtype.kind not in "iuf"]
     if texts:
         raise ValueError(f"{path}: column {texts[0]} holds no numbers")

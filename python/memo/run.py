@@ -186,12 +186,14 @@ def contours_of_run(
     """Visible contours of the model, (n, 2, 2) pixels of the video, for each row of a track.
 
     They are those of `Track.contours`. `path` is the folder of a run or a table in it, `columns` are those of
-    the table. A row of a frame that the run did not track has none.
+    the table. A row with an unknown position or phase has none, nor has one of a frame that the run did not
+    track.
     """
     folder = Path(path) if Path(path).is_dir() else Path(path).parent
     run = read_run(folder)
     contours: list[npt.NDArray[np.float64]] = [np.empty((0, 2, 2))] * len(columns["walk"])
-    frames = np.asarray(columns["frame"], np.int64)
+    known = np.isfinite(np.asarray(columns["x_m"], np.float64) + np.asarray(columns["phase"], np.float64))
+    frames = np.where(known, np.asarray(columns["frame"], np.int64), -1)
     for walk in np.unique(columns["walk"]).tolist():
         if not 0 <= walk < len(run["walks"]):
             raise RunError(

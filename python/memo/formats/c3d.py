@@ -61,7 +61,7 @@ _TEXTS = {
 _FLEXIONS = {
     f"{side}_{part}": f"{side[0].upper()}{part.capitalize()}Angles"
     for side in ("right", "left")
-    for part in ("hip", "knee", "shoulder", "elbow")
+    for part in ("hip", "knee", "ankle", "shoulder", "elbow")
 }
 _OURS = {label: joint for joint, label in _FLEXIONS.items()}
 

@@ -47,6 +47,7 @@ OPENSIM = {
     for part, name in (
         ("hip", "hip_flexion"),
         ("knee", "knee_angle"),
+        ("ankle", "ankle_angle"),
         ("shoulder", "arm_flex"),
         ("elbow", "elbow_flex"),
     )
@@ -63,7 +64,6 @@ _PLUG_IN_GAIT = {
     for part, axis, name in (
         ("Hip", "y", "hip_adduction"),
         ("Hip", "z", "hip_rotation"),
-        ("Ankle", "x", "ankle_angle"),
     )
 }
 """OpenSim's coordinate for angles of a C3D file with the same meaning and sign."""
@@ -139,7 +139,10 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
         columns |= {f"pelvis_t{axis}": turned[:, k] for k, axis in enumerate("xyz")}
     names = OPENSIM | _PLUG_IN_GAIT
     columns |= {names.get(name, name): values for name, values in motion.angles.items()}
-    columns = {name: values for name, values in columns.items() if np.isfinite(values).any()}
+    # A joint that is hardly seen must not cost the others their instants.
+    rare = [name for name, values in columns.items() if 2 * np.isfinite(values).sum() < len(values)]
+    columns = {name: values for name, values in columns.items() if name not in rare}
+    rare = [name for name in rare if np.isfinite(motion.angles.get(_OURS.get(name, name), np.nan)).any()]
     for name in columns:
         if not name.isprintable() or " " in name:
             raise FormatError(f"angle {name!r}: the labels of a MOT file have no white space")
@@ -166,6 +169,8 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
     notes = (
         [f"Left out: {counted(gaps, 'instant')} at which an angle or the pelvis is missing."] if gaps else []
     )
+    if rare:
+        notes.append(f"Left out, missing at most instants: {', '.join(rare)}.")
     if pelvis_angles and up != "y":
         notes.append("OpenSim's pelvis angles are those of a world with Y up: left out.")
     if origin is None and motion.names:

@@ -62,7 +62,9 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         if names
         else np.empty((len(times_s), 0, 3))
     )
-    angles = {f"{side}_{angle}": columns[f"{side}_{angle}_deg"][chosen] for side in SIDES for angle in ANGLES}
+    names_of_angles = [f"{side}_{angle}" for side in SIDES for angle in ANGLES]
+    angles = {name: columns[f"{name}_deg"][chosen] for name in names_of_angles}
+    angles = {name: values for name, values in angles.items() if np.isfinite(values).any()}
     walks = len(np.unique(columns["walk"]))
     notes = (
         [f"{counted(walks, 'walk')}: between them nobody was tracked."] if walk is None and walks > 1 else []

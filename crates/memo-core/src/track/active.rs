@@ -131,7 +131,9 @@ impl Active {
         };
         let places = smoothed_hypotheses(steps, &options.walk.filter);
         let frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
-        Some(Problem::new(&self.camera, &self.average, path, &frames, fit).fit(p_swapped))
+        let problem = Problem::new(&self.camera, &self.average, path, &frames, fit);
+        let problem = if options.camera.is_none() { problem.of_assumed_camera() } else { problem };
+        Some(problem.fit(p_swapped))
     }
 
     /// Follows the kept frames again, and from then on the person instead of the average, if the person could be

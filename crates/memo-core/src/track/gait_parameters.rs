@@ -74,7 +74,7 @@ const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 const Z: f64 = 1.959_964;
 /// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
-const CONTACT_SD_S: f64 = 0.012;
+const CONTACT_SD_S: f64 = 0.025;
 const CONTACT_COMMON_SD_S: f64 = 0.015;
 /// A fitted strike this much later than the one before is not its next, strides.
 const LONGEST_STEP: f64 = 0.8;
@@ -275,7 +275,10 @@ impl TrackedWalk {
         };
         let steps = steps_between(&strikes, &self.rows());
         let (rate_hz, speed_mps) = (whole.rate_hz.value, whole.speed_mps.value.abs());
-        let strike_sd_s = STRIKE_SD_CYCLES / rate_hz;
+        let strike_sd_s = match self.fitted() {
+            Some(_) => CONTACT_COMMON_SD_S,
+            None => STRIKE_SD_CYCLES / rate_hz,
+        };
         let noise_sq = steps.iter().map(|s| s.variance_s2).sum::<f64>() / steps.len().max(1) as f64;
         let (step_s, step_m) = (0.5 / rate_hz, 0.5 * speed_mps / rate_hz);
         let time_s = BySide::of(

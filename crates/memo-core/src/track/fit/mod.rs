@@ -28,6 +28,7 @@ use super::search::{Hypothesis, Path};
 use crate::estimate::arrow::{Arrow, Solution};
 use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Posture, Walker};
 use crate::option_error::OptionError;
+use crate::wording::counted;
 use contacts::Contact;
 use edge_search::{Border, View};
 use glam::{DVec2, DVec3};
@@ -82,7 +83,7 @@ pub const LEAST_FRAMES: usize = 15;
 #[non_exhaustive]
 pub enum FitError {
     /// The walk is too short.
-    #[error("{got} frames do not suffice to measure a person: {LEAST_FRAMES} are needed")]
+    #[error("{} do not show a walk: {LEAST_FRAMES} are needed to measure a person", counted(*.got, "frame"))]
     TooFewFrames {
         /// Frames given.
         got: usize,
@@ -201,6 +202,8 @@ pub(crate) struct Problem<'a> {
     pub frames: &'a [FitFrame],
     pub options: &'a FitOptions,
     pub priors: Vec<Prior>,
+    /// Standard deviation of the height of a standing foot, metres.
+    pub ground_sd_m: f64,
     /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
     pub origin: DVec2,
     pub origin_along_m: f64,
@@ -260,7 +263,17 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let origin_along_m = frames.get(frames.len() / 2).map_or(0.0, |frame| frame.start.along_m);
         let origin = path.point(origin_along_m, 0.0).truncate();
-        Self { camera, walker, path, frames, options, priors: priors(), origin, origin_along_m }
+        let ground_sd_m = GROUND_SD_M;
+        Self { camera, walker, path, frames, options, priors: priors(), ground_sd_m, origin, origin_along_m }
+    }
+
+    /// The same in an assumed camera, whose ground and whose direction of sight are assumed too: distance and heading
+    /// stay near those that the tracker found from the person's size.
+    pub fn of_assumed_camera(mut self) -> Self {
+        self.priors[WHOLE_HEADING].sd = ASSUMED_HEADING_SD_RAD;
+        self.priors[WHOLE_ACROSS].sd = ASSUMED_ACROSS_SD_M;
+        self.ground_sd_m = ASSUMED_GROUND_SD_M;
+        self
     }
 
     /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
@@ -420,7 +433,7 @@ impl<'a> Problem<'a> {
         }
         // The lower foot stands on the ground, with an error common to about ten independent frames.
         let (side, lowest) = figure.lowest_point();
-        let weight = GROUND_SD_M.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
+        let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
         add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
         slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], room_slopes);
         let (normal, right) = of_unknowns(&normal, &right, room_slopes);
@@ -457,6 +470,13 @@ impl<'a> Problem<'a> {
                 arrow.add_row(&terms, -now, 1.0 / (rate * rate * 0.5 * (before_s + after_s)));
             }
         }
+    }
+
+    /// How much of a measured zero of the phase is believed: contacts of small people are blurred, and the average
+    /// curves have their zero within ZERO_SD of a person's.
+    fn share_of_zero(&self, quality: &FitQuality) -> f64 {
+        let blur = ZERO_BLUR_PX / quality.height_px;
+        ZERO_SD.powi(2) / (ZERO_SD.powi(2) + blur.powi(2))
     }
 
     fn quality(&self, fitted: &Fitted) -> FitQuality {
@@ -506,7 +526,7 @@ impl<'a> Problem<'a> {
         let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
         let contacts = contacts::contacts(&times_s, &phases, &feet, path.direction());
         // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
-        let zero = contacts::mean_phase(&contacts, &times_s, &phases);
+        let zero = contacts::mean_phase(&contacts, &times_s, &phases) * self.share_of_zero(&quality);
         all.iter_mut().for_each(|frame| frame.phase -= zero);
         let curves = unknowns::curves(&self.walker.gait, whole, zero);
         WalkFit {
@@ -664,6 +684,10 @@ const CLEAR_STEP: f64 = 15.0;
 /// Standard deviation of the height of a standing foot, metres, and the number of independent feet in a walk.
 const GROUND_SD_M: f64 = 0.015;
 const GROUND_FRAMES: f64 = 10.0;
+/// The same, and the standard deviations of heading and distance, in an assumed camera.
+const ASSUMED_GROUND_SD_M: f64 = 0.06;
+const ASSUMED_HEADING_SD_RAD: f64 = 0.02;
+const ASSUMED_ACROSS_SD_M: f64 = 0.1;
 /// What frames deviate from the curves while only curves are fitted.
 const HELD_SD_RAD: f64 = 1e-6;
 /// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,
@@ -682,6 +706,10 @@ const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
 const PLACE_SD: [f64; 4] = [0.01, 0.035, 0.022, 0.012];
 /// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
 const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
+/// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and
+/// the error of a measured one times the person's height in pixels.
+const ZERO_SD: f64 = 0.03;
+const ZERO_BLUR_PX: f64 = 3.0;
 /// A fit that misses more of its outline, or is farther from the edges, is no fit.
 const MOST_MISSED: f64 = 0.2;
 const MOST_RESIDUAL: f64 = 0.012;
