@@ -2,8 +2,8 @@
 Gait parameters with intervals
 ==============================
 
-Cadence, speed, stride and step with 95 % intervals, over several walks. Which of them are measured and which
-are assumed, the definitions say.
+Cadence, speed, stride and step with 95 % intervals, over several walks. The definitions say how each is
+measured.
 """
 
 import matplotlib.pyplot as plt

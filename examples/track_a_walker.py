@@ -33,8 +33,8 @@ ax.imshow(draw_row(scene.frames[track.columns["frame"][row]], track, row))
 ax.set_axis_off()
 
 # %%
-# Against the truth. The knee's curve is that of average gait at the phase found, and this person walks by
-# curves of their own: what is left between the two is what the average does not know.
+# Against the truth. This person walks by curves of their own, which the fit measures: body, path and joint
+# curves are fitted to all frames of the walk.
 
 found, true = track.columns, scene.truth
 rows = np.searchsorted(true["frame"], found["frame"])

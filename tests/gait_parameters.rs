@@ -166,7 +166,7 @@ fn a_limp_is_told_with_its_side() {
     let seeds: u64 = if std::env::var_os("MEMO_FULL").is_some() { 40 } else { 2 };
     let (mut signs, mut told) = (0, 0);
     for seed in 0..seeds {
-        let late_left = if seed.is_multiple_of(2) { 0.05 } else { -0.05 };
+        let late_left = if seed.is_multiple_of(2) { 0.08 } else { -0.08 };
         let drawn = Drawn::limping(seed, late_left);
         let table = drawn.walk().expect("somebody walks").gait_parameters();
         let symmetry = line(&table, GaitQuantity::StepTimeSymmetry, None);
@@ -207,17 +207,20 @@ fn what_is_not_known_is_left_open() {
     let sure = walk.gait_parameters();
     assert!(line(&sure, GaitQuantity::StepLength, Some(Side::Right)).value.is_some());
     let stance = line(&sure, GaitQuantity::Stance, None);
-    assert!(stance.value.is_some() && stance.interval.is_none() && stance.n == 0, "assumed, not measured");
+    assert!(
+        stance.interval.is_some_and(|[low, high]| low > 50.0 && high < 75.0) && stance.n >= 2,
+        "{stance:?}"
+    );
     // 1. The sides may be interchanged.
-    for twin in &mut walk.walk.twins {
-        twin.similarity_sum = 30.0;
-    }
+    walk.fit.as_mut().unwrap().as_mut().unwrap().p_swapped = 0.45;
     assert!(walk.p_swapped() > 0.4);
     let unsure = walk.gait_parameters();
     assert_eq!(line(&unsure, GaitQuantity::StepLength, Some(Side::Right)).value, None);
     assert!(line(&unsure, GaitQuantity::StepLength, None).value.is_some());
     assert_eq!(unsure.len(), sure.len());
-    // 2. A handful of frames.
+    // 2. Without a fit, and a handful of frames.
+    walk.fit = None;
+    assert_eq!(line(&walk.gait_parameters(), GaitQuantity::Stance, None).value, None);
     for twin in &mut walk.walk.twins {
         twin.steps.truncate(6);
     }

@@ -341,7 +341,7 @@ def test_what_is_assumed_or_hardly_seen_is_no_measurement(run_folder):
     table = folder / "gait_parameters.csv"
     table.write_text(table.read_text() + "0,stance,,61.0,%,,,0\n")
     written, _, _ = page_of(folder)
-    assert '61.0 <small class="interval">assumed, not measured</small>' in written
+    assert '61.0 <small class="interval">not measured</small>' in written
     assert '<span class="status good">tracked</span>' in written
     table.write_text("walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,40.1,1/min,-2,82.2,2\n")
     assert '<span class="status fair">tracked</span>' in page_of(folder)[0]

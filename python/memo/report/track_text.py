@@ -213,7 +213,7 @@ def _measured(line: dict[str, Any]) -> str:
     digits = 1 if line["unit"] in ("%", "1/min") else 3
     value = number(line["value"], digits)
     if line["n"] == 0:
-        return f'{value} <small class="interval">assumed, not measured</small>'
+        return f'{value} <small class="interval">not measured</small>'
     interval = "no interval"
     if np.isfinite(line["ci_low"]) and np.isfinite(line["ci_high"]):
         interval = f"{number(line['ci_low'], digits)} to {number(line['ci_high'], digits)}"

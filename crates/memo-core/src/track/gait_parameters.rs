@@ -74,8 +74,10 @@ const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 const Z: f64 = 1.959_964;
 /// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
-const CONTACT_SD_S: f64 = 0.025;
+const CONTACT_SD_S: f64 = 0.028;
 const CONTACT_COMMON_SD_S: f64 = 0.015;
+/// Standard deviation over people of how much earlier contacts of one side are found than those of the other, seconds.
+const CONTACT_SIDE_SD_S: f64 = 0.022;
 /// A fitted strike this much later than the one before is not its next, strides.
 const LONGEST_STEP: f64 = 0.8;
 
@@ -276,7 +278,7 @@ impl TrackedWalk {
         let steps = steps_between(&strikes, &self.rows());
         let (rate_hz, speed_mps) = (whole.rate_hz.value, whole.speed_mps.value.abs());
         let strike_sd_s = match self.fitted() {
-            Some(_) => CONTACT_COMMON_SD_S,
+            Some(_) => CONTACT_SIDE_SD_S,
             None => STRIKE_SD_CYCLES / rate_hz,
         };
         let noise_sq = steps.iter().map(|s| s.variance_s2).sum::<f64>() / steps.len().max(1) as f64;
