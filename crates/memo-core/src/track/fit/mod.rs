@@ -4,14 +4,14 @@
 //! Tracking finds where somebody is and in which phase of an average gait. The fit starts there and asks what body
 //! and what motion put the contours where the frames show them:
 //!
-//! 1. Unknowns start at their means over people ([`unknowns`]), place and phase of each frame at the tracker's.
-//! 2. Visible contours are sampled ([`lines`]), and the nearest edge on each sample's normal is searched
-//!    ([`edge_search`]).
+//! 1. Unknowns start at their means over people (`unknowns`), place and phase of each frame at the tracker's.
+//! 2. Visible contours are sampled (`lines`), and the nearest edge on each sample's normal is searched
+//!    (`edge_search`).
 //! 3. A Gauss-Newton step moves all unknowns at once; large distances count less (Geman and McClure). Distances that
 //!    count become smaller from step to step.
 //! 4. The first steps are made from several gaits; the one whose contours are nearest goes on.
 //! 5. The joint curves are fitted first, then what each frame deviates from them.
-//! 6. Everything is done again with left and right exchanged, and the evidence decides ([`sides`]).
+//! 6. Everything is done again with left and right exchanged, and the evidence decides (`sides`).
 //! 7. Standard deviations follow from the normal equations.
 //!
 //! The normal equations have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time is
