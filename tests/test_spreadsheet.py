@@ -10,6 +10,7 @@ import io
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import memo
 import numpy as np
@@ -157,12 +158,12 @@ def write_labels(path):
     write_joints(path.with_name("motion.csv"))
     from memo.cli.pointlight import _write_labels
 
-    display = {
-        "labels": np.array([[0, 1, -1]]),
-        "limb_ends": np.array([[2, -1, -1]]),
-        "fractions": np.array([[0.25, 0, 0]]),
-        "visible": np.ones((1, 3), bool),
-    }
+    display = SimpleNamespace(
+        labels=np.array([[0, 1, -1]]),
+        limb_ends=np.array([[2, -1, -1]]),
+        fractions=np.array([[0.25, 0, 0]]),
+        visible=np.ones((1, 3), bool),
+    )
     _write_labels(path, list(NAMES), list(NAMES), display)
     columns = read_text_columns(path)
     assert columns["dot"] == list(NAMES[:3]) and columns["shows"] == [*NAMES[:2], "noise"]
