@@ -77,7 +77,7 @@ const Z: f64 = 1.959_964;
 const CONTACT_SD_S: f64 = 0.028;
 const CONTACT_COMMON_SD_S: f64 = 0.015;
 /// Standard deviation over people of how much earlier contacts of one side are found than those of the other, seconds.
-const CONTACT_SIDE_SD_S: f64 = 0.022;
+const CONTACT_SIDE_SD_S: f64 = 0.018;
 /// A fitted strike this much later than the one before is not its next, strides.
 const LONGEST_STEP: f64 = 0.8;
 
