@@ -156,6 +156,20 @@ pub struct GaitStyle {
     pub arm_amplitude: f64,
 }
 
+impl GaitStyle {
+    /// Crouched: thighs 22 and knees 40 degrees more flexed than the average's. A place to start from, not a measured
+    /// gait.
+    pub const CROUCHED: Self = Self {
+        hip_offset: 22.0 * std::f64::consts::PI / 180.0,
+        knee_offset: 40.0 * std::f64::consts::PI / 180.0,
+        shoulder_offset: 0.0,
+        elbow_offset: 0.0,
+        trunk_lean: 0.0,
+        leg_amplitude: 1.0,
+        arm_amplitude: 1.0,
+    };
+}
+
 impl Default for GaitStyle {
     fn default() -> Self {
         Self {

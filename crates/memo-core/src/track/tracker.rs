@@ -78,17 +78,8 @@ const FASTEST_MPS: f64 = 3.0;
 /// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
 /// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
 const LEAST_CONTRAST: f64 = 1.22;
-/// Gaits other than the average with which a walk can start: crouched, thighs 22 and knees 40 degrees more flexed, as
-/// in the crouch gait of Rodda and others (J Bone Joint Surg Br 86:251, 2004).
-const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle {
-    hip_offset: 0.384,
-    knee_offset: 0.698,
-    shoulder_offset: 0.0,
-    elbow_offset: 0.0,
-    trunk_lean: 0.0,
-    leg_amplitude: 1.0,
-    arm_amplitude: 1.0,
-}];
+/// Gaits other than the average with which a walk can start.
+const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle::CROUCHED];
 /// Another gait starts if it is more similar than the average one by this factor.
 const OTHER_GAIN: f64 = 1.05;
 /// A walk ends when this share of the body's height or width is outside the image.
@@ -350,7 +341,7 @@ impl Tracker {
             average: Walker { style: GaitStyle::default(), ..walker },
             kept,
             gait_speed_mps: course.speed_mps,
-            turned: false,
+            settled: false,
             pieces: Vec::new(),
         })
     }
@@ -396,14 +387,14 @@ impl Tracker {
         if self.options.fit.is_some() {
             active.pieces.push(Piece::new(evidence.frame, &evidence.grey, window));
         }
-        if !active.turned {
+        if !active.settled {
             active.kept.push((sighting, edges));
             if active.kept.len() >= self.options.path_frames {
-                active.turn(&self.backdrop, &self.options);
+                active.settle(&self.backdrop, &self.options);
             }
         }
         // On a wrong path a walk can seem to be over, so the path is looked for first.
-        if active.turned && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
+        if active.settled && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
             self.end_walk();
         }
         Ok(())
@@ -436,7 +427,7 @@ impl Tracker {
 
     fn end_walk(&mut self) {
         if let Some(mut active) = self.walking.take() {
-            active.turn(&self.backdrop, &self.options);
+            active.settle(&self.backdrop, &self.options);
             active.trim();
             if !active.is_walk() {
                 self.report.refused_starts += 1;

@@ -28,10 +28,11 @@ const BALL_SHARE: f64 = 0.4;
 const NEAR: f64 = 0.2;
 const TOE_OFF_PHASE: f64 = 0.61;
 
-/// The contacts of a walk. `feet` has ankle, heel and ball of the right and the left foot in each frame, metres.
-pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 3]; 2]], ahead: DVec2) -> Vec<Contact> {
+/// The contacts of a walk, none of a backward one. `feet` has heel and ball of the right and the left foot in each
+/// frame, metres.
+pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead: DVec2) -> Vec<Contact> {
     let count = times_s.len();
-    if count < 3 {
+    if count < 3 || phases[count - 1] <= phases[0] {
         return Vec::new();
     }
     let place = |k: usize, side: usize, point: usize| feet[k][side][point].truncate().dot(ahead);
@@ -42,8 +43,8 @@ pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 3]; 2]], ahead
     for (side, name) in [Side::Right, Side::Left].into_iter().enumerate() {
         let later = 0.5 * side as f64;
         for (kind, point, at, share, rises) in [
-            (EventKind::HeelStrike, 1, 0.0, HEEL_SHARE, false),
-            (EventKind::ToeOff, 2, TOE_OFF_PHASE, BALL_SHARE, true),
+            (EventKind::HeelStrike, 0, 0.0, HEEL_SHARE, false),
+            (EventKind::ToeOff, 1, TOE_OFF_PHASE, BALL_SHARE, true),
         ] {
             // Speed over the walking speed, between frames.
             let speed = |k: usize| {
@@ -101,19 +102,19 @@ mod tests {
     use super::*;
 
     /// Feet that stand for 0.6 of each cycle of a second and move by the stride of 1.2 m in the rest, at a steady
-    /// speed; the ball leaves later than the ankle by 0.02 s.
-    fn feet(time_s: f64) -> [[DVec3; 3]; 2] {
+    /// speed; the ball leaves later than the heel by 0.02 s.
+    fn feet(time_s: f64) -> [[DVec3; 2]; 2] {
         let place = |t: f64| {
             let (cycle, at) = (t.floor(), t - t.floor());
             1.2 * (cycle + ((at - 0.6) / 0.4).clamp(0.0, 1.0))
         };
         [0.0, 0.5].map(|later| {
-            let [ankle, ball] = [0.0, 0.02].map(|late| {
+            let [heel, ball] = [0.0, 0.02].map(|late| {
                 let t = time_s + later;
                 let end = if (t - t.floor()) > 0.8 { 0.0 } else { late };
                 place(t - end) - 1.2 * later
             });
-            [DVec3::X * ankle, DVec3::X * ankle, DVec3::X * ball]
+            [DVec3::X * heel, DVec3::X * ball]
         })
     }
 
@@ -137,9 +138,11 @@ mod tests {
                 .zip(expected)
                 .for_each(|(t, e)| assert!((t - e).abs() < 0.02, "{kind:?} {side:?}: {t} {e}"));
         }
-        // The phases are ahead by 0.03; ankles stop at 0 and 0.5.
+        // The phases are ahead by 0.03; heels stop at 0 and 0.5.
         assert!((mean_phase(&found, &times_s, &phases) - 0.03).abs() < 0.01);
         assert_eq!(mean_phase(&[], &times_s, &phases), 0.0);
         assert!(contacts(&times_s[..2], &phases[..2], &all[..2], DVec2::X).is_empty());
+        let backwards: Vec<f64> = phases.iter().map(|p| -p).collect();
+        assert!(contacts(&times_s, &backwards, &all, DVec2::X).is_empty());
     }
 }

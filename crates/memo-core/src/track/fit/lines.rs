@@ -46,6 +46,8 @@ pub struct Sample {
     pub radius: DVec3,
     /// Height in the cylinder, from -1 to 1.
     pub z: f64,
+    /// The taper of the part.
+    pub taper: f64,
 }
 
 /// What [`samples`] needs again and again.
@@ -189,7 +191,8 @@ impl<'a> Line<'a> {
         }
         let radius = if self.is_rim { DVec3::ZERO } else { radius };
         let point_px = camera.project(world)?;
-        Some(Sample { part: self.part, point_px, normal: self.normal, is_outer: true, world, radius, z })
+        let (normal, taper) = (self.normal, self.taper);
+        Some(Sample { part: self.part, point_px, normal, is_outer: true, world, radius, z, taper })
     }
 }
 
@@ -219,7 +222,7 @@ impl Figure {
             (ACROSS, left),
             (HEIGHT, DVec3::Z),
             (HEADING, DVec3::Z.cross(x - self.origin.extend(0.0))),
-            (BODY + WIDTHS + row_of(sample.part), sample.radius),
+            (BODY + WIDTHS + row_of(sample.part), sample.radius * (1.0 + sample.taper * sample.z)),
         ]);
         out.extend(taper_of(sample.part).map(|taper| (BODY + TAPERS + taper, sample.radius * sample.z)));
         if sample.part.is_leg() { self.leg_motion(sample, out) } else { self.trunk_motion(sample, out) }
@@ -360,9 +363,9 @@ fn lens(camera: &Camera, ideal_px: DVec2) -> DMat2 {
 #[cfg(test)]
 mod tests {
     use super::super::super::search::tests::camera;
-    use super::super::unknowns::{FIGURE, WHOLE};
+    use super::super::unknowns::{FIGURE, WHOLE, side_angles};
     use super::*;
-    use crate::model::{Posture, SideAngles};
+    use crate::model::Posture;
 
     /// A figure by its coordinates, away from symmetry.
     fn figure(q: &[f64]) -> Figure {
@@ -370,14 +373,7 @@ mod tests {
         let body = super::super::unknowns::body(&Body::from_height(1.75).unwrap(), whole);
         let ahead = DVec2::from_angle(q[HEADING]);
         let pelvis = (q[ALONG] * ahead + q[ACROSS] * ahead.perp()).extend(q[HEIGHT]);
-        let side = |a: &[f64]| SideAngles {
-            hip: a[0],
-            knee: a[1],
-            ankle: a[2],
-            shoulder: a[3],
-            elbow: a[4],
-            abduction: whole[TILT],
-        };
+        let side = |a: &[f64]| side_angles(a, whole[TILT]);
         let posture = Posture {
             right: side(&q[ANGLES..]),
             left: side(&q[ANGLES + JOINTS..]),
@@ -456,7 +452,7 @@ mod tests {
                 let expected = (to - from) / (2.0 * step);
                 let scale = expected.abs().max(30.0);
                 assert!(
-                    (slope - expected).abs() < 0.06 * scale,
+                    (slope - expected).abs() < 0.03 * scale,
                     "{coordinate} of {:?} at {:.2}: {slope:.1} for {expected:.1}",
                     sample.part,
                     sample.z

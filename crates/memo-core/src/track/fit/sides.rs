@@ -3,7 +3,7 @@
 //! With wrong sides the outline can be the same, but then the far limbs are drawn in front of the near ones: their
 //! lines inside the body, where the frames have edges, are hidden. So the right sides explain more of these lines.
 
-use super::Seen;
+use super::seen::Seen;
 
 /// Log odds per unit of evidence.
 const LOG_ODDS: f64 = 8.0;

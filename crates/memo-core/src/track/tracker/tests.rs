@@ -277,7 +277,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         kept: Vec::new(),
         gait_speed_mps: 1.25,
         average: walker(),
-        turned: true,
+        settled: true,
         pieces: Vec::new(),
     });
     tracker
@@ -316,7 +316,7 @@ fn following_to_a_stop() -> Tracker {
 fn who_stands_still_is_let_go_once_the_path_is_known() {
     for turned in [true, false] {
         let mut tracker = following_to_a_stop();
-        tracker.walking.as_mut().unwrap().turned = turned;
+        tracker.walking.as_mut().unwrap().settled = turned;
         tracker.advance(&evidence(60, &[])).unwrap();
         assert_eq!(tracker.walking.is_none(), turned);
         assert_eq!(tracker.take_finished().len(), usize::from(turned));
@@ -341,11 +341,11 @@ fn who_never_got_on_is_refused_at_the_end() {
 fn frames_are_kept_until_there_are_enough_for_the_path() {
     let mut tracker = following(20, -0.5, 1.2);
     tracker.options.path_frames = 3;
-    tracker.walking.as_mut().unwrap().turned = false;
+    tracker.walking.as_mut().unwrap().settled = false;
     for (k, (kept, turned)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
         tracker.advance(&evidence(20 + k, &[])).unwrap();
         let active = tracker.walking.as_ref().unwrap();
-        assert_eq!((active.kept.len(), active.turned), (kept, turned), "frame {k}");
+        assert_eq!((active.kept.len(), active.settled), (kept, turned), "frame {k}");
     }
 }
 
@@ -497,7 +497,7 @@ fn a_walker_is_started_with_both_twins_through_the_start_frames() {
     let active = begun(seen.clone()).expect("a walker");
     assert!((active.start.beginning.speed_mps - 1.3).abs() < 0.1 && active.start.contrast() > 1.22);
     assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
-    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.turned);
+    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.settled);
     let sightings: Vec<Sighting> = seen.iter().map(|(s, _)| *s).collect();
     let course = locate(&sightings, &camera(), walker().level_crown_height_m()).unwrap();
     assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));

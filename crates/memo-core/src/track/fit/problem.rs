@@ -1,0 +1,565 @@
+//! The least-squares problem of the fit: steps, normal equations, and the result with its standard deviations.
+
+use super::contacts;
+use super::edge_search::{Border, View};
+use super::lines::{Figure, Sample, Workspace, gradient, row_of, samples};
+use super::seen::{LEAST_STEP, Seen};
+use super::sides;
+use super::unknowns::{
+    self, ANGLES, FIGURE, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior,
+    STATURE, Slope, TORSO, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_HEADING, WHOLE_LEAN, body, flatten, mean_of,
+    posture, priors, slopes,
+};
+use super::{FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit};
+use crate::estimate::arrow::{Arrow, Solution};
+use crate::model::{Camera, Gait, GaitStyle, Walker};
+use crate::track::search::{Hypothesis, Path};
+use glam::DVec2;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// A frame to be fitted: its time, its picture around the person, and where the tracker found the person.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FitFrame {
+    pub time_s: f64,
+    pub view: View,
+    /// Where the pelvis is: along the path and above the ground; and the phase, not wrapped.
+    pub start: Hypothesis,
+}
+
+/// What stays the same during a fit.
+pub(crate) struct Problem<'a> {
+    camera: &'a Camera,
+    /// The average walker of the stated height.
+    walker: &'a Walker,
+    /// The tracker's path.
+    path: &'a Path,
+    frames: &'a [FitFrame],
+    options: &'a FitOptions,
+    priors: Vec<Prior>,
+    /// Standard deviation of the height of a standing foot, metres.
+    ground_sd_m: f64,
+    /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
+    origin: DVec2,
+    origin_along_m: f64,
+}
+
+/// A gait from which the fit starts. People who walk unlike the average are not always reached from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum StartGait {
+    Average,
+    /// [`GaitStyle::CROUCHED`].
+    Crouched,
+    /// One knee, of the side 0 or 1, flexes by 0.4 of the average's swing.
+    StiffKnee(usize),
+}
+
+impl StartGait {
+    const ALL: [Self; 4] = [Self::Average, Self::Crouched, Self::StiffKnee(0), Self::StiffKnee(1)];
+
+    fn mirrored(self) -> Self {
+        match self {
+            Self::StiffKnee(side) => Self::StiffKnee(1 - side),
+            same => same,
+        }
+    }
+
+    fn apply(self, gait: &Gait, whole: &mut [f64]) {
+        match self {
+            Self::Average => {}
+            Self::Crouched => {
+                whole[mean_of(0)] += GaitStyle::CROUCHED.hip_offset;
+                whole[mean_of(1)] += GaitStyle::CROUCHED.knee_offset;
+            }
+            Self::StiffKnee(side) => flatten(gait, whole, 1, side, 0.6),
+        }
+    }
+}
+
+/// Steps from every starting gait, then steps with the person's curves, then with what single frames deviate.
+const STEPS: [usize; 3] = [4, 4, 4];
+/// How far edges are searched, and the distance at which an edge counts a quarter: shares of the person's height at
+/// the first and at the last step.
+const REACH: [f64; 2] = [0.06, 0.02];
+const SCALE: [f64; 2] = [0.03, 0.008];
+/// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
+/// distance from each other.
+const SAMPLES_PER_HEIGHT: f64 = 75.0;
+const LEAST_SPACING_PX: f64 = 2.0;
+const LEAST_REACH_PX: f64 = 4.0;
+
+impl<'a> Problem<'a> {
+    pub fn new(
+        camera: &'a Camera,
+        walker: &'a Walker,
+        path: &'a Path,
+        frames: &'a [FitFrame],
+        options: &'a FitOptions,
+    ) -> Self {
+        let origin_along_m = frames.get(frames.len() / 2).map_or(0.0, |frame| frame.start.along_m);
+        let origin = path.point(origin_along_m, 0.0).truncate();
+        let ground_sd_m = GROUND_SD_M;
+        Self { camera, walker, path, frames, options, priors: priors(), ground_sd_m, origin, origin_along_m }
+    }
+
+    /// The same in an assumed camera, whose ground and whose direction of sight are assumed too: distance and heading
+    /// stay near those that the tracker found from the person's size.
+    pub fn of_assumed_camera(mut self) -> Self {
+        self.priors[WHOLE_HEADING].sd = ASSUMED_HEADING_SD_RAD;
+        self.priors[WHOLE_ACROSS].sd = ASSUMED_ACROSS_SD_M;
+        self.ground_sd_m = ASSUMED_GROUND_SD_M;
+        self
+    }
+
+    /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
+    /// sides are exchanged; without it, the sides stay as tracked.
+    pub fn fit(&self, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
+        if self.frames.len() < LEAST_FRAMES {
+            return Err(FitError::TooFewFrames { got: self.frames.len() });
+        }
+        let (as_tracked, gait) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
+        let as_tracked = self.finished(as_tracked).ok_or(FitError::Undetermined)?;
+        let exchanged = p_tracked_swapped.and_then(|_| {
+            let start = self.started(0.5, gait.mirrored())?.1;
+            self.finished(start)
+        });
+        let p_tracked = p_tracked_swapped.unwrap_or(0.0);
+        let p_exchanged =
+            exchanged.as_ref().map_or(0.0, |other| sides::p_other(&as_tracked.seen, &other.seen, p_tracked));
+        let (best, p_swapped) = match exchanged {
+            Some(other) if p_exchanged > 0.5 => (other, 1.0 - p_exchanged),
+            _ => (as_tracked, p_exchanged),
+        };
+        let quality = self.quality(&best);
+        let residual = quality.residual_px / quality.height_px;
+        if quality.missed > MOST_MISSED || residual > MOST_RESIDUAL {
+            return Err(FitError::Misfit { missed: quality.missed, residual });
+        }
+        Ok(self.result(&best, p_swapped, quality))
+    }
+
+    /// The start whose first steps come nearest to the edges, with the tracker's phase shifted by some cycles.
+    fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
+        let starts = StartGait::ALL.into_iter().filter_map(|gait| Some((self.started(phase, gait)?, gait)));
+        let ((_, unknowns), gait) = starts.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
+        Some((unknowns, gait))
+    }
+
+    /// The first steps from one gait, and their cost.
+    fn started(&self, phase: f64, gait: StartGait) -> Option<(f64, Unknowns)> {
+        let mut unknowns = self.start(phase);
+        gait.apply(&self.walker.gait, &mut unknowns.whole);
+        let height_px = self.height_px(&unknowns)?;
+        let mut cost = f64::INFINITY;
+        for n in 0..STEPS[0] {
+            cost = self.step(&mut unknowns, &Width::of_step(n, height_px), false)?.0.cost;
+        }
+        Some((cost, unknowns))
+    }
+
+    /// The other steps.
+    fn finished(&self, mut unknowns: Unknowns) -> Option<Fitted> {
+        let height_px = self.height_px(&unknowns)?;
+        let mut last = None;
+        for n in STEPS[0]..STEPS.iter().sum() {
+            last = Some(self.step(&mut unknowns, &Width::of_step(n, height_px), n >= STEPS[0] + STEPS[1])?);
+        }
+        let (seen, solution) = last?;
+        Some(Fitted { unknowns, seen, solution, height_px })
+    }
+
+    /// Means over people, at the places and phases that the tracker found.
+    fn start(&self, phase: f64) -> Unknowns {
+        let frame = |f: &FitFrame| {
+            let mut frame = [0.0; FRAME];
+            frame[FRAME_ALONG] = f.start.along_m - self.origin_along_m;
+            frame[FRAME_HEIGHT] = f.start.height_m;
+            frame[FRAME_PHASE] = f.start.phase + phase;
+            frame
+        };
+        Unknowns {
+            whole: self.priors.iter().map(|prior| prior.mean).collect(),
+            frames: self.frames.iter().map(frame).collect(),
+        }
+    }
+
+    /// The figure of a frame.
+    fn figure(&self, unknowns: &Unknowns, frame: usize) -> Figure {
+        let (whole, frame) = (&unknowns.whole, &unknowns.frames[frame]);
+        let body = body(&self.walker.body, whole);
+        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
+        let ahead = DVec2::from_angle(heading_rad);
+        let ground = self.origin + frame[FRAME_ALONG] * ahead + whole[WHOLE_ACROSS] * ahead.perp();
+        let pelvis = ground.extend(frame[FRAME_HEIGHT]);
+        let (sin, cos) = whole[WHOLE_LEAN].sin_cos();
+        let torso_centre = pelvis + 0.5 * body.torso_length_m() * (sin * ahead).extend(cos);
+        let posed = body.pose(torso_centre, heading_rad, &posture(&self.walker.gait, whole, frame));
+        Figure { body, posed, pelvis, ahead, origin: self.origin }
+    }
+
+    /// Height of the person in the middle frame, pixels.
+    fn height_px(&self, unknowns: &Unknowns) -> Option<f64> {
+        let figure = self.figure(unknowns, unknowns.frames.len() / 2);
+        self.camera.pixel_height_at(figure.pelvis.with_z(0.0), figure.body.height_m)
+    }
+
+    /// One Gauss-Newton step of all unknowns; with `free` frames, what they deviate from the curves is fitted too.
+    fn step(&self, unknowns: &mut Unknowns, width: &Width, free: bool) -> Option<(Seen, Solution)> {
+        let mut arrow = Arrow::new(self.frames.len(), FRAME, WHOLE);
+        let terms: Vec<_> = (0..self.frames.len())
+            .into_par_iter()
+            .map_init(Room::default, |room, frame| self.frame_terms(unknowns, frame, width, room))
+            .collect();
+        let mut seen = Seen::default();
+        for (frame, (normal, right, of_frame)) in terms.iter().enumerate() {
+            arrow.add_frame(frame, normal, right);
+            seen.add(of_frame);
+        }
+        self.add_priors(unknowns, free, &mut arrow);
+        let solution = arrow.solve()?;
+        for (x, step) in unknowns.whole.iter_mut().zip(solution.whole.iter()) {
+            *x += step;
+        }
+        for (x, step) in unknowns.frames.iter_mut().flatten().zip(solution.frames.iter()) {
+            *x += step;
+        }
+        Some((seen, solution))
+    }
+
+    /// The normal equations of one frame over the unknowns of the whole and of the frame, and what was seen.
+    fn frame_terms(
+        &self,
+        unknowns: &Unknowns,
+        frame: usize,
+        width: &Width,
+        room: &mut Room,
+    ) -> (DMatrix<f64>, DVector<f64>, Seen) {
+        let figure = self.figure(unknowns, frame);
+        let Room { work, slopes: room_slopes } = room;
+        samples(&figure, self.camera, &unknowns.whole, width.spacing_px(), work);
+        let mut normal = DMatrix::<f64>::zeros(FIGURE, FIGURE);
+        let mut right = DVector::<f64>::zeros(FIGURE);
+        let mut seen = Seen::default();
+        let Workspace { samples, motion, looks, .. } = work;
+        let view = &self.frames[frame].view;
+        for sample in samples.iter() {
+            let border = if sample.is_outer { Border::Outer } else { Border::Inner };
+            let Some(edge) = view.search(sample.point_px, sample.normal, width.reach_px, border, looks)
+            else {
+                continue;
+            };
+            let importance = importance(sample);
+            let far = 1.0 / (1.0 + (edge.offset_px / width.scale_px).powi(2));
+            seen.count(sample, &edge, importance * (1.0 - far));
+            if edge.strength < LEAST_STEP {
+                continue;
+            }
+            let clear = edge.strength / (edge.strength + CLEAR_STEP);
+            let weight = importance * far * far * clear / width.sd_px().powi(2);
+            figure.motion(sample, motion);
+            let n_j = gradient(self.camera, sample.world, sample.normal);
+            add_terms(
+                &mut normal,
+                &mut right,
+                motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))),
+                edge.offset_px,
+                weight,
+            );
+        }
+        // The lower foot stands on the ground, with an error common to about ten independent frames.
+        let (side, lowest) = figure.lowest_point();
+        let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
+        add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], room_slopes);
+        let (normal, right) = of_unknowns(&normal, &right, room_slopes);
+        (normal, right, seen)
+    }
+
+    /// Priors of people, of the stated height and of smooth motion.
+    fn add_priors(&self, unknowns: &Unknowns, free: bool, arrow: &mut Arrow) {
+        for (n, prior) in self.priors.iter().enumerate() {
+            arrow.add_whole_row(&[(n, 1.0)], prior.mean - unknowns.whole[n], prior.sd.powi(-2));
+        }
+        let excess: f64 = STATURE.iter().map(|&n| unknowns.whole[n]).sum();
+        arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), -excess, self.options.height_sd.powi(-2));
+        let joint_of = |unknown: usize| (unknown - FRAME_ANGLES) % JOINTS;
+        for (k, frame) in unknowns.frames.iter().enumerate() {
+            for (unknown, value) in frame.iter().enumerate().skip(FRAME_ANGLES) {
+                let sd = match (free, joint_of(unknown)) {
+                    (false, _) => HELD_SD_RAD,
+                    (true, 0 | 1) => self.options.frame_sd_rad,
+                    (true, _) => 2.0 * self.options.frame_sd_rad,
+                };
+                arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -value, sd.powi(-2));
+            }
+        }
+        // Velocities change as in a random walk: their change between two intervals has a variance in proportion to
+        // the time between their middles.
+        for k in 1..unknowns.frames.len().saturating_sub(1) {
+            let time = |k: usize| self.frames[k].time_s;
+            let (before_s, after_s) = (time(k) - time(k - 1), time(k + 1) - time(k));
+            let factors = [1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s];
+            for (unknown, rate) in RATES.iter().enumerate() {
+                let terms = [0, 1, 2].map(|n| (arrow.index(k - 1 + n, unknown), factors[n]));
+                let now: f64 = (0..3).map(|n| factors[n] * unknowns.frames[k - 1 + n][unknown]).sum();
+                arrow.add_row(&terms, -now, 1.0 / (rate * rate * 0.5 * (before_s + after_s)));
+            }
+        }
+    }
+
+    /// How much of a measured zero of the phase is believed: contacts of small people are blurred, and the average
+    /// curves have their zero within ZERO_SD of a person's.
+    fn share_of_zero(&self, quality: &FitQuality) -> f64 {
+        let blur = ZERO_BLUR_PX / quality.height_px;
+        ZERO_SD.powi(2) / (ZERO_SD.powi(2) + blur.powi(2))
+    }
+
+    fn quality(&self, fitted: &Fitted) -> FitQuality {
+        let seen = &fitted.seen;
+        let lengths = STATURE.iter().map(|&n| {
+            let Prior { mean, sd } = self.priors[n];
+            ((fitted.unknowns.whole[n] - mean) / sd).abs()
+        });
+        FitQuality {
+            residual_px: seen.distance_px / (seen.outer - seen.outer_missed).max(1.0),
+            height_px: fitted.height_px,
+            missed: seen.outer_missed / seen.outer.max(1.0),
+            missed_inside: seen.inner_missed / seen.inner.max(1.0),
+            worst_length_sd: lengths.fold(0.0, f64::max),
+        }
+    }
+
+    /// Step 7.
+    fn result(&self, fitted: &Fitted, p_swapped: f64, quality: FitQuality) -> WalkFit {
+        let Unknowns { whole, frames } = &fitted.unknowns;
+        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
+        let across = whole[WHOLE_ACROSS] * DVec2::from_angle(heading_rad).perp();
+        let path = Path { origin: self.origin + across, heading_rad };
+        let frame = |k: usize| {
+            let figure = self.figure(&fitted.unknowns, k);
+            let frame = FittedFrame {
+                torso_centre: figure.posed.torso_centre,
+                along_m: path.along(figure.posed.torso_centre.truncate()),
+                phase: frames[k][FRAME_PHASE],
+                posture: posture(&self.walker.gait, whole, &frames[k]),
+                measured: self.measured(fitted, k),
+                sd: self.place_sd(fitted, k),
+            };
+            (frame, [0, 1].map(|side| figure.sole(side)))
+        };
+        let (mut all, feet): (Vec<FittedFrame>, Vec<_>) =
+            (0..frames.len()).into_par_iter().map(frame).unzip();
+        let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
+        let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
+        let contacts = contacts::contacts(&times_s, &phases, &feet, path.direction());
+        // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
+        let zero = contacts::mean_phase(&contacts, &times_s, &phases) * self.share_of_zero(&quality);
+        all.iter_mut().for_each(|frame| frame.phase -= zero);
+        let curves = unknowns::curves(&self.walker.gait, whole, zero);
+        WalkFit {
+            body: body(&self.walker.body, whole),
+            path,
+            curves,
+            frames: all,
+            contacts,
+            p_swapped,
+            quality,
+        }
+    }
+
+    /// The angles of a frame that the pictures determine, with standard deviations.
+    fn measured(&self, fitted: &Fitted, frame: usize) -> [Measured; 2] {
+        let unknowns = &fitted.unknowns;
+        let angles = unknowns::angles(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame]);
+        let mut all = Vec::new();
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut all);
+        let measured = |at: usize| {
+            let (mut whole, mut frames) = (Vec::new(), Vec::new());
+            for &(_, unknown, slope) in all.iter().filter(|s| s.0 == ANGLES + at) {
+                match unknown.checked_sub(WHOLE) {
+                    None => whole.push((unknown, slope)),
+                    Some(unknown) => frames.push((frame * FRAME + unknown, slope)),
+                }
+            }
+            let [sd, most] =
+                [SD_FACTOR * fitted.solution.variance(&whole, &frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
+            let sd = sd.hypot(MODEL_SD_RAD[at % JOINTS]);
+            (sd <= most).then_some([angles[at], sd])
+        };
+        [0, 1].map(|side| Measured { angles: std::array::from_fn(|joint| measured(side * JOINTS + joint)) })
+    }
+
+    /// Standard deviations of the torso's centre along, across and up, and of the phase.
+    fn place_sd(&self, fitted: &Fitted, frame: usize) -> [f64; 4] {
+        let (height_m, lean) = (self.walker.body.height_m, fitted.unknowns.whole[WHOLE_LEAN]);
+        let half_m = 0.5 * body(&self.walker.body, &fitted.unknowns.whole).torso_length_m();
+        let along_m = fitted.unknowns.frames[frame][FRAME_ALONG];
+        let at = |unknown: usize| [(frame * FRAME + unknown, 1.0)];
+        let sd = |whole: &[(usize, f64)], frames: &[(usize, f64)], common: f64| {
+            (SD_FACTOR * fitted.solution.variance(whole, frames).sqrt()).hypot(common)
+        };
+        let half_torso = 0.5 * height_m;
+        [
+            sd(
+                &[(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())],
+                &at(FRAME_ALONG),
+                PLACE_SD[0],
+            ),
+            sd(&[(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)], &[], PLACE_SD[1]),
+            sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), PLACE_SD[2]),
+            sd(&[], &at(FRAME_PHASE), PLACE_SD[3]),
+        ]
+    }
+}
+
+/// Search width and weights of one step.
+#[derive(Debug, Clone, Copy)]
+struct Width {
+    reach_px: f64,
+    scale_px: f64,
+    height_px: f64,
+}
+
+impl Width {
+    fn of_step(n: usize, height_px: f64) -> Self {
+        let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
+        let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
+        Self { reach_px: at(REACH).max(LEAST_REACH_PX), scale_px: at(SCALE).max(1.0), height_px }
+    }
+
+    fn spacing_px(&self) -> f64 {
+        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
+    }
+
+    /// Standard deviation of the edge of one sample.
+    fn sd_px(&self) -> f64 {
+        (self.height_px / SAMPLES_PER_HEIGHT).max(1.0)
+    }
+}
+
+/// Working memory of a thread.
+#[derive(Debug, Default)]
+struct Room {
+    work: Workspace,
+    slopes: Vec<Slope>,
+}
+
+/// A fit with one choice of sides.
+struct Fitted {
+    unknowns: Unknowns,
+    seen: Seen,
+    solution: Solution,
+    height_px: f64,
+}
+
+/// An outline counts fully, a foot half, because shoes have edges of their own, and so do clothes inside the body.
+/// The top of the thigh belongs to buttock and pelvis as much.
+fn importance(sample: &Sample) -> f64 {
+    let row = row_of(sample.part);
+    let of_border = match (sample.is_outer, row) {
+        (true, 7) => 0.5,
+        (true, _) => 1.0,
+        (false, _) => 0.25,
+    };
+    let is_top_of_thigh = row == 5 && sample.z > 1.0 - 2.0 * 0.28;
+    let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
+    of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
+}
+
+/// A step of this many grey levels counts half as much as a large one.
+const CLEAR_STEP: f64 = 15.0;
+/// Standard deviation of the height of a standing foot, metres, and the number of independent feet in a walk.
+const GROUND_SD_M: f64 = 0.015;
+const GROUND_FRAMES: f64 = 10.0;
+/// The same, and the standard deviations of heading and distance, in an assumed camera.
+const ASSUMED_GROUND_SD_M: f64 = 0.06;
+const ASSUMED_HEADING_SD_RAD: f64 = 0.02;
+const ASSUMED_ACROSS_SD_M: f64 = 0.1;
+/// What frames deviate from the curves while only curves are fitted.
+const HELD_SD_RAD: f64 = 1e-6;
+/// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,
+/// cycles/s of the phase, rad/s of the angles. Of the size that prototypes on motion-captured walks used; the
+/// result hardly depends on them.
+const RATES: [f64; FRAME] = {
+    let mut rates = [75.0 * std::f64::consts::PI / 180.0; FRAME];
+    rates[FRAME_ALONG] = 0.5;
+    rates[FRAME_HEIGHT] = 0.75;
+    rates[FRAME_PHASE] = 0.19;
+    rates
+};
+/// Errors that the equations do not contain, because edges of neighbouring samples and frames err together, and
+/// because people are no cylinders: a factor, and standard deviations to add.
+const SD_FACTOR: f64 = 1.3;
+const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
+const PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
+/// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
+const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
+/// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and
+/// the error of a measured one times the person's height in pixels.
+const ZERO_SD: f64 = 0.03;
+const ZERO_BLUR_PX: f64 = 3.0;
+/// A fit that misses more of its outline, or is farther from the edges, is no fit.
+const MOST_MISSED: f64 = 0.2;
+const MOST_RESIDUAL: f64 = 0.012;
+
+/// Adds weight (Σ slope q - offset)² to normal equations over the figure.
+fn add_terms(
+    normal: &mut DMatrix<f64>,
+    right: &mut DVector<f64>,
+    slopes: impl Iterator<Item = (usize, f64)> + Clone,
+    offset: f64,
+    weight: f64,
+) {
+    for (i, a) in slopes.clone() {
+        for (j, b) in slopes.clone() {
+            normal[(i, j)] += weight * a * b;
+        }
+        right[i] += weight * a * offset;
+    }
+}
+
+/// Normal equations over the figure as those over the unknowns: Aᵀ H A and Aᵀ b, with the slopes A.
+fn of_unknowns(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    slopes: &[Slope],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let count = WHOLE + FRAME;
+    let mut half = DMatrix::<f64>::zeros(FIGURE, count);
+    let mut of_right = DVector::<f64>::zeros(count);
+    for &(q, unknown, slope) in slopes {
+        half.column_mut(unknown).axpy(slope, &normal.column(q), 1.0);
+        of_right[unknown] += slope * right[q];
+    }
+    let half = half.transpose();
+    let mut of_unknowns = DMatrix::<f64>::zeros(count, count);
+    for &(q, unknown, slope) in slopes {
+        of_unknowns.column_mut(unknown).axpy(slope, &half.column(q), 1.0);
+    }
+    (of_unknowns, of_right)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::track::search::tests::{camera, walker};
+
+    #[test]
+    fn a_short_walk_and_an_empty_picture_are_no_person() {
+        let (camera, walker, options) = (camera(), walker(), FitOptions::default());
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+        let grey = Image::filled(640, 480, 90u8);
+        let frame = |k: usize| FitFrame {
+            time_s: 0.04 * k as f64,
+            view: View { corner: [0, 0], grey: grey.clone(), background: grey.clone() },
+            start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
+        };
+        let fit = |count: usize| {
+            let frames: Vec<FitFrame> = (0..count).map(frame).collect();
+            Problem::new(&camera, &walker, &path, &frames, &options).fit(Some(0.1))
+        };
+        assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
+        assert_eq!(fit(15), Err(FitError::Undetermined));
+    }
+}

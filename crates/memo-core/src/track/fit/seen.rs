@@ -1,0 +1,47 @@
+//! What a step saw: samples with and without an edge, and how far the edges are.
+
+use super::edge_search::FoundEdge;
+use super::lines::Sample;
+
+/// Steps of less grey levels are noise.
+pub const LEAST_STEP: f64 = 3.0;
+
+/// Sums over samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Seen {
+    /// Samples of the outline, and those without an edge; the same of inner lines.
+    pub outer: f64,
+    pub outer_missed: f64,
+    pub inner: f64,
+    pub inner_missed: f64,
+    /// Distances of the outline's edges, pixels.
+    pub distance_px: f64,
+    /// Robust cost of all distances.
+    pub cost: f64,
+}
+
+impl Seen {
+    /// Counts a sample with its edge and its part of the cost.
+    pub fn count(&mut self, sample: &Sample, edge: &FoundEdge, cost: f64) {
+        let missed = f64::from(u8::from(edge.strength < LEAST_STEP));
+        if sample.is_outer {
+            self.outer += 1.0;
+            self.outer_missed += missed;
+            self.distance_px += (1.0 - missed) * edge.offset_px.abs();
+        } else {
+            self.inner += 1.0;
+            self.inner_missed += missed;
+        }
+        self.cost += (1.0 - missed) * cost;
+    }
+
+    /// Adds the sums of another frame.
+    pub fn add(&mut self, other: &Self) {
+        self.outer += other.outer;
+        self.outer_missed += other.outer_missed;
+        self.inner += other.inner;
+        self.inner_missed += other.inner_missed;
+        self.distance_px += other.distance_px;
+        self.cost += other.cost;
+    }
+}
