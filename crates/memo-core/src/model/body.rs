@@ -315,12 +315,13 @@ impl Body {
         let wrist = elbow * up(-p.forearm * h);
         let (across, back) = posture.pelvis_rotation.sin_cos();
         let (across, back) = (back * side * p.hip_half_width * h, -across * side * p.hip_half_width * h);
-        let hip = world_from_torso
+        let tilted = |tilt: f64| DAffine3::from_rotation_x(side * tilt);
+        let level_at_hip = world_from_torso
             * DAffine3::from_translation(DVec3::new(back, across, -half_torso))
-            * flexed(posture.trunk_lean)
-            * DAffine3::from_rotation_x(side * angles.abduction)
-            * flexed(angles.hip);
-        let knee = hip * up(-(p.hip_height - p.knee_height) * h) * flexed(-angles.knee);
+            * flexed(posture.trunk_lean);
+        let hip = level_at_hip * tilted(angles.thigh_tilt) * flexed(angles.hip);
+        let mut knee = level_at_hip * tilted(angles.shank_tilt) * flexed(angles.hip - angles.knee);
+        knee.translation = hip.transform_point3(DVec3::NEG_Z * (p.hip_height - p.knee_height) * h);
         let ankle = knee * up(-(p.knee_height - p.ankle_height) * h) * flexed(angles.ankle);
 
         let first_arm = if side > 0.0 { Part::LeftUpperArm } else { Part::RightUpperArm } as usize;

@@ -88,8 +88,10 @@ pub struct SideAngles {
     pub elbow: f64,
     /// Dorsiflexion of the ankle, toes up positive; 0 = foot at a right angle to the shank.
     pub ankle: f64,
-    /// Tilt of the whole leg in the frontal plane, outwards positive.
-    pub abduction: f64,
+    /// Tilts of thigh and shank against the vertical in the frontal plane, outwards positive.
+    pub thigh_tilt: f64,
+    /// See `thigh_tilt`. A shank that tilts less than the thigh makes a knock-knee.
+    pub shank_tilt: f64,
 }
 
 /// All joint angles of the body at one instant.
@@ -107,13 +109,13 @@ pub struct Posture {
 
 impl Posture {
     /// Number of values of [`Posture::to_array`].
-    pub const COUNT: usize = 14;
+    pub const COUNT: usize = 16;
 
-    /// Hip, knee, shoulder, elbow, ankle and abduction of the right side, then of the left, then the lean of the
-    /// trunk and the rotation of the pelvis.
+    /// Hip, knee, shoulder, elbow, ankle, tilt of the thigh and tilt of the shank of the right side, then of the
+    /// left, then the lean of the trunk and the rotation of the pelvis.
     pub fn to_array(&self) -> [f64; Self::COUNT] {
-        let [r, l] =
-            [&self.right, &self.left].map(|s| [s.hip, s.knee, s.shoulder, s.elbow, s.ankle, s.abduction]);
+        let [r, l] = [&self.right, &self.left]
+            .map(|s| [s.hip, s.knee, s.shoulder, s.elbow, s.ankle, s.thigh_tilt, s.shank_tilt]);
         let mut all = r.into_iter().chain(l).chain([self.trunk_lean, self.pelvis_rotation]);
         std::array::from_fn(|_| all.next().unwrap_or(0.0))
     }
@@ -126,13 +128,14 @@ impl Posture {
             shoulder: v[2],
             elbow: v[3],
             ankle: v[4],
-            abduction: v[5],
+            thigh_tilt: v[5],
+            shank_tilt: v[6],
         };
         Self {
-            right: side(&values[..6]),
-            left: side(&values[6..12]),
-            trunk_lean: values[12],
-            pelvis_rotation: values[13],
+            right: side(&values[..7]),
+            left: side(&values[7..14]),
+            trunk_lean: values[14],
+            pelvis_rotation: values[15],
         }
     }
 }
@@ -274,7 +277,8 @@ impl Gait {
             shoulder: mean(&shoulder),
             elbow: mean(&elbow),
             ankle: 0.0,
-            abduction: 0.0,
+            thigh_tilt: 0.0,
+            shank_tilt: 0.0,
         };
         Self { hip, knee, shoulder, elbow, vertical_amplitude_m: VERTICAL_AMPLITUDE_M, mean }
     }
@@ -307,7 +311,8 @@ impl Gait {
             shoulder: scaled(&self.shoulder, self.mean.shoulder, style.arm_amplitude) + style.shoulder_offset,
             elbow: scaled(&self.elbow, self.mean.elbow, style.arm_amplitude) + style.elbow_offset,
             ankle: 0.0,
-            abduction: 0.0,
+            thigh_tilt: 0.0,
+            shank_tilt: 0.0,
         }
     }
 

@@ -373,7 +373,8 @@ impl ClothedScene {
                 shoulder: upper_arm - trunk,
                 elbow: elevation(j.elbow, j.wrist) - upper_arm,
                 ankle: 0.0,
-                abduction: 0.0,
+                thigh_tilt: 0.0,
+                shank_tilt: 0.0,
             }
         })
     }

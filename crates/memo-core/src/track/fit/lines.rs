@@ -10,7 +10,8 @@
 
 use super::unknowns::{
     ACROSS, ALONG, ANGLES, ANKLE, BODY, CROWN, FOOT, FOREARM, HEAD_FORWARD, HEADING, HEEL, HEIGHT, HIP_WIDTH,
-    JOINTS, LEAN, PELVIS, SHANK, SHOULDER_WIDTH, TAPERS, THIGH, TILT, TORSO, UPPER_ARM, WIDTHS,
+    JOINTS, LEAN, PELVIS, SHANK, SHANK_TILT, SHOULDER_WIDTH, TAPERS, THIGH, THIGH_TILT, TORSO, UPPER_ARM,
+    WIDTHS,
 };
 use crate::model::body::Part;
 use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
@@ -276,16 +277,19 @@ impl Figure {
         let thigh = if side == 0 { Part::RightThigh } else { Part::LeftThigh } as usize;
         let angle = |joint: usize| ANGLES + side * JOINTS + joint;
         let axes = self.axes(sample.part as usize);
-        let (bend, x) = (axes.y_axis, sample.world);
+        let (bend, bend_of_thigh, x) = (axes.y_axis, self.axes(thigh).y_axis, sample.world);
+        // What turns about the hip moves shank and foot as far as the knee.
+        let thigh_point = if row == 5 { x } else { joints.knee };
         let hip = joints.hip - self.pelvis;
         out.push((PELVIS, DVec3::Z.cross(hip)));
         out.push((BODY + HIP_WIDTH, hip / self.body.proportions.hip_half_width));
-        out.push((BODY + TILT, sign * ahead.cross(x - joints.hip)));
-        out.push((angle(0), -bend.cross(x - joints.hip)));
+        out.push((BODY + THIGH_TILT, sign * ahead.cross(thigh_point - joints.hip)));
+        out.push((angle(0), -bend_of_thigh.cross(thigh_point - joints.hip) - bend.cross(x - thigh_point)));
         let share = if row == 5 { down } else { 1.0 };
         out.push((BODY + THIGH, -self.axes(thigh).z_axis * (height_m * share)));
         if row >= 6 {
             let share = if row == 6 { down } else { 1.0 };
+            out.push((BODY + SHANK_TILT, sign * ahead.cross(x - joints.knee)));
             out.push((angle(1), bend.cross(x - joints.knee)));
             out.push((BODY + SHANK, -self.axes(thigh + 1).z_axis * (height_m * share)));
         }
@@ -373,7 +377,7 @@ mod tests {
         let body = super::super::unknowns::body(&Body::from_height(1.75).unwrap(), whole);
         let ahead = DVec2::from_angle(q[HEADING]);
         let pelvis = (q[ALONG] * ahead + q[ACROSS] * ahead.perp()).extend(q[HEIGHT]);
-        let side = |a: &[f64]| side_angles(a, whole[TILT]);
+        let side = |a: &[f64]| side_angles(a, whole);
         let posture = Posture {
             right: side(&q[ANGLES..]),
             left: side(&q[ANGLES + JOINTS..]),
@@ -395,7 +399,8 @@ mod tests {
         q[PELVIS] = 0.07;
         let angles = [0.4, 0.2, 0.1, -0.3, 0.5, -0.2, 0.6, -0.15, 0.2, 0.7];
         q[ANGLES..BODY].copy_from_slice(&angles);
-        q[BODY + TILT] = 0.04;
+        q[BODY + THIGH_TILT] = 0.04;
+        q[BODY + SHANK_TILT] = -0.06;
         q[BODY + TAPERS + 3] = 0.2;
         q[BODY + HEAD_FORWARD] = 0.02;
         q

@@ -43,10 +43,11 @@ pub const FOOT: usize = 8;
 pub const HEEL: usize = 9;
 pub const HIP_WIDTH: usize = 10;
 pub const SHOULDER_WIDTH: usize = 11;
-/// Outward tilt of the legs, radians.
-pub const TILT: usize = 12;
+/// Outward tilts of the thighs and of the shanks, radians.
+pub const THIGH_TILT: usize = 12;
+pub const SHANK_TILT: usize = 13;
 /// Natural logarithms of the thickness of head, torso, upper arm, forearm, hand, thigh, shank and foot.
-pub const WIDTHS: usize = 13;
+pub const WIDTHS: usize = 14;
 /// Tapers of torso, upper arm, forearm, thigh and shank: how much thicker than the middle the upper end is.
 pub const TAPERS: usize = WIDTHS + 8;
 /// Number of coordinates of the body.
@@ -139,7 +140,8 @@ pub fn priors() -> Vec<Prior> {
         (HEEL, 0.0, 0.008),
         (HIP_WIDTH, -0.003, 0.008),
         (SHOULDER_WIDTH, -0.01, 0.012),
-        (TILT, -1.5 * deg, 2.5 * deg),
+        (THIGH_TILT, -1.5 * deg, 4.0 * deg),
+        (SHANK_TILT, -3.0 * deg, 2.5 * deg),
         (WHOLE_LEAN, 0.03, 0.08),
         (WHOLE_HEADING, 0.0, 0.1),
         (WHOLE_ACROSS, 0.0, 0.5),
@@ -290,15 +292,23 @@ pub fn slopes(gait: &Gait, whole: &[f64], frame: &[f64; FRAME], slopes: &mut Vec
     }
 }
 
-/// The angles of one side, in the order of the joints.
-pub fn side_angles(a: &[f64], abduction: f64) -> SideAngles {
-    SideAngles { hip: a[0], knee: a[1], ankle: a[2], shoulder: a[3], elbow: a[4], abduction }
+/// The angles of one side, in the order of the joints, with the tilts of the legs from the body's coordinates.
+pub fn side_angles(a: &[f64], body: &[f64]) -> SideAngles {
+    SideAngles {
+        hip: a[0],
+        knee: a[1],
+        ankle: a[2],
+        shoulder: a[3],
+        elbow: a[4],
+        thigh_tilt: body[THIGH_TILT],
+        shank_tilt: body[SHANK_TILT],
+    }
 }
 
 /// The posture of a frame.
 pub fn posture(gait: &Gait, whole: &[f64], frame: &[f64; FRAME]) -> Posture {
     let angles = angles(gait, whole, frame);
-    let side = |a: &[f64]| side_angles(a, whole[TILT]);
+    let side = |a: &[f64]| side_angles(a, whole);
     let (sin, cos) = (TAU * frame[FRAME_PHASE]).sin_cos();
     Posture {
         right: side(&angles[..JOINTS]),
