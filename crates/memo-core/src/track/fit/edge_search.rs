@@ -37,21 +37,36 @@ pub struct FoundEdge {
     pub strength: f64,
 }
 
+/// How far edges are searched on both sides of a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reach {
+    /// What an edge counts by its distance in pixels: one at the line, e^-2 at the end.
+    near: Vec<f64>,
+}
+
+impl Reach {
+    /// Edges within `reach_px` pixels.
+    pub fn new(reach_px: f64) -> Self {
+        let near = |offset: i64| (-0.5 * (2.0 * offset as f64 / reach_px).powi(2)).exp();
+        Self { near: (0..=reach_px.ceil() as i64).map(near).collect() }
+    }
+}
+
 /// A step is the difference between the means of this many samples on either side, one pixel apart.
 const SAMPLES: usize = 2;
 
 impl View {
-    /// The strongest and nearest edge within `reach_px` of a point, along a unit normal that points outwards; `None`
+    /// The strongest and nearest edge within reach of a point, along a unit normal that points outwards; `None`
     /// if the normal leaves the piece.
     pub fn search(
         &self,
         point: DVec2,
         normal: DVec2,
-        reach_px: f64,
+        reach: &Reach,
         border: Border,
         samples: &mut Vec<[f64; 2]>,
     ) -> Option<FoundEdge> {
-        let reach = reach_px.ceil() as i64;
+        let (near, reach) = (&reach.near, reach.near.len() as i64 - 1);
         let margin = SAMPLES as i64;
         let corner = DVec2::new(self.corner[0] as f64, self.corner[1] as f64);
         samples.clear();
@@ -70,10 +85,9 @@ impl View {
                 Border::Inner => fall(0).abs(),
             }
         };
-        let near = |offset: i64| (-0.5 * (2.0 * offset as f64 / reach_px).powi(2)).exp();
         let mut best = (0.0, 0);
         for offset in -reach..=reach {
-            let value = step(offset) * near(offset);
+            let value = step(offset) * near[offset.unsigned_abs() as usize];
             if value > best.0 {
                 best = (value, offset);
             }
@@ -131,7 +145,7 @@ mod tests {
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {
-        view.search(DVec2::new(100.0 + x, 70.2), DVec2::X, 8.0, border, &mut Vec::new()).unwrap()
+        view.search(DVec2::new(100.0 + x, 70.2), DVec2::X, &Reach::new(8.0), border, &mut Vec::new()).unwrap()
     }
 
     #[test]
@@ -152,8 +166,13 @@ mod tests {
         assert_eq!(empty.strength, 0.0, "the room looks as it always does");
         assert!(found(&view(100), 44.0, Border::Inner).strength > 50.0);
         // Where the body is inside, the difference falls inwards.
-        let inwards =
-            view(100).search(DVec2::new(130.0, 70.0), -DVec2::X, 8.0, Border::Outer, &mut Vec::new());
+        let inwards = view(100).search(
+            DVec2::new(130.0, 70.0),
+            -DVec2::X,
+            &Reach::new(8.0),
+            Border::Outer,
+            &mut Vec::new(),
+        );
         assert_eq!(inwards.unwrap().strength, 0.0);
     }
 
@@ -162,7 +181,8 @@ mod tests {
         let view = view(100);
         for x in [104.0, 156.0, 90.0, f64::NAN] {
             assert!(
-                view.search(DVec2::new(x, 70.0), DVec2::X, 8.0, Border::Inner, &mut Vec::new()).is_none()
+                view.search(DVec2::new(x, 70.0), DVec2::X, &Reach::new(8.0), Border::Inner, &mut Vec::new())
+                    .is_none()
             );
         }
     }

@@ -35,6 +35,14 @@ impl Seen {
         self.cost += (1.0 - missed) * cost;
     }
 
+    /// The share of the outline that is missed where the model fits.
+    pub const USUALLY_MISSED: f64 = 0.012;
+
+    /// The share of the outline without an edge beyond the usual.
+    pub fn off(&self) -> f64 {
+        (self.outer_missed / self.outer.max(1.0) - Self::USUALLY_MISSED).max(0.0)
+    }
+
     /// Adds the sums of another frame.
     pub fn add(&mut self, other: &Self) {
         self.outer += other.outer;
