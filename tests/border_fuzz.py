@@ -679,6 +679,8 @@ def _(d, name):
             walk.record(),
             walk.events(),
             walk.gait_parameters(),
+            walk.cycles(),
+            walk.departures(),
             walk.measured(),
             walk.contours(0),
         )
@@ -793,6 +795,11 @@ def _(d):
 def _(d):
     first, second = d.frames(2)
     return memo.velocity_field(first, second, d.mask(np.shape(first)[:2] if np.ndim(first) >= 2 else None))
+
+
+@case("normal_cycle")
+def _(d):
+    return _memo.normal_cycle(d.choice("hip", "knee"))
 
 
 @case("euler_angles")
@@ -1232,10 +1239,8 @@ def _(d):
     all(True for _ in tracks(d, tracker))
     repr(tracker)
     found = tracker.finish()
-    return [
-        getattr(found, name)
-        for name in ("columns", "events", "gait_parameters", "summary", "sentences", "records", "measured")
-    ]
+    tables = ("columns", "events", "gait_parameters", "cycles", "records", "measured")
+    return [getattr(found, name) for name in (*tables, "summary", "sentences")]
 
 
 @case("memo.track")

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from memo.cycles import cycle_table
 from memo.files import JOINTS, TRACK_COLUMNS
 from memo.gait import gait_table
 
@@ -79,6 +80,7 @@ class Track:
         self.gait_parameters = gait_table(
             [[("speed", "", SPEED_MPS, "m/s", 1.2, 1.4, 3)]] if len(times_s) else []
         )
+        self.cycles = cycle_table([])
         self.records = []
         phases = np.arange(N_PHASE) / N_PHASE
         best = self.columns["phase"][:12]

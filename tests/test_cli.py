@@ -52,7 +52,7 @@ class Telling(memo.Tracker):
 memo.Tracker = Telling
 memo.cli.main()
 """
-TABLES = {"track.csv", "events.csv", "gait_parameters.csv", "run.json"}
+TABLES = {"track.csv", "events.csv", "gait_parameters.csv", "cycles.csv", "run.json"}
 CAMERA = "[side]\nname = 'side'\nsize = [50, 36]\n[front]\nname = 'front'\nsize = [640, 480]\n"
 
 

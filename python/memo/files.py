@@ -89,6 +89,7 @@ _DIGITS = {
     "probability": 6,
     "similarity": 5,
     "walk": 0,
+    "cycle": 0,
 }
 
 MAX_TEXT_BYTES = 256 << 20

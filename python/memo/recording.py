@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import memo
+from memo.cycles import write_cycles_csv
 from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
@@ -79,6 +80,7 @@ class Recorded:
     summary: dict[str, Any]
     sentences: list[str]
     gait_parameters: dict[str, Any]
+    cycles: dict[str, Any]
     camera: Any
     shrink: int
     records: list[dict[str, Any]]
@@ -300,6 +302,7 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
         summary=dict(track.summary),
         sentences=list(track.sentences),
         gait_parameters=dict(track.gait_parameters),
+        cycles=dict(track.cycles),
         camera=track.camera,
         shrink=source.shrink,
         records=track.records,
@@ -308,11 +311,13 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
 
 
 def write_tables(recorded: Recorded, out: Path) -> None:
-    """Writes track.csv, events.csv, gait_parameters.csv and run.json; removes pictures of an earlier run."""
+    """Writes the tables and run.json; removes pictures of an earlier run."""
     for stale in _DRAWN:  # from an earlier run: they do not match the new tables
         (out / stale).unlink(missing_ok=True)
-    table, events, gait = (out / name for name in ("track.csv", "events.csv", "gait_parameters.csv"))
+    names = ("track.csv", "events.csv", "gait_parameters.csv", "cycles.csv")
+    table, events, gait, cycles = (out / name for name in names)
     write_track_csv(table, recorded.columns)
     write_events_csv(events, recorded.events)
     write_gait_parameters_csv(gait, recorded.gait_parameters)
-    recorded.written = [table, events, gait, write_run(out, recorded, *recorded.run)]
+    write_cycles_csv(cycles, recorded.cycles)
+    recorded.written = [table, events, gait, cycles, write_run(out, recorded, *recorded.run)]

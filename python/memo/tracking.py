@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.cycles import cycle_table, departure_sentences
 from memo.files import TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
 from memo.pixels import camera_of_video, columns_of_video, of_video
@@ -221,6 +222,12 @@ class StoredWalk:
     def gait_parameters(self) -> list[tuple[str, str, float, str, float, float, int]]:
         return list(self.tables["gait_parameters"])
 
+    def cycles(self) -> list[tuple[str, str, float, float, npt.NDArray[np.float64]]]:
+        return list(self.tables["cycles"])
+
+    def departures(self) -> list[tuple[str, str, float, float, int, float]]:
+        return list(self.tables["departures"])
+
     def record(self) -> dict[str, Any]:
         return dict(self.tables["record"])
 
@@ -234,7 +241,10 @@ class StoredWalk:
         return f"StoredWalk({counted(len(self), 'row')}, {self.direction})"
 
 
-_TABLES = ("columns", "events", "measured", "start", "gait_parameters", "record")
+_TABLES = ("columns", "events", "measured", "start", "gait_parameters", "cycles", "departures", "record")
+
+
+_FRAMES = ("columns", "gait_parameters", "cycles")
 
 
 class Track:
@@ -289,6 +299,11 @@ class Track:
         return gait_table(walk.gait_parameters() for walk in self.walks)
 
     @property
+    def cycles(self) -> dict[str, npt.NDArray[Any]]:
+        """The columns of `cycles.csv`: every gait cycle of each side at 0 to 100 %, and their mean."""
+        return cycle_table(walk.cycles() for walk in self.walks)
+
+    @property
     def sentences(self) -> list[str]:
         """The findings in sentences, one walk after another."""
         if not self.walks:
@@ -302,6 +317,8 @@ class Track:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
             told += symmetry_sentences(self.gait_parameters, index)
+            if walk.p_swapped <= LIKELY_SWAPPED:
+                told += departure_sentences(walk.departures())
             several = f"Walk {index + 1} of {len(self.walks)}: " if len(self.walks) > 1 else ""
             said += [several + sentence for sentence in told]
         return said
@@ -424,9 +441,11 @@ class Track:
             return "never fully visible"
         return "nobody"
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """The columns of `track.csv` as a `pandas.DataFrame`, one row per frame."""
-        return data_frame(self.columns)
+    def to_pandas(self, table: str = "columns") -> pandas.DataFrame:
+        """A table as a `pandas.DataFrame`: "columns" (one row per frame), "gait_parameters" or "cycles"."""
+        if table not in _FRAMES:
+            raise ValueError(f"table must be one of {', '.join(_FRAMES)}, got {table!r}")
+        return data_frame(getattr(self, table))
 
     def plot(self, what: str = "knee", ax: Axes | None = None) -> Axes:
         """Draws a quantity over time into `ax`, or new Axes, and returns them.

@@ -4,6 +4,7 @@
 mod array;
 mod calibrate;
 mod camera;
+mod cycles;
 mod defaults;
 mod error;
 mod euler;
@@ -36,6 +37,8 @@ mod _memo {
     };
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
+    #[pymodule_export]
+    use super::cycles::py_normal_cycle;
     #[pymodule_export]
     use super::defaults::defaults;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
 use crate::camera::PyCamera;
+use crate::cycles::{self, CycleTuple};
 use crate::error::value_error;
 use crate::explain::record_of;
 use crate::fit::WalkFit;
@@ -219,7 +220,7 @@ impl PyTracker {
     }
 }
 
-fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
+pub(crate) fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
     PyValueError::new_err(format!("{name} must be {wanted}, got {got:?}"))
 }
 
@@ -310,6 +311,20 @@ impl PyWalk {
             (p.quantity.name(), side, p.value.unwrap_or(f64::NAN), p.quantity.unit(), low, high, p.n)
         };
         self.walk.gait_parameters().into_iter().map(line).collect()
+    }
+
+    /// Gait cycles, right then left, each side's mean last: (side, curve, start_s, end_s, values); curve is "cycle",
+    /// "partial" or "mean", values are (5, 101, 6): of hip, knee, ankle, shoulder and elbow, at 0 to 100 %, angle, stated
+    /// standard deviation, standard deviation over cycles, low and high end of the 95 % interval (degrees), and number
+    /// of cycles; NaN if unknown.
+    fn cycles<'py>(&self, py: Python<'py>) -> PyResult<Vec<CycleTuple<'py>>> {
+        cycles::cycles_of(py, &self.walk)
+    }
+
+    /// Joints whose mean cycle is outside of average walking: (side, joint, excess_deg, half of its 95 % interval,
+    /// at_percent, share of the cycle); more flexed is positive.
+    fn departures(&self) -> Vec<(&'static str, &'static str, f64, f64, usize, f64)> {
+        cycles::departures_of(&self.walk)
     }
 
     /// The record of the walk, as plain numbers: see `Explainer`.

@@ -55,7 +55,7 @@ const REACH_COUNTS: f64 = 1.35;
 /// Step variability of a healthy adult, as a share of step length or step time.
 const NATURAL_SHARE: f64 = 0.03;
 /// Weight of the prior step variability, in observed steps.
-const PRIOR_STEPS: f64 = 4.0;
+pub(super) const PRIOR_STEPS: f64 = 4.0;
 /// Relative standard deviation over people of the height while walking, compared with the model of the same body
 /// height: legs bend more or less than the average's, and feet point in other directions.
 const POSTURE_SD: f64 = 0.015;
@@ -72,14 +72,16 @@ const LEAST_CYCLES: f64 = 0.5;
 /// Neighbouring frames have similar errors: this many of them count as one.
 const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
-const Z: f64 = 1.959_964;
+pub(super) const Z: f64 = 1.959_964;
 /// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
-const CONTACT_SD_S: f64 = 0.028;
-const CONTACT_COMMON_SD_S: f64 = 0.015;
+pub(super) const CONTACT_SD_S: f64 = 0.028;
+pub(super) const CONTACT_COMMON_SD_S: f64 = 0.015;
 /// Standard deviation over people of how much earlier contacts of one side are found than those of the other, seconds.
 const CONTACT_SIDE_SD_S: f64 = 0.018;
 /// A fitted strike this much later than the one before is not its next, strides.
 const LONGEST_STEP: f64 = 0.8;
+/// Two strikes of one side that are farther apart are not successive, strides.
+pub(super) const LONGEST_STRIDE: f64 = 1.5;
 
 /// A gait parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -205,6 +207,11 @@ impl TrackedWalk {
             add(KneePeak, Some(side), self.motion(side, 1).map(|m| m.peak));
         }
         table
+    }
+
+    /// Mean duration of a cycle, seconds.
+    pub(super) fn stride_s(&self) -> Option<f64> {
+        Whole::of(self).map(|whole| whole.stride_s().value)
     }
 
     /// Stance from the contacts of the fitted feet, both sides together: from a strike to the toe-off of that foot.
@@ -573,7 +580,7 @@ impl BySide {
 
 /// 97.5 % quantile of Student's t, by its expansion about the normal one (Abramowitz and Stegun 26.7.5). The
 /// error is 0.1 % at 3 degrees of freedom.
-fn student_quantile(freedom: f64) -> f64 {
+pub(super) fn student_quantile(freedom: f64) -> f64 {
     let z = Z;
     let terms = [
         (z.powi(3) + z) / 4.0,

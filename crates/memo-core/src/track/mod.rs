@@ -2,11 +2,13 @@
 
 mod active;
 mod column;
+pub mod cycles;
 pub mod evidence;
 pub mod explain;
 pub mod fit;
 pub mod gait_parameters;
 pub mod locate;
+pub mod normal_gait;
 pub mod options;
 pub mod result;
 pub mod score;

@@ -33,9 +33,9 @@ use crate::wording::counted;
 use contacts::Contact;
 use glam::DVec3;
 use thiserror::Error;
-use unknowns::JOINTS;
 
 pub(crate) use problem::{FitFrame, Problem};
+pub use unknowns::JOINTS;
 
 /// Options of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,81 @@
+"""Gait cycles of walks: the table of `cycles.csv`, and sentences about departures from average walking.
+
+The core computes the numbers (`memo_core::track::cycles` and `memo_core::track::normal_gait`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo.files import ANGLES, read_typed_columns, write_columns_csv
+
+__all__ = ["CYCLE_COLUMNS", "cycle_table", "departure_sentences", "read_cycles_csv", "write_cycles_csv"]
+
+_VALUES = ("angle_deg", "sd_deg", "cycle_sd_deg", "ci_low_deg", "ci_high_deg", "n")
+
+CYCLE_COLUMNS = ("walk", "side", "joint", "curve", "cycle", "start_s", "end_s", "percent", *_VALUES)
+"""Columns of `cycles.csv`, in order; an empty cell means unknown."""
+
+_WHOLE = ("walk", "percent", "n")
+_TEXTS = ("side", "joint", "curve")
+
+Curve = tuple[str, str, float, float, npt.NDArray[np.float64]]
+"""Side, kind of curve, first and last second, (5, 101, 6) values."""
+Departure = tuple[str, str, float, float, int, float]
+
+
+def cycle_table(walks: Iterable[Sequence[Curve]]) -> dict[str, npt.NDArray[Any]]:
+    """The columns of `cycles.csv` from the curves of each walk, as `_memo.Walk.cycles` gives them."""
+    blocks: list[dict[str, npt.NDArray[Any]]] = []
+    for walk, curves in enumerate(walks):
+        counts: dict[str, int] = {}
+        for side, curve, start_s, end_s, values in curves:
+            cycle = float("nan") if curve == "mean" else counts.setdefault(side, 0)
+            counts[side] = counts.get(side, 0) + 1
+            joints, points, _ = values.shape
+            alike = {"walk": walk, "side": side, "curve": curve, "cycle": cycle}
+            block = {name: np.full(joints * points, value) for name, value in alike.items()}
+            block |= {"start_s": np.full(joints * points, start_s), "end_s": np.full(joints * points, end_s)}
+            block["joint"] = np.repeat(ANGLES, points)
+            block["percent"] = np.tile(np.arange(points), joints)
+            block |= dict(zip(_VALUES, values.reshape(-1, len(_VALUES)).T, strict=True))
+            blocks.append(block)
+    return {
+        name: np.concatenate([np.empty(0), *(block[name] for block in blocks)]).astype(_kind(name))
+        if name not in _TEXTS
+        else np.array([text for block in blocks for text in block[name].tolist()], dtype=object)
+        for name in CYCLE_COLUMNS
+    }
+
+
+def _kind(name: str) -> type:
+    return np.int64 if name in _WHOLE else np.float64
+
+
+def write_cycles_csv(path: str | PathLike[str], table: Mapping[str, npt.ArrayLike]) -> None:
+    """Writes the columns of a table of cycles, which must be `CYCLE_COLUMNS`."""
+    absent, unknown = set(CYCLE_COLUMNS) - set(table), set(table) - set(CYCLE_COLUMNS)
+    if absent or unknown:
+        raise ValueError(f"cycles: missing {sorted(absent)}, unknown {sorted(unknown)}")
+    write_columns_csv(path, {name: table[name] for name in CYCLE_COLUMNS})
+
+
+def read_cycles_csv(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
+    """Reads what `write_cycles_csv` wrote; NaN for empty numbers, whole numbers as int64."""
+    return read_typed_columns(path, CYCLE_COLUMNS, whole=_WHOLE, texts=_TEXTS)
+
+
+def departure_sentences(departures: Iterable[Departure]) -> list[str]:
+    """Reports each joint whose mean cycle is outside of average walking with its whole interval."""
+    return [
+        f"The {side} {joint} is {'more' if excess_deg > 0 else 'less'} flexed than in average walking: "
+        f"{abs(excess_deg):.0f}° ({abs(excess_deg) - half_deg:.0f} to {abs(excess_deg) + half_deg:.0f}) "
+        f"outside the band of healthy adults at {at_percent} % of the cycle, and surely outside for "
+        f"{share:.0%} of it."
+        for side, joint, excess_deg, half_deg, at_percent, share in departures
+    ]
