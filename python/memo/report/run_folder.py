@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from memo.cycles import read_cycles_csv
 from memo.files import read_events_csv, read_track_csv
 from memo.gait import read_gait_parameters_csv
 from memo.run import read_run
@@ -30,6 +31,8 @@ class RunFolder:
     """`events.csv`."""
     parameters: dict[str, Any]
     """`gait_parameters.csv`: one array per column; empty if the file is missing."""
+    cycles: dict[str, Any]
+    """`cycles.csv`: one array per column; empty if the file is missing."""
     run: dict[str, Any]
     """`run.json`; empty if it is missing."""
     missing: list[str]
@@ -90,6 +93,7 @@ def read_run_folder(folder: Path, video: Path | None = None) -> RunFolder:
         columns=columns,
         events=read("events.csv", read_events_csv, []),
         parameters=read("gait_parameters.csv", read_gait_parameters_csv, {}),
+        cycles=read("cycles.csv", read_cycles_csv, {}),
         run=run,
         missing=missing,
         video=video if video is not None or not run.get("video") else Path(run["video"]),

@@ -15,8 +15,8 @@ import numpy as np
 import memo
 from memo.explain import explain
 from memo.files import JOINTS
-from memo.report import normative
 from memo.report.choice import Choice, ordinal
+from memo.report.cycles import drawn_cycles
 from memo.report.evidence import CHANGED, evidence
 from memo.report.page import Page, columns
 from memo.report.pictures import LONGEST_PX, Picture, Thinned, colour_frames, jpeg_uri, mask_uri
@@ -47,10 +47,6 @@ _SHOWN = {
     "sd_z_m": 4,
     "sd_phase": 4,
     "similarity": 5,
-    "right_hip_deg": 2,
-    "right_knee_deg": 2,
-    "left_hip_deg": 2,
-    "left_knee_deg": 2,
 }
 
 Item = TypeVar("Item")
@@ -77,6 +73,7 @@ def track_page(
     page = Page(
         title=f"memo: {run.name}",
         layout="track",
+        scripts=("base.js", "view3d.js", "cycles.js"),
         filled=track_text(run, notes, pictures),
         data={
             "name": run.name,
@@ -92,7 +89,7 @@ def track_page(
             "track": _track(run),
             "events": run.events,
             "camera": _camera(run),
-            "band": normative.band(),
+            "cycles": drawn_cycles(run.cycles),
             "why": explained,
         },
     )

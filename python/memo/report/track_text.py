@@ -9,6 +9,7 @@ import numpy as np
 import memo
 from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences
 from memo.report import normative
+from memo.report.cycles import none_sentence
 from memo.report.page import UNKNOWN, number, rows_table, text
 from memo.report.pictures import Picture
 from memo.report.run_folder import RunFolder
@@ -39,6 +40,7 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
         "walks": _walks(run),
         "events": _events(run),
         "band_source": text(normative.SOURCE),
+        "no_cycles": text(none_sentence(run.cycles)),
         "how": _how(run),
         "moved": text(_moved_sentence(pictures)),
         "nobody": " hidden" if run.frames else "",
@@ -105,8 +107,7 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
     if backward := _backward(run):
         verb = "goes" if len(backward) == 1 else "go"
         told.append(
-            f"{_numbered(backward).capitalize()} {verb} backwards: the band of normal gait is of people who "
-            "walk forward."
+            f"{_numbered(backward).capitalize()} {verb} backwards: backward walking has no gait cycles here."
         )
     if run.frames and not run.run.get("camera_given", True):
         told.append(

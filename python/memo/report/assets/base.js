@@ -206,7 +206,8 @@ function stretches(xs, ys, gaps) {
 
 /**
  * A chart in `host`. `spec`: title, unit, digits, xs, xLabel, xRange, yRange, curves [{name, ys, sds, gaps, look}],
- * band {xs, ys, sds}, marks [{x, look}], seek(x). Returns a function (x, values) that shows the current position.
+ * band {xs, ys, sds}, marks [{x, look}], seek(x), hover(x) that returns {x, ys, words}. Returns a function
+ * (x, values, words) that shows the current position.
  */
 function chart(host, spec) {
   const value = element("span");
@@ -305,13 +306,22 @@ function chart(host, spec) {
     svg.addEventListener("pointerdown", (event) => { svg.setPointerCapture(event.pointerId); go(event); });
     svg.addEventListener("pointermove", (event) => { if (event.buttons) go(event); });
   }
-  new ResizeObserver(draw).observe(host);
-  return {
-    draw,
-    show(x, ys, words) {
-      now = { x, ys };
-      value.textContent = words;
-      mark();
-    },
+  const show = (x, ys, words) => {
+    now = { x, ys };
+    value.textContent = words;
+    mark();
   };
+  if (spec.hover) {
+    svg.addEventListener("pointermove", (event) => {
+      const [xLow, xHigh] = spec.xRange;
+      const box = svg.getBoundingClientRect();
+      const share = (event.clientX - box.left - MARGIN.left) / (box.width - MARGIN.left - MARGIN.right);
+      const { x, ys, words } = spec.hover(xLow + Math.min(1, Math.max(0, share)) * (xHigh - xLow));
+      show(x, ys, words);
+    });
+    svg.addEventListener("pointerleave", () => show(NaN, [], spec.words ?? ""));
+    value.textContent = spec.words ?? "";
+  }
+  new ResizeObserver(draw).observe(host);
+  return { draw, show };
 }

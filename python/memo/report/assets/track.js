@@ -1,6 +1,6 @@
 // The page of a tracked walk.
 
-const { pictures, track, events, band, why } = data;
+const { pictures, track, events, why } = data;
 const frames = pictures.frame.length ? pictures.frame : track.frame;
 const times = pictures.frame.length ? pictures.time_s : track.time_s ?? [];
 const rowOf = new Map(track.frame.map((frame, row) => [frame, row]));
@@ -286,22 +286,20 @@ if (track.frame.length) {
       drawn.show(row === undefined ? times[player.at] : track.time_s[row], row === undefined ? [] : [ys[row]], row === undefined ? "" : `${told(ys[row], spec.digits)}${spread} ${spec.unit}`);
     });
   }
-  for (const joint of ["hip", "knee"]) {
-    for (const side of ["right", "left"]) {
-      const host = element("div");
-      $("cycles").append(host);
-      const percent = track.phase.map((phase) => (isNumber(phase) ? 100 * ((phase + (side === "left" ? 0.5 : 0)) % 1) : null));
-      const ys = track[`${side}_${joint}_deg`];
-      const drawn = chart(host, {
-        title: `${joint === "hip" ? "Hip" : "Knee"}, ${side}`, unit: "\u00B0", digits: 1, height: 190,
-        xs: percent, xRange: [0, 100], xLabel: "% of the cycle", noLine: true,
-        band: { xs: band.phase.map((phase) => 100 * phase), ys: band[joint], sds: band[`${joint}_sd`] },
-        curves: [{ ys, look: side, gaps: percent.map((value, row) => row > 0 && (track.walk[row] !== track.walk[row - 1] || Math.abs(value - percent[row - 1]) > 50)) }],
-      });
-      curves.push((row) => drawn.show(row === undefined ? NaN : percent[row], row === undefined ? [] : [ys[row]], row === undefined ? "" : `${told(ys[row], 1)}\u00B0 at ${told(percent[row], 0)} %`));
-    }
-  }
 }
+
+// Gait cycles.
+
+const choice = $("cycle-walk");
+for (const walk of data.cycles.walks) choice.append(element("option", { value: walk }, `walk ${walk + 1}`));
+const drawCycles = () => {
+  const walk = Number(choice.value);
+  const looks = ["right", "left"].map((side) => ({ name: side, look: side, of: (curve) => curve.walk === walk && curve.side === side }));
+  cycleCharts($("cycles"), data.cycles, looks);
+};
+choice.addEventListener("change", drawCycles);
+$("cycle-choice").hidden = data.cycles.walks.length < 2;
+if (data.cycles.walks.length) drawCycles();
 
 player.listeners.push(drawStage, () => {
   aim();
