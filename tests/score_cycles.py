@@ -9,7 +9,8 @@ there. Four tables:
    and the share of the cycle within two standard deviations of the corrected average
    (`memo_core::track::normal_gait`).
 2. The same share for the mean cycles that memo measured.
-3. How much of the true mean cycles the 95 % intervals of the measured ones contain.
+3. How much of the true mean cycles, and of the true differences between any two of them, is in the 95 %
+   intervals; the ankle on people with toes.
 4. RMS difference between the mean cycles of two walks, measured and true.
 
 Nobody of these people was recorded in two walks. Two clips of one person are drawn from the same walk, with
@@ -30,12 +31,14 @@ import numpy as np
 import truth as gt
 from conftest import SHARED_DATA
 from memo import _memo
-from memo.cycles import read_cycles_csv
+from memo.compare import LEAST_SHARE, curve_differences
+from memo.cycles import mean_cycle, read_cycles_csv
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 from score_walks import GROUPS, Clip, shared_clips, walking_direction
 
 JOINTS = ("hip", "knee")
+"""Joints with a band of average walking."""
 RECORDED = {
     **{"ANTO": "BTK_ANTO_M_hole", "BELT": "BTK_BELT_C", "CMU02": "CMU_02_01", "CMU12": "CMU_12_01"},
     **{"Gait": "BTK_Gait", "BMC2": "BMC_walk2"},
@@ -45,6 +48,7 @@ DRAWN = {"mocap_a": "ANTO", "mocap_b": "BELT", "mocap_c_yaw25": "CMU12"}
 """Who walks in the clips whose names do not say it."""
 ALTERED = GROUPS["crouch, stiff, limp, brisk"]
 PERCENT = np.arange(101)
+ENDS = ("ci_low_deg", "ci_high_deg")
 #: Contact: the ankle's forward speed falls below this share of the walking speed.
 STRIKE_SHARE = 0.4
 
@@ -58,7 +62,7 @@ Curves = dict[tuple[str, str], np.ndarray]
 def clip_curves(folder: Path) -> Curves:
     """The true mean cycles of a drawn walk."""
     columns = gt.read_columns(folder / "truth.csv")
-    codes = {code: code for code in gt.JOINTS}
+    codes = {code: code for code in (*gt.JOINTS, *gt.TOES) if f"{code}_x_m" in columns}
     angles = gt.joint_angles_deg(columns, codes, walking_direction(columns))
     events = gt.read_columns(folder / "events.csv")
     strikes_s = {
@@ -104,30 +108,27 @@ def mean_curves(
     found: Curves = {}
     for side, at_s in strikes_s.items():
         cycles = [a + (b - a) * PERCENT / 100 for a, b in pairwise(at_s) if b - a < 1.8]
-        for joint in JOINTS:
+        for joint in (joint for joint in (*JOINTS, "ankle") if cycles and f"{side}_{joint}" in angles):
             spline = CubicSpline(times_s, angles[f"{side}_{joint}"])
-            if cycles:
-                found[side, joint] = np.mean([spline(cycle) for cycle in cycles], axis=0)
+            found[side, joint] = np.mean([spline(cycle) for cycle in cycles], axis=0)
     return found
 
 
 # Measured cycles
 
 
+def longest(folder: Path) -> tuple[Mapping[str, np.ndarray], int]:
+    """The table of cycles of a run, and the number of its longest walk."""
+    table = read_cycles_csv(folder / "cycles.csv")
+    return table, int(np.bincount(table["walk"]).argmax()) if len(table["walk"]) else 0
+
+
 def measured(folder: Path, column: str = "angle_deg") -> Curves:
     """A column of the mean cycles of the longest walk of a run; NaN where not measured."""
-    table = read_cycles_csv(folder / "cycles.csv")
-    found: Curves = {}
-    if not len(table["walk"]):
-        return found
-    longest = np.bincount(table["walk"]).argmax()
-    for side in ("right", "left"):
-        for joint in JOINTS:
-            rows = (table["walk"] == longest) & (table["curve"] == "mean")
-            rows &= (table["side"] == side) & (table["joint"] == joint)
-            if rows.any():
-                found[side, joint] = table[column][rows][np.argsort(table["percent"][rows])]
-    return found
+    table, walk = longest(folder)
+    keys = [(side, joint) for side in ("right", "left") for joint in (*JOINTS, "ankle")]
+    means = {key: mean_cycle(table, walk, *key)[column] for key in keys}
+    return {key: mean for key, mean in means.items() if np.isfinite(mean).any()}
 
 
 def track(clip: Clip, runs: Path) -> Path:
@@ -177,20 +178,45 @@ def band_lines(curves: Mapping[str, Curves]) -> Iterator[str]:
         yield f"{name:18s} " + "; ".join(cells)
 
 
-def coverage_lines(pairs: Mapping[str, tuple[Curves, Curves, Curves, Curves]]) -> Iterator[str]:
-    """Share of the points of the true means within the intervals, RMS error and mean half width, by joint."""
-    for joint in JOINTS:
+def coverage_lines(truths: Mapping[str, Curves], folders: Mapping[str, Path]) -> Iterator[str]:
+    """Share of the points of the true means in the intervals, RMS error and mean half width; differences."""
+    for joint in (*JOINTS, "ankle"):
         hits, errors, halves = [], [], []
-        for true, mean, low, high in pairs.values():
-            for key in true.keys() & mean.keys():
-                if key[1] == joint and np.isfinite(mean[key]).any():
-                    hits.append(np.mean((low[key] <= true[key]) & (true[key] <= high[key])))
-                    errors.append(rms(mean[key] - true[key]))
-                    halves.append(np.nanmean((high[key] - low[key]) / 2))
+        for name, true in truths.items():
+            mean, low, high = (measured(folders[name], part) for part in ("angle_deg", *ENDS))
+            for key in (key for key in true.keys() & mean.keys() if key[1] == joint):
+                hits.append(np.mean((low[key] <= true[key]) & (true[key] <= high[key])))
+                errors.append(rms(mean[key] - true[key]))
+                halves.append(np.nanmean((high[key] - low[key]) / 2))
         yield (
             f"{joint}: {len(hits)} means, {100 * np.mean(hits):.0f} % of the true values in the interval; "
             f"RMS error {np.sqrt(np.mean(np.square(errors))):.1f} deg, half width {np.mean(halves):.1f} deg"
         )
+        found = list(difference_hits(joint, truths, folders))
+        signs = [sign for _, sign in found if sign is not None]
+        share = 100 * np.mean([hit for hit, _ in found])
+        yield (
+            f"{joint}: {len(found)} differences, {share:.0f} % of the true ones in the interval; "
+            f"{len(signs)} sure, {sum(signs)} of them with the true sign"
+        )
+
+
+def difference_hits(
+    joint: str, truths: Mapping[str, Curves], folders: Mapping[str, Path]
+) -> Iterator[tuple[float, bool | None]]:
+    """For any two walks: share of the true difference in the interval; whether a sure one has its sign."""
+    tables = {name: longest(folder) for name, folder in folders.items()}
+    for a, b in combinations(truths, 2):
+        (first, walk_a), (second, walk_b) = tables[a], tables[b]
+        for one in curve_differences(first, second, (walk_a, walk_b)):
+            key = (one.side, one.joint)
+            if one.joint != joint or not (key in truths[a] and key in truths[b]):
+                continue
+            true = truths[b][key] - truths[a][key]
+            percent, value, _ = one.largest
+            is_sure = one.sure_share >= LEAST_SHARE
+            sign = bool(np.sign(true[percent]) == np.sign(value)) if is_sure else None
+            yield float(np.mean(np.abs(one.values_deg - true) <= one.half_deg)), sign
 
 
 def person(clip: str) -> str:
@@ -198,24 +224,23 @@ def person(clip: str) -> str:
     return DRAWN.get(clip, clip.split("_")[0])
 
 
-def repeat_lines(pairs: Mapping[str, tuple[Curves, Curves, Curves, Curves]]) -> Iterator[str]:
+def repeat_lines(truths: Mapping[str, Curves], folders: Mapping[str, Path]) -> Iterator[str]:
     """RMS difference between two clips of a person, both sides, measured and (true)."""
+    means = {name: measured(folder) for name, folder in folders.items()}
     pooled: dict[tuple[bool, str], list[tuple[float, float]]] = {}
-    for a, b in combinations(pairs, 2):
+    for a, b in combinations(truths, 2):
         altered = any(word in clip for clip in (a, b) for word in ALTERED)
         if person(a) != person(b):
             continue
-        (true_a, mean_a, *_), (true_b, mean_b, *_) = pairs[a], pairs[b]
         for joint in JOINTS:
             keys = [(side, joint) for side in ("right", "left")]
-            keys = [key for key in keys if all(key in of for of in (true_a, true_b, mean_a, mean_b))]
+            keys = [key for key in keys if all(key in of[clip] for of in (means, truths) for clip in (a, b))]
             if keys:
-                found = tuple(
-                    float(np.mean([rms(x[key] - y[key]) for key in keys]))
-                    for x, y in ((mean_a, mean_b), (true_a, true_b))
+                now, true = (
+                    np.mean([rms(of[a][key] - of[b][key]) for key in keys]) for of in (means, truths)
                 )
-                pooled.setdefault((altered, joint), []).append(found)
-                yield f"{a:18s} {b:18s} {joint:4s} {found[0]:4.1f} ({found[1]:4.1f})"
+                pooled.setdefault((altered, joint), []).append((now, true))
+                yield f"{a:18s} {b:18s} {joint:4s} {now:4.1f} ({true:4.1f})"
     for (altered, joint), found in sorted(pooled.items()):
         kind = "with an altered walk" if altered else "of the same walk"
         middle = np.median(found, axis=0)
@@ -234,15 +259,11 @@ def main() -> int:
     folders = {clip.name: track(clip, args.runs) for clip in clips}
     print("\n2. Measured mean cycles, right / left")
     print("\n".join(band_lines({name: measured(folder) for name, folder in folders.items()})))
-    parts = ("angle_deg", "ci_low_deg", "ci_high_deg")
-    pairs = {
-        clip.name: (clip_curves(clip.folder), *(measured(folders[clip.name], part) for part in parts))
-        for clip in clips
-    }
-    print("\n3. True mean cycles in the 95 % intervals")
-    print("\n".join(coverage_lines(pairs)))
+    truths = {clip.name: clip_curves(clip.folder) for clip in clips}
+    print("\n3. True mean cycles, and their differences, in the 95 % intervals")
+    print("\n".join(coverage_lines(truths, folders)))
     print("\n4. Two clips of a person, RMS difference in degrees, measured (true)")
-    print("\n".join(repeat_lines(pairs)))
+    print("\n".join(repeat_lines(truths, folders)))
     return 0
 
 

@@ -23,7 +23,7 @@ from memo.cycles import cycle_table, write_cycles_csv
 from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
 from memo.gait import DEFINITIONS
 from memo.linkage import Points, write_figure_csv
-from memo.report import normative, write_report
+from memo.report import normative, write_comparison, write_report
 from memo.report.choice import ordinal
 from memo.report.page import number
 from memo.report.pictures import Thinned, jpeg_uri, mask_uri, packed
@@ -239,6 +239,61 @@ def test_the_page_holds_the_cycles(run_folder):
     assert data["cycles"]["curves"] == [] and "cycles.csv is not in the folder" in written
     write_cycles_csv(folder / "cycles.csv", cycle_table([]))
     assert "There are no measured cycles" in page_of(folder)[0]
+
+
+# Two walks
+
+
+@pytest.fixture
+def two_folders(run_folder, tmp_path):
+    """Two runs: in the second, the knee bends 30 degrees more, the speed is that of the first."""
+    first = run_folder()
+    second = tmp_path / "after"
+    shutil.copytree(first, second)
+    added = np.array([30, 0, 0, 30, 30, 0])
+    more = [(*told, values + added) for *told, values in CURVES]
+    write_cycles_csv(second / "cycles.csv", cycle_table([more]))
+    return first, second
+
+
+def test_two_walks_are_compared(two_folders):
+    first, second = two_folders
+    for folder in two_folders:
+        table = read_track_csv(folder / "track.csv")
+        write_track_csv(folder / "track.csv", table | {"p_swapped": np.full(20, 0.01)})
+    report = write_comparison(first, second)
+    written = report.path.read_text(encoding="utf-8")
+    data = json.loads(re.search(r'id="data">(.*?)</script>', written, re.DOTALL)[1])
+    assert report.path == first / "comparison.html" and report.contents["walks"] == [0, 0]
+    assert [c["of"] for c in data["cycles"]["curves"]] == ["a"] * 15 + ["b"] * 15
+    told = "The right knee is 30° (26 to 34) more flexed in B than in A"
+    assert told in report.contents["sentences"][1] and told in written and report.contents["notes"] == []
+    assert '<th scope="row">cadence, 1/min</th>' in written and "&minus;" not in written
+    assert "0.0 <small" in written and "no difference can be told" in written and "not judged" in written
+
+
+def test_sides_that_may_be_swapped_are_not_judged(two_folders):
+    report = write_comparison(*two_folders)
+    written = report.path.read_text(encoding="utf-8")
+    assert report.contents["sentences"] == ["No difference between the two walks can be told."]
+    assert "left and right may be swapped (probability 40%)." in written
+    assert "not judged: left and right may be swapped" in written
+
+
+def test_walks_that_cannot_be_compared(two_folders, memo_command, posture_folder):
+    first, second = two_folders
+    for arguments, complaint in (
+        ((first, "--walks", "0,0"), "run: walk 0 is compared with itself; give two walks"),
+        ((first, second, "--walks", "0,7"), "after: has no walk 7, but 1 walk from 0"),
+        ((first, second, "--walks", "0"), "--walks must be two numbers of walks, such as 0,1, got '0'"),
+        ((first, second, "--every", "2"), "--video have no effect on a comparison"),
+        ((first, posture_folder), "holds results of memo posture; walks of memo track are compared"),
+    ):
+        code, _, said = memo_command("report", *arguments)
+        assert code == 1 and said.endswith(f"{complaint}\n"), said
+    (second / "cycles.csv").unlink()
+    code, _, said = memo_command("report", first, second)
+    assert code == 1 and "missing: cycles.csv" in said and not (first / "comparison.html").exists()
 
 
 # What comes from files stays text, and nothing comes from a network
@@ -862,6 +917,16 @@ def test_cycles_are_drawn_and_tell_their_values(run_folder, opened):
     average = _memo.normal_cycle("knee")[100, 0]
     told = f"100 %: right 32.0 ± 3.0°, left 20.0 ± 5.0°, average {average:.1f}°"
     assert shown_text(page, f"{knee} h3 span") == told.replace("-", "\N{MINUS SIGN}")
+
+
+def test_both_walks_are_drawn_in_one_plot(two_folders, opened):
+    page = opened(write_comparison(*two_folders).path, PHONE_PX)
+    count = "return document.querySelectorAll(arguments[0]).length"
+    looks = ("curve.a.thin", "curve.b.thin", "curve.a.thick", "spread.b.thick", "band")
+    knee = "#right .chart:nth-child(2)"
+    assert [page.execute_script(count, f"{knee} path.{look}") for look in looks] == [2, 2, 1, 1, 1]
+    assert shown_text(page, f"{knee} h3 span") == "cycles: A: 2, B: 2"
+    assert page.execute_script("return document.documentElement.scrollWidth") <= PHONE_PX
 
 
 @pytest.mark.parametrize("width_px", [DESK_PX, PHONE_PX])

@@ -14,13 +14,21 @@ import numpy.typing as npt
 
 from memo.files import ANGLES, read_typed_columns, write_columns_csv
 
-__all__ = ["CYCLE_COLUMNS", "cycle_table", "departure_sentences", "read_cycles_csv", "write_cycles_csv"]
+__all__ = [
+    "CYCLE_COLUMNS",
+    "cycle_table",
+    "departure_sentences",
+    "mean_cycle",
+    "read_cycles_csv",
+    "write_cycles_csv",
+]
 
 _VALUES = ("angle_deg", "sd_deg", "cycle_sd_deg", "ci_low_deg", "ci_high_deg", "n")
 
 CYCLE_COLUMNS = ("walk", "side", "joint", "curve", "cycle", "start_s", "end_s", "percent", *_VALUES)
 """Columns of `cycles.csv`, in order; an empty cell means unknown."""
 
+_POINTS = 101
 _WHOLE = ("walk", "percent", "n")
 _TEXTS = ("side", "joint", "curve")
 
@@ -68,6 +76,23 @@ def write_cycles_csv(path: str | PathLike[str], table: Mapping[str, npt.ArrayLik
 def read_cycles_csv(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
     """Reads what `write_cycles_csv` wrote; NaN for empty numbers, whole numbers as int64."""
     return read_typed_columns(path, CYCLE_COLUMNS, whole=_WHOLE, texts=_TEXTS)
+
+
+def mean_cycle(
+    table: Mapping[str, npt.NDArray[Any]], walk: int, side: str, joint: str
+) -> dict[str, npt.NDArray[np.float64]]:
+    """The mean of a joint at 0 to 100 %: `angle_deg`, `ci_low_deg` and so on; all NaN where there is none."""
+    chosen = (table["walk"] == walk) & (table["curve"] == "mean")
+    chosen &= (table["side"] == side) & (table["joint"] == joint)
+    found = {name: np.full(_POINTS, np.nan) for name in _VALUES}
+    percent = table["percent"][chosen]
+    if ((percent < 0) | (percent >= _POINTS)).any():
+        raise ValueError(
+            f"percent of a cycle must be 0 to {_POINTS - 1}, got {percent.min()} to {percent.max()}"
+        )
+    for name, values in found.items():
+        values[percent] = table[name][chosen]
+    return found
 
 
 def departure_sentences(departures: Iterable[Departure]) -> list[str]:

@@ -31,7 +31,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorded", "Recording", "Stop", "follow", "track_recording", "write_results", "write_tables"]
 
-_DRAWN = ("overlay.mp4", "motion.png", "angles.png", "similarity.png", "start.png", "report.html")
+_DRAWN = (
+    "overlay.mp4",
+    "motion.png",
+    "angles.png",
+    "similarity.png",
+    "start.png",
+    "report.html",
+    "comparison.html",
+)
 _LARGEST_PX = 1920  # longest tested side; for a walk enlarged to 2560 or more, the facing direction was wrong
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 EPILOG = """Examples:
   memo report memo-out/walk --open
   memo report memo-out/walk --frames 45:146 --every 2
+  memo report memo-out/before memo-out/after
+  memo report memo-out/walk --walks 0,1
 
 Exit codes: 0 the page was written; 1 the folder cannot be used; 2 wrong usage; \
 4 the app extra is not installed; 130 interrupted (an older page stays unchanged)."""
@@ -36,26 +38,49 @@ def add_report(app: "typer.Typer") -> None:
                 metavar="DIR", help="Folder of results of memo track, memo posture or memo planar."
             ),
         ],
+        other: Annotated[
+            Path | None,
+            typer.Argument(metavar="OTHER", help="Another folder of memo track: compare a walk of each."),
+        ] = None,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         every: Annotated[
             int | None, typer.Option(help="Every N-th frame; default: as many as fit in about 25 MB.", min=1)
         ] = None,
         why: Annotated[bool, typer.Option(help="Show what the model was matched to in each frame.")] = True,
         video: Annotated[Path | None, typer.Option(help="The video, if it was moved.")] = None,
-        out: Annotated[Path | None, typer.Option(help="The file to write; default: DIR/report.html.")] = None,
+        walks: Annotated[
+            str | None,
+            typer.Option(help="Compare walk A of DIR and B of OTHER (or of DIR), from 0.", metavar="A,B"),
+        ] = None,
+        out: Annotated[
+            Path | None,
+            typer.Option(help="The file to write; default: DIR/report.html or DIR/comparison.html."),
+        ] = None,
         open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
         as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Makes one HTML file of the results in DIR, readable without memo or a network."""
 
+        def compare(path: Path) -> "Report":
+            if frames != ":" or every is not None or not why or video is not None:
+                raise InputError("--frames, --every, --no-why and --video have no effect on a comparison")
+            from memo.report import write_comparison
+
+            return write_comparison(folder, other or folder, path, walks=_walks(walks))
+
         def work() -> Exit:
-            path = folder / "report.html" if out is None else _checked_file(out)
+            is_comparison = other is not None or walks is not None
+            default = folder / ("comparison.html" if is_comparison else "report.html")
+            path = default if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
-            if video is not None and not video.exists():
-                raise InputError(nothing_at(video, "video"))
-            options = {"frames": frame_range(frames), "every": every, "why": why, "video": video}
-            report = write_page(folder, path, delivery, **options)
+            if is_comparison:
+                report = compare(path)
+            else:
+                if video is not None and not video.exists():
+                    raise InputError(nothing_at(video, "video"))
+                options = {"frames": frame_range(frames), "every": every, "why": why, "video": video}
+                report = write_page(folder, path, delivery, **options)
             told = {"kind": report.kind, "bytes": report.bytes, **report.contents}
             delivery.tell(told, _lines(report), [report.path])
             if open_:
@@ -76,11 +101,23 @@ def write_page(folder: Path, path: Path, delivery: Delivery, **options: Any) -> 
 def _lines(report: "Report") -> list[str]:
     """Describes the page in sentences."""
     contents = report.contents
+    if "walks" in contents:
+        return [*contents["sentences"], *contents["notes"]]
     if report.kind == "memo track":
         line = f"{counted(contents['pictures'], 'frame')} with pictures, {contents['explained']} explained"
     else:
         line = counted(contents["frames"], "frame")
     return [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]
+
+
+def _walks(given: str | None) -> tuple[int | None, int | None]:
+    """The numbers of two walks, as in 0,1; None where not given."""
+    if given is None:
+        return None, None
+    parts = given.split(",")
+    if len(parts) != 2 or not all(part.isascii() and part.isdigit() for part in parts):
+        raise InputError(f"--walks must be two numbers of walks, such as 0,1, got {given!r}")
+    return int(parts[0]), int(parts[1])
 
 
 def _checked_file(path: Path) -> Path:

@@ -14,12 +14,14 @@ from typing import Any
 
 from memo.given import nothing_at
 from memo.report.choice import Choice
+from memo.report.comparison import comparison_page
+from memo.report.page import Page
 from memo.report.planar import planar_page
 from memo.report.posture import posture_page
 from memo.report.track import track_page
 from memo.unfinished import complete_file
 
-__all__ = ["KINDS", "Report", "write_report"]
+__all__ = ["KINDS", "Report", "write_comparison", "write_report"]
 
 KINDS = {"track.csv": "memo track", "postures.json": "memo posture", "points3d.csv": "memo planar"}
 """The file that identifies a kind of folder, and the command that writes it."""
@@ -36,8 +38,9 @@ class Report:
     bytes: int
     """Size of the file."""
     contents: dict[str, Any]
-    """Number of pictures and explanations in the page, their spacing in frames, and `notes`: what could not
-    be shown, and why."""
+    """Number of pictures and explanations in the page, their spacing in frames (of a comparison: `walks` and
+    `sentences`), and
+    `notes`: what could not be shown, and why."""
 
 
 def write_report(
@@ -67,7 +70,32 @@ def write_report(
         page, contents = track_page(folder, choice, progress, None if video is None else Path(video))
     else:
         page, contents = (posture_page if kind == "memo posture" else planar_page)(folder, choice)
-    path = folder / "report.html" if out is None else Path(out)
+    return _written(page, folder / "report.html" if out is None else Path(out), kind, contents)
+
+
+def write_comparison(
+    first: str | PathLike[str],
+    second: str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    *,
+    walks: tuple[int | None, int | None] = (None, None),
+) -> Report:
+    """Writes `out`, by default `comparison.html` in the first folder: a walk of each of two folders of
+    `memo track` beside each other.
+
+    `walks` are their numbers in the folders, by default those of the longest. The folders may be the same if
+    the walks differ. Raises ValueError if a folder lacks a table or the walk.
+    """
+    folders = (Path(first), Path(second))
+    for folder in folders:
+        if (kind := _kind(folder)) != "memo track":
+            raise ValueError(f"{folder}: holds results of {kind}; walks of memo track are compared")
+    page, contents = comparison_page(folders, walks)
+    path = folders[0] / "comparison.html" if out is None else Path(out)
+    return _written(page, path, "memo track", contents)
+
+
+def _written(page: Page, path: Path, kind: str, contents: dict[str, Any]) -> Report:
     written = page.html().encode("utf-8")
     with complete_file(path) as temporary:
         temporary.write_bytes(written)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from memo.report.pictures import Picture
 from memo.report.run_folder import RunFolder
 from memo.wording import counted
 
-__all__ = ["track_text"]
+__all__ = ["measured", "track_text"]
 
 _DEEPEST = 4
 _LIKELY_SWAPPED = 0.2
@@ -198,7 +199,7 @@ def _parameters(run: RunFolder) -> str:
             continue
         rows = []
         for name, unit in dict.fromkeys((line["parameter"], line["unit"]) for line in known):
-            cells = {line["side"]: _measured(line) for line in known if line["parameter"] == name}
+            cells = {line["side"]: measured(line) for line in known if line["parameter"] == name}
             in_words = text(name.replace("_", " ")) + (f", {text(unit)}" if unit else "")
             rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
         header = ("parameter", "both", "right", "left")
@@ -209,7 +210,7 @@ def _parameters(run: RunFolder) -> str:
     return _folded(tables, _MOST_TABLES, "walks") + told
 
 
-def _measured(line: dict[str, Any]) -> str:
+def measured(line: Mapping[str, Any]) -> str:
     """A value with its interval and the number of steps it is based on, as HTML."""
     digits = 1 if line["unit"] in ("%", "1/min") else 3
     value = number(line["value"], digits)

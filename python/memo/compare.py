@@ -1,0 +1,153 @@
+"""Two walks compared: differences of gait parameters and of mean gait cycles, with their 95 % intervals.
+
+The interval of a difference combines those of the two walks as independent errors. For two walks of one
+person before one camera it is too wide, because such walks share the error of the height and most of that of
+the body. A difference whose interval touches zero cannot be told. Curves of hip and knee are judged; those of
+the other joints have larger errors than their intervals state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo.cycles import mean_cycle
+from memo.files import ANGLES, SIDES
+from memo.gait import GAIT_COLUMNS
+
+__all__ = [
+    "JUDGED",
+    "LEAST_SHARE",
+    "CurveDifference",
+    "ParameterDifference",
+    "curve_differences",
+    "difference_sentences",
+    "parameter_differences",
+]
+
+JUDGED = ("hip", "knee")
+"""Joints whose intervals hold: tests/score_cycles.py."""
+
+LEAST_SHARE = 0.1
+"""A difference of curves over a smaller share of the cycle may be chance, because a cycle has many points."""
+
+Table = Mapping[str, npt.NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class ParameterDifference:
+    """One gait parameter of two walks; the rows have the columns of `gait_parameters.csv`."""
+
+    first: Mapping[str, Any]
+    second: Mapping[str, Any]
+
+    @property
+    def value(self) -> float:
+        """Second less first, in their unit; NaN if one was not measured."""
+        return float(self.second["value"] - self.first["value"])
+
+    @property
+    def half(self) -> float:
+        """Half the 95 % interval."""
+        halves = [(row["ci_high"] - row["ci_low"]) / 2 for row in (self.first, self.second)]
+        return float(np.hypot(*halves))
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the interval excludes zero."""
+        return abs(self.value) > self.half
+
+
+@dataclass(frozen=True)
+class CurveDifference:
+    """The mean cycle of one joint and side in two walks, degrees; second less first."""
+
+    side: str
+    joint: str
+    values_deg: npt.NDArray[np.float64]
+    """At 0 to 100 % of the cycle; NaN where one of them was not measured."""
+    half_deg: npt.NDArray[np.float64]
+    """Half the 95 % interval."""
+
+    @property
+    def rms_deg(self) -> float:
+        """Root mean square over the cycle."""
+        return float(np.sqrt(np.nanmean(self.values_deg**2)))
+
+    @property
+    def sure_share(self) -> float:
+        """Share of the measured points whose interval excludes zero."""
+        known = np.isfinite(self.values_deg)
+        return float(np.mean(np.abs(self.values_deg[known]) > self.half_deg[known]))
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the walks differ in a joint that is judged, for long enough that it is not chance."""
+        return self.joint in JUDGED and self.sure_share >= LEAST_SHARE
+
+    @property
+    def largest(self) -> tuple[int, float, float]:
+        """Per cent of the cycle, difference and half its interval where the sure difference is largest."""
+        sure = np.where(np.abs(self.values_deg) > self.half_deg, np.abs(self.values_deg), -1.0)
+        percent = int(np.argmax(sure))
+        return percent, float(self.values_deg[percent]), float(self.half_deg[percent])
+
+
+def parameter_differences(first: Table, second: Table, walks: tuple[int, int]) -> list[ParameterDifference]:
+    """The gait parameters of two walks, one of each table, in the order of `gait_parameters.csv`."""
+    rows = [_rows(table, walk) for table, walk in zip((first, second), walks, strict=True)]
+    return [ParameterDifference(row, rows[1][key]) for key, row in rows[0].items() if key in rows[1]]
+
+
+def _rows(table: Table, walk: int) -> dict[tuple[str, str], dict[str, Any]]:
+    """The rows of a walk by parameter and side."""
+    found = {}
+    for row in np.flatnonzero(table["walk"] == walk):
+        line = {name: table[name][row] for name in GAIT_COLUMNS}
+        found[str(line["parameter"]), str(line["side"])] = line
+    return found
+
+
+def curve_differences(first: Table, second: Table, walks: tuple[int, int]) -> list[CurveDifference]:
+    """The mean cycles of a walk of each table of `cycles.csv` that both walks have, right before left."""
+    found = []
+    for side in SIDES:
+        for joint in ANGLES:
+            means = [
+                mean_cycle(table, walk, side, joint)
+                for table, walk in zip((first, second), walks, strict=True)
+            ]
+            values = means[1]["angle_deg"] - means[0]["angle_deg"]
+            if np.isfinite(values).any():
+                halves = [(mean["ci_high_deg"] - mean["ci_low_deg"]) / 2 for mean in means]
+                found.append(CurveDifference(side, joint, values, np.hypot(*halves)))
+    return found
+
+
+def difference_sentences(
+    names: tuple[str, str], parameters: Iterable[ParameterDifference], curves: Iterable[CurveDifference]
+) -> list[str]:
+    """Reports only differences whose interval excludes zero; one sentence if there are none."""
+    said = []
+    for one in (one for one in parameters if one.is_sure):
+        row, size = one.first, abs(one.value)
+        digits = 1 if row["unit"] in ("%", "1/min", "deg") else 3
+        unit = {"deg": "°", "": ""}.get(str(row["unit"]), f" {row['unit']}")
+        side = f", {row['side']}" if row["side"] else ""
+        said.append(
+            f"{str(row['parameter']).replace('_', ' ').capitalize()}{side}: {size:.{digits}f}{unit} "
+            f"({size - one.half:.{digits}f} to {size + one.half:.{digits}f}) "
+            f"{'larger' if one.value > 0 else 'smaller'} in {names[1]} than in {names[0]}."
+        )
+    for curve in (curve for curve in curves if curve.is_sure):
+        percent, value, half = curve.largest
+        said.append(
+            f"The {curve.side} {curve.joint} is {abs(value):.0f}° ({abs(value) - half:.0f} to "
+            f"{abs(value) + half:.0f}) {'more' if value > 0 else 'less'} flexed in {names[1]} than in "
+            f"{names[0]} at {percent} % of the cycle, and surely for {curve.sure_share:.0%} of it."
+        )
+    return said or ["No difference between the two walks can be told."]

@@ -1,0 +1,162 @@
+"""The page of two walks: their gait cycles in one plot each, and the differences of their gait parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import memo
+from memo.compare import (
+    JUDGED,
+    CurveDifference,
+    ParameterDifference,
+    curve_differences,
+    difference_sentences,
+    parameter_differences,
+)
+from memo.report import normative
+from memo.report.cycles import drawn_cycles
+from memo.report.page import Page, number, rows_table, text
+from memo.report.run_folder import RunFolder, read_run_folder
+from memo.report.track_text import measured
+from memo.wording import counted
+
+__all__ = ["comparison_page"]
+
+_LIKELY_SWAPPED = 0.2
+_NO_DIFFERENCE = "no difference can be told"
+
+
+def comparison_page(
+    folders: tuple[Path, Path], walks: tuple[int | None, int | None]
+) -> tuple[Page, dict[str, Any]]:
+    """The page of a walk of each folder, by default the longest, and its `walks`, `sentences` and `notes`.
+
+    ValueError names a folder that lacks a table or the walk.
+    """
+    runs = (read_run_folder(folders[0]), read_run_folder(folders[1]))
+    chosen = (_walk(runs[0], walks[0]), _walk(runs[1], walks[1]))
+    if runs[0].path.resolve() == runs[1].path.resolve() and chosen[0] == chosen[1]:
+        raise ValueError(f"{runs[0].path}: walk {chosen[0]} is compared with itself; give two walks")
+    parameters = parameter_differences(runs[0].parameters, runs[1].parameters, chosen)
+    curves = curve_differences(runs[0].cycles, runs[1].cycles, chosen)
+    are_sides_sure = all(
+        _p_swapped(run, walk) <= _LIKELY_SWAPPED for run, walk in zip(runs, chosen, strict=True)
+    )
+    sentences = difference_sentences(("A", "B"), parameters, curves if are_sides_sure else [])
+    notes = [note for run, walk in zip(runs, chosen, strict=True) for note in _doubts(run, walk)]
+    page = Page(
+        title=f"memo: {_name(runs[0], chosen[0])} and {_name(runs[1], chosen[1])}",
+        layout="comparison",
+        scripts=("base.js", "cycles.js"),
+        filled={
+            "version": text(memo.__version__),
+            "first": text(_name(runs[0], chosen[0])),
+            "second": text(_name(runs[1], chosen[1])),
+            "sentences": "".join(f"<p>{text(said)}</p>" for said in sentences),
+            "warnings": "".join(f"<li>{text(note)}</li>" for note in notes),
+            "parameters": _parameter_table(parameters),
+            "curves": _curve_table(curves, are_sides_sure),
+            "band_source": text(normative.SOURCE),
+        },
+        data={"cycles": _cycles(runs, chosen)},
+    )
+    return page, {"walks": list(chosen), "sentences": sentences, "notes": notes}
+
+
+def _walk(run: RunFolder, wanted: int | None) -> int:
+    """The number of the wanted walk, else of the longest."""
+    needed = {"track.csv": run.columns, "gait_parameters.csv": run.parameters, "cycles.csv": run.cycles}
+    absent = [name for name, table in needed.items() if not table]
+    if absent:
+        raise ValueError(f"{run.path}: two walks are compared by {', '.join(needed)}; missing: {absent[0]}")
+    walks, rows = np.unique(run.columns["walk"], return_counts=True)
+    if not len(walks):
+        raise ValueError(f"{run.path}: nobody was tracked, so there is no walk to compare")
+    if wanted is None:
+        return int(walks[np.argmax(rows)])
+    if wanted not in walks:
+        raise ValueError(f"{run.path}: has no walk {wanted}, but {counted(len(walks), 'walk')} from 0")
+    return wanted
+
+
+def _name(run: RunFolder, walk: int) -> str:
+    """The folder, and the walk if there are several."""
+    several = len(np.unique(run.columns["walk"])) > 1
+    return run.path.resolve().name + (f", walk {walk + 1}" if several else "")
+
+
+def _p_swapped(run: RunFolder, walk: int) -> float:
+    return float(run.columns["p_swapped"][run.columns["walk"] == walk][0])
+
+
+def _doubts(run: RunFolder, walk: int) -> list[str]:
+    p_swapped = _p_swapped(run, walk)
+    told = []
+    if p_swapped > _LIKELY_SWAPPED:
+        told.append(f"{_name(run, walk)}: left and right may be swapped (probability {p_swapped:.0%}).")
+    if not (run.cycles["walk"] == walk).any():
+        told.append(f"{_name(run, walk)}: it has no measured gait cycles.")
+    return told
+
+
+def _cycles(runs: tuple[RunFolder, RunFolder], walks: tuple[int, int]) -> dict[str, Any]:
+    """The curves of both walks with `of`, "a" or "b", and the band."""
+    drawn = [drawn_cycles(run.cycles) for run in runs]
+    curves = [
+        {**curve, "of": of}
+        for of, cycles, walk in zip("ab", drawn, walks, strict=True)
+        for curve in cycles["curves"]
+        if curve["walk"] == walk
+    ]
+    return {"curves": curves, "band": normative.band()}
+
+
+def _parameter_table(parameters: list[ParameterDifference]) -> str:
+    rows = [
+        (_parameter(one.first), measured(one.first), measured(one.second), _difference(one))
+        for one in parameters
+        if np.isfinite(one.first["value"]) or np.isfinite(one.second["value"])
+    ]
+    header = ("parameter", "A", "B", "B less A")
+    return rows_table("Gait parameters: value, 95 % interval, number of steps", header, rows)
+
+
+def _parameter(row: Any) -> str:
+    side = f", {row['side']}" if row["side"] else ""
+    unit = f", {row['unit']}" if row["unit"] else ""
+    return text(str(row["parameter"]).replace("_", " ") + side + unit)
+
+
+def _difference(one: ParameterDifference) -> str:
+    """The difference with its interval, and whether it can be told, as HTML."""
+    if not np.isfinite(one.value):
+        return number(one.value)
+    digits = 1 if one.first["unit"] in ("%", "1/min") else 3
+    interval = f"{number(one.value - one.half, digits)} to {number(one.value + one.half, digits)}"
+    told = "" if one.is_sure else f"; {_NO_DIFFERENCE}"
+    return f'{number(one.value, digits)} <small class="interval">{interval}{told}</small>'
+
+
+def _curve_table(curves: list[CurveDifference], are_sides_sure: bool) -> str:
+    rows = [
+        (text(f"{curve.side} {curve.joint}"), number(curve.rms_deg, 1), _largest(curve, are_sides_sure))
+        for curve in curves
+    ]
+    header = ("joint", "RMS difference, °", "largest sure difference B less A, °")
+    return rows_table("Mean gait cycles", header, rows)
+
+
+def _largest(curve: CurveDifference, are_sides_sure: bool) -> str:
+    if not are_sides_sure:
+        return "not judged: left and right may be swapped"
+    if curve.joint not in JUDGED:
+        return "not judged: its errors are larger than stated"
+    if not curve.is_sure:
+        return _NO_DIFFERENCE
+    percent, value, half = curve.largest
+    interval = f"{number(value - half, 1)} to {number(value + half, 1)}"
+    where = f"at {percent} % of the cycle; sure for {curve.sure_share:.0%} of it"
+    return f'{number(value, 1)} <small class="interval">{interval}, {where}</small>'
