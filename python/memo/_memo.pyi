@@ -69,6 +69,7 @@ __all__ = [
     "lee_chen_walker",
     "model_contours",
     "moving_regions",
+    "normal_cycle",
     "planar",
     "planar_hinges",
     "planar_rods",
