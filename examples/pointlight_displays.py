@@ -12,7 +12,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import memo
 import numpy as np
-from memo.linkage_plot import write_display_video
+from memo.display import write_display_video
 
 walker = memo.walker_motion(60, rate_hz=60)
 motion = (walker.positions, walker.times_s, walker.names)
@@ -47,5 +47,5 @@ for ax, (title, options) in zip(axes.flat, displays.items(), strict=True):
 
 display = memo.pointlight(*motion, azimuth_deg=45)
 video = Path(tempfile.mkdtemp()) / "display.mp4"
-write_display_video(video, display.times_s, display.positions_px)
+write_display_video(video, display)
 print(video.name, display.positions_px.shape, f"{np.diff(display.times_s).mean():.4f} s a frame")

@@ -819,6 +819,8 @@ def _(d):
         phase=lambda: d.number(-2, 2),
         height_m=lambda: d.number(1, 2.2),
     )
+    if d.random.random() < 0.3:
+        return memo.walker_motion(cycles=d.whole(0, 4), **options)
     return memo.walker_motion(d.whole(0, 200), **options)
 
 
@@ -836,10 +838,14 @@ def _(d):
         px_per_m=lambda: d.number(1, 900),
         camera=d.camera,
         locomotion=lambda: d.choice("treadmill", "translating", "pelvis"),
+        cycles=lambda: d.whole(0, 4),
+        tempo=lambda: d.number(0.1, 10),
         inverted=lambda: d.choice(True, False),
         mirrored=lambda: d.choice(True, False),
         reversed=lambda: d.choice(True, False),
         scramble_position=lambda: d.choice(True, False),
+        scramble_axes=lambda: d.choice("both", "horizontal", "vertical"),
+        scramble_limit_px=lambda: d.number(0, 300),
         scramble_phase=lambda: d.choice(None, "periodic", "shortened"),
         period_s=lambda: d.number(0, 1),
         max_shift_s=lambda: d.number(0, 1),
@@ -856,6 +862,35 @@ def _(d):
         seed=lambda: d.whole(0, 2**62),
     )
     return memo.pointlight(d.numbers(-2, 2, frames, count, 3), d.times(frames), names, **options)
+
+
+def shown(d):
+    walk = memo.walker_motion(d.size(9, 1))
+    return memo.pointlight(walk.positions, walk.times_s, walk.names, noise_dots=d.size(4))
+
+
+@case("pointlight_together")
+def _(d):
+    displays = [shown(d) for _ in range(d.size(3))]
+    offsets = [(d.number(-90, 90), d.number(-90, 90)) for _ in range(d.size(3))]
+    return memo.pointlight_together(displays, d.choice(None, offsets))
+
+
+@case("PointLightDisplay.frames")
+def _(d):
+    options = d.options(
+        size_px=lambda: (d.whole(1, 90), d.whole(1, 90)),
+        centre_px=lambda: (d.number(-90, 90), d.number(-90, 90)),
+        dot_px=lambda: d.number(0, 40),
+        shape=lambda: d.choice("disc", "square", "gaussian"),
+        colour=lambda: (d.whole(0, 255), d.whole(0, 255), d.whole(0, 255)),
+        background=lambda: (d.whole(0, 255), d.whole(0, 255), d.whole(0, 255)),
+        smooth=lambda: d.choice(True, False),
+        alpha=lambda: d.choice(True, False),
+        start=lambda: d.whole(0, 12),
+        stop=lambda: d.whole(0, 12),
+    )
+    return shown(d).frames(**options)
 
 
 def swinging(d, frames, count):
@@ -936,7 +971,7 @@ RESULTS = results()
         f"{kind}.{part}"
         for kind, result in RESULTS.items()
         for part in vars(type(result))
-        if part not in NO_CALLS
+        if part not in NO_CALLS and f"{kind}.{part}" != "PointLightDisplay.frames"
     )
 )
 def _(d, name):

@@ -8,6 +8,9 @@ import memo
 import pytest
 from memo import _memo
 
+PICTURE = {"dot_px": "dot_px", "shape": "shape"}
+"""Options of `memo pointlight` that have the default of `PointLightDisplay.frames`."""
+
 FUNCTIONS = {
     name: getattr(memo, name)
     for name in ("edge_segments", "planar", "pointlight", "posture", "silhouettes", "walker_motion")
@@ -19,6 +22,7 @@ OPTIONS = {
     ("pointlight", "elevation_deg"): "elevation_deg",
     ("pointlight", "px_per_m"): "px_per_m",
     ("pointlight", "locomotion"): "locomotion",
+    ("pointlight", "scramble_axes"): "scramble_axes",
     ("pointlight", "dots"): "life_dots",
     ("pointlight", "on"): "life_sites",
     ("pointlight", "noise_dots"): "noise_dots",
@@ -64,6 +68,20 @@ def test_the_help_of_a_command_states_the_defaults(command, option):
     )
     value = _memo.defaults(command)[OPTIONS[command, option]]
     assert found.default == value if found.default is not None else f"default: {value}." in found.help
+
+
+@pytest.mark.parametrize("option", PICTURE)
+def test_pictures_of_displays_have_the_defaults_of_the_core(option):
+    typer = pytest.importorskip("typer")
+    from memo.cli import _app
+
+    usual = _memo.defaults("pointlight_frames")
+    parameters = typer.main.get_command(_app()).commands["pointlight"].params
+    (found,) = (parameter for parameter in parameters if parameter.name == option)
+    assert found.default == usual[PICTURE[option]]
+    stated = " ".join(memo._memo.PointLightDisplay.frames.__doc__.split())
+    shown = {"shape": '"disc"', "dot_px": "10"}
+    assert f"`{option}` {shown[option]}" in stated
 
 
 def test_a_function_without_options_of_the_core_has_no_defaults():

@@ -224,7 +224,6 @@ def test_frames_without_points_are_drawn(tmp_path):
     linkage_plot.write_linkage_png(tmp_path / "linkage.png", points, found)
     linkage_plot.write_turned_png(tmp_path / "turned.png", points, found)
     linkage_plot.write_turned_video(tmp_path / "turned.mp4", points, found)
-    linkage_plot.write_display_video(tmp_path / "display.mp4", points.times_s, tracks)
     assert np.isfinite(tracks[linkage_plot._fullest(tracks)]).all()
 
 
@@ -357,7 +356,7 @@ def test_senseless_options_are_refused(tmp_path):
         (("planar", tmp_path / "dots.csv", "--focal-px", "0"), "--focal-px 0 must be positive"),
         (("planar", tmp_path / "dots.csv", "--turn-deg", "nan"), "--turn-deg nan must be finite"),
         (("planar", tmp_path / "dots.csv", "--names"), "no column names a joint"),
-        (("pointlight", "--period", "1"), "--scramble-phase"),
+        (("pointlight", "--period", "1"), "--period needs --scramble-phase"),
         (("pointlight", "--scramble-phase", "--period", "0"), "--period 0 must be positive"),
     ):
         refused = run(*command, "--out", tmp_path)

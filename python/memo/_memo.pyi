@@ -74,6 +74,7 @@ __all__ = [
     "planar_hinges",
     "planar_rods",
     "pointlight",
+    "pointlight_together",
     "posture",
     "posture_tree",
     "recorded_contours",
@@ -375,6 +376,23 @@ class PointLightDisplay:
     limb_ends: Final[npt.NDArray[np.int64]]
     fractions: Final[npt.NDArray[np.float64]]
     times_s: Final[npt.NDArray[np.float64]]
+    centre_px: Final[tuple[float, float]]
+    points: Final[int]
+    period_s: Final[float | None]
+    def frames(
+        self,
+        *,
+        size_px: tuple[int, int] | None = None,
+        centre_px: tuple[float, float] | None = None,
+        dot_px: float | None = None,
+        shape: str | None = None,
+        colour: tuple[int, int, int] | None = None,
+        background: tuple[int, int, int] | None = None,
+        smooth: bool = True,
+        alpha: bool = False,
+        start: int = 0,
+        stop: int | None = None,
+    ) -> npt.NDArray[np.uint8]: ...
 
 def euler_angles(rotations: npt.NDArray[np.float64], order: str) -> npt.NDArray[np.float64]: ...
 def walker_motion(
@@ -385,6 +403,7 @@ def walker_motion(
     heading_deg: float | None = None,
     phase: float | None = None,
     height_m: float | None = None,
+    cycles: int | None = None,
 ) -> WalkerMotion: ...
 def pointlight(
     positions: npt.NDArray[np.float64],
@@ -396,10 +415,14 @@ def pointlight(
     px_per_m: float | None = None,
     camera: Camera | None = None,
     locomotion: str | None = None,
+    cycles: int | None = None,
+    tempo: float | None = None,
     inverted: bool = False,
     mirrored: bool = False,
     reversed: bool = False,
     scramble_position: bool = False,
+    scramble_axes: str | None = None,
+    scramble_limit_px: float | None = None,
     scramble_phase: str | None = None,
     period_s: float | None = None,
     max_shift_s: float | None = None,
@@ -414,6 +437,9 @@ def pointlight(
     noise_speed_px_s: float | None = None,
     noise_sd_px: float | None = None,
     seed: int | None = None,
+) -> PointLightDisplay: ...
+def pointlight_together(
+    displays: Sequence[PointLightDisplay], offsets_px: Sequence[tuple[float, float]] | None = None
 ) -> PointLightDisplay: ...
 
 @final

@@ -1,4 +1,4 @@
-"""Pictures and animations of point-light displays and of the linkages found in them."""
+"""Pictures and animations of the linkages found in point-light displays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -19,7 +18,6 @@ from memo.unfinished import complete_file
 __all__ = [
     "plot_linkage",
     "telling_window",
-    "write_display_video",
     "write_linkage_png",
     "write_turned_png",
     "write_turned_video",
@@ -182,24 +180,6 @@ def _links_by_frame(figure: PlanarFigure, frames: int) -> list[list[tuple[int, i
         return [(index, *link.points) for index, chain in enumerate(window.chains) for link in chain.links]
 
     return [links(frame) for frame in range(frames)]
-
-
-def write_display_video(
-    path: str | PathLike[str], times_s: npt.NDArray[np.float64], positions_px: npt.NDArray[np.float64]
-) -> None:
-    """White discs on black, the display scaled to fit 640 pixels."""
-    low, high = (f(positions_px, axis=(0, 1)) for f in (np.nanmin, np.nanmax))
-    scale = 560 / max(float((high - low).max()), 1e-9)
-    shifted = (positions_px - low) * scale + (640 - (high - low) * scale) / 2
-    v, u = np.mgrid[:640, :640]
-    with complete_file(path) as temporary, _h264(str(temporary), _rate(times_s)) as write:
-        for time_s, dots in zip(times_s, shifted, strict=True):
-            grey = np.zeros((640, 640))
-            for dot in dots[np.isfinite(dots).all(axis=1)]:
-                a, b = (slice(max(int(x) - 9, 0), int(x) + 10) for x in dot[::-1])
-                disc = np.clip(5.5 - np.hypot(u[a, b] - dot[0], v[a, b] - dot[1]), 0, 1)
-                grey[a, b] = np.maximum(grey[a, b], disc)
-            write(np.repeat((255 * grey).astype(np.uint8)[..., None], 3, axis=2), float(time_s))
 
 
 def _rate(times_s: Any) -> float:

@@ -22,6 +22,7 @@ pub fn defaults<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyD
         "edge_segments" => image::edge_defaults(py),
         "planar" => planar::defaults(py),
         "pointlight" => pointlight::defaults(py),
+        "pointlight_frames" => pointlight::picture_defaults(py),
         "posture" => posture::defaults(py),
         "silhouettes" => image::silhouette_defaults(py),
         "walker_motion" => pointlight::walker_defaults(py),

@@ -59,7 +59,9 @@ mod _memo {
         PlanarChain, PlanarInterpretation, PlanarLink, PlanarWindow, planar, planar_hinges, planar_rods,
     };
     #[pymodule_export]
-    use super::pointlight::{PointLightDisplay, WalkerMotion, pointlight, walker_motion};
+    use super::pointlight::{
+        PointLightDisplay, WalkerMotion, pointlight, pointlight_together, walker_motion,
+    };
     #[pymodule_export]
     use super::posture::{PostureSequence, SecondMotion, posture, posture_tree};
     #[pymodule_export]

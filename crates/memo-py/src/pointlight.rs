@@ -5,14 +5,15 @@ use crate::camera::PyCamera;
 use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::result;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use memo_core::model::{Body, Gait, GaitStyle, Walker};
 use memo_core::synth::{
-    self, DisplayView, DotSource, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble,
-    PointLightOptions, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, point_light_display, sampled_walk,
+    self, CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
+    NoiseDots, NoiseKind, PhaseScramble, PointLightOptions, PointMotion, PositionScramble,
+    SampledWalkOptions, ScrambleAxes, WALKER_HEIGHT_M, displays_together, point_light_display, sampled_walk,
 };
 use memo_core::wording::counted;
-use numpy::{PyArray1, PyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -53,18 +54,150 @@ result! {
         fractions: Py<PyArrayDyn<f64>> = per_dot(py, &shown, shown.sources.iter().map(|s| shows(s).2))?,
         /// Times (T,) of the frames.
         times_s: Py<PyArray1<f64>> = numpy_from_column(py, shown.times_s),
+        /// Pixel that `frames` draws in the middle of the picture.
+        centre_px: (f64, f64) = (shown.centre_px.x, shown.centre_px.y),
+        /// Number of points of the motion, or of all motions of a display of several.
+        points: usize,
+        /// Duration of the cycle that the display repeats, if it does.
+        period_s: Option<f64>,
     }
     |own| Python::attach(|py| match own.visible.bind(py).shape() {
         [frames, dots] => format!("{} in {}", counted(*dots, "dot"), counted(*frames, "frame")),
         _ => String::new(),
-    })
+    });
+    methods {
+        /// Frames `start` to `stop` as pictures (T, H, W, 3), red, green and blue; with `alpha` (T, H, W, 4), the colour
+        /// of the dots and how much of it, without background.
+        ///
+        /// One pixel of the display is one pixel of the picture: nothing is scaled to fit. `centre_px` is the pixel of
+        /// the display in the middle of the picture, by default `self.centre_px`; `size_px` is width and height; `shape`
+        /// is "disc", "square" (`dot_px` is the diameter or side) or "gaussian" (`dot_px` is the full width at half
+        /// maximum); without `smooth`, a pixel is covered wholly or not at all.
+        ///
+        /// Defaults: `size_px` (640, 640), `dot_px` 10, `shape` "disc", `colour` (255, 255, 255), `background` (0, 0, 0),
+        /// `smooth` True.
+        #[pyo3(signature = (
+            *, size_px=None, centre_px=None, dot_px=None, shape=None, colour=None, background=None, smooth=true,
+            alpha=false, start=0, stop=None
+        ))]
+        #[allow(clippy::too_many_arguments, reason = "each is a property of a picture")]
+        fn frames<'py>(
+            &self,
+            py: Python<'py>,
+            size_px: Option<[usize; 2]>,
+            centre_px: Option<[f64; 2]>,
+            dot_px: Option<f64>,
+            shape: Option<&str>,
+            colour: Option<[u8; 3]>,
+            background: Option<[u8; 3]>,
+            smooth: bool,
+            alpha: bool,
+            start: usize,
+            stop: Option<usize>,
+        ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+            let usual = DotPicture::default();
+            let picture = DotPicture {
+                size_px: size_px.unwrap_or(usual.size_px),
+                centre_px: centre_px.map(DVec2::from),
+                dot_px: dot_px.unwrap_or(usual.dot_px),
+                shape: shape.map(|name| chosen("shape", name, SHAPES)).transpose()?.unwrap_or(usual.shape),
+                colour: colour.unwrap_or(usual.colour),
+                background: background.unwrap_or(usual.background),
+                is_smooth: smooth,
+            };
+            picture.check().map_err(value_error)?;
+            drawn(py, &self.core(py)?, &picture, alpha, start, stop)
+        }
+    }
+}
+
+const SHAPES: [(&str, DotShape); 3] =
+    [("disc", DotShape::Disc), ("square", DotShape::Square), ("gaussian", DotShape::Gaussian)];
+
+/// Largest array of pictures, bytes.
+const MOST_BYTES: usize = 8 << 30;
+
+fn drawn<'py>(
+    py: Python<'py>,
+    shown: &synth::PointLightDisplay,
+    picture: &DotPicture,
+    alpha: bool,
+    start: usize,
+    stop: Option<usize>,
+) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+    let ([width, height], channels) = (picture.size_px, if alpha { 4 } else { 3 });
+    let stop = stop.unwrap_or(usize::MAX).min(shown.times_s.len());
+    let start = start.min(stop);
+    let bytes = (stop - start).saturating_mul(width * height * channels);
+    if bytes > MOST_BYTES {
+        return Err(PyValueError::new_err(format!(
+            "{} of {width} x {height} pixels would take {:.0} GB: draw fewer at a time, from start to stop",
+            counted(stop - start, "frame"),
+            bytes as f64 / 1e9
+        )));
+    }
+    let pixels = py.detach(|| (start..stop).flat_map(|t| picture.pixels(shown, t, alpha)).collect());
+    numpy_from_flat(py, pixels, vec![stop - start, height, width, channels])
+}
+
+impl PointLightDisplay {
+    /// The display as the core has it; noise dots without the point that they copy.
+    fn core(&self, py: Python<'_>) -> PyResult<synth::PointLightDisplay> {
+        let (positions, frames, dots) = motion_from_numpy::<2>(self.positions_px.bind(py).as_any())?;
+        let (labels, ends, fractions) = (
+            self.labels.bind(py).to_vec()?,
+            self.limb_ends.bind(py).to_vec()?,
+            self.fractions.bind(py).to_vec()?,
+        );
+        let times_s = self.times_s.bind(py).to_vec()?;
+        if times_s.len() != frames || [labels.len(), ends.len(), fractions.len()] != [frames * dots; 3] {
+            return Err(PyValueError::new_err("the arrays of the display have different shapes"));
+        }
+        let source = |i: usize| match (usize::try_from(labels[i]), usize::try_from(ends[i])) {
+            (Ok(a), Ok(b)) => DotSource::Limb([a, b], fractions[i]),
+            (Ok(k), Err(_)) => DotSource::Joint(k),
+            _ => DotSource::Noise(None),
+        };
+        Ok(synth::PointLightDisplay {
+            times_s,
+            dots,
+            points: self.points,
+            centre_px: DVec2::from(self.centre_px),
+            period_s: self.period_s,
+            positions_px: positions.into_iter().map(DVec2::from).collect(),
+            sources: (0..frames * dots).map(source).collect(),
+        })
+    }
+}
+
+/// The displays of several actors as one, with `offsets_px`, (u, v) for each, added to their dots.
+///
+/// The displays must have the same times. Dots, and the points that `labels` count, continue from one display to the
+/// next. The centre is the mean of the centres. Without offsets, everything stays where it is.
+#[pyfunction]
+#[pyo3(signature = (displays, offsets_px=None))]
+pub fn pointlight_together(
+    py: Python<'_>,
+    displays: Vec<PyRef<'_, PointLightDisplay>>,
+    offsets_px: Option<Vec<[f64; 2]>>,
+) -> PyResult<PointLightDisplay> {
+    let all: Vec<_> = displays.iter().map(|one| one.core(py)).collect::<PyResult<_>>()?;
+    let offsets = offsets_px.unwrap_or_else(|| vec![[0.0; 2]; all.len()]);
+    let offsets: Vec<DVec2> = offsets.into_iter().map(DVec2::from).collect();
+    PointLightDisplay::of(py, displays_together(&all, &offsets).map_err(value_error)?)
 }
 
 /// Motion of the body model walking through the origin.
 ///
+/// `cycles`, in place of `frames`: a whole number of gait cycles, each of a whole number of frames, so that the motion
+/// on the spot loops without a jump; the speed is the nearest that allows this.
+///
 /// Defaults: `frames` 60, `rate_hz` 60, `speed_mps` 1.3, `heading_deg` 0, `phase` 0, `height_m` 1.75.
 #[pyfunction]
-#[pyo3(signature = (frames=None, *, rate_hz=None, speed_mps=None, heading_deg=None, phase=None, height_m=None))]
+#[pyo3(signature = (
+    frames=None, *, rate_hz=None, speed_mps=None, heading_deg=None, phase=None, height_m=None, cycles=None
+))]
+#[allow(clippy::too_many_arguments, reason = "each is a property of the walk")]
 pub fn walker_motion(
     py: Python<'_>,
     frames: Option<usize>,
@@ -73,7 +206,11 @@ pub fn walker_motion(
     heading_deg: Option<f64>,
     phase: Option<f64>,
     height_m: Option<f64>,
+    cycles: Option<usize>,
 ) -> PyResult<WalkerMotion> {
+    if frames.is_some() && cycles.is_some() {
+        return Err(PyValueError::new_err("give either frames or cycles"));
+    }
     let body = Body::from_height(height_m.unwrap_or(WALKER_HEIGHT_M)).map_err(value_error)?;
     let walker = Walker { body, gait: Gait::dense(), style: GaitStyle::default() };
     let usual = SampledWalkOptions::default();
@@ -83,6 +220,10 @@ pub fn walker_motion(
         speed_mps: speed_mps.unwrap_or(usual.speed_mps),
         heading_rad: heading_deg.map_or(usual.heading_rad, f64::to_radians),
         phase: phase.unwrap_or(usual.phase),
+    };
+    let options = match cycles {
+        Some(cycles) => options.of_whole_cycles(&walker, cycles).map_err(value_error)?,
+        None => options,
     };
     let motion = py.detach(|| sampled_walk(&walker, &options)).map_err(value_error)?;
     WalkerMotion::of(py, motion, options.cycle_s(&walker))
@@ -96,14 +237,19 @@ const LOCOMOTIONS: [(&str, Locomotion); 3] = [
 
 /// A point-light display of points over time (T, K, 3), world metres, Z up, NaN if unknown.
 ///
-/// Defaults: `azimuth_deg` 0, `elevation_deg` 0, `px_per_m` 200, `locomotion` "treadmill", `max_shift_s` 0.5,
-/// `life_dots` 8, `life_sites` "limbs", `noise_dots` 0, `noise_kind` "scrambled", `noise_area` 1.5,
+/// `cycles`: one cycle of the motion, that many times, without a jump from its end to its start, `tempo` times as fast.
+/// `period_s`: its period, for `cycles` and `scramble_phase="periodic"`; by default the whole motion, if its end leads
+/// to its start, or else the lag at which it repeats itself best. `scramble_limit_px`: largest shift along each of
+/// `scramble_axes`; by default, the extent of the figure.
+///
+/// Defaults: `azimuth_deg` 0, `elevation_deg` 0, `px_per_m` 200, `locomotion` "treadmill", `tempo` 1,
+/// `scramble_axes` "both", `max_shift_s` 0.5, `life_dots` 8, `life_sites` "limbs", `noise_dots` 0, `noise_kind` "scrambled", `noise_area` 1.5,
 /// `noise_speed_px_s` 60, `noise_sd_px` 0, `seed` 0.
 #[pyfunction]
 #[pyo3(signature = (
     positions, times_s, names, *, azimuth_deg=None, elevation_deg=None, px_per_m=None, camera=None,
-    locomotion=None, inverted=false, mirrored=false, reversed=false, scramble_position=false,
-    scramble_phase=None, period_s=None, max_shift_s=None, lifetime_frames=None, life_dots=None,
+    locomotion=None, cycles=None, tempo=None, inverted=false, mirrored=false, reversed=false,
+    scramble_position=false, scramble_axes=None, scramble_limit_px=None, scramble_phase=None, period_s=None, max_shift_s=None, lifetime_frames=None, life_dots=None,
     life_sites=None, limbs=None, synchronous=false, noise_dots=None, noise_kind=None, noise_area=None,
     noise_speed_px_s=None, noise_sd_px=None, seed=None
 ))]
@@ -118,10 +264,14 @@ pub fn pointlight(
     px_per_m: Option<f64>,
     camera: Option<PyCamera>,
     locomotion: Option<&str>,
+    cycles: Option<usize>,
+    tempo: Option<f64>,
     inverted: bool,
     mirrored: bool,
     reversed: bool,
     scramble_position: bool,
+    scramble_axes: Option<&str>,
+    scramble_limit_px: Option<f64>,
     scramble_phase: Option<&str>,
     period_s: Option<f64>,
     max_shift_s: Option<f64>,
@@ -149,8 +299,10 @@ pub fn pointlight(
         is_inverted: inverted,
         is_mirrored: mirrored,
         is_reversed: reversed,
-        scrambles_position: scramble_position,
-        scrambles_phase: scramble_phase.map(|kind| shifts(kind, period_s, max_shift_s)).transpose()?,
+        cycles: repeated(cycles, tempo)?,
+        period_s,
+        scrambles_position: moved(scramble_position, scramble_axes, scramble_limit_px)?,
+        scrambles_phase: scramble_phase.map(|kind| shifts(kind, max_shift_s)).transpose()?,
         limited_life: lifetime_frames.map(life).transpose()?,
         noise_dots: noise(noise_dots, noise_kind, noise_area, noise_speed_px_s)?,
         noise_sd_px: noise_sd_px.unwrap_or(usual.noise_sd_px),
@@ -187,12 +339,34 @@ fn parallel(
     }
 }
 
-fn shifts(kind: &str, period_s: Option<f64>, max_shift_s: Option<f64>) -> PyResult<PhaseScramble> {
+fn repeated(cycles: Option<usize>, tempo: Option<f64>) -> PyResult<Option<CycleOptions>> {
+    let tempo_of = || tempo.unwrap_or(CycleOptions::default().tempo);
+    match (cycles, tempo) {
+        (None, Some(_)) => Err(PyValueError::new_err("tempo needs cycles")),
+        _ => Ok(cycles.map(|cycles| CycleOptions { cycles, tempo: tempo_of() })),
+    }
+}
+
+const AXES: [(&str, ScrambleAxes); 3] = [
+    ("both", ScrambleAxes::Both),
+    ("horizontal", ScrambleAxes::Horizontal),
+    ("vertical", ScrambleAxes::Vertical),
+];
+
+fn moved(is_moved: bool, axes: Option<&str>, limit_px: Option<f64>) -> PyResult<Option<PositionScramble>> {
+    if !is_moved && (axes.is_some() || limit_px.is_some()) {
+        let message = "scramble_axes and scramble_limit_px need scramble_position";
+        return Err(PyValueError::new_err(message));
+    }
+    let axes = axes.map(|name| chosen("scramble_axes", name, AXES)).transpose()?;
+    let axes = axes.unwrap_or(PositionScramble::default().axes);
+    Ok(is_moved.then_some(PositionScramble { axes, limit_px }))
+}
+
+fn shifts(kind: &str, max_shift_s: Option<f64>) -> PyResult<PhaseScramble> {
     let max_shift_s = max_shift_s.unwrap_or(PhaseScramble::MAX_SHIFT_S);
-    let kinds = [
-        ("periodic", PhaseScramble::Periodic { period_s }),
-        ("shortened", PhaseScramble::Shortened { max_shift_s }),
-    ];
+    let kinds =
+        [("periodic", PhaseScramble::Periodic), ("shortened", PhaseScramble::Shortened { max_shift_s })];
     chosen("scramble_phase", kind, kinds)
 }
 
@@ -267,7 +441,9 @@ pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         inverted: usual.is_inverted,
         mirrored: usual.is_mirrored,
         reversed: usual.is_reversed,
-        scramble_position: usual.scrambles_position,
+        tempo: CycleOptions::default().tempo,
+        scramble_position: usual.scrambles_position.is_some(),
+        scramble_axes: name_of(&PositionScramble::default().axes, &AXES),
         max_shift_s: PhaseScramble::MAX_SHIFT_S,
         life_dots: life.dots,
         life_sites: sites_name(&life.sites),
@@ -278,6 +454,19 @@ pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         noise_speed_px_s: NoiseKind::SPEED_PX_S,
         noise_sd_px: usual.noise_sd_px,
         seed: usual.seed,
+    })
+}
+
+pub fn picture_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let DotPicture { size_px, centre_px: _, dot_px, shape, colour, background, is_smooth } =
+        DotPicture::default();
+    dict!(py, {
+        size_px: (size_px[0], size_px[1]),
+        dot_px: dot_px,
+        shape: name_of(&shape, &SHAPES),
+        colour: (colour[0], colour[1], colour[2]),
+        background: (background[0], background[1], background[2]),
+        smooth: is_smooth,
     })
 }
 

@@ -6,7 +6,8 @@ use pyo3::types::PyTuple;
 use pyo3::{PyClass, PyClassInitializer};
 
 /// Declares a class whose objects hold one result: read-only attributes, which pickling keeps, each with its type and
-/// what it is made of, or else the field of the same name of the core's result; and the text within the `repr`.
+/// what it is made of, or else the field of the same name of the core's result; the text within the `repr`; and
+/// methods, if any.
 macro_rules! result {
     (@value $core:ident $field:ident) => { $core.$field };
     (@value $core:ident $field:ident $value:expr) => { $value };
@@ -16,6 +17,7 @@ macro_rules! result {
             $($(#[$meaning:meta])* $field:ident: $type:ty $(= $value:expr)?,)*
         }
         $described:expr
+        $(; methods { $($methods:tt)* })?
     ) => {
         $(#[$about])*
         #[pyo3::pyclass(frozen, get_all, module = "memo._memo")]
@@ -44,6 +46,8 @@ macro_rules! result {
                 let described: fn(&Self) -> String = $described;
                 format!("{}({})", stringify!($name), described(self))
             }
+
+            $($($methods)*)?
         }
     };
 }

@@ -6,6 +6,7 @@
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     import typer
 
 EPILOG = """Examples:
-  memo pointlight --azimuth-deg 60
-  memo pointlight --azimuth-deg 60 --scramble-position --seed 3 --out control
-  memo pointlight walk.c3d --out mine
+  memo pointlight --cycles 2 --azimuth-deg 60
+  memo pointlight --cycles 2 --azimuth-deg 60 --scramble-position --seed 3 --out control
+  memo pointlight walk.c3d --markers joints.toml --cycles 2 --png --lossless --out mine
 
 Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage; \
 4 the app extra is not installed."""
@@ -34,21 +35,43 @@ FEWEST_FRAMES = 8
 
 _SECONDS = 2.4
 
+_SAME_TIME_S = 1e-3  # files round times to milliseconds
+
 
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
 
     usual = memo._memo.defaults("pointlight")
+    drawn = memo._memo.defaults("pointlight_frames")
 
     @app.command(epilog=EPILOG)
     def pointlight(
         motion: Annotated[
-            Path | None,
+            list[Path] | None,
             typer.Argument(
-                metavar="MOTION",
+                metavar="MOTION...",
                 help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
-                " (.c3d, .bvh, .trc); default: an average walker.",
+                " (.c3d, .bvh, .trc); several: one actor each; default: an average walker.",
             ),
+        ] = None,
+        markers: Annotated[
+            Path | None,
+            typer.Option(
+                help='TOML with the markers of each joint: right_hip = "RASI", or a list to average.'
+            ),
+        ] = None,
+        apart_m: Annotated[
+            float | None,
+            typer.Option(help="Distance between actors side by side, metres; default: as recorded."),
+        ] = None,
+        cycles: Annotated[
+            int | None, typer.Option(help="Number of whole cycles, which loop without a jump.", min=1)
+        ] = None,
+        speed: Annotated[
+            float | None, typer.Option(help="Without MOTION: walking speed, m/s; default: 1.3.")
+        ] = None,
+        tempo: Annotated[
+            float | None, typer.Option(help="With MOTION and --cycles: times as fast; default: 1.")
         ] = None,
         azimuth_deg: Annotated[
             float, typer.Option(help="Azimuth of the viewer, degrees; 90 looks from +x.")
@@ -66,11 +89,22 @@ def add_pointlight(app: "typer.Typer") -> None:
         scramble_position: Annotated[
             bool, typer.Option("--scramble-position", help="Move each dot's motion to a random place.")
         ] = False,
+        scramble_axes: Annotated[
+            str | None,
+            typer.Option(
+                help="With --scramble-position: both, horizontal or vertical; "
+                f"default: {usual['scramble_axes']}."
+            ),
+        ] = None,
+        scramble_limit_px: Annotated[
+            float | None,
+            typer.Option(help="With --scramble-position: largest shift; default: the figure's extent."),
+        ] = None,
         scramble_phase: Annotated[
             bool, typer.Option("--scramble-phase", help="Shift each dot's motion in time.")
         ] = False,
         period: Annotated[
-            float | None, typer.Option(help="Period of the motion, seconds; default: its whole length.")
+            float | None, typer.Option(help="Period of the motion, seconds; default: the one found.")
         ] = None,
         lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
         dots: Annotated[
@@ -97,6 +131,24 @@ def add_pointlight(app: "typer.Typer") -> None:
         ] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has none.")] = None,
         seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = usual["seed"],
+        size: Annotated[
+            str, typer.Option(help="Width and height of the picture, pixels.", metavar="WxH")
+        ] = "{}x{}".format(*drawn["size_px"]),
+        centre: Annotated[
+            str | None,
+            typer.Option(help="Pixel of dots.csv in the middle; default: of the figure.", metavar="U,V"),
+        ] = None,
+        dot_px: Annotated[float, typer.Option(help="Size of a dot, pixels.")] = drawn["dot_px"],
+        shape: Annotated[str, typer.Option(help="Of a dot: disc, square or gaussian.")] = drawn["shape"],
+        colour: Annotated[str, typer.Option(help="Of the dots.")] = _hexadecimal(drawn["colour"]),
+        background: Annotated[str, typer.Option(help="Colour behind the dots.")] = _hexadecimal(
+            drawn["background"]
+        ),
+        hard: Annotated[bool, typer.Option("--hard", help="Dots without smooth edges.")] = False,
+        lossless: Annotated[
+            bool, typer.Option("--lossless", help="display.mkv (FFV1) in place of display.mp4.")
+        ] = False,
+        png: Annotated[bool, typer.Option("--png", help="Also pictures with alpha, in frames/.")] = False,
         out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("memo-out/pointlight"),
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
@@ -107,10 +159,14 @@ def add_pointlight(app: "typer.Typer") -> None:
             "elevation_deg": elevation_deg,
             "px_per_m": px_per_m,
             "locomotion": locomotion,
+            "cycles": cycles,
+            "tempo": tempo,
             "inverted": inverted,
             "mirrored": mirrored,
             "reversed": reversed_,
             "scramble_position": scramble_position,
+            "scramble_axes": scramble_axes,
+            "scramble_limit_px": scramble_limit_px,
             "scramble_phase": "periodic" if scramble_phase else None,
             "period_s": period,
             "lifetime_frames": lifetime,
@@ -126,46 +182,88 @@ def add_pointlight(app: "typer.Typer") -> None:
             "--dots needs --lifetime": dots is not None and lifetime is None,
             "--on needs --lifetime": on is not None and lifetime is None,
             "--noise-kind needs --noise-dots": noise_kind is not None and not noise_dots,
-            "--seconds cannot be used with MOTION": seconds is not None and motion is not None,
+            "--scramble-axes needs --scramble-position": scramble_axes is not None and not scramble_position,
+            "--scramble-limit-px needs --scramble-position": scramble_limit_px is not None
+            and not scramble_position,
+            "--seconds cannot be used with MOTION": seconds is not None and bool(motion),
+            "--seconds cannot be used with --cycles": seconds is not None and cycles is not None,
+            "--speed cannot be used with MOTION": speed is not None and bool(motion),
+            "--markers needs MOTION": markers is not None and not motion,
+            "--tempo needs MOTION and --cycles": tempo is not None and not (motion and cycles),
+            "--apart-m needs several MOTION": apart_m is not None and len(motion or ()) < 2,
+            "--period needs --scramble-phase, or MOTION and --cycles": period is not None
+            and not (scramble_phase or (motion and cycles)),
         }
 
         def work() -> Exit:
             for says, is_so in idle.items():
                 if is_so:
                     raise InputError(says)
-            return _pointlight(motion, _SECONDS if seconds is None else seconds, fps, options, delivery)
+            if period is not None and not (period > 0 and math.isfinite(period)):
+                raise InputError(f"--period {period:g} must be positive and finite")
+            picture = {
+                "size_px": _numbers("--size", size, "x", int),
+                "centre_px": None if centre is None else _numbers("--centre", centre, ",", float),
+                "dot_px": dot_px,
+                "shape": shape,
+                "colour": _rgb("--colour", colour),
+                "background": _rgb("--background", background),
+                "smooth": not hard,
+            }
+            notes: list[str] = []
+            if motion:
+                actors, notes = _read_actors(motion, markers, fps)
+            else:
+                length_s = _SECONDS if seconds is None else seconds
+                actors = [_walker_points(length_s, fps, cycles is not None, speed)]
+            display, names = _display_of(actors, options, apart_m)
+            return _deliver(display, names, options, picture, (lossless, png), notes, delivery)
 
         raise typer.Exit(guarded(work))
 
 
-def _pointlight(
-    motion: Path | None, seconds: float, fps: float | None, options: dict[str, Any], delivery: Delivery
+def _deliver(
+    display: memo._memo.PointLightDisplay,
+    names: list[str],
+    options: dict[str, Any],
+    picture: dict[str, Any],
+    also: tuple[bool, bool],
+    notes: Sequence[str],
+    delivery: Delivery,
 ) -> Exit:
+    from memo.display import frames_left, write_display_png, write_display_video
     from memo.linkage import Points, write_points_csv
-    from memo.linkage_plot import write_display_video
 
-    notes: Sequence[str] = ()
-    _check_period(options["period_s"], options["scramble_phase"] is not None)
-    if motion is None:
-        points = _walker_points(
-            seconds, memo._memo.defaults("walker_motion")["rate_hz"] if fps is None else fps
-        )
-    else:
-        points, notes = _read_points(motion, fps)
-    out = delivery.out
+    out, (lossless, png) = delivery.out, also
+    display.frames(stop=0, **picture)  # refuses a bad picture before anything is written
     check_writable(out)
-    display = _new_display(points, options)
     shown, labels = display.positions_px, display.labels
     stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
-    named = [points.names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
-    write_points_csv(out / "dots.csv", Points(named, display.times_s, shown))
-    _write_labels(out / "labels.csv", points.names, named, display)
-    write_display_video(out / "display.mp4", display.times_s, shown)
-    written = [out / "dots.csv", out / "labels.csv", out / "display.mp4"]
-    summary = {"dots": shown.shape[1], "frames": shown.shape[0], "notes": list(notes)}
-    delivery.tell(
-        summary, [*notes, f"{counted(shown.shape[1], 'dot')} in {counted(shown.shape[0], 'frame')}."], written
-    )
+    named = [names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
+    written = [out / "dots.csv", out / "labels.csv", out / f"display.{'mkv' if lossless else 'mp4'}"]
+    write_points_csv(written[0], Points(named, display.times_s, shown))
+    _write_labels(written[1], names, named, display)
+    write_display_video(written[2], display, lossless=lossless, **picture)
+    if png:
+        write_display_png(out / "frames", display, **picture)
+        written.append(out / "frames")
+    lines = [*notes, f"{counted(shown.shape[1], 'dot')} in {counted(shown.shape[0], 'frame')}."]
+    left, (width, height) = frames_left(display, picture["size_px"], picture["centre_px"])
+    if left:
+        lines.append(
+            f"Dots leave the picture in {counted(left, 'frame')}; --size {width}x{height} holds them."
+        )
+    if display.period_s is not None:
+        lines.append(f"The cycle of {display.period_s:.4g} s loops.")
+    summary = {
+        "dots": shown.shape[1],
+        "frames": shown.shape[0],
+        "period_s": display.period_s,
+        "centre_px": list(display.centre_px),
+        "frames_with_dots_outside": left,
+        "notes": list(notes),
+    }
+    delivery.tell(summary, lines, written)
     scrambled = options["scramble_position"] or options["scramble_phase"]
     if delivery.talks and stays and not scrambled and len(shown) >= FEWEST_FRAMES:
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
@@ -173,33 +271,120 @@ def _pointlight(
     return Exit.DONE
 
 
-def _read_points(path: Path, fps: float | None) -> tuple[Any, Sequence[str]]:
+def _hexadecimal(colour: tuple[int, int, int]) -> str:
+    return "#" + "".join(f"{channel:02x}" for channel in colour)
+
+
+def _rgb(option: str, text: str) -> tuple[int, int, int]:
+    from PIL import ImageColor
+
+    try:
+        red, green, blue = ImageColor.getrgb(text)[:3]
+    except ValueError:
+        raise InputError(f"{option} {text}: wanted a colour such as #ffcc00 or white") from None
+    return red, green, blue
+
+
+def _numbers(option: str, text: str, separator: str, kind: type[int] | type[float]) -> tuple[Any, Any]:
+    try:
+        first, second = (kind(part) for part in text.split(separator))
+    except ValueError:
+        wanted = "640x480" if kind is int else "120.5,-80"
+        raise InputError(f"{option} {text}: wanted two numbers such as {wanted}") from None
+    if kind is int and min(first, second) < 1:
+        raise InputError(f"{option} {text}: wanted a width and height of at least 1")
+    return first, second
+
+
+def _read_actors(paths: list[Path], markers: Path | None, fps: float | None) -> tuple[list[Any], list[str]]:
+    """The points of each file, cut to the length of the shortest."""
+    read = [_read_points(path, markers, fps) for path in paths]
+    actors, notes = (
+        [points for points, _ in read],
+        list(dict.fromkeys(note for _, own in read for note in own)),
+    )
+    shortest = min(len(points.times_s) for points in actors)
+    if any(len(points.times_s) > shortest for points in actors):
+        notes.append(f"Cut to {counted(shortest, 'frame')}, the length of the shortest motion.")
+    if len(actors) == 1:
+        return actors, notes
+    clocks = [points.times_s[:shortest] - points.times_s[0] for points in actors]
+    for path, clock in zip(paths, clocks, strict=True):
+        if not np.allclose(clock, clocks[0], atol=_SAME_TIME_S):
+            raise InputError(f"{path}: has other times than {paths[0]}: give motions of one frame rate")
+    cut = [replace(one, times_s=clocks[0], positions=one.positions[:shortest]) for one in actors]
+    return cut, notes
+
+
+def _read_points(path: Path, markers: Path | None, fps: float | None) -> tuple[Any, Sequence[str]]:
     """All points of a table; of a motion file or the folder of a track, only the joints."""
     from memo.formats import READERS, FormatError, read_motion
-    from memo.formats.names import joint_points
+    from memo.formats.names import joint_points, mapped_points, read_marker_map
     from memo.linkage import Points, read_points_csv
 
     if not path.exists():
         raise InputError(nothing_at(path, "file or folder"))
+    wanted = None if markers is None else read_marker_map(markers)
+    notes: Sequence[str] = ()
     if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
-        return read_points_csv(path, 3, fps), ()
-    motion = read_motion(path)
-    if fps is not None:
-        raise InputError(f"{path}: already has times: leave --fps out")
+        points = read_points_csv(path, 3, fps)
+    else:
+        motion = read_motion(path)
+        if fps is not None:
+            raise InputError(f"{path}: already has times: leave --fps out")
+        if wanted is None:
+            try:
+                motion = joint_points(motion)
+            except FormatError as error:
+                raise InputError(f"{path}: {error}; name the markers of each joint with --markers") from None
+        points, notes = Points(list(motion.names), motion.times_s, motion.points), motion.notes
+    if wanted is None:
+        return points, notes
     try:
-        joints = joint_points(motion)
+        names, positions = mapped_points(points.names, points.positions, wanted)
     except FormatError as error:
         raise InputError(f"{path}: {error}") from None
-    return Points(list(joints.names), joints.times_s, joints.points), motion.notes
+    return Points(names, points.times_s, positions), notes
 
 
-def _check_period(period_s: float | None, scrambles_phase: bool) -> None:
-    if period_s is None:
-        return
-    if not (period_s > 0 and math.isfinite(period_s)):
-        raise InputError(f"--period {period_s:g} must be positive and finite")
-    if not scrambles_phase:
-        raise InputError("--period needs --scramble-phase")
+def _display_of(
+    actors: list[Any], options: dict[str, Any], apart_m: float | None
+) -> tuple[memo._memo.PointLightDisplay, list[str]]:
+    """One display of all actors, each with its own seed, and the names of all points."""
+    displays = [
+        memo.pointlight(
+            np.ascontiguousarray(points.positions, dtype=np.float64),
+            points.times_s,
+            points.names,
+            **{**options, "seed": options["seed"] + index},
+        )
+        for index, points in enumerate(actors)
+    ]
+    if len(displays) == 1:
+        return displays[0], actors[0].names
+    offsets = None
+    if apart_m is not None:
+        middle = np.mean([display.centre_px for display in displays], axis=0)
+        sides = (np.arange(len(displays)) - (len(displays) - 1) / 2) * apart_m * options["px_per_m"]
+        offsets = [
+            (middle[0] - display.centre_px[0] + side, middle[1] - display.centre_px[1])
+            for display, side in zip(displays, sides, strict=True)
+        ]
+    names = [f"actor{index}_{name}" for index, points in enumerate(actors, 1) for name in points.names]
+    return memo.pointlight_together(displays, offsets), names
+
+
+def _walker_points(seconds: float, fps: float | None, one_cycle: bool, speed: float | None) -> Any:
+    from memo.linkage import Points
+
+    rate_hz = memo._memo.defaults("walker_motion")["rate_hz"] if fps is None else fps
+    if one_cycle:
+        walk = memo.walker_motion(cycles=1, rate_hz=rate_hz, speed_mps=speed)
+    else:
+        if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
+            raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
+        walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz, speed_mps=speed)
+    return Points(walk.names, walk.times_s, walk.positions)
 
 
 def _write_labels(
@@ -214,17 +399,3 @@ def _write_labels(
             limb = [names[end], f"{display.fractions[frame, dot]:.4f}"] if end >= 0 else ["", ""]
             rows.append([frame, dots[dot], shows, *limb, int(display.visible[frame, dot])])
     write_table(path, ["frame", "dot", "shows", "limb_end", "fraction", "visible"], rows)
-
-
-def _new_display(points: Any, options: dict[str, Any]) -> memo._memo.PointLightDisplay:
-    positions = np.ascontiguousarray(points.positions, dtype=np.float64)
-    return memo.pointlight(positions, points.times_s, points.names, **options)
-
-
-def _walker_points(seconds: float, rate_hz: float) -> Any:
-    from memo.linkage import Points
-
-    if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
-        raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
-    walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz)
-    return Points(walk.names, walk.times_s, walk.positions)

@@ -10,16 +10,27 @@ the femur, is the hip).
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import tomllib
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from memo import _memo
 from memo.files import JOINTS
 from memo.formats.motion import FormatError, Motion, Up
 
-__all__ = ["SHORT", "joint_points", "joints_found", "standing_up"]
+__all__ = [
+    "SHORT",
+    "joint_points",
+    "joints_found",
+    "mapped_points",
+    "read_marker_map",
+    "standing_up",
+]
 
 _PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 
@@ -123,6 +134,63 @@ def joint_points(motion: Motion) -> Motion:
     kept = [*JOINTS, *(("head",) if "head" in found else ())]
     names = tuple(SHORT.get(joint, joint.upper()) for joint in kept)
     return replace(motion, names=names, points=motion.points[:, [found[joint] for joint in kept]])
+
+
+def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
+    """The markers of each joint from a TOML file: `right_hip = "RASI"`, or a list whose mean is the joint."""
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FormatError(f"{path}: not TOML: {error}") from None
+    markers = {}
+    for joint, value in table.items():
+        names = [value] if isinstance(value, str) else value
+        if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
+            raise FormatError(
+                f"{path}: {joint}: wanted the name of a marker or a list of names, got {value!r}"
+            )
+        markers[joint] = tuple(names)
+    return markers
+
+
+def mapped_points(
+    names: Sequence[str], points: npt.NDArray[np.float64], markers: Mapping[str, Sequence[str]]
+) -> tuple[list[str], npt.NDArray[np.float64]]:
+    """Names of joints and their points (T, K, D), each the mean of its markers, NaN where one is missing.
+
+    The joints have memo's short names. Raises `FormatError` for joints that memo does not know and for
+    markers that do not exist; a marker may be named without its subject ("RKNE" for "Anna:RKNE") and in any
+    case.
+    """
+    exact = {name: index for index, name in reversed(list(enumerate(names)))}
+    plain = {_letters(name): index for index, name in reversed(list(enumerate(names)))}
+    try:
+        spelt = {joint: _memo.joint_name(joint) for joint in markers}
+    except ValueError as error:
+        raise FormatError(str(error)) from None
+    unknown = [joint for joint, name in spelt.items() if name is None]
+    if unknown or not markers:
+        known = ", ".join([*JOINTS, "head"])
+        raise FormatError(f"joints of memo wanted ({known}), got {', '.join(unknown) or 'none'}")
+    twice = [joint for joint, count in Counter(spelt.values()).items() if count > 1]
+    if twice:
+        raise FormatError(f"joints with two entries: {listed([str(joint) for joint in twice])}")
+    absent = [
+        f"{name} ({joint})"
+        for joint, wanted in markers.items()
+        for name in wanted
+        if name not in exact and _letters(name) not in plain
+    ]
+    if absent:
+        raise FormatError(f"no points for {', '.join(absent)}; the file has {listed(names)}")
+    places = [
+        [exact.get(name, plain.get(_letters(name), 0)) for name in wanted] for wanted in markers.values()
+    ]
+    joints = [str(spelt[joint]) for joint in markers]
+    means = [points[:, place].mean(axis=1) for place in places]
+    return [SHORT.get(joint, joint.upper()) for joint in joints], np.stack(means, axis=1)
 
 
 def listed(names: Sequence[str], most: int = 40) -> str:

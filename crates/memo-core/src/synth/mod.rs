@@ -11,8 +11,9 @@ pub use motion::{
     MotionError, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, WALKER_LIMBS, limbs_of, sampled_walk,
 };
 pub use pointlight::{
-    DisplayView, DotSource, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble,
-    PointLightDisplay, PointLightError, PointLightOptions, point_light_display,
+    CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
+    NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay, PointLightError, PointLightOptions,
+    PositionScramble, ScrambleAxes, displays_together, point_light_display,
 };
 pub use random::Random;
 pub use scene::{SceneError, SceneOptions, SynthScene, Truth, Uneven};

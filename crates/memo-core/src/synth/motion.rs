@@ -209,6 +209,11 @@ impl PointMotion {
         Self { positions, ..self.clone() }
     }
 
+    /// Other positions of the same points, frame after frame, at other times.
+    pub(super) fn replaced(&self, positions: Vec<DVec3>, times_s: Vec<f64>) -> Self {
+        Self { positions, names: self.names.clone(), times_s }
+    }
+
     /// The first `frames` frames.
     pub(super) fn truncated(mut self, frames: usize) -> Self {
         self.positions.truncate(frames * self.points());
@@ -249,6 +254,21 @@ impl Default for SampledWalkOptions {
 }
 
 impl SampledWalkOptions {
+    /// The same with a whole number of cycles, each of a whole number of frames, at the nearest possible speed.
+    ///
+    /// # Errors
+    ///
+    /// No cycle, or a speed, rate or stride that is not positive and finite.
+    pub fn of_whole_cycles(self, walker: &Walker, cycles: usize) -> Result<Self, MotionError> {
+        let in_cycle = (self.cycle_s(walker) * self.rate_hz).round().max(1.0);
+        let frames = in_cycle * cycles as f64;
+        if !(1.0..=MOST_FRAMES as f64).contains(&frames) {
+            return Err(MotionError::Walk { parameter: "number of frames", value: frames });
+        }
+        let speed_mps = stride_length_m(walker) * self.rate_hz / in_cycle;
+        Ok(Self { frames: frames as usize, speed_mps, ..self })
+    }
+
     /// Duration of one gait cycle of this walker, seconds.
     pub fn cycle_s(&self, walker: &Walker) -> f64 {
         stride_length_m(walker) / self.speed_mps

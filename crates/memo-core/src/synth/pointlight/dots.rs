@@ -1,9 +1,7 @@
 //! Dots: all points of the figure, dots of limited lifetime on it, and noise dots around it.
 
 use super::figure::{Extent, Figure};
-use super::{
-    DotSource, LifeSites, LimitedLife, NoiseDots, NoiseKind, PointLightDisplay, PointLightError, below,
-};
+use super::{DotSource, LifeSites, LimitedLife, NoiseDots, NoiseKind, PointLightError, below};
 use crate::synth::Random;
 use crate::synth::motion::{PointMotion, limbs_of};
 use glam::DVec2;
@@ -87,7 +85,7 @@ pub(super) fn noise_layer(
     let new_dot = |i: usize, since: usize, random: &mut Random| {
         let point = seen[if life.is_some() { below(random, seen.len()) } else { i % seen.len() }];
         let place = match noise.kind {
-            NoiseKind::ScrambledWalker => body.draw_shift(&trajectories[point], random),
+            NoiseKind::ScrambledWalker => body.shifts_of(&trajectories[point]).draw(random),
             NoiseKind::Linear { .. } | NoiseKind::Flicker => screen.draw(random),
         };
         NoiseDot { place, point, since, direction_rad: random.uniform(0.0, TAU) }
@@ -147,17 +145,17 @@ fn wrapped(point: DVec2, area: &Extent) -> DVec2 {
     DVec2::new(wrap(point.x, area.low.x, side.x), wrap(point.y, area.low.y, side.y))
 }
 
-/// The dots of two layers in one display.
-pub(super) fn beside(first: Layer, second: Layer, times_s: Vec<f64>) -> PointLightDisplay {
+/// The dots of two layers beside each other: their number, positions and sources.
+pub(super) fn beside(first: Layer, second: Layer, frames: usize) -> (usize, Vec<DVec2>, Vec<DotSource>) {
     let dots = first.dots + second.dots;
-    let mut positions_px = Vec::with_capacity(dots * times_s.len());
-    let mut sources = Vec::with_capacity(dots * times_s.len());
-    for frame in 0..times_s.len() {
+    let mut positions = Vec::with_capacity(dots * frames);
+    let mut sources = Vec::with_capacity(dots * frames);
+    for frame in 0..frames {
         for layer in [&first, &second] {
             let row = frame * layer.dots..(frame + 1) * layer.dots;
-            positions_px.extend_from_slice(&layer.positions[row.clone()]);
+            positions.extend_from_slice(&layer.positions[row.clone()]);
             sources.extend_from_slice(&layer.sources[row]);
         }
     }
-    PointLightDisplay { times_s, dots, positions_px, sources }
+    (dots, positions, sources)
 }

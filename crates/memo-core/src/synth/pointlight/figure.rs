@@ -1,6 +1,6 @@
 //! The points of a motion in the image, and the areas they cover.
 
-use super::{DisplayView, DotSource, PointLightError};
+use super::{DisplayView, DotSource, PointLightError, PositionScramble, ScrambleAxes};
 use crate::synth::Random;
 use crate::synth::motion::PointMotion;
 use glam::{DVec2, DVec3};
@@ -40,10 +40,10 @@ impl Extent {
         self.low + DVec2::new(x, y) * (self.high - self.low)
     }
 
-    /// A shift that moves `part` to a random position within this extent, if it fits.
-    pub fn draw_shift(&self, part: &Self, random: &mut Random) -> DVec2 {
+    /// The shifts that keep `part` within this extent, if it fits.
+    pub fn shifts_of(&self, part: &Self) -> Self {
         let (least, most) = (self.low - part.low, self.high - part.high);
-        Self { low: least.min(most), high: least.max(most) }.draw(random)
+        Self { low: least.min(most), high: least.max(most) }
     }
 }
 
@@ -93,18 +93,33 @@ impl Figure {
         Extent::of((0..self.positions.len()).map(|i| self.positions[i] - self.path[i / self.points]))
     }
 
-    pub fn scramble_positions(&mut self, random: &mut Random) {
+    /// The rectangle that the figure covers over all frames.
+    pub fn extent(&self) -> Extent {
+        Extent::of(self.positions.iter().copied())
+    }
+
+    pub fn scramble_positions(&mut self, scramble: &PositionScramble, random: &mut Random) {
         let body = self.body_extent();
+        let limit = DVec2::splat(scramble.limit_px.unwrap_or(f64::INFINITY));
+        let free = match scramble.axes {
+            ScrambleAxes::Both => DVec2::ONE,
+            ScrambleAxes::Horizontal => DVec2::X,
+            ScrambleAxes::Vertical => DVec2::Y,
+        };
         for k in 0..self.points {
             let own = self.trajectory_extent(k);
-            let shift = if own.is_empty() { DVec2::ZERO } else { body.draw_shift(&own, random) };
+            if own.is_empty() {
+                continue;
+            }
+            let Extent { low, high } = body.shifts_of(&own);
+            let allowed = Extent { low: low.clamp(-limit, limit), high: high.clamp(-limit, limit) };
+            let shift = allowed.draw(random) * free;
             self.positions.iter_mut().skip(k).step_by(self.points).for_each(|p| *p += shift);
         }
     }
 
-    /// Mirrors about the centre of all points, along each axis where `sign` is -1.
-    pub fn flip(&mut self, sign: DVec2) {
-        let middle = Extent::of(self.positions.iter().copied()).middle();
+    /// Mirrors about a point, along each axis where `sign` is -1.
+    pub fn flip(&mut self, middle: DVec2, sign: DVec2) {
         for p in self.positions.iter_mut().chain(&mut self.path) {
             *p = middle + (*p - middle) * sign;
         }

@@ -4,30 +4,36 @@
 //! (inversion); Cutting, Moore and Morrison 1988 (masks of scrambled walkers); Neri, Morrone and Burr 1998
 //! and Beintema and Lappe 2002 (limited lifetime); van Boxtel and Lu 2013 (the usual set of options).
 //!
-//! The steps, in order: time reversal, locomotion, phase scrambling (in space); projection; position
-//! scrambling, inversion and mirroring (in the image); limited lifetime; noise dots; pixel noise. Every step
-//! uses its own random stream of the seed, so that switching one step on does not change the others.
+//! The steps, in order: repetition of a cycle, time reversal, locomotion, phase scrambling (in space);
+//! projection; position scrambling, inversion and mirroring (in the image); limited lifetime; noise dots;
+//! pixel noise. Every step uses its own random stream of the seed, so that switching one step on does not
+//! change the others. A [`DotPicture`] draws the dots at the scale of the display, whatever its extent.
 //!
 //! Limits: the body does not hide dots (Cutting's walker hid dots behind a limb); mark hidden points as NaN
-//! in the motion. This module does not render images.
+//! in the motion.
 
+mod course;
+mod cycle;
 mod dots;
 mod figure;
-mod motion;
 mod options;
+mod period;
+mod picture;
 
 pub use options::{
-    DisplayView, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble, PointLightError,
-    PointLightOptions,
+    CycleOptions, DisplayView, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble,
+    PointLightError, PointLightOptions, PositionScramble, ScrambleAxes,
 };
+pub use picture::{DotPicture, DotShape};
 
 use super::motion::PointMotion;
 use super::random::Random;
 use crate::option_error::OptionError;
+use course::Course;
+use cycle::closed_cycle;
 use dots::{Layer, all_points, beside, limbs, limited, noise_layer};
 use figure::Figure;
 use glam::DVec2;
-use motion::{phase_scrambled, without_advance};
 use std::f64::consts::FRAC_PI_2;
 
 /// Largest number of dots over all frames.
@@ -52,6 +58,13 @@ pub struct PointLightDisplay {
     pub times_s: Vec<f64>,
     /// Number of dots N.
     pub dots: usize,
+    /// Number of points of the motion, or of all motions of a display of several.
+    pub points: usize,
+    /// Pixel that belongs in the middle of a picture of the display: the middle of the figure before
+    /// scrambling and noise, or of the camera's picture. Controls of the same motion have the same one.
+    pub centre_px: DVec2,
+    /// Duration of the cycle that the display repeats, seconds.
+    pub period_s: Option<f64>,
     /// Pixel positions (u, v), frame after frame, T x N; NaN where the dot is not visible.
     pub positions_px: Vec<DVec2>,
     /// What each dot shows, T x N.
@@ -86,22 +99,21 @@ pub fn point_light_display(
     motion: &PointMotion,
     options: &PointLightOptions,
 ) -> Result<PointLightDisplay, PointLightError> {
-    checked(motion, options)?;
-    let mut motion = motion.clone();
-    if options.is_reversed {
-        let last = motion.frames() - 1;
-        let forward = motion.clone();
-        motion = motion.map(|t, k, _| forward.positions()[(last - t) * forward.points() + k]);
-    }
-    motion = without_advance(motion, options.locomotion);
-    if let Some(scramble) = &options.scrambles_phase {
-        motion = phase_scrambled(&motion, scramble, &mut stream(options.seed, 1))?;
-    }
+    checked(options)?;
+    let (course, period_s) = course_of(motion, options)?;
+    check_dots(course.still.frames(), motion, options)?;
+    let unscrambled = course.clone().shown(options.locomotion);
+    let centre_px = match &options.view {
+        DisplayView::Perspective(camera) => 0.5 * (DVec2::from(camera.size.map(f64::from)) - 1.0),
+        DisplayView::Orthographic { .. } => Figure::seen(&unscrambled, &options.view)?.extent().middle(),
+    };
+    let motion = phase_scrambled(course, period_s, options)?.shown(options.locomotion);
     let mut figure = Figure::seen(&motion, &options.view)?;
-    if options.scrambles_position {
-        figure.scramble_positions(&mut stream(options.seed, 2));
+    let middle = figure.extent().middle();
+    if let Some(scramble) = &options.scrambles_position {
+        figure.scramble_positions(scramble, &mut stream(options.seed, 2));
     }
-    figure.flip(DVec2::new(sign(options.is_mirrored), sign(options.is_inverted)));
+    figure.flip(middle, DVec2::new(sign(options.is_mirrored), sign(options.is_inverted)));
     let shown = match &options.limited_life {
         Some(life) => limited(&figure, life, limbs(&motion, life)?, &mut stream(options.seed, 3)),
         None => all_points(&figure),
@@ -111,7 +123,110 @@ pub fn point_light_display(
         let interval_s = motion.frame_interval_s();
         noise_layer(&figure, &noise, life, interval_s, &mut stream(options.seed, 4))
     });
-    let mut display = beside(shown, noise, motion.times_s().to_vec());
+    let (dots, positions_px, sources) = beside(shown, noise, motion.frames());
+    let (times_s, points) = (motion.times_s().to_vec(), motion.points());
+    let mut display = PointLightDisplay { times_s, dots, points, centre_px, period_s, positions_px, sources };
+    add_noise(&mut display, options);
+    Ok(display)
+}
+
+/// The displays of several actors as one; `offsets_px` are added to the positions of each. Indices of points
+/// count on from one display to the next.
+///
+/// # Errors
+///
+/// No display, not one offset for each, offsets that are not finite, or displays with different times.
+pub fn displays_together(
+    displays: &[PointLightDisplay],
+    offsets_px: &[DVec2],
+) -> Result<PointLightDisplay, PointLightError> {
+    let (count, offsets) = (displays.len(), offsets_px.len());
+    let Some(first) = displays.first().filter(|_| count == offsets) else {
+        return Err(PointLightError::Actors { displays: count, offsets });
+    };
+    let is_far = |offset: &DVec2| !(offset.abs().max_element() <= 1e6);
+    if let Some(offset) = offsets_px.iter().find(|offset| is_far(offset)) {
+        let wanted = "at most 1,000,000 pixels";
+        let got = offset.abs().max_element();
+        return Err(PointLightError::Option(OptionError { name: "offsets_px", wanted, got }));
+    }
+    let frames = first.times_s.len();
+    if let Some(actor) = displays.iter().position(|other| other.times_s != first.times_s) {
+        return Err(PointLightError::Clocks { actor, frames, others: displays[actor].times_s.len() });
+    }
+    let mut all = PointLightDisplay {
+        dots: displays.iter().map(|display| display.dots).sum(),
+        points: displays.iter().map(|display| display.points).sum(),
+        centre_px: displays.iter().zip(offsets_px).map(|(one, by)| one.centre_px + *by).sum::<DVec2>()
+            / count as f64,
+        period_s: first.period_s.filter(|_| displays.iter().all(|other| other.period_s == first.period_s)),
+        times_s: first.times_s.clone(),
+        positions_px: Vec::new(),
+        sources: Vec::new(),
+    };
+    for frame in 0..frames {
+        let mut points = 0;
+        for (display, offset) in displays.iter().zip(offsets_px) {
+            let row = frame * display.dots..(frame + 1) * display.dots;
+            all.positions_px.extend(display.positions_px[row.clone()].iter().map(|p| *p + *offset));
+            all.sources.extend(display.sources[row].iter().map(|source| source.counted_from(points)));
+            points += display.points;
+        }
+    }
+    Ok(all)
+}
+
+impl DotSource {
+    /// The same with indices of points counted from `points`.
+    fn counted_from(self, points: usize) -> Self {
+        match self {
+            Self::Joint(k) => Self::Joint(k + points),
+            Self::Limb([a, b], fraction) => Self::Limb([a + points, b + points], fraction),
+            Self::Noise(copied) => Self::Noise(copied.map(|k| k + points)),
+        }
+    }
+}
+
+/// The motion, or its repeated cycle with its duration, in the direction of time and with the pelvis as asked
+/// for.
+fn course_of(
+    motion: &PointMotion,
+    options: &PointLightOptions,
+) -> Result<(Course, Option<f64>), PointLightError> {
+    let (repetitions, tempo) = match (&options.cycles, &options.scrambles_phase) {
+        (Some(repeated), _) => (Some(repeated.cycles), repeated.tempo),
+        (None, Some(PhaseScramble::Periodic)) => (None, 1.0),
+        (None, _) => return Ok((prepared(Course::of(motion), options), None)),
+    };
+    let cycle = closed_cycle(motion, options.period_s, tempo)?;
+    let frames = repetitions.map_or(motion.frames(), |cycles| cycle.frames.saturating_mul(cycles));
+    check_dots(frames, motion, options)?;
+    Ok((prepared(cycle.repeated(frames, motion), options), Some(cycle.period_s())))
+}
+
+fn prepared(course: Course, options: &PointLightOptions) -> Course {
+    let course = if options.is_reversed { course.reversed() } else { course };
+    if options.locomotion == Locomotion::PelvisFixed { course.fixed() } else { course }
+}
+
+fn phase_scrambled(
+    course: Course,
+    period_s: Option<f64>,
+    options: &PointLightOptions,
+) -> Result<Course, PointLightError> {
+    let mut random = stream(options.seed, 1);
+    match (options.scrambles_phase, period_s) {
+        (Some(PhaseScramble::Periodic), Some(period_s)) => {
+            let interval_s = course.still.frame_interval_s();
+            let period = if interval_s > 0.0 { (period_s / interval_s).round() as usize } else { 1 };
+            Ok(course.shifted_within(period.max(1), &mut random))
+        }
+        (Some(PhaseScramble::Shortened { max_shift_s }), _) => course.shortened(max_shift_s, &mut random),
+        _ => Ok(course),
+    }
+}
+
+fn add_noise(display: &mut PointLightDisplay, options: &PointLightOptions) {
     if options.noise_sd_px > 0.0 {
         let mut random = stream(options.seed, 5);
         for p in &mut display.positions_px {
@@ -119,7 +234,6 @@ pub fn point_light_display(
             *p += DVec2::new(f64::from(du), f64::from(dv)) * options.noise_sd_px;
         }
     }
-    Ok(display)
 }
 
 /// The random stream of one step.
@@ -136,7 +250,7 @@ fn below(random: &mut Random, count: usize) -> usize {
     (random.uniform(0.0, count as f64) as usize).min(count - 1)
 }
 
-fn checked(motion: &PointMotion, options: &PointLightOptions) -> Result<(), PointLightError> {
+fn checked(options: &PointLightOptions) -> Result<(), PointLightError> {
     let refuse = |parameter, wanted, value| {
         Err(PointLightError::Option(OptionError { name: parameter, wanted, got: value }))
     };
@@ -154,15 +268,10 @@ fn checked(motion: &PointMotion, options: &PointLightOptions) -> Result<(), Poin
     if !(0.0..=1e6).contains(&options.noise_sd_px) {
         return refuse("noise_sd_px", "from 0 to 1,000,000 pixels", options.noise_sd_px);
     }
-    let mut dots = motion.points();
-    if let Some(life) = &options.limited_life {
-        if life.dots == 0 || life.frames == 0 {
-            return refuse("dots and frames of a limited life", "at least 1", 0.0);
-        }
-        if life.sites == LifeSites::Joints && life.dots >= motion.points() {
-            return Err(PointLightError::NoFreeJoint { dots: life.dots, points: motion.points() });
-        }
-        dots = life.dots;
+    if let Some(life) = &options.limited_life
+        && (life.dots == 0 || life.frames == 0)
+    {
+        return refuse("dots and frames of a limited life", "at least 1", 0.0);
     }
     if let Some(noise) = &options.noise_dots {
         if !(noise.area_scale > 0.0 && noise.area_scale <= 1000.0) {
@@ -173,10 +282,38 @@ fn checked(motion: &PointMotion, options: &PointLightOptions) -> Result<(), Poin
         {
             return refuse("speed of the noise dots", "at most 1,000,000 pixels a second", speed_px_s);
         }
-        dots = dots.saturating_add(noise.count);
     }
-    let frames = motion.frames();
-    if dots.saturating_mul(frames) > MOST_DOTS {
+    if let Some(limit_px) = options.scrambles_position.and_then(|scramble| scramble.limit_px)
+        && !(limit_px > 0.0 && limit_px <= 1e6)
+    {
+        return refuse("scramble_limit_px", "positive and at most 1,000,000 pixels", limit_px);
+    }
+    if options.cycles.as_ref().is_some_and(|repeated| repeated.cycles == 0) {
+        return refuse("cycles", "at least 1", 0.0);
+    }
+    let is_periodic = options.scrambles_phase == Some(PhaseScramble::Periodic);
+    match options.period_s {
+        Some(_) if options.cycles.is_none() && !is_periodic => Err(PointLightError::IdlePeriod),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses more dots than can be stored, and more than there are places for.
+fn check_dots(
+    frames: usize,
+    motion: &PointMotion,
+    options: &PointLightOptions,
+) -> Result<(), PointLightError> {
+    let points = motion.points();
+    let mut dots = points;
+    if let Some(life) = &options.limited_life {
+        if life.sites == LifeSites::Joints && life.dots >= points {
+            return Err(PointLightError::NoFreeJoint { dots: life.dots, points });
+        }
+        dots = life.dots;
+    }
+    let dots = dots.saturating_add(options.noise_dots.map_or(0, |noise| noise.count));
+    if dots.max(points).saturating_mul(frames) > MOST_DOTS {
         return Err(PointLightError::TooMany { dots, frames });
     }
     Ok(())

@@ -23,6 +23,39 @@ pub enum PointLightError {
         /// Length of the motion, seconds.
         available_s: f64,
     },
+    /// The motion does not repeat itself.
+    #[error(
+        "no period found up to {searched_s:.2} s: at the best lag, the mismatch is {mismatch:.2} of that of unrelated \
+         positions (at most 0.2 wanted); give period_s, or shift the phases with \"shortened\""
+    )]
+    NoPeriod {
+        /// Mismatch at the best lag, as a share of that of unrelated positions; infinite if no lag is better
+        /// than those around it.
+        mismatch: f64,
+        /// Longest lag searched, seconds.
+        searched_s: f64,
+    },
+    /// There is a period, but no cycle is repeated and no phase is shifted by it.
+    #[error("period_s has an effect only with cycles or with scramble_phase \"periodic\"")]
+    IdlePeriod,
+    /// Displays of several actors need one offset for each.
+    #[error("wanted displays with an offset each, got {} and {}", counted(*displays, "display"), counted(*offsets, "offset"))]
+    Actors {
+        /// Number of displays.
+        displays: usize,
+        /// Number of offsets.
+        offsets: usize,
+    },
+    /// Displays of several actors have different times.
+    #[error("the display of actor {actor} has other times than that of actor 0: {} after {}", counted(*others, "frame"), counted(*frames, "frame"))]
+    Clocks {
+        /// Index of the actor.
+        actor: usize,
+        /// Number of frames of actor 0.
+        frames: usize,
+        /// Number of frames of this actor.
+        others: usize,
+    },
     /// The dots are on joints with a limited lifetime, and there is no free joint to jump to.
     #[error("nowhere to jump for {} on {}: fewer dots than joints wanted", counted(*dots, "dot"), counted(*points, "joint"))]
     NoFreeJoint {
@@ -102,21 +135,59 @@ pub enum Locomotion {
     PelvisFixed,
 }
 
-/// Phase scrambling: the trajectory of each point is shifted in time by its own random amount, relative to
-/// the horizontal path of the body.
+/// One cycle of the motion, repeated without a jump from its end to its start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CycleOptions {
+    /// Number of cycles, at least 1.
+    pub cycles: usize,
+    /// Speed as a multiple of that of the motion, 0.1 to 10. It is adjusted so that a cycle takes a whole number
+    /// of frames.
+    pub tempo: f64,
+}
+
+impl Default for CycleOptions {
+    fn default() -> Self {
+        Self { cycles: 1, tempo: 1.0 }
+    }
+}
+
+/// Phase scrambling: the trajectory of each point on the spot is shifted in time by its own random amount.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PhaseScramble {
-    /// The motion is periodic: shifts of up to one period, where later frames are taken from one period
-    /// earlier. The trajectory has no jump if the motion has this period.
-    Periodic {
-        /// The period, seconds; `None` for the whole motion (one cycle, or a whole number of cycles).
-        period_s: Option<f64>,
-    },
-    /// The motion is not periodic: shifts from 0 to this value, which also shortens the display.
+    /// Shifts of up to one period. The motion is one cycle, repeated without a jump.
+    Periodic,
+    /// Shifts from 0 to this value, for motions that are not periodic; the display becomes shorter.
     Shortened {
         /// Largest shift, seconds.
         max_shift_s: f64,
     },
+}
+
+/// The directions in which position scrambling moves points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScrambleAxes {
+    /// Horizontally and vertically.
+    Both,
+    /// Horizontally only: heights are kept.
+    Horizontal,
+    /// Vertically only.
+    Vertical,
+}
+
+/// Position scrambling: the trajectory of each point is shifted as a whole to a random position within the
+/// extent of the figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionScramble {
+    /// Directions of the shifts.
+    pub axes: ScrambleAxes,
+    /// Largest shift along each axis, pixels; `None` for the extent of the figure.
+    pub limit_px: Option<f64>,
+}
+
+impl Default for PositionScramble {
+    fn default() -> Self {
+        Self { axes: ScrambleAxes::Both, limit_px: None }
+    }
 }
 
 /// Positions of dots with limited lifetime.
@@ -210,10 +281,14 @@ pub struct PointLightOptions {
     pub is_mirrored: bool,
     /// Time-reversed.
     pub is_reversed: bool,
-    /// Position scrambling: the trajectory of each point is shifted as a whole to a random position within
-    /// the extent of the figure.
-    pub scrambles_position: bool,
-    /// Phase scrambling: the trajectory of each point is shifted in time.
+    /// Repetition of one cycle.
+    pub cycles: Option<CycleOptions>,
+    /// Period of the motion, seconds, for `cycles` and periodic phase scrambling. By default, the whole motion if
+    /// its end leads to its start, otherwise the lag at which the motion repeats itself best.
+    pub period_s: Option<f64>,
+    /// Position scrambling.
+    pub scrambles_position: Option<PositionScramble>,
+    /// Phase scrambling.
     pub scrambles_phase: Option<PhaseScramble>,
     /// Dots with limited lifetime.
     pub limited_life: Option<LimitedLife>,
@@ -232,7 +307,9 @@ impl Default for PointLightOptions {
             is_inverted: false,
             is_mirrored: false,
             is_reversed: false,
-            scrambles_position: false,
+            cycles: None,
+            period_s: None,
+            scrambles_position: None,
             scrambles_phase: None,
             limited_life: None,
             noise_dots: None,

@@ -96,7 +96,10 @@ fn inversion_flips_up_and_down_only_and_mirroring_left_and_right_only() {
 #[test]
 fn scrambled_positions_keep_every_local_motion_and_stay_in_the_figure() {
     let upright = display(PointLightOptions::default());
-    let scrambled = display(PointLightOptions { scrambles_position: true, ..PointLightOptions::default() });
+    let scrambled = display(PointLightOptions {
+        scrambles_position: Some(PositionScramble::default()),
+        ..PointLightOptions::default()
+    });
     let figure = Extent::of(upright.positions_px.iter().copied());
     let mut moved = 0;
     for k in 0..13 {
@@ -114,7 +117,7 @@ fn scrambled_positions_keep_every_local_motion_and_stay_in_the_figure() {
 fn phase_scrambling_shifts_whole_cycles_without_a_jump_and_keeps_the_mean_places() {
     let options = PointLightOptions { locomotion: Locomotion::PelvisFixed, ..PointLightOptions::default() };
     let upright = display(options.clone());
-    let scramble = Some(PhaseScramble::Periodic { period_s: None });
+    let scramble = Some(PhaseScramble::Periodic);
     let shifted = display(PointLightOptions { scrambles_phase: scramble, ..options });
     let mut shifts = Vec::new();
     for k in 0..13 {
@@ -212,7 +215,7 @@ fn noise_dots_copy_local_motions_or_drift_or_flicker() {
 fn seeds_repeat_and_options_do_not_disturb_each_other() {
     let options = PointLightOptions {
         seed: 3,
-        scrambles_position: true,
+        scrambles_position: Some(PositionScramble::default()),
         noise_dots: Some(NoiseDots::default()),
         noise_sd_px: 1.0,
         ..PointLightOptions::default()
@@ -233,7 +236,11 @@ fn unknown_points_are_unseen_dots() {
     positions[2] = DVec3::NAN;
     let motion = PointMotion::new(positions, cycle().names().to_vec(), cycle().times_s().to_vec()).unwrap();
     let noise_dots = Some(NoiseDots::default());
-    let options = PointLightOptions { scrambles_position: true, noise_dots, ..PointLightOptions::default() };
+    let options = PointLightOptions {
+        scrambles_position: Some(PositionScramble::default()),
+        noise_dots,
+        ..PointLightOptions::default()
+    };
     let shown = point_light_display(&motion, &options).unwrap();
     assert!(shown.at(0, 2).is_none() && shown.at(1, 2).is_some() && shown.at(0, 3).is_some());
     let nothing = motion.map(|_, _, _| DVec3::NAN);
@@ -255,9 +262,19 @@ fn bad_options_are_refused_with_their_values() {
         assert!(refused(PointLightOptions { view, ..fresh() }).contains("pixels per metre"));
         let noise_dots = Some(NoiseDots { area_scale: bad, ..NoiseDots::default() });
         assert!(refused(PointLightOptions { noise_dots, ..fresh() }).contains("area_scale"));
-        let scrambles_phase = Some(PhaseScramble::Periodic { period_s: Some(bad) });
-        refused(PointLightOptions { scrambles_phase, ..fresh() });
+        let scrambles_phase = Some(PhaseScramble::Periodic);
+        refused(PointLightOptions { scrambles_phase, period_s: Some(bad), ..fresh() });
+        let scramble = PositionScramble { limit_px: Some(bad), ..PositionScramble::default() };
+        let said = refused(PointLightOptions { scrambles_position: Some(scramble), ..fresh() });
+        assert!(said.contains("scramble_limit_px"));
+        let repeated = CycleOptions { tempo: bad, cycles: 1 };
+        assert!(refused(PointLightOptions { cycles: Some(repeated), ..fresh() }).contains("tempo"));
     }
+    assert!(refused(PointLightOptions { period_s: Some(1.0), ..fresh() }).contains("only with cycles"));
+    let none = CycleOptions { cycles: 0, tempo: 1.0 };
+    assert!(refused(PointLightOptions { cycles: Some(none), ..fresh() }).contains("cycles"));
+    let endless = CycleOptions { cycles: usize::MAX, tempo: 1.0 };
+    assert!(refused(PointLightOptions { cycles: Some(endless), ..fresh() }).contains("too many"));
     let scrambles_phase = Some(PhaseScramble::Shortened { max_shift_s: 1e9 });
     assert!(refused(PointLightOptions { scrambles_phase, ..fresh() }).contains("longer motion"));
     let life = LimitedLife { dots: 13, sites: LifeSites::Joints, ..LimitedLife::default() };
@@ -268,12 +285,144 @@ fn bad_options_are_refused_with_their_values() {
     assert!(refused(PointLightOptions { noise_dots, ..fresh() }).contains("too many"));
     let one = PointMotion::new(vec![DVec3::ZERO], vec!["dot".into()], vec![0.0]).unwrap();
     let everything = PointLightOptions {
-        scrambles_position: true,
+        scrambles_position: Some(PositionScramble::default()),
         is_inverted: true,
         is_reversed: true,
-        scrambles_phase: Some(PhaseScramble::Periodic { period_s: None }),
+        scrambles_phase: Some(PhaseScramble::Periodic),
         noise_dots: Some(NoiseDots { kind: NoiseKind::Linear { speed_px_s: 9.0 }, ..NoiseDots::default() }),
         ..fresh()
     };
     assert_eq!(point_light_display(&one, &everything).unwrap().dots, 41);
+}
+
+/// A recording of 2.6 cycles that does not repeat itself exactly: it drifts, sways and becomes faster.
+fn recording() -> PointMotion {
+    let options = SampledWalkOptions { frames: 170, ..SampledWalkOptions::default() };
+    let walk = sampled_walk(&walker(), &options).unwrap();
+    walk.map(|t, k, p| {
+        let t = t as f64;
+        p + DVec3::new(3e-7 * t * t, 0.02 * (0.031 * t).sin(), 4e-5 * t * (k % 3) as f64)
+    })
+}
+
+#[test]
+fn a_cycle_repeats_without_a_jump_and_keeps_its_period() {
+    let cycle_s = SampledWalkOptions::default().cycle_s(&walker());
+    let repeated = CycleOptions { cycles: 3, tempo: 1.0 };
+    for locomotion in [Locomotion::Treadmill, Locomotion::PelvisFixed, Locomotion::Translating] {
+        let options =
+            PointLightOptions { cycles: Some(repeated), locomotion, ..PointLightOptions::default() };
+        let shown = point_light_display(&recording(), &options).unwrap();
+        let period_s = shown.period_s.unwrap();
+        assert!((period_s - cycle_s).abs() < 0.02, "{period_s} instead of {cycle_s}");
+        let frames = (period_s * 60.0).round() as usize;
+        assert_eq!(shown.times_s.len(), 3 * frames);
+        let advance = if locomotion == Locomotion::Translating { 1.3 * 200.0 * period_s } else { 0.0 };
+        for k in 0..13 {
+            let path = trajectory(&shown, k);
+            let jump = path[frames] - path[0] - DVec2::X * advance;
+            assert!(jump.length() < 0.02 * advance + 1e-9, "{locomotion:?}, dot {k}: {jump}");
+            let bends: Vec<f64> = path.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).length()).collect();
+            let largest = |from: usize, to: usize| bends[from..to].iter().copied().fold(0.0, f64::max);
+            let (at_seam, within) = (largest(frames - 2, frames + 1), largest(0, frames - 2));
+            assert!(at_seam <= 1.5 * within, "{locomotion:?}, dot {k}: {at_seam} after {within} px");
+        }
+    }
+}
+
+#[test]
+fn a_tempo_changes_the_period_and_not_the_trajectory() {
+    let at = |tempo| {
+        let cycles = Some(CycleOptions { cycles: 1, tempo });
+        point_light_display(&recording(), &PointLightOptions { cycles, ..PointLightOptions::default() })
+            .unwrap()
+    };
+    let (usual, slow) = (at(1.0), at(0.5));
+    assert!((slow.period_s.unwrap() - 2.0 * usual.period_s.unwrap()).abs() < 0.02);
+    let places = |d: &PointLightDisplay, k| Extent::of(trajectory(d, k).into_iter());
+    for k in 0..13 {
+        let (a, b) = (places(&usual, k), places(&slow, k));
+        assert!((a.low - b.low).length() < 1.0 && (a.high - b.high).length() < 1.0, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn what_does_not_repeat_itself_has_no_period() {
+    let mut random = Random::new(1);
+    let wander = cycle().map(|_, _, p| p);
+    let mut place = DVec3::ZERO;
+    let positions = wander.positions().iter().map(|_| {
+        place += DVec3::new(random.uniform(-1.0, 1.0), 0.0, random.uniform(-1.0, 1.0)) * 0.02;
+        place
+    });
+    let motion =
+        PointMotion::new(positions.collect(), wander.names().to_vec(), wander.times_s().to_vec()).unwrap();
+    let cycles = Some(CycleOptions::default());
+    let options = PointLightOptions { cycles, ..PointLightOptions::default() };
+    let refused = point_light_display(&motion, &options).unwrap_err();
+    assert!(matches!(refused, PointLightError::NoPeriod { .. }), "{refused}");
+    assert!(point_light_display(&motion, &PointLightOptions { period_s: Some(0.5), ..options }).is_ok());
+}
+
+#[test]
+fn scrambling_keeps_to_its_axis_and_its_limit() {
+    let upright = display(PointLightOptions::default());
+    for (axes, limit_px) in [
+        (ScrambleAxes::Horizontal, None),
+        (ScrambleAxes::Vertical, None),
+        (ScrambleAxes::Both, Some(15.0)),
+        (ScrambleAxes::Vertical, Some(15.0)),
+    ] {
+        let scrambles_position = Some(PositionScramble { axes, limit_px });
+        let scrambled = display(PointLightOptions { scrambles_position, ..PointLightOptions::default() });
+        let shifts: Vec<DVec2> =
+            (0..13).map(|k| trajectory(&scrambled, k)[0] - trajectory(&upright, k)[0]).collect();
+        let most = shifts.iter().fold(DVec2::ZERO, |most, shift| most.max(shift.abs()));
+        assert_eq!(most.x > 1e-9, axes != ScrambleAxes::Vertical, "{most}");
+        assert_eq!(most.y > 1e-9, axes != ScrambleAxes::Horizontal, "{most}");
+        assert!(most.max_element() < limit_px.unwrap_or(400.0) + 1e-9 && most.max_element() > 10.0, "{most}");
+    }
+}
+
+#[test]
+fn controls_have_the_centre_of_their_walker() {
+    let upright = display(PointLightOptions::default());
+    let middle = Extent::of(upright.positions_px.iter().copied()).middle();
+    assert!((upright.centre_px - middle).length() < 1e-9);
+    for control in [
+        PointLightOptions { is_inverted: true, is_mirrored: true, ..PointLightOptions::default() },
+        PointLightOptions {
+            scrambles_position: Some(PositionScramble::default()),
+            ..PointLightOptions::default()
+        },
+        PointLightOptions { scrambles_phase: Some(PhaseScramble::Periodic), ..PointLightOptions::default() },
+        PointLightOptions { noise_dots: Some(NoiseDots::default()), ..PointLightOptions::default() },
+    ] {
+        assert!((display(control).centre_px - middle).length() < 1e-9);
+    }
+}
+
+#[test]
+fn actors_keep_their_dots_and_what_they_show() {
+    let (one, other) = (
+        display(PointLightOptions::default()),
+        display(PointLightOptions { noise_dots: Some(NoiseDots::default()), ..PointLightOptions::default() }),
+    );
+    let offsets = [DVec2::new(-90.0, 0.0), DVec2::new(90.0, 5.0)];
+    let both = displays_together(&[one.clone(), other.clone()], &offsets).unwrap();
+    assert_eq!([both.dots, both.points], [13 + 53, 26]);
+    for t in [0, 31, 59] {
+        assert_eq!(both.at(t, 4), one.at(t, 4).map(|p| p + offsets[0]));
+        assert_eq!(both.at(t, 13 + 40), other.at(t, 40).map(|p| p + offsets[1]));
+        assert_eq!(both.sources[t * both.dots + 15], DotSource::Joint(13 + 2));
+    }
+    let refused = |displays: &[PointLightDisplay], offsets: &[DVec2]| {
+        displays_together(displays, offsets).unwrap_err().to_string()
+    };
+    assert!(refused(&[], &[]).contains("0 displays"));
+    assert!(refused(&[one.clone()], &[]).contains("1 display and 0 offsets"));
+    assert!(refused(&[one.clone()], &[DVec2::NAN]).contains("offsets_px"));
+    let shorter = Some(PhaseScramble::Shortened { max_shift_s: 0.3 });
+    let shorter = display(PointLightOptions { scrambles_phase: shorter, ..PointLightOptions::default() });
+    assert!(refused(&[one, shorter], &offsets).contains("actor 1"));
 }

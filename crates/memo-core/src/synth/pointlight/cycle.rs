@@ -1,0 +1,140 @@
+//! One cycle of a motion, cut and closed so that it repeats without a jump.
+//!
+//! The cut is where position and velocity differ least one period later. What still differs is taken out
+//! evenly over the cycle, point by point. The cycle is then sampled in whole frames.
+
+use super::PointLightError;
+use super::course::Course;
+use super::period::{closes_itself, found_period, mean};
+use crate::option_error::OptionError;
+use crate::synth::motion::PointMotion;
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// A cycle on the spot that continues in its own first frame.
+pub(super) struct Cycle {
+    /// Positions, frame after frame, metres.
+    still: Vec<DVec3>,
+    points: usize,
+    pub frames: usize,
+    /// Mean velocity of the body, m/s.
+    velocity: DVec3,
+    interval_s: f64,
+}
+
+/// Largest change of the speed, and of its inverse.
+const MOST_TEMPO: f64 = 10.0;
+
+/// One cycle of a motion, played `tempo` times as fast. The period is found if it is not given.
+pub(super) fn closed_cycle(
+    motion: &PointMotion,
+    period_s: Option<f64>,
+    tempo: f64,
+) -> Result<Cycle, PointLightError> {
+    let is_possible = (1.0 / MOST_TEMPO..=MOST_TEMPO).contains(&tempo);
+    OptionError::unless(is_possible, "tempo", "between 0.1 and 10", tempo)?;
+    let (course, interval_s) = (Course::of(motion), motion.frame_interval_s());
+    let (still, whole) = (&course.still, motion.frames() as f64);
+    let is_closed = closes_itself(still);
+    let period = match period_s {
+        Some(period_s) => asked_period(period_s, interval_s, motion.frames())?,
+        None if is_closed => part_of(whole, found_period(still, interval_s).ok()),
+        None => found_period(still, interval_s)?,
+    };
+    let frames = ((period / tempo).round() as usize).max(1);
+    let start = best_start(still, period) as f64;
+    let of_point = |k: usize| move |frame: usize| still.at(frame, k).unwrap_or(DVec3::NAN);
+    let path = still.pelvis_path();
+    let drift = |positions: &dyn Fn(usize) -> DVec3| {
+        let apart =
+            between(positions, still.frames(), start + period) - between(positions, still.frames(), start);
+        if apart.is_nan() || (is_closed && period == whole) { DVec3::ZERO } else { apart }
+    };
+    let drifts: Vec<DVec3> = (0..motion.points()).map(|k| drift(&of_point(k))).collect();
+    let sampled = (0..frames * motion.points()).map(|i| {
+        let (share, k) = ((i / motion.points()) as f64 / frames as f64, i % motion.points());
+        between(&of_point(k), still.frames(), start + period * share) - drifts[k] * (share - 0.5)
+    });
+    let duration_s = (frames as f64 * interval_s).max(f64::MIN_POSITIVE);
+    let advance = course.velocity * (period * interval_s) + drift(&|frame| path[frame]).with_z(0.0);
+    Ok(Cycle {
+        still: sampled.collect(),
+        points: motion.points(),
+        frames,
+        velocity: advance / duration_s,
+        interval_s,
+    })
+}
+
+impl Cycle {
+    /// Duration of the cycle, seconds.
+    pub fn period_s(&self) -> f64 {
+        self.frames as f64 * self.interval_s
+    }
+
+    /// The cycle repeated over a number of frames, with the names and the first instant of `motion`.
+    pub fn repeated(&self, frames: usize, motion: &PointMotion) -> Course {
+        let positions = (0..frames * self.points).map(|i| self.still[i % self.still.len()]).collect();
+        let first_s = motion.times_s()[0];
+        let times_s = (0..frames).map(|frame| first_s + frame as f64 * self.interval_s).collect();
+        Course { still: motion.replaced(positions, times_s), velocity: self.velocity }
+    }
+}
+
+/// A period in frames; within a frame of the whole motion, it is the whole motion.
+fn asked_period(period_s: f64, interval_s: f64, frames: usize) -> Result<f64, PointLightError> {
+    let parameter = "period_s";
+    OptionError::unless_positive(parameter, period_s)?;
+    let available_s = interval_s * frames as f64;
+    if period_s > available_s * (1.0 + 1e-9) {
+        return Err(PointLightError::TooShort { parameter, wanted_s: period_s, available_s });
+    }
+    let period = (period_s / interval_s).max(1.0);
+    Ok(if period > frames as f64 - 1.0 { frames as f64 } else { period })
+}
+
+/// The duration of one cycle of a motion that closes by itself, in frames: a part of the whole, if that repeats.
+fn part_of(whole: f64, found: Option<f64>) -> f64 {
+    let parts = found.map_or(1.0, |found| (whole / found).round().max(1.0));
+    let is_part = found.is_some_and(|found| (whole / parts - found).abs() < 0.5);
+    if is_part { whole / parts } else { whole }
+}
+
+/// The first frame whose position and velocity differ least from those one period later.
+fn best_start(still: &PointMotion, period: f64) -> usize {
+    let latest = (still.frames() - 1) as f64 - period;
+    if latest < 1.0 {
+        return 0;
+    }
+    let pace = period / TAU; // turns velocities into distances, as in a motion of one harmonic
+    let apart_sq = |start: f64, k: usize| {
+        let at = |t: f64| between(&|frame| still.at(frame, k).unwrap_or(DVec3::NAN), still.frames(), t);
+        let moved = |t: f64| 0.5 * (at(t + 1.0) - at(t - 1.0));
+        let apart = at(start + period) - at(start);
+        let sum = apart.length_squared() + (pace * (moved(start + period) - moved(start))).length_squared();
+        sum.is_finite().then_some(sum)
+    };
+    let cost = |start: usize| mean((0..still.points()).filter_map(|k| apart_sq(start as f64, k)));
+    let costs: Vec<f64> = (0..=latest as usize).map(|t| cost(t).unwrap_or(f64::INFINITY)).collect();
+    (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0)
+}
+
+/// A position between frames by cubic interpolation (Catmull and Rom 1974), NaN if unknown. Beyond the first
+/// and the last frame it continues with the nearest step.
+fn between(positions: &dyn Fn(usize) -> DVec3, frames: usize, at: f64) -> DVec3 {
+    let last = frames - 1;
+    let frame = at.floor().clamp(0.0, last.saturating_sub(1) as f64) as usize;
+    let (b, t) = (positions(frame), at - frame as f64);
+    if t == 0.0 || last == 0 {
+        return b;
+    }
+    let c = positions(frame + 1);
+    if !(0.0..1.0).contains(&t) {
+        return if t == 1.0 { c } else { b + (c - b) * t };
+    }
+    let known = |p: Option<DVec3>, straight: DVec3| p.filter(|p| !p.is_nan()).unwrap_or(straight);
+    let a = known(frame.checked_sub(1).map(positions), 2.0 * b - c);
+    let d = known((frame + 2 <= last).then(|| positions(frame + 2)), 2.0 * c - b);
+    let [slope, bend, twist] = [c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a];
+    b + 0.5 * t * (slope + t * (bend + t * twist))
+}

@@ -1,0 +1,244 @@
+"""Pictures of point-light displays, measured with OpenCV; loops, scrambling, actors and marker files."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import memo
+import numpy as np
+import pytest
+from fake_psychopy import SCREENS, stand_in
+
+WALKER = memo.walker_motion(cycles=2)
+MOTION = (WALKER.positions, WALKER.times_s, WALKER.names)
+
+
+def spots(picture):
+    """Centres (N, 2) of the bright spots of a picture, by OpenCV, spots that touch as one."""
+    cv2 = pytest.importorskip("cv2")
+    grey = picture[..., 0]
+    _, areas, boxes, _ = cv2.connectedComponentsWithStats((grey > 0).astype(np.uint8))
+    centres = []
+    for index, (left, top, width, height, _) in enumerate(boxes[1:], start=1):
+        part = np.s_[top : top + height, left : left + width]
+        moments = cv2.moments(np.where(areas[part] == index, grey[part], 0).astype(np.float32))
+        centres.append((left + moments["m10"] / moments["m00"], top + moments["m01"] / moments["m00"]))
+    return np.array(centres)
+
+
+def figure_height_px(display, **picture):
+    """Vertical distance of the uppermost and the lowest spot over all frames."""
+    frames = range(0, len(display.times_s), 10)
+    v = np.concatenate([spots(*display.frames(start=t, stop=t + 1, **picture))[:, 1] for t in frames])
+    return v.max() - v.min()
+
+
+def test_every_condition_is_drawn_at_one_scale():
+    height_m = np.ptp(WALKER.positions[::10, :, 2])
+    upright = memo.pointlight(*MOTION, px_per_m=150)
+    for options in ({}, {"inverted": True}, {"locomotion": "translating"}, {"azimuth_deg": 60.0}):
+        display = memo.pointlight(*MOTION, px_per_m=150, **options)
+        assert figure_height_px(display, size_px=(700, 400), dot_px=6) == pytest.approx(
+            150 * height_m, abs=0.3
+        )
+    for options in (
+        {"scramble_position": True},
+        {"scramble_phase": "periodic"},
+        {"noise_dots": 30},
+        {"scramble_position": True, "noise_dots": 30},
+    ):
+        display = memo.pointlight(*MOTION, px_per_m=150, **options)
+        assert np.allclose(display.centre_px, upright.centre_px)
+        local = display.positions_px[:, :13] - display.positions_px[:, :13].mean(axis=0)
+        before = upright.positions_px - upright.positions_px.mean(axis=0)
+        assert np.allclose(
+            np.ptp(local, axis=0), np.ptp(before, axis=0)
+        )  # each trajectory as large as before
+
+
+def test_a_spot_is_where_the_dot_is_to_a_part_of_a_pixel():
+    display = memo.pointlight(*MOTION, azimuth_deg=70.0, px_per_m=400)
+    (picture,) = display.frames(size_px=(501, 801), dot_px=9, start=7, stop=8)
+    wanted = display.positions_px[7] - display.centre_px + (250, 400)
+    found = spots(picture)
+    alone = [w for w in wanted if np.sort(np.hypot(*(wanted - w).T))[1] > 12]
+    assert len(alone) >= 8
+    for place in alone:
+        assert np.hypot(*(found - place).T).min() < 0.05
+
+
+def test_the_loop_continues_where_it_starts_also_for_a_recording_that_drifts():
+    frames = np.arange(170) / 60
+    walk = memo.walker_motion(170)
+    drift = np.stack([0.01 * frames**2, 0.02 * np.sin(2 * frames), 0.01 * frames], axis=-1)
+    recorded = walk.positions + drift[:, None]
+    for motion in (MOTION, (recorded, walk.times_s, walk.names)):
+        display = memo.pointlight(*motion, cycles=2)
+        assert display.period_s == pytest.approx(walk.cycle_s, abs=0.02)
+        paths = display.positions_px
+        steps = np.linalg.norm(np.diff(paths, axis=0), axis=2).max(axis=1)
+        seam = np.linalg.norm(paths[0] - paths[-1], axis=1).max()
+        assert seam <= steps.max()
+        assert np.allclose(paths[: len(paths) // 2], paths[len(paths) // 2 :])
+
+
+def test_phase_scrambling_keeps_each_trajectory_and_its_spectrum():
+    display = memo.pointlight(*MOTION, cycles=2)
+    shifted = memo.pointlight(*MOTION, cycles=2, scramble_phase="periodic", seed=5)
+    spectrum, other = (np.abs(np.fft.rfft(d.positions_px, axis=0)) for d in (display, shifted))
+    assert np.allclose(spectrum, other, atol=1e-6)
+    shifts = set()
+    for before, after in zip(
+        display.positions_px.swapaxes(0, 1), shifted.positions_px.swapaxes(0, 1), strict=True
+    ):
+        turns = [s for s in range(len(before)) if np.allclose(np.roll(before, s, axis=0), after)]
+        assert turns
+        shifts.add(turns[0])
+    assert len(shifts) > 6
+    seam = np.linalg.norm(shifted.positions_px[0] - shifted.positions_px[-1], axis=1)
+    steps = np.linalg.norm(np.diff(display.positions_px, axis=0), axis=2).max(axis=0)
+    assert (seam <= steps + 1e-9).all()
+
+
+def test_scrambling_keeps_heights_or_stays_within_a_limit():
+    upright = memo.pointlight(*MOTION).positions_px
+    level = memo.pointlight(*MOTION, scramble_position=True, scramble_axes="horizontal").positions_px
+    assert np.array_equal(level[..., 1], upright[..., 1]) and not np.allclose(level[..., 0], upright[..., 0])
+    near = memo.pointlight(*MOTION, scramble_position=True, scramble_limit_px=20).positions_px
+    assert 10 < np.abs(near - upright).max() <= 20 + 1e-9
+    for options, words in (
+        ({"scramble_axes": "vertical"}, "need scramble_position"),
+        ({"scramble_position": True, "scramble_axes": "up"}, "one of both, horizontal, vertical"),
+        ({"tempo": 2.0}, "tempo needs cycles"),
+        ({"period_s": 1.0}, "only with cycles"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            memo.pointlight(*MOTION, **options)
+    still = np.random.default_rng(0).normal(size=(80, 3, 3))
+    with pytest.raises(ValueError, match=r"no period found.*give period_s"):
+        memo.pointlight(still, np.arange(80) / 60, ["a", "b", "c"], cycles=1)
+
+
+def test_a_walk_of_whole_cycles_has_the_nearest_speed():
+    slow = memo.walker_motion(cycles=3, speed_mps=0.9, rate_hz=100)
+    assert len(slow.times_s) == 3 * round(slow.cycle_s * 100)
+    assert slow.cycle_s * 100 == pytest.approx(round(slow.cycle_s * 100))
+    hips = slow.positions[:, [6, 9]].mean(axis=1)
+    speed = (hips[-1, 0] - hips[0, 0]) / slow.times_s[-1]
+    assert speed == pytest.approx(0.9, abs=0.01)
+    with pytest.raises(ValueError, match="either frames or cycles"):
+        memo.walker_motion(10, cycles=1)
+
+
+def test_actors_share_a_picture_and_keep_what_they_show():
+    one, other = memo.pointlight(*MOTION), memo.pointlight(*MOTION, mirrored=True, noise_dots=5)
+    both = memo.pointlight_together([one, other], [(-100, 0), (100, 0)])
+    assert both.points == 26 and both.positions_px.shape[1] == 13 + 18
+    assert np.allclose(both.positions_px[:, 13:], other.positions_px + np.array([100, 0]))
+    assert both.labels[0].tolist() == [*range(26), *[-1] * 5]
+    shorter = memo.pointlight(WALKER.positions[:9], WALKER.times_s[:9], WALKER.names)
+    with pytest.raises(ValueError, match="actor 1 has other times"):
+        memo.pointlight_together([one, shorter])
+
+
+def test_pictures_have_the_colours_asked_for_and_alpha_mixes_to_the_same():
+    display = memo.pointlight(*MOTION, px_per_m=100)
+    options = {"size_px": (200, 220), "dot_px": 7, "colour": (250, 120, 0), "stop": 3}
+    opaque = display.frames(background=(20, 30, 40), **options).astype(float)
+    clear = display.frames(alpha=True, **options).astype(float)
+    assert opaque.shape == (3, 220, 200, 3) and clear.shape == (3, 220, 200, 4)
+    share = clear[..., 3:] / 255
+    assert np.abs(share * clear[..., :3] + (1 - share) * (20, 30, 40) - opaque).max() <= 1
+    hard = display.frames(smooth=False, shape="square", **options)
+    assert {tuple(pixel) for pixel in hard.reshape(-1, 3).tolist()} == {(250, 120, 0), (0, 0, 0)}
+    for options, words in (
+        ({"dot_px": 0}, "dot_px"),
+        ({"size_px": (0, 9)}, "size_px"),
+        ({"shape": "star"}, "one of disc, square, gaussian"),
+        ({"size_px": (16000, 16000)}, "draw fewer at a time"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            display.frames(**options)
+
+
+def test_lossless_video_and_pictures_hold_the_pixels_of_frames(tmp_path):
+    av, image = pytest.importorskip("av"), pytest.importorskip("PIL.Image")
+    from memo.display import write_display_png, write_display_video
+
+    display = memo.pointlight(WALKER.positions[:8], WALKER.times_s[:8], WALKER.names, px_per_m=60)
+    picture = {"size_px": (161, 121), "colour": (255, 200, 30), "background": (9, 80, 3)}
+    write_display_video(tmp_path / "d.mkv", display, lossless=True, **picture)
+    with av.open(str(tmp_path / "d.mkv")) as video:
+        read = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+    assert np.array_equal(read, display.frames(**picture))
+    paths = write_display_png(tmp_path / "png", display, **picture)
+    assert [path.name for path in paths] == [f"{index:05d}.png" for index in range(8)]
+    read = [np.asarray(image.open(path)) for path in paths]
+    assert np.array_equal(read, display.frames(alpha=True, **picture))
+
+
+def write_markers(path):
+    """A table of a walker by markers with names of their own; two markers at each wrist."""
+    names = [f"m{index}" for index in range(13)] + ["extra"]
+    points = np.concatenate([WALKER.positions, WALKER.positions[:, [2]] + (0.02, 0, 0)], axis=1)
+    with open(path, "w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["time_s", *(f"{name}_{axis}" for name in names for axis in "xyz")])
+        for time_s, frame in zip(WALKER.times_s, points, strict=True):
+            out.writerow([repr(float(time_s)), *map(repr, frame.ravel().tolist())])
+
+
+def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo_command):
+    write_markers(tmp_path / "walk.csv")
+    names = dict(zip(memo.keypoints.layouts()["MOCAP_12"], range(12), strict=True))
+    lines = [f'{joint} = "M{index}"' for joint, index in names.items() if joint != "right_wrist"]
+    (tmp_path / "map.toml").write_text("\n".join([*lines, 'right_wrist = ["m2", "extra"]', 'head = "m12"']))
+    arguments = ["pointlight", tmp_path / "walk.csv", "--markers", tmp_path / "map.toml", "--size", "90x90"]
+    code, out, err = memo_command(*arguments, "--out", tmp_path / "out", "--json")
+    assert code == 0, err
+    assert json.loads(out)["frames"] == len(WALKER.times_s)
+    with open(tmp_path / "out" / "dots.csv", newline="") as file:
+        row = next(csv.DictReader(file))
+    usual = memo.pointlight(*MOTION).positions_px[0]
+    assert float(row["RWR_u_px"]) == pytest.approx(usual[2, 0] + 0.01 * 200, abs=1e-3)
+    assert float(row["LKN_v_px"]) == pytest.approx(usual[10, 1], abs=1e-3)
+    (tmp_path / "bad.toml").write_text('right_knee = "RKNE"\nleft_knee = ["m10", "nothing"]\n')
+    arguments[3] = tmp_path / "bad.toml"
+    code, _, err = memo_command(*arguments, "--out", tmp_path / "bad")
+    assert code == 1 and "no points for RKNE (right_knee), nothing (left_knee)" in err
+    (tmp_path / "bad.toml").write_text('tail = "m1"\n')
+    assert "got tail" in memo_command(*arguments, "--out", tmp_path / "bad")[2]
+
+
+def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_pictures(tmp_path, memo_command):
+    out = tmp_path / "out"
+    common = ["pointlight", "--cycles", "1", "--size", "200x200", "--px-per-m", "150", "--out", out]
+    code, said, _ = memo_command(*common, "--locomotion", "translating", "--lossless", "--png")
+    assert code == 0 and "Dots leave the picture" in said and "loops" in said
+    needed = said.split("--size ")[1].split(" ")[0]
+    assert len(list((out / "frames").iterdir())) == len(memo.walker_motion(cycles=1).times_s)
+    code, said, _ = memo_command(*common[:4], needed, *common[5:], "--locomotion", "translating")
+    assert code == 0 and "Dots leave" not in said
+    for options, words in (
+        (["--colour", "no"], "wanted a colour"),
+        (["--size", "9"], "wanted two numbers such as 640x480"),
+        (["--dot-px", "0"], "dot_px"),
+        (["--scramble-axes", "both"], "--scramble-position"),
+        (["--tempo", "2"], "--tempo needs MOTION"),
+        (["--apart-m", "2"], "several MOTION"),
+    ):
+        code, _, err = memo_command(*common, *options)
+        assert code == 1 and words in err, (options, err)
+
+
+def test_the_documented_program_shows_each_frame_upright_and_as_drawn(monkeypatch):
+    page = Path(__file__).resolve().parents[1] / "docs/methods/point-light-displays.md"
+    program = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    monkeypatch.setitem(sys.modules, "psychopy", stand_in())
+    known = {}
+    exec(compile(program, str(page), "exec"), known)
+    assert np.array_equal([screen[60:540, 200:600] for screen in SCREENS], known["frames"])
+    assert np.all(SCREENS[0][:60] == 128) and len(SCREENS) == 2 * round(known["walker"].cycle_s * 60)
+    head = spots((SCREENS[0] > 190).astype(np.uint8) * 255)[:, 1].min()
+    assert head < 300 - 60  # the head is above the middle of the screen
