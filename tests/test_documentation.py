@@ -17,6 +17,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+import detector_files
 import matplotlib
 import memo
 import numpy as np
@@ -40,8 +41,9 @@ NOT_RUN = {
     "docs/start/vision-science.md": 1,
     "docs/reference/accuracy.md": 7,
     "docs/methods/point-light-displays.md": 1,
+    "docs/start/keypoints-from.md": 1,
 }
-BLOCKS_RUN = 20
+BLOCKS_RUN = 28
 
 _FENCE = re.compile(
     r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
@@ -109,6 +111,7 @@ def given(tmp_path_factory):
     (folder / "camera.toml").write_text(calibration(scene.camera), encoding="utf-8")
     write_keypoints(folder / "walk_json", scene.camera)
     write_points(folder / "points.csv", scene.camera)
+    write_detections(folder)
     return folder
 
 
@@ -157,6 +160,19 @@ def write_keypoints(folder, camera):
         triples = [[u, v, 0.9] if np.isfinite(u) else [0, 0, 0] for u, v in points] + [[0, 0, 0]] * 4
         person = {"pose_keypoints_2d": np.round(np.ravel(triples), 2).tolist()}
         write_json(folder / f"walk_{frame:012d}_keypoints.json", {"version": 1.3, "people": [person]})
+
+
+def write_detections(folder):
+    """Files of detectors, as each of them writes them."""
+    detector_files.mediapipe(folder / "mediapipe.json")
+    detector_files.mmpose_demo(folder / "rtmpose.json")
+    detector_files.easy_vitpose(folder / "vitpose.json")
+    detector_files.yolo_labels(folder / "labels")
+    detector_files.yolo_json(folder / "yolo.json")
+    for ending in ("csv", "h5"):
+        detector_files.deeplabcut(folder / f"deeplabcut.{ending}")
+    detector_files.sleap_h5(folder / "sleap.h5")
+    detector_files.sleap_csv(folder / "sleap.csv")
 
 
 @pytest.fixture

@@ -5,12 +5,14 @@ from typing import Annotated
 
 import typer
 
+from memo.given import InputError
+
 KeypointsPath = Annotated[
     Path,
     typer.Argument(
         metavar="KEYPOINTS",
-        help="OpenPose folder, COCO or AlphaPose JSON, Sports2D's TRC in pixels, a table (CSV or "
-        "Parquet), or a folder with track.csv.",
+        help="JSON of MediaPipe, RTMPose (MMPose), YOLO, OpenPose, COCO, AlphaPose; CSV or H5 of DeepLabCut "
+        "or SLEAP, Sports2D's TRC in pixels, a table (CSV, Parquet), or a folder with track.csv.",
     ),
 ]
 Fps = Annotated[
@@ -20,7 +22,24 @@ Fps = Annotated[
 LayoutName = Annotated[
     str | None, typer.Option(help="Order of the points, such as BODY_25B, if detected wrongly.")
 ]
+ImageSize = Annotated[
+    str | None,
+    typer.Option(
+        help="Width and height of the picture, pixels: for coordinates that are fractions of it.",
+        metavar="WxH",
+    ),
+]
 Person = Annotated[
     int | None,
     typer.Option(help="Index of the person in each frame's list; default: one is followed.", min=0),
 ]
+
+
+def size_of(text: str | None) -> tuple[int, int] | None:
+    """Width and height from `640x480`."""
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not (width.isascii() and width.isdecimal() and height.isascii() and height.isdecimal()):
+        raise InputError(f"--image-size {text}: wanted width and height in pixels, such as 1920x1080")
+    return int(width), int(height)

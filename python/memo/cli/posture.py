@@ -81,7 +81,7 @@ def add_posture(app: "typer.Typer") -> None:
     import typer
 
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
-    from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person
 
     usual = memo._memo.defaults("posture")
     usual_rules, usual_strength = Rules(usual["rules"]), Strength(usual["strength"])
@@ -115,6 +115,7 @@ def add_posture(app: "typer.Typer") -> None:
         fps: Fps = None,
         layout: LayoutName = None,
         person: Person = None,
+        image_size: ImageSize = None,
         unswap: Annotated[
             bool, typer.Option(help="First exchange right and left where the detector confused them.")
         ] = True,
@@ -134,7 +135,7 @@ def add_posture(app: "typer.Typer") -> None:
         """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
-        reading = {"fps": fps, "layout": layout, "person": person}
+        reading = {"fps": fps, "layout": layout, "person": person, "image_size": image_size}
         options = {
             "rules": rules.value,
             "strength": strength.value,
@@ -160,7 +161,10 @@ def _posture(
     frame: int | None,
     delivery: Delivery,
 ) -> Exit:
+    from memo.cli.keypoint_options import size_of
+
     check_writable(delivery.out)
+    reading = {**reading, "image_size": size_of(reading["image_size"])}
     with with_count("finding postures", delivery) as progress:
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)

@@ -41,7 +41,7 @@ _ENDS = {Written.OPENPOSE: "_json", Written.COCO: ".json", Written.CSV: ".csv"}
 def add_unswap(app: "typer.Typer") -> None:
     import typer
 
-    from memo.cli.keypoint_options import Fps, KeypointsPath, LayoutName, Person
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person
 
     @app.command(epilog=EPILOG)
     def unswap(
@@ -49,6 +49,7 @@ def add_unswap(app: "typer.Typer") -> None:
         fps: Fps = None,
         layout: LayoutName = None,
         person: Person = None,
+        image_size: ImageSize = None,
         written: Annotated[
             Written,
             typer.Option(
@@ -68,14 +69,17 @@ def add_unswap(app: "typer.Typer") -> None:
         Labels that are exchanged in all frames, or in most, cannot be detected.
         """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
-        options = {"fps": fps, "layout": layout, "person": person}
+        options = {"fps": fps, "layout": layout, "person": person, "image_size": image_size}
         raise typer.Exit(guarded(lambda: _unswap(keypoints, options, written, delivery)))
 
 
 def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
+    from memo.cli.keypoint_options import size_of
+
     check_writable(delivery.out)
+    reading = {**options, "image_size": size_of(options["image_size"])}
     with with_elapsed("looking at right and left", delivery):
-        keypoints = memo.read_keypoints(path, **options)
+        keypoints = memo.read_keypoints(path, **reading)
         repair = memo.unswap(keypoints)
         source = repair.keypoints.source.path.resolve()
         stem = source.stem.removesuffix("_json")

@@ -19,7 +19,7 @@ from memo.keypoints.points import Array, Keypoints, KeypointsError, Source
 from memo.keypoints.text import MAX_FRAME_FILE_BYTES, content_of, json_text, last_number, parsed
 from memo.unfinished import complete_folder
 
-__all__ = ["frame_people", "read_openpose", "write_openpose"]
+__all__ = ["frame_people", "numbered_files", "read_openpose", "write_openpose"]
 
 _MAX_FRAME_FILES = 1_000_000
 _LISTS = ("people", "bodies")
@@ -33,7 +33,7 @@ _OTHER_KEYS = (
 
 def read_openpose(folder: Path) -> Found:
     """All people in a folder of frames."""
-    files = _numbered_files(folder)
+    files = numbered_files(folder)
     people = []
     for frame, file in files.items():
         data = parsed(file, content_of(file, MAX_FRAME_FILE_BYTES))
@@ -107,11 +107,11 @@ def _pose_key(person: Any) -> str | None:
     return next((key for key in _POSE_KEYS if isinstance(person, dict) and key in person), None)
 
 
-def _numbered_files(folder: Path) -> dict[int, Path]:
-    """The JSON files of a folder by the last number in their names, in order."""
+def numbered_files(folder: Path, ending: str = ".json") -> dict[int, Path]:
+    """The files of a folder with this ending by the last number in their names, in order."""
     numbered: dict[int, Path] = {}
     for file in sorted(folder.iterdir()):
-        if file.suffix.lower() != ".json" or file.name.startswith(".") or not file.is_file():
+        if file.suffix.lower() != ending or file.name.startswith(".") or not file.is_file():
             continue
         frame = last_number(file.stem)
         if frame is None:

@@ -14,13 +14,9 @@ import numpy as np
 
 from memo import _memo
 from memo.given import nothing_at
-from memo.keypoints.coco import read_coco
-from memo.keypoints.found import Found, Person
-from memo.keypoints.openpose import read_openpose
+from memo.keypoints.found import MAX_COORDINATE_PX, Found, Person
 from memo.keypoints.points import Array, Keypoints, KeypointsError, frame_range
-from memo.keypoints.table import read_csv, read_parquet_table
-from memo.keypoints.text import content_of, parsed
-from memo.keypoints.trc import is_trc, read_trc
+from memo.keypoints.recognising import everybody_in
 from memo.pixels import of_video, shrink_of_table
 from memo.wording import counted
 
@@ -35,6 +31,7 @@ def read_keypoints(
     person: int | None = None,
     fps: float | None = None,
     layout: str | None = None,
+    image_size: tuple[int, int] | None = None,
 ) -> Keypoints:
     """Reads one person's keypoints; the format is recognised by the content.
 
@@ -43,18 +40,22 @@ def read_keypoints(
     backwards, the nearest in each next frame, if within 0.3 of the person's size (more after a gap). `fps` is
     needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the file does
     not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether the
-    points that would be neck and middle of the hips lie there. For a run of `memo track` (a folder with
-    `track.csv` or `track.parquet`) the projected joints are read.
+    points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels, is
+    needed if coordinates are fractions of the picture (MediaPipe, labels of YOLO). For a run of `memo track`
+    (a folder with `track.csv` or `track.parquet`) the projected joints are read.
     """
     path = Path(path)
     if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
         raise KeypointsError(f"the frame rate must be positive, got {fps}")
     if person is not None and (isinstance(person, bool) or not isinstance(person, int) or person < 0):
         raise KeypointsError(f"person {person!r} is not an index in the list of people: 0, 1, ...")
+    if image_size is not None and not _is_size(image_size):
+        raise KeypointsError(f"image_size {image_size!r}: wanted width and height in whole pixels")
     try:
         if not path.exists():
             raise KeypointsError(nothing_at(path, "file or folder"))
-        found = _found(path)
+        run = next((path / name for name in _OF_A_TRACK if (path / name).is_file()), path)
+        found = everybody_in(run, image_size)
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
     keypoints = _assembled(found, person, fps, layout)
@@ -62,20 +63,12 @@ def read_keypoints(
     return keypoints if shrink == 1 else replace(keypoints, points=of_video(keypoints.points, shrink))
 
 
-def _found(path: Path) -> Found:
-    path = next((path / name for name in _OF_A_TRACK if (path / name).is_file()), path)
-    if path.is_dir():
-        return read_openpose(path)
-    if not path.is_file():
-        raise KeypointsError(f"{path}: neither a file nor a folder")
-    if path.suffix.lower() == ".parquet":
-        return read_parquet_table(path)
-    content = content_of(path)
-    if not content.strip():
-        raise KeypointsError(f"{path}: the file is empty")
-    if content.lstrip()[:1] in ("{", "["):
-        return read_coco(path, parsed(path, content))
-    return read_trc(path, content) if is_trc(content) else read_csv(path, content)
+def _is_size(size: Any) -> bool:
+    return (
+        isinstance(size, tuple | list)
+        and len(size) == 2
+        and all(type(side) is int and 0 < side <= MAX_COORDINATE_PX for side in size)
+    )
 
 
 def _assembled(found: Found, person: int | None, fps: float | None, layout: str | None) -> Keypoints:

@@ -1,0 +1,116 @@
+"""YOLO-pose of Ultralytics: label files (`save_txt=True`) and the JSON of its results.
+
+- A folder with a text file per frame, `NAME_1.txt`, ...: `class x y width height`, then `x y` or `x y
+  confidence` of each of the 17 points, all as fractions of the picture, then perhaps the box's confidence
+  and the track's number. A frame without people has no file.
+- `results.to_json()`: `[{"name", "class", "confidence", "box", "keypoints": {"x": [...], "y": [...],
+  "visible": [...]}}]`, in pixels or, if normalized, in fractions: a folder with a file per frame, or one
+  file with a list of these lists.
+
+Source: ultralytics/ultralytics `ultralytics/engine/results.py`, `Results.save_txt`, `Results.summary`.
+Points at (0, 0) are missing. Only models with the 17 points of COCO can be read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from memo.keypoints.found import Found, Person, with_missing
+from memo.keypoints.points import Array, KeypointsError, Source
+from memo.keypoints.text import content_of, short
+
+__all__ = ["is_detections", "read_detections", "read_labels"]
+
+_POINTS = 17
+_BOX = 5  # class and box before the points of a line
+_LARGEST_FRACTION = 1.5
+_PERSON = 0
+
+
+def is_detections(detections: Any) -> bool:
+    """Whether this is the JSON of the results of one frame."""
+    first = detections[0] if isinstance(detections, list) and detections else None
+    return isinstance(first, dict) and "box" in first
+
+
+def read_detections(
+    path: Path, frames: Sequence[tuple[int, str, Any]], image_size: tuple[int, int] | None
+) -> Found:
+    """All people in the results of several frames, each with its number and its place for messages."""
+    people = []
+    for frame, where, detections in frames:
+        if not isinstance(detections, list):
+            raise KeypointsError(f"{where}: wanted a list of detections, got {short(detections)}")
+        for place, detection in enumerate(detections):
+            if isinstance(detection, dict) and detection.get("class", _PERSON) != _PERSON:
+                continue
+            values = _of_detection(detection, f"{where}, detection {place}")
+            people.append(Person(frame, values, None))
+    if people and all(np.nanmax(one.values[:, :2], initial=0) <= _LARGEST_FRACTION for one in people):
+        people = [Person(one.frame, _in_pixels(one.values, path, image_size), None) for one in people]
+    return Found(
+        Source(path, None), people, image_size=image_size, frames=tuple(frame for frame, _, _ in frames)
+    )
+
+
+def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] | None) -> Found:
+    """All people in a folder of label files, by the number of their frame."""
+    people = []
+    for frame, file in files.items():
+        for number, line in enumerate(content_of(file).splitlines(), start=1):
+            if not line.strip():
+                continue
+            values = _of_line(line, f"{file}: line {number}")
+            if values is not None:
+                people.append(Person(frame, _in_pixels(values, path, image_size), None))
+    return Found(Source(path, None), people, image_size=image_size, frames=tuple(files))
+
+
+def _of_detection(detection: Any, where: str) -> Array:
+    points = detection.get("keypoints") if isinstance(detection, dict) else None
+    if not isinstance(points, dict) or not {"x", "y"} <= points.keys():
+        got = ", ".join(detection) if isinstance(detection, dict) else short(detection)
+        raise KeypointsError(f"{where}: wanted keypoints with x and y (of a -pose model), got {short(got)}")
+    x, y = points["x"], points["y"]
+    visible = points.get("visible", [1.0] * len(x) if isinstance(x, list) else None)
+    try:
+        values = np.array([x, y, visible], np.float64).T
+    except (TypeError, ValueError):
+        raise KeypointsError(f"{where}: x, y and visible must be lists of numbers of one length") from None
+    if values.shape != (_POINTS, 3):
+        raise KeypointsError(f"{where}: wanted {_POINTS} points, got {len(values)}")
+    return with_missing(values, where)
+
+
+def _of_line(line: str, where: str) -> Array | None:
+    """(17, 3) fractions and confidence of a line, None if it is not a person."""
+    try:
+        numbers = [float(cell) for cell in line.split()]
+    except ValueError:
+        raise KeypointsError(f"{where}: not numbers: {short(line)}") from None
+    if not all(map(math.isfinite, numbers)):
+        raise KeypointsError(f"{where}: numbers that are not finite")
+    if numbers and numbers[0] != _PERSON:
+        return None
+    # Behind the points: nothing, the confidence of the box, or that and the number of the track.
+    for each in (3, 2):
+        if 0 <= len(numbers) - _BOX - each * _POINTS <= 2:
+            points = np.array(numbers[_BOX : _BOX + each * _POINTS]).reshape(_POINTS, each)
+            return points if each == 3 else np.column_stack([points, np.ones(_POINTS)])
+    raise KeypointsError(
+        f"{where}: {len(numbers)} numbers; wanted class, box and {_POINTS} points of 2 or 3 numbers, "
+        "as a -pose model has"
+    )
+
+
+def _in_pixels(values: Array, path: Path, image_size: tuple[int, int] | None) -> Array:
+    if image_size is None:
+        raise KeypointsError(
+            f"{path}: coordinates are fractions of the picture: give its width and height (image_size)"
+        )
+    return with_missing(values * (*image_size, 1.0), str(path))

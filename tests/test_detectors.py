@@ -1,0 +1,259 @@
+"""Files of detectors: all points are where the detector put them, and damage is described."""
+
+import json
+
+import detector_files as made
+import memo
+import numpy as np
+import pytest
+
+READ = {
+    "mediapipe": (made.mediapipe, "walk.json", {5}, 33),
+    "mmpose_demo": (made.mmpose_demo, "results.json", set(), 26),
+    "mmpose_whole_body": (made.mmpose_whole_body, "walk.json", set(), 23),
+    "mmpose_images": (made.mmpose_images, "predictions", {4}, 17),
+    "easy_vitpose": (made.easy_vitpose, "walk_result.json", {4}, 17),
+    "yolo_labels": (made.yolo_labels, "labels", {4}, 17),
+    "yolo_json": (made.yolo_json, "walk.json", {4}, 17),
+    "deeplabcut": (made.deeplabcut, "walkDLC_resnet50.csv", set(), 7),
+    "deeplabcut_h5": (made.deeplabcut, "walkDLC_resnet50.h5", set(), 7),
+    "sleap": (made.sleap_csv, "analysis.csv", set(), 7),
+    "sleap_h5": (made.sleap_h5, "analysis.h5", set(), 7),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_points_are_where_the_detector_put_them(tmp_path, name):
+    write, file, absent, count = READ[name]
+    if file.endswith(".h5"):
+        pytest.importorskip("h5py")
+    if name == "deeplabcut_h5":
+        pytest.importorskip("tables")
+    points, scores = write(tmp_path / file)
+    read = memo.read_keypoints(tmp_path / file, fps=made.FPS, image_size=made.SIZE)
+    seen = np.array([frame not in absent for frame in range(made.FRAMES)])
+    assert read.points.shape == (made.FRAMES, count, 2)
+    assert np.abs(read.points[seen] - points[seen]).max() < 0.01  # label files have six digits
+    assert np.allclose(read.scores[seen], scores[seen], atol=1e-4)
+    assert np.isnan(read.points[~seen]).all()
+    assert read.people.tolist() == [
+        0
+        if frame in absent
+        else 2
+        if (name, frame) == ("mediapipe", 3)
+        else 2
+        if name == "sleap_h5" and frame > 7
+        else 1
+        for frame in range(made.FRAMES)
+    ]
+    assert np.allclose(np.diff(read.times_s), 1 / made.FPS)
+
+
+def test_feet_and_face_are_kept_where_the_layout_has_them(tmp_path):
+    made.mediapipe(tmp_path / "a.json"), made.mmpose_whole_body(tmp_path / "b.json")
+    for file in ("a.json", "b.json"):
+        names = memo.read_keypoints(tmp_path / file, fps=25, image_size=made.SIZE).names
+        assert {"left_big_toe", "right_heel", "nose", "left_ear"} <= set(names)
+    assert "right_small_toe" in names
+
+
+@pytest.mark.parametrize("shape", ["frames", "landmarks", "javascript", "solution"])
+def test_mediapipe_is_read_in_each_form_in_which_people_save_it(tmp_path, shape):
+    points, _ = made.mediapipe(tmp_path / "walk.json")
+    results = json.loads((tmp_path / "walk.json").read_text())
+    change = {
+        "frames": lambda people: people,
+        "landmarks": lambda people: people[0] if people else None,
+        "javascript": lambda people: {"landmarks": people, "worldLandmarks": []},
+        "solution": lambda people: {"pose_landmarks": {"landmark": people[0]} if people else None},
+    }[shape]
+    saved = [change(result["pose_landmarks"]) for result in results]
+    (tmp_path / "other.json").write_text(json.dumps(saved))
+    read = memo.read_keypoints(tmp_path / "other.json", fps=30, image_size=made.SIZE)
+    seen = np.arange(made.FRAMES) != 5
+    assert np.abs(read.points[seen] - points[seen]).max() < 1e-6 and read.layout == "MEDIAPIPE_33"
+
+
+def test_mediapipe_gives_the_times_that_were_saved(tmp_path):
+    made.mediapipe(tmp_path / "walk.json")
+    results = json.loads((tmp_path / "walk.json").read_text())
+    timed = [{**result, "timestamp_ms": 40 * frame + 7} for frame, result in enumerate(results)]
+    (tmp_path / "walk.json").write_text(json.dumps(timed))
+    read = memo.read_keypoints(tmp_path / "walk.json", image_size=made.SIZE)
+    assert np.allclose(read.times_s, 0.007 + 0.04 * np.arange(made.FRAMES))
+    del timed[2]["timestamp_ms"]
+    (tmp_path / "walk.json").write_text(json.dumps(timed))
+    with pytest.raises(memo.keypoints.KeypointsError, match="19 of 20 entries have timestamp_ms"):
+        memo.read_keypoints(tmp_path / "walk.json", image_size=made.SIZE)
+
+
+def test_variants_of_yolo_sleap_and_deeplabcut(tmp_path):
+    points, scores = made.yolo_labels(tmp_path / "labels", confidence=False)
+    read = memo.read_keypoints(tmp_path / "labels", fps=30, image_size=made.SIZE)
+    assert np.allclose(read.points[0], points[0], atol=0.01) and (read.scores[0] == 1).all()
+    points, _ = made.yolo_json(tmp_path / "n.json", normalized=True)
+    read = memo.read_keypoints(tmp_path / "n.json", fps=30, image_size=made.SIZE)
+    assert np.allclose(read.points[0], points[0], atol=0.02)
+    points, _ = made.deeplabcut(tmp_path / "two.csv", individuals=("anna", "ben"))
+    read = memo.read_keypoints(tmp_path / "two.csv", fps=30, person=1)
+    assert np.allclose(read.points, points + 300) and read.people.tolist() == [2] * made.FRAMES
+    pytest.importorskip("h5py")
+    points, scores = made.sleap_h5(tmp_path / "s.h5", dims=("frame", "track", "node", "xy"))
+    read = memo.read_keypoints(tmp_path / "s.h5", fps=30)
+    assert np.allclose(read.points, points) and np.allclose(read.scores, scores)
+
+
+def saved(folder, name, text):
+    (folder / name).write_text(text)
+    return folder / name
+
+
+DAMAGE = {
+    "a fraction without size": (
+        lambda f: (made.mediapipe(f / "a.json"), f / "a.json")[1],
+        "fractions of the picture.*image_size",
+    ),
+    "landmarks missing": (
+        lambda f: saved(f, "a.json", json.dumps([[[{"x": 0.1, "y": 0.2}] * 32]])),
+        "entry 0, person 0: wanted 33 landmarks, got 32",
+    ),
+    "a landmark of text": (
+        lambda f: saved(f, "a.json", json.dumps([[[{"x": "0.1", "y": 0.2}] * 33]])),
+        "landmark 0, x: 0.1 is not a number",
+    ),
+    "instances without scores": (
+        lambda f: saved(f, "a.json", json.dumps([{"frame_id": 0, "instances": [{"keypoints": [[1, 2]]}]}])),
+        "instance 0: wanted keypoints and keypoint_scores, got keypoints",
+    ),
+    "points in space": (
+        lambda f: saved(
+            f,
+            "a.json",
+            json.dumps([{"frame_id": 0, "instances": [{"keypoints": [[1, 2, 3]], "keypoint_scores": [1]}]}]),
+        ),
+        r"wanted points \(K, 2\) in the picture.*got \(1, 3\)",
+    ),
+    "a frame twice": (
+        lambda f: saved(f, "a.json", json.dumps([{"frame_id": 3, "instances": []}] * 2)),
+        "frame_id 3 is also that of entry 0",
+    ),
+    "no frame number": (
+        lambda f: saved(f, "a.json", json.dumps({"instance_info": [{"frame_id": "x", "instances": []}]})),
+        "frame_id x is not a frame number",
+    ),
+    "a detection model": (
+        lambda f: saved(f, "a.json", json.dumps([[{"class": 0, "box": {}, "name": "person"}]])),
+        "wanted keypoints with x and y .* got class, box, name",
+    ),
+    "one picture": (
+        lambda f: saved(f, "a.json", json.dumps([{"class": 0, "box": {}, "name": "person"}])),
+        "the people of one picture",
+    ),
+    "a skeleton of a mouse": (
+        lambda f: saved(f, "a.json", json.dumps({"keypoints": [], "skeleton": {"0": "whisker"}})),
+        "wanted different names of joints, got none",
+    ),
+    "body parts of a mouse": (
+        lambda f: saved(f, "a.csv", "scorer,s,s\nbodyparts,whisker,whisker\ncoords,x,y\n0,1,2\n"),
+        "names of different joints, such as left_knee, are needed; got whisker",
+    ),
+    "a short row": (
+        lambda f: saved(f, "a.csv", "scorer,s,s\nbodyparts,nose,nose\ncoords,x,y\n0,1\n"),
+        "row 4 has 2 cells, the header 3",
+    ),
+    "nodes without y": (
+        lambda f: saved(f, "a.csv", "track,frame_idx,nose.x\n,0,1\n"),
+        "no column nose.y",
+    ),
+    "a frame that is none": (
+        lambda f: saved(f, "a.csv", "track,frame_idx,nose.x,nose.y\n,x,1,2\n"),
+        "row 2, frame_idx: x is not a number",
+    ),
+    "a project of SLEAP": (lambda f: saved(f, "a.slp", "x"), "export its analysis"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damage_is_described(tmp_path, damage):
+    write, words = DAMAGE[damage]
+    with pytest.raises(memo.keypoints.KeypointsError, match=words):
+        memo.read_keypoints(write(tmp_path), fps=30, image_size=None if "size" in damage else made.SIZE)
+
+
+def test_damaged_labels_and_sizes_are_described(tmp_path):
+    made.yolo_labels(tmp_path / "labels")
+    with pytest.raises(memo.keypoints.KeypointsError, match="image_size"):
+        memo.read_keypoints(tmp_path / "labels", fps=30)
+    (tmp_path / "labels" / "walk_2.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+    with pytest.raises(
+        memo.keypoints.KeypointsError, match=r"walk_2.txt: line 1: 5 numbers; wanted class, box"
+    ):
+        memo.read_keypoints(tmp_path / "labels", fps=30, image_size=made.SIZE)
+    for size in ((0, 9), (1280.0, 720.0), "1280x720", (1, 2, 3)):
+        with pytest.raises(memo.keypoints.KeypointsError, match="wanted width and height in whole pixels"):
+            memo.read_keypoints(tmp_path / "labels", fps=30, image_size=size)
+
+
+def test_h5_files_of_other_programs_and_damaged_ones_are_described(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file.create_dataset("speed", data=[1.0])
+    (tmp_path / "text.h5").write_text("not HDF5")
+    made.sleap_h5(tmp_path / "short.h5")
+    with h5py.File(tmp_path / "short.h5", "r+") as file:
+        del file["node_names"]
+        file.create_dataset("node_names", data=[b"nose"])
+    with h5py.File(tmp_path / "code.h5", "w") as file:
+        table = np.zeros(1, [("index", "i8"), ("values_block_0", "f8", (2,))])
+        file.create_dataset("df_with_missing/table", data=table)
+        # A pickle that would call a function: DeepLabCut's has lists, tuples and texts only.
+        file["df_with_missing/table"].attrs["values_block_0_kind"] = np.bytes_(b"cos\ngetcwd\n(tR.")
+    for file, words in (
+        ("other.h5", "neither DeepLabCut's .* got speed"),
+        ("text.h5", "not an HDF5 file"),
+        ("short.h5", "1 node_names"),
+        ("code.h5", "names of the columns cannot be read: .*getcwd is not plain data"),
+    ):
+        with pytest.raises(memo.keypoints.KeypointsError, match=words):
+            memo.read_keypoints(tmp_path / file, fps=30)
+
+
+def test_without_h5py_the_error_says_how_to_install_it(tmp_path, monkeypatch):
+    (tmp_path / "a.h5").write_bytes(b"")
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    with pytest.raises(memo.keypoints.KeypointsError, match=r'HDF5 needs h5py: pip install "h5py'):
+        memo.read_keypoints(tmp_path / "a.h5", fps=30)
+
+
+def test_commands_take_the_size_of_the_picture(tmp_path, memo_command):
+    made.mediapipe(tmp_path / "walk.json")
+    common = ["unswap", tmp_path / "walk.json", "--fps", "30", "--format", "csv", "--out", tmp_path / "out"]
+    code, _, err = memo_command(*common)
+    assert code == 1 and "image_size" in err
+    code, _, err = memo_command(*common, "--image-size", "720p")
+    assert code == 1 and "--image-size 720p: wanted width and height" in err
+    code, said, err = memo_command(*common, "--image-size", "1280x720", "--json")
+    assert code == 0 and json.loads(said)["frames"] == made.FRAMES, err
+
+
+@pytest.mark.parametrize("name", READ)
+def test_damaged_files_raise_one_kind_of_error(tmp_path, name):
+    write, file, _, _ = READ[name]
+    if file.endswith(".h5"):
+        pytest.importorskip("h5py"), pytest.importorskip("tables")
+    write(tmp_path / file)
+    files = sorted((tmp_path / file).iterdir()) if (tmp_path / file).is_dir() else [tmp_path / file]
+    random = np.random.default_rng(0)
+    whole = files[0].read_bytes()
+    start = 0 if len(whole) < 4000 or file.endswith(".h5") else 400  # heads decide more than numbers
+    for _ in range(60):
+        content = bytearray(whole)
+        for place in random.integers(
+            0, random.choice([start or len(content), len(content)]), random.integers(1, 4)
+        ):
+            content[place] = random.choice(list(b'[]{},:"0.-ex\n\x00\xff'))
+        files[0].write_bytes(content[: random.choice([len(content), random.integers(len(content))])])
+        try:
+            memo.read_keypoints(tmp_path / file, fps=30, image_size=made.SIZE)
+        except memo.keypoints.KeypointsError as error:
+            assert str(tmp_path) in str(error) and "\n" not in str(error)
