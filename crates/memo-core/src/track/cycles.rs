@@ -7,7 +7,7 @@
 //! linearly. Nothing is extrapolated: a point is known only between two successive frames that show the limb.
 //!
 //! A side without two successive contacts has partial cycles instead: one of their contacts is outside of the frames,
-//! and is placed one mean stride from the other.
+//! and is placed one mean stride from the other, with an error as large as strides vary.
 //!
 //! The 95 % interval of the mean is for the person's mean cycle, of which the measured cycles are a sample. Two terms
 //! decrease with their number, the variation of a person from cycle to cycle (`CYCLE_SD_DEG`) and late or early contacts,
@@ -17,7 +17,7 @@
 
 use super::fit::JOINTS;
 use super::gait_parameters::{
-    CONTACT_COMMON_SD_S, CONTACT_SD_S, LONGEST_STRIDE, PRIOR_STEPS, Z, student_quantile,
+    CONTACT_COMMON_SD_S, CONTACT_SD_S, LONGEST_STRIDE, NATURAL_SHARE, PRIOR_STEPS, Z, student_quantile,
 };
 use super::result::{Event, EventKind, Side, TrackedWalk};
 
@@ -97,21 +97,31 @@ pub fn mean_cycles(cycles: &[GaitCycle]) -> Vec<MeanCycle> {
     let of = |side: Side| {
         let own: Vec<&GaitCycle> = cycles.iter().filter(|cycle| cycle.side == side).collect();
         let stride_s = own.iter().map(|cycle| cycle.end_s - cycle.start_s).sum::<f64>() / own.len() as f64;
+        let is_whole = own.iter().all(|cycle| cycle.is_whole);
+        let stride_sd = if is_whole { 0.0 } else { NATURAL_SHARE };
+        let contact_sd = stride_sd.hypot(CONTACT_SD_S / stride_s);
+        let timing = Timing { contact_sd, common_sd: CONTACT_COMMON_SD_S / stride_s };
         let angles = std::array::from_fn(|joint| {
             let at = |point: usize| own.iter().filter_map(|cycle| cycle.angles[joint][point]).collect();
-            mean_angles(
-                &(0..CYCLE_POINTS).map(at).collect::<Vec<_>>(),
-                stride_s,
-                CYCLE_SD_DEG[joint].to_radians(),
-            )
+            let points: Vec<Vec<[f64; 2]>> = (0..CYCLE_POINTS).map(at).collect();
+            mean_angles(&points, timing, CYCLE_SD_DEG[joint].to_radians())
         });
         (!own.is_empty()).then_some(MeanCycle { side, angles })
     };
     [Side::Right, Side::Left].into_iter().filter_map(of).collect()
 }
 
+/// Standard deviations of the times of contacts, cycles.
+#[derive(Debug, Clone, Copy)]
+struct Timing {
+    /// Of each contact; where one was placed a mean stride from the other, with the variation of strides.
+    contact_sd: f64,
+    /// Of the error that all contacts have in common.
+    common_sd: f64,
+}
+
 /// The mean at each point, given the angles of the cycles there.
-fn mean_angles(points: &[Vec<[f64; 2]>], stride_s: f64, prior_sd: f64) -> Vec<Option<MeanAngle>> {
+fn mean_angles(points: &[Vec<[f64; 2]>], timing: Timing, prior_sd: f64) -> Vec<Option<MeanAngle>> {
     let mean = |angles: &Vec<[f64; 2]>| {
         (!angles.is_empty()).then(|| angles.iter().map(|[angle, _]| angle).sum::<f64>() / angles.len() as f64)
     };
@@ -120,11 +130,10 @@ fn mean_angles(points: &[Vec<[f64; 2]>], stride_s: f64, prior_sd: f64) -> Vec<Op
     let at = |point: usize| {
         let (before, after) = (point.saturating_sub(1), (point + 1).min(last));
         let rise = means[after].zip(means[before]).map_or(0.0, |(b, a)| b - a);
-        let rate = rise * last as f64 / ((after - before) as f64 * stride_s);
+        let rate = rise * last as f64 / (after - before) as f64;
         let share = point as f64 / last as f64;
-        let late_sd = rate * CONTACT_SD_S * share.hypot(1.0 - share);
-        let common_sd = rate * CONTACT_COMMON_SD_S;
-        mean_angle(&points[point], means[point]?, prior_sd.hypot(late_sd), common_sd)
+        let late_sd = rate * timing.contact_sd * share.hypot(1.0 - share);
+        mean_angle(&points[point], means[point]?, prior_sd.hypot(late_sd), rate * timing.common_sd)
     };
     (0..points.len()).map(at).collect()
 }
@@ -297,7 +306,7 @@ mod tests {
         let angle = |point: usize| Some([0.05 * point as f64, 0.0]);
         let angles = std::array::from_fn(|_| (0..CYCLE_POINTS).map(angle).collect());
         let steep = GaitCycle { angles, ..cycle(Side::Right, 0.0) };
-        let [mean] = mean_cycles(&[steep]).try_into().unwrap();
+        let [mean] = mean_cycles(std::slice::from_ref(&steep)).try_into().unwrap();
         // 5 radians per cycle of a second; at the start only the first contact counts.
         let prior = (2.2f64.to_radians()).hypot(5.0 * CONTACT_SD_S);
         let wanted = (2.776 * prior).hypot(1.96 * 5.0 * CONTACT_COMMON_SD_S);
@@ -305,5 +314,11 @@ mod tests {
         let middle = (2.2f64.to_radians()).hypot(5.0 * CONTACT_SD_S * 0.5f64.sqrt());
         let wanted = (2.776 * middle).hypot(1.96 * 5.0 * CONTACT_COMMON_SD_S);
         assert!((mean.angles[1][50].unwrap().half / wanted - 1.0).abs() < 2e-3);
+        // A contact that was placed is as late as strides vary, too.
+        let partial = GaitCycle { is_whole: false, ..steep };
+        let [mean] = mean_cycles(&[partial]).try_into().unwrap();
+        let prior = (2.2f64.to_radians()).hypot(5.0 * CONTACT_SD_S.hypot(NATURAL_SHARE));
+        let wanted = (2.776 * prior).hypot(1.96 * 5.0 * CONTACT_COMMON_SD_S);
+        assert!((mean.angles[1][0].unwrap().half / wanted - 1.0).abs() < 2e-3);
     }
 }

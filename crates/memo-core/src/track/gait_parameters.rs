@@ -53,7 +53,7 @@ const REACH_SD_M: f64 = 0.012;
 /// Step-length error per metre of reach asymmetry: a leg that swings farther ahead also looks later in the cycle.
 const REACH_COUNTS: f64 = 1.35;
 /// Step variability of a healthy adult, as a share of step length or step time.
-const NATURAL_SHARE: f64 = 0.03;
+pub(super) const NATURAL_SHARE: f64 = 0.03;
 /// Weight of the prior step variability, in observed steps.
 pub(super) const PRIOR_STEPS: f64 = 4.0;
 /// Relative standard deviation over people of the height while walking, compared with the model of the same body
