@@ -314,9 +314,9 @@ impl PyWalk {
     }
 
     /// Gait cycles, right then left, each side's mean last: (side, curve, start_s, end_s, values); curve is "cycle",
-    /// "partial" or "mean", values are (5, 101, 6): of hip, knee, ankle, shoulder and elbow, at 0 to 100 %, angle, stated
-    /// standard deviation, standard deviation over cycles, low and high end of the 95 % interval (degrees), and number
-    /// of cycles; NaN if unknown.
+    /// "partial" or "mean", values are (5, 101, 6): of hip, knee, ankle, shoulder and elbow, at 0 to 100 %, angle,
+    /// stated standard deviation, standard deviation over cycles, low and high end of the 95 % interval (degrees), and
+    /// number of cycles; NaN if unknown.
     fn cycles<'py>(&self, py: Python<'py>) -> PyResult<Vec<CycleTuple<'py>>> {
         cycles::cycles_of(py, &self.walk)
     }

@@ -10,10 +10,10 @@
 //! and is placed one mean stride from the other, with an error as large as strides vary.
 //!
 //! The 95 % interval of the mean is for the person's mean cycle, of which the measured cycles are a sample. Two terms
-//! decrease with their number, the variation of a person from cycle to cycle (`CYCLE_SD_DEG`) and late or early contacts,
-//! which matter where the angle is steep. Both are a prior scatter, combined with that of the cycles as the steps of
-//! [`gait_parameters`](super::gait_parameters). Two terms do not: the stated standard deviation of the angles, and the
-//! error that contacts have in common.
+//! decrease with their number: the variation of a person from cycle to cycle (`CYCLE_SD_DEG`), and late or early
+//! contacts, which matter where the angle is steep. Both are a prior scatter, combined with that of the cycles as the
+//! steps of [`gait_parameters`](super::gait_parameters). Two terms do not: the stated standard deviation of the angles,
+//! and the error that contacts have in common.
 
 use super::fit::JOINTS;
 use super::gait_parameters::{
@@ -24,8 +24,8 @@ use super::result::{Event, EventKind, Side, TrackedWalk};
 /// Points of a cycle: 0, 1, ..., 100 %.
 pub const CYCLE_POINTS: usize = 101;
 
-/// Standard deviation of an angle from cycle to cycle, degrees: hip, knee, ankle, shoulder, elbow. Measured on the ten
-/// sides and cycles that three motion-captured people repeat (6 degrees of freedom).
+/// Standard deviation of an angle from cycle to cycle, degrees: hip, knee, ankle, shoulder, elbow. Measured on
+/// three motion-captured people who repeat cycles (6 degrees of freedom).
 const CYCLE_SD_DEG: [f64; JOINTS] = [1.5, 2.2, 1.9, 4.0, 4.5];
 
 /// An angle and its standard deviation, radians; `None` where it was not measured.

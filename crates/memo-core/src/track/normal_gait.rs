@@ -6,8 +6,8 @@
 //! zero is set by skin markers, and they are higher than angles between joint centres in everybody. `OFFSET_RAD` is the
 //! mean difference, measured on the Plug-in-Gait joint centres of two people of the Biomechanical-ToolKit data
 //! (hip 7.5 and 7.8 degrees, knee 10.7 and 8.2). Two other people confirm it: their curves are within two standard
-//! deviations of the corrected average for 100 % (hip) and 90 to 100 % (knee) of the cycle. A correction that varies over
-//! the cycle fits the first two better and the others worse. Skeletons of the CMU data have knees with another
+//! deviations of the corrected average for 100 % (hip) and 90 to 100 % (knee) of the cycle. A correction that varies
+//! over the cycle fits the first two better and the others worse. Skeletons of the CMU data have knees with another
 //! zero and were not used.
 //!
 //! Limits: adults who walk forward at their own speed on level ground; for the ankle, no correction could be checked.
@@ -23,8 +23,9 @@ const OFFSET_RAD: [f64; 2] = [7.7 * std::f64::consts::PI / 180.0, 9.6 * std::f64
 const OFFSET_SD_RAD: f64 = 1.7 * std::f64::consts::PI / 180.0;
 /// The band of healthy walking is this many standard deviations wide on each side of the average.
 pub const BAND_SD: f64 = 2.0;
-/// A departure over a smaller share of the cycle may be chance, because a cycle has many points. Of 16 drawn walks of four
-/// healthy people, one departs, for 6 % of the cycle; three with a stiff knee or a crouched gait depart for 25 to 100 %.
+/// A departure over a smaller share of the cycle may be chance, because a cycle has many points. Of 16 drawn walks of
+/// four healthy people, one departs, for 6 % of the cycle; three with a stiff knee or a crouched gait depart for 25 to
+/// 100 %.
 const LEAST_SHARE: f64 = 0.1;
 
 /// Standard deviations over people at twenty equally spaced points of the cycle, degrees.
