@@ -9,6 +9,7 @@ import memo
 import numpy as np
 import pytest
 from fake_psychopy import SCREENS, stand_in
+from motions import shared_motion
 
 WALKER = memo.walker_motion(cycles=2)
 MOTION = (WALKER.positions, WALKER.times_s, WALKER.names)
@@ -239,6 +240,31 @@ def test_the_documented_program_shows_each_frame_upright_and_as_drawn(monkeypatc
     known = {}
     exec(compile(program, str(page), "exec"), known)
     assert np.array_equal([screen[60:540, 200:600] for screen in SCREENS], known["frames"])
-    assert np.all(SCREENS[0][:60] == 128) and len(SCREENS) == 2 * round(known["walker"].cycle_s * 60)
+    assert np.all(SCREENS[0][:60] == 128) and len(SCREENS) == round(known["walker"].cycle_s * 60)
     head = spots((SCREENS[0] > 190).astype(np.uint8) * 255)[:, 1].min()
     assert head < 300 - 60  # the head is above the middle of the screen
+
+
+@pytest.mark.parametrize(
+    "clip",
+    ["BTK_Gait", "Gait_limp", "CMU12_brisk", "BTK_BELT_C", "BTK_ANTO_M_hole", "CMU02_limp", "CMU_02_01"],
+)
+def test_recorded_walks_loop_with_the_period_of_their_knees(clip):
+    from memo.linkage import read_points_csv
+
+    points = read_points_csv(shared_motion("mocap", "joints", f"{clip}.csv"), 3)
+    display = memo.pointlight(points.positions, points.times_s, points.names, azimuth_deg=45, cycles=2)
+    # By another way, from the knee alone: the lag of its highest autocorrelation from 0.7 to 1.6 s.
+    hip, knee, ankle = (points.positions[:, points.names.index(name)] for name in ("RHP", "RKN", "RAN"))
+    bend = np.linalg.norm(ankle - hip, axis=1) / np.linalg.norm(ankle - knee, axis=1)
+    bend = bend - bend.mean()
+    interval_s = np.diff(points.times_s).mean()
+    lags = np.arange(int(0.7 / interval_s), min(int(1.6 / interval_s), int(0.8 * len(bend))))
+    alike = [np.corrcoef(bend[lag:], bend[:-lag])[0, 1] for lag in lags]
+    assert display.period_s == pytest.approx(lags[np.argmax(alike)] * interval_s, rel=0.05)
+    paths = display.positions_px
+    middle = len(paths) // 2
+    steps = np.linalg.norm(np.diff(paths, axis=0), axis=2)
+    bends = np.linalg.norm(np.diff(paths, n=2, axis=0), axis=2)
+    assert (steps[middle - 1] <= 1.05 * steps[: middle - 1].max(axis=0)).all()
+    assert (bends[middle - 2 : middle] <= bends[: middle - 2].max(axis=0)).all()

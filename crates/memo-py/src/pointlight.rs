@@ -66,16 +66,16 @@ result! {
         _ => String::new(),
     });
     methods {
-        /// Frames `start` to `stop` as pictures (T, H, W, 3), red, green and blue; with `alpha` (T, H, W, 4), the colour
-        /// of the dots and how much of it, without background.
+        /// Frames `start` to `stop` as pictures (T, H, W, 3), red, green and blue; with `alpha` (T, H, W, 4), the
+        /// colour of the dots and how much of it, without background.
         ///
-        /// One pixel of the display is one pixel of the picture: nothing is scaled to fit. `centre_px` is the pixel of
-        /// the display in the middle of the picture, by default `self.centre_px`; `size_px` is width and height; `shape`
-        /// is "disc", "square" (`dot_px` is the diameter or side) or "gaussian" (`dot_px` is the full width at half
-        /// maximum); without `smooth`, a pixel is covered wholly or not at all.
+        /// One pixel of the display is one pixel of the picture: nothing is scaled to fit. `centre_px` is the pixel
+        /// of the display in the middle of the picture, by default `self.centre_px`; `size_px` is width and height;
+        /// `shape` is "disc", "square" (`dot_px` is the diameter or side) or "gaussian" (`dot_px` is the full width
+        /// at half maximum); without `smooth`, a pixel is covered wholly or not at all.
         ///
-        /// Defaults: `size_px` (640, 640), `dot_px` 10, `shape` "disc", `colour` (255, 255, 255), `background` (0, 0, 0),
-        /// `smooth` True.
+        /// Defaults: `size_px` (640, 640), `dot_px` 10, `shape` "disc", `colour` (255, 255, 255), `background`
+        /// (0, 0, 0), `smooth` True.
         #[pyo3(signature = (
             *, size_px=None, centre_px=None, dot_px=None, shape=None, colour=None, background=None, smooth=true,
             alpha=false, start=0, stop=None
@@ -131,7 +131,7 @@ fn drawn<'py>(
     let bytes = (stop - start).saturating_mul(width * height * channels);
     if bytes > MOST_BYTES {
         return Err(PyValueError::new_err(format!(
-            "{} of {width} x {height} pixels would take {:.0} GB: draw fewer at a time, from start to stop",
+            "{} of size {width}x{height} would take {:.0} GB: draw fewer at a time, from start to stop",
             counted(stop - start, "frame"),
             bytes as f64 / 1e9
         )));
@@ -237,21 +237,21 @@ const LOCOMOTIONS: [(&str, Locomotion); 3] = [
 
 /// A point-light display of points over time (T, K, 3), world metres, Z up, NaN if unknown.
 ///
-/// `cycles`: one cycle of the motion, that many times, without a jump from its end to its start, `tempo` times as fast.
-/// `period_s`: its period, for `cycles` and `scramble_phase="periodic"`; by default the whole motion, if its end leads
-/// to its start, or else the lag at which it repeats itself best. `scramble_limit_px`: largest shift along each of
-/// `scramble_axes`; by default, the extent of the figure.
+/// `cycles`: one cycle of the motion, that many times, without a jump from its end to its start, `tempo` times as
+/// fast. `period_s`: its period, for `cycles` and `scramble_phase="periodic"`; by default the whole motion, if its end
+/// leads to its start, or else the lag at which it repeats itself best. `scramble_limit_px`: largest shift along each
+/// of `scramble_axes`; by default, the extent of the figure.
 ///
 /// Defaults: `azimuth_deg` 0, `elevation_deg` 0, `px_per_m` 200, `locomotion` "treadmill", `tempo` 1,
-/// `scramble_axes` "both", `max_shift_s` 0.5, `life_dots` 8, `life_sites` "limbs", `noise_dots` 0, `noise_kind` "scrambled", `noise_area` 1.5,
-/// `noise_speed_px_s` 60, `noise_sd_px` 0, `seed` 0.
+/// `scramble_axes` "both", `max_shift_s` 0.5, `life_dots` 8, `life_sites` "limbs", `noise_dots` 0,
+/// `noise_kind` "scrambled", `noise_area` 1.5, `noise_speed_px_s` 60, `noise_sd_px` 0, `seed` 0.
 #[pyfunction]
 #[pyo3(signature = (
     positions, times_s, names, *, azimuth_deg=None, elevation_deg=None, px_per_m=None, camera=None,
     locomotion=None, cycles=None, tempo=None, inverted=false, mirrored=false, reversed=false,
-    scramble_position=false, scramble_axes=None, scramble_limit_px=None, scramble_phase=None, period_s=None, max_shift_s=None, lifetime_frames=None, life_dots=None,
-    life_sites=None, limbs=None, synchronous=false, noise_dots=None, noise_kind=None, noise_area=None,
-    noise_speed_px_s=None, noise_sd_px=None, seed=None
+    scramble_position=false, scramble_axes=None, scramble_limit_px=None, scramble_phase=None, period_s=None,
+    max_shift_s=None, lifetime_frames=None, life_dots=None, life_sites=None, limbs=None, synchronous=false,
+    noise_dots=None, noise_kind=None, noise_area=None, noise_speed_px_s=None, noise_sd_px=None, seed=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "each is one of the usual conditions of a display")]
 pub fn pointlight(

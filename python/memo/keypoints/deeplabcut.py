@@ -25,6 +25,7 @@ from memo.keypoints.hdf5 import opened
 from memo.keypoints.points import MAX_FRAME, Array, KeypointsError, Source
 from memo.keypoints.text import last_number, short
 from memo.spreadsheet import CsvRows, Error
+from memo.wording import counted
 
 __all__ = [
     "is_deeplabcut",
@@ -64,7 +65,7 @@ def read_deeplabcut(path: Path, content: str) -> Found:
     for number, row in enumerate(rows[count:], start=count + 1):
         if len(row) != indexed + len(columns):
             raise KeypointsError(
-                f"{path}: row {number} has {len(row)} cells, the header {indexed + len(columns)}"
+                f"{path}: row {number} has {counted(len(row), 'cell')}, the header {indexed + len(columns)}"
             )
         try:
             values.append([float(cell) if cell.strip() else np.nan for cell in row[indexed:]])
@@ -103,7 +104,9 @@ def read_deeplabcut_h5(path: Path) -> Found:
         columns = [tuple(map(str, column)) for column in _unpickled(bytes(named), path)]
     values = np.asarray(rows["values_block_0"], np.float64)
     if values.ndim != 2 or values.shape[1] != len(columns) or not columns or len(set(map(len, columns))) > 1:
-        raise KeypointsError(f"{path}: {len(columns)} names of columns for numbers of shape {values.shape}")
+        raise KeypointsError(
+            f"{path}: {counted(len(columns), 'name')} of columns for numbers of shape {values.shape}"
+        )
     index = rows["index"] if "index" in rows.dtype.names else np.arange(len(rows))
     frames = [
         _frame(
@@ -175,8 +178,8 @@ def known_joints(path: Path, names: Sequence[str]) -> dict[str, str]:
     for name in names:
         try:
             joint = _memo.joint_name(name)
-        except ValueError as error:
-            raise KeypointsError(f"{path}: {error}") from None
+        except ValueError:  # similar to a joint, such as neck1
+            continue
         if joint is not None:
             joints[name] = joint
     twice = [name for name in joints if list(joints.values()).count(joints[name]) > 1]

@@ -23,6 +23,7 @@ from memo.keypoints.found import Found, Person, with_missing
 from memo.keypoints.hdf5 import opened
 from memo.keypoints.points import MAX_FRAME, Array, KeypointsError, Source
 from memo.keypoints.text import short
+from memo.wording import counted
 
 __all__ = ["is_sleap", "is_sleap_h5", "read_sleap", "read_sleap_h5"]
 
@@ -48,7 +49,7 @@ def read_sleap(path: Path, content: str) -> Found:
     for number, row in enumerate(rows[1:], start=2):
         where = f"{path}: row {number}"
         if len(row) != len(rows[0]):
-            raise KeypointsError(f"{where} has {len(row)} cells, the header {len(rows[0])}")
+            raise KeypointsError(f"{where} has {counted(len(row), 'cell')}, the header {len(rows[0])}")
 
         def value(column: str, row: list[str] = row, where: str = where) -> float:
             try:

@@ -23,6 +23,7 @@ import numpy as np
 from memo.keypoints.found import Found, Person, with_missing
 from memo.keypoints.points import Array, KeypointsError, Source
 from memo.keypoints.text import content_of, short
+from memo.wording import counted
 
 __all__ = ["is_detections", "read_detections", "read_labels"]
 
@@ -103,8 +104,8 @@ def _of_line(line: str, where: str) -> Array | None:
             points = np.array(numbers[_BOX : _BOX + each * _POINTS]).reshape(_POINTS, each)
             return points if each == 3 else np.column_stack([points, np.ones(_POINTS)])
     raise KeypointsError(
-        f"{where}: {len(numbers)} numbers; wanted class, box and {_POINTS} points of 2 or 3 numbers, "
-        "as a -pose model has"
+        f"{where}: {counted(len(numbers), 'number')}; wanted class, box and {_POINTS} points "
+        "of 2 or 3 numbers, as a -pose model has"
     )
 
 

@@ -1,7 +1,8 @@
 //! One cycle of a motion, cut and closed so that it repeats without a jump.
 //!
-//! The cut is where position and velocity differ least one period later. What still differs is taken out
-//! evenly over the cycle, point by point. The cycle is then sampled in whole frames.
+//! The cut is where position and velocity differ least one period later. What still differs in position is
+//! taken out evenly over the cycle, point by point. The end of the cycle then turns into what precedes its
+//! start, if that was recorded, so that the velocity does not jump either. The cycle is sampled in whole frames.
 
 use super::PointLightError;
 use super::course::Course;
@@ -21,6 +22,9 @@ pub(super) struct Cycle {
     velocity: DVec3,
     interval_s: f64,
 }
+
+/// The share of the cycle at its end that turns into what precedes its start.
+const TURN: f64 = 0.1;
 
 /// Largest change of the speed, and of its inverse.
 const MOST_TEMPO: f64 = 10.0;
@@ -42,7 +46,8 @@ pub(super) fn closed_cycle(
         None => found_period(still, interval_s)?,
     };
     let frames = ((period / tempo).round() as usize).max(1);
-    let start = best_start(still, period) as f64;
+    let start = if is_closed { 0.0 } else { best_start(still, period) as f64 };
+    let turn = if start >= TURN * period { TURN } else { 0.0 };
     let of_point = |k: usize| move |frame: usize| still.at(frame, k).unwrap_or(DVec3::NAN);
     let path = still.pelvis_path();
     let drift = |positions: &dyn Fn(usize) -> DVec3| {
@@ -53,7 +58,10 @@ pub(super) fn closed_cycle(
     let drifts: Vec<DVec3> = (0..motion.points()).map(|k| drift(&of_point(k))).collect();
     let sampled = (0..frames * motion.points()).map(|i| {
         let (share, k) = ((i / motion.points()) as f64 / frames as f64, i % motion.points());
-        between(&of_point(k), still.frames(), start + period * share) - drifts[k] * (share - 0.5)
+        let at = |share: f64| {
+            between(&of_point(k), still.frames(), start + period * share) - drifts[k] * (share - 0.5)
+        };
+        turned(at(share), at(share - 1.0), 1.0 - (1.0 - share) / turn)
     });
     let duration_s = (frames as f64 * interval_s).max(f64::MIN_POSITIVE);
     let advance = course.velocity * (period * interval_s) + drift(&|frame| path[frame]).with_z(0.0);
@@ -81,6 +89,12 @@ impl Cycle {
     }
 }
 
+/// From one position to another: the first up to `done` 0, the second from 1 on, with no jump of the velocity.
+fn turned(from: DVec3, to: DVec3, done: f64) -> DVec3 {
+    let is_turning = done > 0.0 && !to.is_nan();
+    if is_turning { from.lerp(to, done * done * (3.0 - 2.0 * done)) } else { from }
+}
+
 /// A period in frames; within a frame of the whole motion, it is the whole motion.
 fn asked_period(period_s: f64, interval_s: f64, frames: usize) -> Result<f64, PointLightError> {
     let parameter = "period_s";
@@ -100,12 +114,15 @@ fn part_of(whole: f64, found: Option<f64>) -> f64 {
     if is_part { whole / parts } else { whole }
 }
 
-/// The first frame whose position and velocity differ least from those one period later.
+/// The first frame whose position and velocity differ least from those one period later; one that leaves enough
+/// frames before it, if there is any.
 fn best_start(still: &PointMotion, period: f64) -> usize {
     let latest = (still.frames() - 1) as f64 - period;
     if latest < 1.0 {
         return 0;
     }
+    let before = (TURN * period).ceil();
+    let first = if before <= latest { before as usize } else { 0 };
     let pace = period / TAU; // turns velocities into distances, as in a motion of one harmonic
     let apart_sq = |start: f64, k: usize| {
         let at = |t: f64| between(&|frame| still.at(frame, k).unwrap_or(DVec3::NAN), still.frames(), t);
@@ -115,8 +132,8 @@ fn best_start(still: &PointMotion, period: f64) -> usize {
         sum.is_finite().then_some(sum)
     };
     let cost = |start: usize| mean((0..still.points()).filter_map(|k| apart_sq(start as f64, k)));
-    let costs: Vec<f64> = (0..=latest as usize).map(|t| cost(t).unwrap_or(f64::INFINITY)).collect();
-    (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0)
+    let costs: Vec<f64> = (first..=latest as usize).map(|t| cost(t).unwrap_or(f64::INFINITY)).collect();
+    (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).map_or(0, |best| first + best)
 }
 
 /// A position between frames by cubic interpolation (Catmull and Rom 1974), NaN if unknown. Beyond the first

@@ -144,10 +144,9 @@ pub fn displays_together(
     let Some(first) = displays.first().filter(|_| count == offsets) else {
         return Err(PointLightError::Actors { displays: count, offsets });
     };
-    let is_far = |offset: &DVec2| !(offset.abs().max_element() <= 1e6);
-    if let Some(offset) = offsets_px.iter().find(|offset| is_far(offset)) {
+    let is_near = |x: &f64| x.abs() <= 1e6;
+    if let Some(got) = offsets_px.iter().flat_map(|offset| offset.to_array()).find(|x| !is_near(x)) {
         let wanted = "at most 1,000,000 pixels";
-        let got = offset.abs().max_element();
         return Err(PointLightError::Option(OptionError { name: "offsets_px", wanted, got }));
     }
     let frames = first.times_s.len();

@@ -17,8 +17,8 @@ const LONGEST_PERIOD_S: f64 = 10.0;
 /// Largest mismatch of a period; 1 is the mismatch of unrelated positions.
 const MOST_MISMATCH: f64 = 0.2;
 
-/// A multiple of the period may fit better than the period by this mismatch.
-const MULTIPLE_MISMATCH: f64 = 0.02;
+/// A multiple of the period may fit better than the period by this mismatch: up to 0.03 in recorded walks.
+const MULTIPLE_MISMATCH: f64 = 0.05;
 
 /// A motion closes by itself if its first frame is within this share of a step of where the last one leads.
 const CLOSED_SHARE: f64 = 0.25;

@@ -68,8 +68,9 @@ impl DotPicture {
         }
         let is_good = self.dot_px > 0.0 && self.dot_px <= 1e4;
         OptionError::unless(is_good, "dot_px", "positive and at most 10,000 pixels", self.dot_px)?;
-        let farthest = self.centre_px.map_or(0.0, |centre| centre.abs().max_element());
-        OptionError::unless(farthest <= 1e9, "centre_px", "finite and at most 1e9", farthest)?;
+        for along in self.centre_px.iter().flat_map(|centre| centre.to_array()) {
+            OptionError::unless(along.abs() <= 1e9, "centre_px", "finite and at most 1e9", along)?;
+        }
         Ok(())
     }
 
@@ -238,6 +239,7 @@ mod tests {
         }
         assert!(DotPicture { size_px: [0, 5], ..picture }.check().is_err());
         assert!(DotPicture { centre_px: Some(DVec2::NAN), ..picture }.check().is_err());
+        assert!(DotPicture { centre_px: Some(DVec2::new(f64::NAN, 0.0)), ..picture }.check().is_err());
     }
 
     #[test]

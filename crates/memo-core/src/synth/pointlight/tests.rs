@@ -420,8 +420,8 @@ fn actors_keep_their_dots_and_what_they_show() {
         displays_together(displays, offsets).unwrap_err().to_string()
     };
     assert!(refused(&[], &[]).contains("0 displays"));
-    assert!(refused(&[one.clone()], &[]).contains("1 display and 0 offsets"));
-    assert!(refused(&[one.clone()], &[DVec2::NAN]).contains("offsets_px"));
+    assert!(refused(std::slice::from_ref(&one), &[]).contains("1 display and 0 offsets"));
+    assert!(refused(std::slice::from_ref(&one), &[DVec2::NAN]).contains("offsets_px"));
     let shorter = Some(PhaseScramble::Shortened { max_shift_s: 0.3 });
     let shorter = display(PointLightOptions { scrambles_phase: shorter, ..PointLightOptions::default() });
     assert!(refused(&[one, shorter], &offsets).contains("actor 1"));
