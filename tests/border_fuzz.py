@@ -742,7 +742,9 @@ def _(d):
 
 @case("defaults")
 def _(d):
-    return _memo.defaults(d.choice("edge_segments", "planar", "pointlight", "posture", "walker_motion"))
+    return _memo.defaults(
+        d.choice("edge_segments", "planar", "pointlight", "posture", "track", "walker_motion")
+    )
 
 
 @case("change_mask")

@@ -244,7 +244,7 @@ class Tracker:
 
     def __new__(
         cls,
-        height_m: float = 1.75,
+        height_m: float | None = None,
         camera: Camera | None = None,
         *,
         fov_deg: float | None = None,
@@ -289,6 +289,7 @@ class WalkFit:
     missed_inside: Final[float]
     """The same of the lines inside the body."""
     worst_length_sd: Final[float]
+    sole_m: Final[float | None]
     """The farthest that a length of the body is from its mean over people, standard deviations."""
     lengths_m: Final[dict[str, float]]
     """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
@@ -312,6 +313,14 @@ class Walk:
     def measured(self) -> npt.NDArray[np.float64]: ...
     def contours(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]: ...
     def start(self) -> dict[str, Any]: ...
+    @property
+    def height(self) -> tuple[float, float, str]: ...
+    @property
+    def measured_height(self) -> tuple[float, float] | None: ...
+    @property
+    def height_is_contradicted(self) -> bool: ...
+    @property
+    def walk_ratio(self) -> tuple[float, float, float] | None: ...
     @property
     def camera(self) -> Camera: ...
     @property

@@ -1,9 +1,9 @@
 """Gait parameters of walks: the table, the definitions of its rows, and sentences about them.
 
 The core computes the numbers (`memo_core::track::gait_parameters`). All intervals are 95 % intervals for
-the given height, known to 2 cm: lengths scale with it. They describe the person's walking, of which
-the visible steps are a sample; the mean of just these steps is known better. Their coverage is
-measured on drawn people who vary as real people do (`tests/gait_parameters.rs` of the core).
+the height: given, known to 2 cm, measured or assumed. Lengths scale with it. They describe the person's
+walking, of which the visible steps are a sample; the mean of just these steps is known better. Their
+coverage is measured on drawn people who vary as real people do (`tests/gait_parameters.rs` of the core).
 """
 
 from __future__ import annotations

@@ -94,10 +94,10 @@ def checked_height(height_m: float) -> float:
 
 
 def tracker_options(
-    height_m: float, camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None
+    height_m: float | None, camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None
 ) -> dict[str, Any]:
     """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
-    options: dict[str, Any] = {"height_m": checked_height(height_m)}
+    options: dict[str, Any] = {} if height_m is None else {"height_m": checked_height(height_m)}
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
     for name, value in reading.items():

@@ -15,6 +15,12 @@ from memo.cycles import cycle_table, departure_sentences
 from memo.files import TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
 from memo.pixels import camera_of_video, columns_of_video, of_video
+from memo.plausible import (
+    assumed_height_sentences,
+    contradiction_sentences,
+    implausible_sentences,
+    measured_height_sentences,
+)
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -35,8 +41,10 @@ _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
 class Tracker:
     """Tracks one walker at a time through a stream of frames, in bounded memory.
 
-    `height_m` is the body height from crown to sole. Without `camera`, one is assumed from the image size,
-    the horizontal field of view `fov_deg` and the height. The results lag one frame behind the input.
+    `height_m` is the body height from crown to sole. None measures it in the image of `camera`; without a
+    camera either, that of the population is assumed, and standard deviations and intervals of all lengths
+    contain its spread. Without `camera`, one is assumed from the image size, the horizontal field of view
+    `fov_deg` and the height. The results lag one frame behind the input.
 
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
     `adapt=False` does not fit the person: angles are those of the average gait, moved by the tracked phase.
@@ -51,7 +59,7 @@ class Tracker:
 
     def __init__(
         self,
-        height_m: float = 1.75,
+        height_m: float | None = None,
         camera: _memo.Camera | None = None,
         *,
         fov_deg: float | None = None,
@@ -115,7 +123,7 @@ class Tracker:
 def track(
     frames: Iterable[npt.NDArray[np.uint8]],
     *,
-    height_m: float,
+    height_m: float | None = None,
     times_s: Iterable[float] | None = None,
     fps: float | None = None,
     camera: _memo.Camera | None = None,
@@ -133,6 +141,7 @@ def track(
 ) -> Track:
     """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
+    `height_m`: body height; None measures or assumes it (`Tracker`).
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
@@ -198,6 +207,10 @@ class StoredWalk:
     p_swapped: float
     fit: _memo.WalkFit | None
     fit_problem: str | None
+    height: tuple[float, float, str]
+    measured_height: tuple[float, float] | None
+    height_is_contradicted: bool
+    walk_ratio: tuple[float, float, float] | None
 
     @classmethod
     def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
@@ -310,9 +323,11 @@ class Track:
             return [self.summary["message"]]
         said = []
         for index, walk in enumerate(self.walks):
-            told = [self._message(walk)]
+            told = [*assumed_height_sentences(walk), self._message(walk)]
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
+            told += measured_height_sentences(walk)
             told += cadence_sentences(self.gait_parameters, index)
+            told += implausible_sentences(walk)
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
@@ -402,6 +417,12 @@ class Track:
             "p_swapped": main.p_swapped,
             "speed_mps": speed,
             "cadence_steps_per_min": cadence,
+            "height_m": main.height[0],
+            "height_sd_m": main.height[1],
+            "height_source": main.height[2],
+            "measured_height_m": main.measured_height[0] if main.measured_height else None,
+            "measured_height_sd_m": main.measured_height[1] if main.measured_height else None,
+            "doubts": [*contradiction_sentences(main), *implausible_sentences(main)],
             "fit": _fit(main),
         }
 

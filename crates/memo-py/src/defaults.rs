@@ -1,6 +1,6 @@
 //! The defaults of the core's options, for help and documentation.
 
-use crate::{image, planar, pointlight, posture};
+use crate::{image, planar, pointlight, posture, tracker};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -24,6 +24,7 @@ pub fn defaults<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyD
         "pointlight" => pointlight::defaults(py),
         "pointlight_frames" => pointlight::picture_defaults(py),
         "posture" => posture::defaults(py),
+        "track" => tracker::defaults(py),
         "silhouettes" => image::silhouette_defaults(py),
         "walker_motion" => pointlight::walker_defaults(py),
         _ => Err(PyValueError::new_err(format!("no defaults of a function {function:?}"))),

@@ -46,8 +46,9 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyRe
     dict.set_item("height_of_torso_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
     dict.set_item("similarity", steps.iter().map(|s| s.similarity).collect::<Vec<_>>())?;
     dict.set_item("phase", steps.iter().map(|s| s.look.best.phase).collect::<Vec<_>>())?;
-    let drawn = walk.fitted().map_or(body.proportions, |fit| fit.body.proportions);
-    dict.set_item("drawn_proportions", drawn.to_array())?;
+    let drawn = walk.fitted().map_or(body, |fit| &fit.body);
+    dict.set_item("drawn_height_m", drawn.height_m)?;
+    dict.set_item("drawn_proportions", drawn.proportions.to_array())?;
     dict.set_item("drawn_torso_m", rows.iter().map(|r| r.torso_centre.to_array()).collect::<Vec<_>>())?;
     dict.set_item("drawn_heading_rad", rows.iter().map(|r| r.heading_rad).collect::<Vec<_>>())?;
     dict.set_item("drawn_posture_rad", rows.iter().map(|r| r.posture.to_array()).collect::<Vec<_>>())?;
@@ -77,7 +78,7 @@ impl Recorded {
             return Err(refused("curves_rad", format!("must be four curves of 3 to {MOST_SAMPLES} numbers")));
         }
         let gait = Gait::from_samples(curves.each_ref().map(Vec::as_slice));
-        let drawn = drawn(record, body.height_m)?;
+        let drawn = drawn(record)?;
         body.proportions = Proportions::from_array(&finite("proportions", value(record, "proportions")?)?);
         let origin = DVec2::from_array(finite("origin_m", value(record, "origin_m")?)?);
         Ok(Self {
@@ -120,11 +121,12 @@ pub fn recorded_contours<'py>(
 }
 
 /// The bodies that a record draws, by frame.
-fn drawn(record: &Bound<'_, PyDict>, height_m: f64) -> PyResult<HashMap<usize, PosedBody>> {
+fn drawn(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, PosedBody>> {
     let frames: Vec<usize> = value(record, "frame")?;
     let proportions =
         Proportions::from_array(&finite("drawn_proportions", value(record, "drawn_proportions")?)?);
-    let body = Body { height_m, proportions };
+    let height_m = number(record, "drawn_height_m")?;
+    let body = Body { proportions, ..Body::from_height(height_m).map_err(value_error)? };
     let torsos: Vec<[f64; 3]> = column(record, "drawn_torso_m", frames.len())?;
     let headings = numbers(record, "drawn_heading_rad", frames.len())?;
     let postures: Vec<[f64; Posture::COUNT]> = column(record, "drawn_posture_rad", frames.len())?;

@@ -20,6 +20,8 @@ result! {
         missed_inside: f64 = fit.quality.missed_inside,
         /// The farthest that a length of the body is from its mean over people, standard deviations.
         worst_length_sd: f64 = fit.quality.worst_length_sd,
+        /// Mean height of the lower sole above the ground, metres; None in an assumed camera.
+        sole_m: Option<f64> = fit.quality.sole_m,
         /// Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm.
         lengths_m: HashMap<String, f64> = lengths_m(&fit.body),
         /// The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and

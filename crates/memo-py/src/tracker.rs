@@ -3,6 +3,7 @@
 use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows, numpy_from_segments};
 use crate::camera::PyCamera;
 use crate::cycles::{self, CycleTuple};
+use crate::defaults::dict;
 use crate::error::value_error;
 use crate::explain::record_of;
 use crate::fit::WalkFit;
@@ -14,6 +15,7 @@ use memo_core::model::visibility::visible_contours;
 use memo_core::model::{Camera, SideJoints, VisibilityOptions, VisibleSegment};
 use memo_core::track::fit::FitOptions;
 use memo_core::track::gait_parameters::GaitParameter;
+use memo_core::track::height::{BodyHeight, POPULATION_HEIGHT_M, POPULATION_SD_M};
 use memo_core::track::options::{GaitChoice, TrackerOptions};
 use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
@@ -129,12 +131,12 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     #[pyo3(signature = (
-        height_m=1.75, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, compensate_gain=false,
+        height_m=None, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, compensate_gain=false,
         background=false, measure="rohr", full_gradient=None, full_velocity=None, part_weights=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
-        height_m: f64,
+        height_m: Option<f64>,
         camera: Option<PyCamera>,
         fov_deg: Option<f64>,
         gait: &str,
@@ -147,7 +149,7 @@ impl PyTracker {
         full_velocity: Option<f32>,
         part_weights: Option<[f32; 14]>,
     ) -> PyResult<Self> {
-        let mut options = TrackerOptions::for_height(height_m);
+        let mut options = TrackerOptions { height_m, ..TrackerOptions::default() };
         options.camera = camera.map(|camera| camera.0);
         if let Some(degrees) = fov_deg {
             options.field_of_view_rad = degrees.to_radians();
@@ -218,6 +220,14 @@ impl PyTracker {
         dict.set_item("refused_starts", report.refused_starts)?;
         Ok(dict)
     }
+}
+
+/// The defaults of a track.
+pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    dict!(py, {
+        height_m: POPULATION_HEIGHT_M,
+        height_sd_m: POPULATION_SD_M,
+    })
 }
 
 pub(crate) fn choice_error(name: &str, wanted: &str, got: &str) -> PyErr {
@@ -384,6 +394,33 @@ impl PyWalk {
         }
         dict.set_item("p_other_direction", start.p_other_direction)?;
         Ok(dict)
+    }
+
+    /// Body height, its standard deviation (metres), and where it comes from: "given", "measured" or "assumed".
+    #[getter]
+    fn height(&self) -> (f64, f64, &'static str) {
+        let BodyHeight { height_m, sd_m, source } = self.walk.height;
+        (height_m, sd_m, source.name())
+    }
+
+    /// Body height and standard deviation that the fit measured in a calibrated camera, metres, also if another was
+    /// given; None if it measured none.
+    #[getter]
+    fn measured_height(&self) -> Option<(f64, f64)> {
+        self.walk.fitted()?.height.map(|height| (height.height_m, height.sd_m))
+    }
+
+    /// True if the measured height contradicts the given one by more than three standard deviations.
+    #[getter]
+    fn height_is_contradicted(&self) -> bool {
+        self.walk.is_height_contradicted()
+    }
+
+    /// Step length over cadence, and the smallest and largest usual for this height, m per step per minute; None for
+    /// backward or very short walks.
+    #[getter]
+    fn walk_ratio(&self) -> Option<(f64, f64, f64)> {
+        self.walk.walk_ratio().map(|ratio| (ratio.value, ratio.usual[0], ratio.usual[1]))
     }
 
     /// The camera, given or assumed.

@@ -253,8 +253,10 @@ def _attempt(record: Record | None, fingerprint: dict[str, Any]) -> int:
 
 def notes_on(rows: Sequence[Row]) -> list[str]:
     """Notes on the manifest for the user."""
-    without = sum("height_m" not in row.options for row in rows)
-    return [f"{counted(without, 'video')} without height_m: 1.75 m is assumed."] if without else []
+    without = sum(not {"height_m", "camera"} & set(row.options) for row in rows)
+    if not without:
+        return []
+    return [f"{counted(without, 'video')} without height_m and camera: the height is assumed, see summary."]
 
 
 def _notes(

@@ -56,7 +56,7 @@ def _track(arguments: Sequence[str]) -> Exit:
     options: dict[str, Any] = dict(found)
     try:
         reading = {name: options.pop(f"camera_{name}", None) for name in _READING}
-        height_m, camera = options.pop("height_m", 1.75), options.pop("camera", None)
+        height_m, camera = options.pop("height_m", None), options.pop("camera", None)
         recording = Recording(
             video,
             tracker_options(height_m, camera, reading, options.pop("fov_deg", None)),

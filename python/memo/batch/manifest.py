@@ -415,7 +415,7 @@ def _check_options(row: Row) -> None:
     frame_range(options.get("frames", ":"))
     camera = options.get("camera")
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
-    height = options.get("height_m", 1.75)
+    height = options.get("height_m")
     if camera is None or options.get("fov_deg") is not None:
         tracker_options(height, camera, reading, options.get("fov_deg"))
     else:

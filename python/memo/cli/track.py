@@ -41,7 +41,13 @@ def add_track(app: "typer.Typer") -> None:
         camera_unit: CameraUnit = None,
         camera_size: CameraSize = None,
         camera_v_up: CameraVUp = None,
-        height: Annotated[float, typer.Option(help="Height of the walker, metres.")] = 1.75,
+        height: Annotated[
+            float | None,
+            typer.Option(
+                help="Height of the walker, metres. Without it, the height is measured with --camera, and "
+                "assumed to be 1.70 m, with a standard deviation of 0.10 m, otherwise."
+            ),
+        ] = None,
         fov_deg: Annotated[
             float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
         ] = None,

@@ -3,7 +3,8 @@
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, FitFrame, Problem, WalkFit};
-use super::locate::{Sighting, locate_slanting};
+use super::height::{BodyHeight, HeightSource};
+use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
 use super::result::smoothed_hypotheses;
 use super::search::Hypothesis;
@@ -36,6 +37,8 @@ type Kept = [(Option<Sighting>, FrameEdges)];
 #[derive(Debug)]
 pub(super) struct Active {
     pub(super) camera: Camera,
+    /// The body height with which the walk started.
+    pub(super) height: BodyHeight,
     pub(super) depth_sd_m: f64,
     pub(super) start: StartReport,
     pub(super) walk: Walk,
@@ -132,8 +135,21 @@ impl Active {
         let places = smoothed_hypotheses(steps, &options.walk.filter);
         let frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
         let problem = Problem::new(&self.camera, &self.average, path, &frames, fit);
-        let problem = if options.camera.is_none() { problem.of_assumed_camera() } else { problem };
+        let problem = match (&options.camera, self.height.source) {
+            (None, _) => problem.of_assumed_camera(),
+            (Some(_), HeightSource::Given) => problem,
+            (Some(_), _) => problem.of_height(&self.height),
+        };
         Some(problem.fit(p_swapped))
+    }
+
+    /// The given or assumed height, or the one that a fit measured.
+    pub(super) fn height_by(&self, fit: Option<&WalkFit>) -> BodyHeight {
+        let measured = fit.and_then(|fit| fit.height);
+        match (self.height.source, measured) {
+            (HeightSource::Given, _) | (_, None) => self.height,
+            (_, Some(measured)) => measured,
+        }
     }
 
     /// Follows the kept frames again, and from then on the person instead of the average, if the person could be
@@ -143,6 +159,7 @@ impl Active {
         if fit.quality.missed > MOST_MISSED_TO_ADOPT {
             return;
         }
+        self.average.body.height_m = self.height_by(Some(&fit)).height_m;
         let [first, last] = [&fit.frames[0], &fit.frames[fit.frames.len() - 1]];
         let steps = &self.walk.twins[self.walk.best()].steps;
         let elapsed_s = steps[steps.len() - 1].time_s - steps[0].time_s;
@@ -164,8 +181,8 @@ impl Active {
     /// Starts again on an oblique path if the sightings show one and the contours fit it better.
     fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
-        let crown_m = self.walk.walker.level_crown_height_m();
-        let Some(course) = locate_slanting(&sightings, &self.camera, crown_m) else { return };
+        let crown = Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_m };
+        let Some(course) = locate_slanting(&sightings, &self.camera, &crown) else { return };
         let frames: Vec<&FrameEdges> = kept.iter().map(|(_, e)| e).take(options.start_frames).collect();
         let walker = &self.walk.walker;
         if let Some(start) = start(&frames, &course, walker, &self.camera, &options.cadence, &options.walk) {
@@ -214,6 +231,7 @@ mod tests {
         walk.twins[1].steps = walk.twins[0].steps.clone();
         Active {
             camera: camera(),
+            height: BodyHeight::given(1.75),
             depth_sd_m: 0.1,
             start: report(PATH, BEGINNING, Direction::Forward),
             walk,

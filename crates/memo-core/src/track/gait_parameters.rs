@@ -316,14 +316,13 @@ impl TrackedWalk {
     /// also from the focal length, which scales displacement along the line of sight.
     fn scale_sd(&self) -> f64 {
         let (eye, path) = (self.camera.position().truncate(), self.path());
-        let nearest = path.point(path.along(eye), 0.0).truncate();
         let depth_sd_m = match self.fitted() {
             Some(fit) if !self.camera_is_guessed => {
                 fit.frames.iter().map(|f| f.sd[1]).sum::<f64>() / fit.frames.len() as f64
             }
             _ => self.depth_sd_m,
         };
-        let distance = (depth_sd_m / (nearest - eye).length()).hypot(POSTURE_SD);
+        let distance = (depth_sd_m / path.distance(eye)).hypot(POSTURE_SD);
         let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
         let along_view_sq = path.direction().dot(view).powi(2);
         if self.camera_is_guessed { distance.hypot(FOCAL_SD * along_view_sq) } else { distance }

@@ -59,8 +59,6 @@ const MASK_MARGIN_PX: f64 = 2.0;
 const SOLE_QUANTILE: f64 = 0.3;
 /// The crown moves up and down symmetrically about its median row.
 const CROWN_QUANTILE: f64 = 0.5;
-/// Standard deviation of a measured body height, metres: shoes and hair.
-const HEIGHT_SD_M: f64 = 0.02;
 
 /// The bottom row is not used if its depth is smaller than the crown's by more than this many standard
 /// deviations.
@@ -107,25 +105,44 @@ pub struct Course {
     pub depth_sd_m: f64,
 }
 
-/// Finds the line parallel to the image plane on which the sighted person moves; `height_m` is the mean
-/// height of the crown while walking.
-pub fn locate(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Result<Course, LocateError> {
-    // 1. Depth of the line from the pooled rows at the sightings' mean column.
+/// Mean height of the crown while walking, and its standard deviation, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crown {
+    /// Mean height above the ground.
+    pub height_m: f64,
+    /// Its standard deviation.
+    pub sd_m: f64,
+}
+
+/// The pooled rectangle of a person: the middles of its lower and its upper side, as an ideal camera sees them.
+pub(super) fn person_midpoints(sightings: &[Sighting], camera: &Camera) -> Result<Midpoints, LocateError> {
     let (sole, crown) = person_rows(sightings);
-    let column = |s: &Sighting| 0.5 * (s.rectangle.left + s.rectangle.right) as f64;
     let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
-    let midpoints = Midpoints::undistorted(camera, DVec2::new(middle, sole), DVec2::new(middle, crown))?;
-    let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
-    let foot = stand(camera, &midpoints, height_m, &options)?;
-    check_size(camera, &foot.point_in_world, height_m, sole - crown)?;
+    Ok(Midpoints::undistorted(camera, DVec2::new(middle, sole), DVec2::new(middle, crown))?)
+}
+
+/// Middle column of a rectangle, pixels.
+fn column(sighting: &Sighting) -> f64 {
+    0.5 * (sighting.rectangle.left + sighting.rectangle.right) as f64
+}
+
+/// Finds the line parallel to the image plane on which the sighted person moves.
+pub fn locate(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Result<Course, LocateError> {
+    // 1. Depth of the line from the pooled rows at the sightings' mean column.
+    let (sole_row, crown_row) = person_rows(sightings);
+    let midpoints = person_midpoints(sightings, camera)?;
+    let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
+    let foot = stand(camera, &midpoints, crown.height_m, &options)?;
+    check_size(camera, &foot.point_in_world, crown.height_m, sole_row - crown_row)?;
     // 2. The line is parallel to the image's x axis, on the ground.
     let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
     let origin = camera.position().truncate();
     let depth = (foot.point_in_world.truncate() - origin).dot(right.perp());
     let mut path = Path { origin: origin + right.perp() * depth, heading_rad: right.to_angle() };
     // 3. Where the rays of the columns meet the vertical plane above the line, and the direction of movement.
+    let row = 0.5 * (sole_row + crown_row);
     let places: Vec<(f64, f64)> =
-        sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), 0.5 * (sole + crown)))).collect();
+        sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), row))).collect();
     let (speed, _) = line_through(&places);
     if speed < 0.0 {
         path.heading_rad += std::f64::consts::PI;
@@ -143,14 +160,14 @@ const SLANT_M: f64 = 0.2;
 ///
 /// This goes beyond the paper, whose walkers move parallel to the image plane. `along_m` has one value per
 /// sighting.
-pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -> Option<Course> {
+pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Option<Course> {
     let third = sightings.len() / 3;
     if third == 0 {
         return None;
     }
     // 1. Position of the first and the last third, each on its own line parallel to the image plane.
     let standing = |part: &[Sighting]| {
-        let course = locate(part, camera, height_m).ok()?;
+        let course = locate(part, camera, crown).ok()?;
         let along = course.along_m.iter().sum::<f64>() / part.len() as f64;
         Some((course.path.point(along, 0.0).truncate(), course.depth_sd_m))
     };
@@ -163,21 +180,10 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, height_m: f64) -
     }
     let path = Path { origin: start, heading_rad: (end - start).to_angle() };
     // 3. Positions along it.
-    let (sole, crown) = person_rows(sightings);
-    let places: Vec<(f64, f64)> = sightings
-        .iter()
-        .map(|s| {
-            (
-                s.time_s,
-                place(
-                    camera,
-                    &path,
-                    0.5 * (s.rectangle.left + s.rectangle.right) as f64,
-                    0.5 * (sole + crown),
-                ),
-            )
-        })
-        .collect();
+    let (sole_row, crown_row) = person_rows(sightings);
+    let row = 0.5 * (sole_row + crown_row);
+    let places: Vec<(f64, f64)> =
+        sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), row))).collect();
     let (speed_mps, _) = line_through(&places);
     Some(Course {
         path,
@@ -252,6 +258,10 @@ mod tests {
             .collect()
     }
 
+    fn crown(height_m: f64) -> Crown {
+        Crown { height_m, sd_m: 0.02 }
+    }
+
     fn sighted(left: usize, top: usize, right: usize, bottom: usize) -> Sighting {
         Sighting { time_s: 0.0, rectangle: Rectangle { left, top, right, bottom } }
     }
@@ -279,7 +289,7 @@ mod tests {
     fn a_planted_course_is_recovered_in_both_directions() {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap();
         for speed in [1.4, -1.2] {
-            let course = locate(&sightings(&camera, 0.5, speed, 1.8), &camera, 1.8).unwrap();
+            let course = locate(&sightings(&camera, 0.5, speed, 1.8), &camera, &crown(1.8)).unwrap();
             assert!((course.path.origin.y - 0.5).abs() < 0.05, "{course:?}");
             assert!((course.speed_mps - speed.abs()).abs() < 0.05, "{course:?}");
             let start = course.path.point(course.along_m[0], 0.0);
@@ -294,7 +304,7 @@ mod tests {
         let mut seen = sightings(&camera, 0.0, 1.4, 1.8);
         for reflected in [2, 1] {
             seen.iter_mut().step_by(reflected).for_each(|s| s.rectangle.bottom += 60);
-            let course = locate(&seen, &camera, 1.8).unwrap();
+            let course = locate(&seen, &camera, &crown(1.8)).unwrap();
             assert!(course.path.origin.y.abs() < 0.15, "{course:?}");
         }
     }
@@ -304,14 +314,14 @@ mod tests {
         let truth = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
         let seen = sightings(&truth, 0.0, 1.4, 1.7);
         let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7).unwrap();
-        let course = locate(&seen, &camera, 1.7).unwrap();
+        let course = locate(&seen, &camera, &crown(1.7)).unwrap();
         assert!(course.path.origin.length() < 0.05 && (course.speed_mps - 1.4).abs() < 0.05, "{course:?}");
     }
 
     #[test]
     fn a_slanting_path_is_found_and_a_parallel_one_left_alone() {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
-        assert!(locate_slanting(&sightings(&camera, 0.0, 1.4, 1.8), &camera, 1.8).is_none());
+        assert!(locate_slanting(&sightings(&camera, 0.0, 1.4, 1.8), &camera, &crown(1.8)).is_none());
         let slanting: Vec<Sighting> = (0..40)
             .flat_map(|k| {
                 let time_s = f64::from(k) * 0.04;
@@ -323,7 +333,7 @@ mod tests {
                 Some(one)
             })
             .collect();
-        let course = locate_slanting(&slanting, &camera, 1.8).unwrap();
+        let course = locate_slanting(&slanting, &camera, &crown(1.8)).unwrap();
         assert!((course.path.heading_rad - 0.5f64.atan()).abs() < 0.1, "{course:?}");
         assert!((course.speed_mps - 1.25f64.sqrt()).abs() < 0.1, "{course:?}");
     }
@@ -333,14 +343,14 @@ mod tests {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
         // The middles of the first and the last third of a walk of 1.2 s are 0.8 s apart.
         for (towards_mps, found) in [(0.15, false), (-0.15, false), (0.4, true), (-0.4, true)] {
-            let course = locate_slanting(&slanting(&camera, towards_mps), &camera, 1.8);
+            let course = locate_slanting(&slanting(&camera, towards_mps), &camera, &crown(1.8));
             assert_eq!(course.is_some(), found, "{towards_mps} m/s: {course:?}");
             let Some(course) = course else { continue };
             assert!((course.path.heading_rad - towards_mps.atan()).abs() < 0.1, "{course:?}");
             let end = course.path.point(*course.along_m.last().unwrap(), 0.0);
             assert!((end.x - 1.2).abs() < 0.05 && (end.y - 1.2 * towards_mps).abs() < 0.15, "{end}");
         }
-        assert!(locate_slanting(&slanting(&camera, 0.4)[..2], &camera, 1.8).is_none(), "no thirds");
+        assert!(locate_slanting(&slanting(&camera, 0.4)[..2], &camera, &crown(1.8)).is_none(), "no thirds");
     }
 
     /// Sightings over 1.2 s of a person who walks at 1 m/s to the right and at `back_mps` away from the camera.
@@ -365,7 +375,7 @@ mod tests {
     fn stood(camera: &Camera, reflected: f64) -> (f64, [f64; 3]) {
         let [sole, crown] = [0.0, 1.8].map(|z| camera.project(DVec3::new(0.2, 0.0, z)).unwrap());
         let midpoints = Midpoints { bottom_px: sole + reflected * DVec2::Y, top_px: crown };
-        let options = PositionOptions { height_sd_m: HEIGHT_SD_M, ..PositionOptions::default() };
+        let options = PositionOptions { height_sd_m: 0.02, ..PositionOptions::default() };
         let found = stand(camera, &midpoints, 1.8, &options).unwrap().depth_m;
         let ways = [position_from_feet, position_from_head, position_on_ground];
         (found, ways.map(|way| way(camera, &midpoints, 1.8, &options).unwrap().depth_m))
@@ -421,7 +431,7 @@ mod tests {
     fn the_depth_s_standard_deviation_is_that_of_rows_and_height() {
         let camera = Camera::level([1280, 720], 1.08, 1.2, 6.0).unwrap();
         let seen = sightings(&camera, 0.0, 1.0, 1.8);
-        let course = locate(&seen, &camera, 1.8).unwrap();
+        let course = locate(&seen, &camera, &crown(1.8)).unwrap();
         let depth = |bottom: isize, top: isize, height_m: f64| {
             let moved: Vec<Sighting> = seen
                 .iter()
@@ -435,7 +445,7 @@ mod tests {
                     Sighting { rectangle, ..*s }
                 })
                 .collect();
-            locate(&moved, &camera, height_m).unwrap().path.origin.y
+            locate(&moved, &camera, &crown(height_m)).unwrap().path.origin.y
         };
         let at = depth(0, 0, 1.8);
         // Rows changed by their 4 and 2 px, the height by 2 cm.
@@ -460,6 +470,6 @@ mod tests {
     #[test]
     fn a_height_that_cannot_be_is_refused() {
         let camera = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
-        assert!(locate(&sightings(&camera, 0.0, 1.4, 1.7), &camera, 0.5).is_err());
+        assert!(locate(&sightings(&camera, 0.0, 1.4, 1.7), &camera, &crown(0.5)).is_err());
     }
 }

@@ -38,8 +38,9 @@ impl GaitChoice {
 /// What is known of the person and the camera, and options of the stages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Body height of the person, metres.
-    pub height_m: f64,
+    /// Body height of the person, metres. `None` measures it in a calibrated camera; without one, that of the
+    /// population is assumed ([`height`](super::height)).
+    pub height_m: Option<f64>,
     /// The camera; `None` assumes one from field of view and body height.
     pub camera: Option<Camera>,
     /// Horizontal field of view of an assumed camera, radians.
@@ -61,11 +62,11 @@ pub struct TrackerOptions {
     pub walk: WalkOptions,
 }
 
-impl TrackerOptions {
-    /// Defaults for a person of the given height.
-    pub fn for_height(height_m: f64) -> Self {
+impl Default for TrackerOptions {
+    /// Those for a person of unknown height.
+    fn default() -> Self {
         Self {
-            height_m,
+            height_m: None,
             camera: None,
             field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
             gait: GaitChoice::default(),
@@ -76,6 +77,13 @@ impl TrackerOptions {
             evidence: EvidenceOptions::default(),
             walk: WalkOptions::default(),
         }
+    }
+}
+
+impl TrackerOptions {
+    /// Defaults for a person of the given height.
+    pub fn for_height(height_m: f64) -> Self {
+        Self { height_m: Some(height_m), ..Self::default() }
     }
 
     /// Refuses options outside their ranges; [`Tracker::new`](super::tracker::Tracker::new) asks it first.
@@ -93,9 +101,9 @@ impl TrackerOptions {
         self.walk.check()
     }
 
-    /// The average walker of the given height; the gait is made for this speed, m/s.
-    pub fn walker(&self, gait_speed_mps: f64) -> Result<Walker, BodyError> {
-        let body = Body::from_height(self.height_m)?;
+    /// The average walker of a body height in metres; the gait is made for this speed, m/s.
+    pub fn walker(&self, height_m: f64, gait_speed_mps: f64) -> Result<Walker, BodyError> {
+        let body = Body::from_height(height_m)?;
         Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })
     }
 }

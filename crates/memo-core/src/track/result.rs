@@ -7,6 +7,7 @@
 
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
+use super::height::{BodyHeight, HeightSource};
 use super::search::{Hypothesis, Path, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
@@ -25,6 +26,8 @@ pub struct TrackedWalk {
     pub camera: Camera,
     /// True if no camera was given.
     pub camera_is_guessed: bool,
+    /// The body height that the walk was tracked with: given, measured or assumed.
+    pub height: BodyHeight,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
     /// Report of the starting phase.
@@ -122,6 +125,13 @@ impl TrackedWalk {
         self.fitted().map_or_else(|| self.walk.swap_probability(&self.options.swap), |fit| fit.p_swapped)
     }
 
+    /// True if a height was given and the fit contradicts it by more than three standard deviations.
+    pub fn is_height_contradicted(&self) -> bool {
+        let measured = self.fitted().and_then(|fit| fit.height);
+        self.height.source == HeightSource::Given
+            && measured.is_some_and(|seen| self.height.contradicts(&seen))
+    }
+
     /// The path walked: that of the fit, or the tracker's.
     pub fn path(&self) -> &Path {
         self.fitted().map_or(&self.walk.path, |fit| &fit.path)
@@ -174,7 +184,7 @@ impl TrackedWalk {
         let frame = &fit.frames[k];
         let posed = fit.pose(k);
         let ahead = fit.path.direction();
-        let [along, across, height, phase] = frame.sd;
+        let [along, across, height, phase] = self.with_scale(frame);
         let phase_at = frame.phase.rem_euclid(1.0);
         Row {
             frame: step.frame,
@@ -203,6 +213,20 @@ impl TrackedWalk {
         }
     }
 
+    /// Standard deviations of a fitted frame. An assumed height scales the walk about the camera's foot point.
+    fn with_scale(&self, frame: &FittedFrame) -> [f64; 4] {
+        let [along, across, height, phase] = frame.sd;
+        let scale_sd = self.height.assumed_scale_sd();
+        let (eye, path) = (self.camera.position().truncate(), self.path());
+        let off_axis_m = frame.along_m - path.along(eye);
+        [
+            along.hypot(scale_sd * off_axis_m),
+            across.hypot(scale_sd * path.distance(eye)),
+            height.hypot(scale_sd * frame.torso_centre.z),
+            phase,
+        ]
+    }
+
     fn row(&self, step: &Step, p_swapped: f64, [along, height, phase]: [(ConstantVelocity, f64); 3]) -> Row {
         let hypothesis = Hypothesis {
             along_m: along.0.position,
@@ -217,7 +241,7 @@ impl TrackedWalk {
         // camera's foot point.
         let eye = self.camera.position().truncate();
         let off_axis = (hypothesis.along_m - self.walk.path.along(eye)).abs();
-        let distance = (self.walk.path.point(self.walk.path.along(eye), 0.0).truncate() - eye).length();
+        let distance = self.walk.path.distance(eye);
         let along_sd = sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance);
         let heading = self.walk.path.direction();
         let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * self.depth_sd_m);
@@ -232,7 +256,7 @@ impl TrackedWalk {
             sd: [
                 forward.x.hypot(across.x),
                 forward.y.hypot(across.y),
-                sd(height, COMMON_SD[1]),
+                sd(height, COMMON_SD[1]).hypot(self.height.assumed_scale_sd() * posed.torso_centre.z),
                 sd(phase, COMMON_SD[2]),
             ],
             posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),

@@ -36,6 +36,11 @@ impl Path {
     pub fn along(&self, point: DVec2) -> f64 {
         (point - self.origin).dot(self.direction())
     }
+
+    /// Distance of a point on the ground from the path, metres.
+    pub fn distance(&self, point: DVec2) -> f64 {
+        (point - self.origin).dot(self.direction().perp()).abs()
+    }
 }
 
 /// One point of the search space.

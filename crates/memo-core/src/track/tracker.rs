@@ -22,7 +22,8 @@
 use super::active::{Active, SLOWEST_MPS};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
 use super::fit::views::{Backdrop, Piece};
-use super::locate::{Course, LocateError, Sighting, camera_from_sightings, locate};
+use super::height::{BodyHeight, GIVEN_SD_M, start_height};
+use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
 use super::options::TrackerOptions;
 use super::result::TrackedWalk;
 use super::search::{Hypothesis, Scene};
@@ -140,7 +141,7 @@ pub struct Tracker {
 impl Tracker {
     /// A tracker for a new stream; an error if the body height or an option is out of range.
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
-        Body::from_height(options.height_m)?;
+        options.height_m.map(Body::from_height).transpose()?;
         options.check()?;
         let stream = EvidenceStream::new(options.evidence);
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
@@ -315,12 +316,13 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) {
             return None;
         }
-        let average = self.started(&sightings, size, &GaitStyle::default())?;
+        let height = start_height(&self.options, &sightings);
+        let average = self.started(&sightings, size, &height, &GaitStyle::default())?;
         let similarity = |started: &Started| started.start.lines.best.similarity;
         let others = if self.options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
         let Started { camera, course, walker, start } = others
             .iter()
-            .filter_map(|style| self.started(&sightings, size, style))
+            .filter_map(|style| self.started(&sightings, size, &height, style))
             .filter(|other| similarity(other) > OTHER_GAIN * similarity(&average))
             .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
             .unwrap_or(average);
@@ -335,6 +337,7 @@ impl Tracker {
         }
         Some(Active {
             camera,
+            height,
             depth_sd_m: course.depth_sd_m,
             start,
             walk,
@@ -347,10 +350,18 @@ impl Tracker {
     }
 
     /// The course and the lines of phase of one gait; `None` for things that do not move like a walker.
-    fn started(&self, sightings: &[Sighting], size: [u32; 2], style: &GaitStyle) -> Option<Started> {
-        let styled = |speed_mps: f64| Some(Walker { style: *style, ..self.options.walker(speed_mps).ok()? });
+    fn started(
+        &self,
+        sightings: &[Sighting],
+        size: [u32; 2],
+        height: &BodyHeight,
+        style: &GaitStyle,
+    ) -> Option<Started> {
+        let styled = |speed_mps: f64| {
+            Some(Walker { style: *style, ..self.options.walker(height.height_m, speed_mps).ok()? })
+        };
         let (camera, course) =
-            self.course(sightings, size, styled(COMFORTABLE_MPS)?.level_crown_height_m()).ok()?;
+            self.course(sightings, size, styled(COMFORTABLE_MPS)?.level_crown_height_m(), height).ok()?;
         if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
             return None;
         }
@@ -365,13 +376,20 @@ impl Tracker {
         sightings: &[Sighting],
         size: [u32; 2],
         crown_m: f64,
+        height: &BodyHeight,
     ) -> Result<(Camera, Course), LocateError> {
-        let camera = match &self.options.camera {
-            Some(camera) => camera.clone(),
-            None => camera_from_sightings(sightings, size, self.options.field_of_view_rad, crown_m)?,
+        let Some(camera) = &self.options.camera else {
+            // The assumed camera has the scale of the height, so in it the height is known. Its error moves the walk
+            // nearer or farther with all its lengths.
+            let camera = camera_from_sightings(sightings, size, self.options.field_of_view_rad, crown_m)?;
+            let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
+            let course = locate(sightings, &camera, &crown)?;
+            let distance_m = course.path.distance(camera.position().truncate());
+            let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
+            return Ok((camera, Course { depth_sd_m, ..course }));
         };
-        let course = locate(sightings, &camera, crown_m)?;
-        Ok((camera, course))
+        let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_m })?;
+        Ok((camera.clone(), course))
     }
 
     /// Follows the person into a frame, or ends the walk.
@@ -414,7 +432,7 @@ impl Tracker {
         }
         let reach =
             DVec2::new(predicted.along.position_sd().min(0.2), predicted.height.position_sd().min(0.1));
-        let scale = (high.y - low.y) / self.options.height_m;
+        let scale = (high.y - low.y) / active.walk.walker.body.height_m;
         let margin = reach * scale + WINDOW_MARGIN_PX;
         let (low, high) = ((low - margin).max(DVec2::ZERO), (high + margin).min(size - 1.0));
         Some(Rectangle {
@@ -435,8 +453,10 @@ impl Tracker {
             }
             let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
             let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
+            let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
             self.finished.push(TrackedWalk {
                 walk: active.walk,
+                height,
                 camera: active.camera,
                 depth_sd_m: active.depth_sd_m,
                 start: active.start,

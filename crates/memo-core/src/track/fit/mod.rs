@@ -26,6 +26,7 @@ mod sides;
 mod unknowns;
 pub(crate) mod views;
 
+use super::height::BodyHeight;
 use super::search::Path;
 use crate::model::{Body, Gait, GaitStyle, PosedBody, Posture, Walker};
 use crate::option_error::OptionError;
@@ -113,6 +114,8 @@ pub struct FitQuality {
     pub missed_inside: f64,
     /// The farthest that a length of the body is from its mean over people, standard deviations.
     pub worst_length_sd: f64,
+    /// Mean height of the lower sole above the ground, metres; `None` in an assumed camera, whose ground is assumed.
+    pub sole_m: Option<f64>,
 }
 
 /// Angles of one side with their standard deviations, radians; `None` where the frames do not show the limb.
@@ -144,6 +147,9 @@ pub struct FittedFrame {
 pub struct WalkFit {
     /// The person's body.
     pub body: Body,
+    /// The body height that the outlines show above the ground of a calibrated camera, whatever height was given;
+    /// `None` in an assumed camera.
+    pub height: Option<BodyHeight>,
     /// The fitted path.
     pub path: Path,
     /// The person's curves at fifty equally spaced phases from the side's own initial contact: hip, knee, ankle,

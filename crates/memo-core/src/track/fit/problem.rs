@@ -13,6 +13,7 @@ use super::unknowns::{
 use super::{FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit};
 use crate::estimate::arrow::{Arrow, Solution};
 use crate::model::{Camera, Gait, GaitStyle, Walker};
+use crate::track::height::{BodyHeight, HeightSource};
 use crate::track::search::{Hypothesis, Path};
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
@@ -30,13 +31,17 @@ pub(crate) struct FitFrame {
 /// What stays the same during a fit.
 pub(crate) struct Problem<'a> {
     camera: &'a Camera,
-    /// The average walker of the stated height.
+    /// The average walker of the given or supposed height.
     walker: &'a Walker,
     /// The tracker's path.
     path: &'a Path,
     frames: &'a [FitFrame],
     options: &'a FitOptions,
     priors: Vec<Prior>,
+    /// How much taller the person is than the walker, as a share of the walker's height.
+    excess: Prior,
+    /// True if the camera shows how far away, and so how tall, the person is.
+    is_scale_seen: bool,
     /// Standard deviation of the height of a standing foot, metres.
     ground_sd_m: f64,
     /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
@@ -98,8 +103,26 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let origin_along_m = frames.get(frames.len() / 2).map_or(0.0, |frame| frame.start.along_m);
         let origin = path.point(origin_along_m, 0.0).truncate();
-        let ground_sd_m = GROUND_SD_M;
-        Self { camera, walker, path, frames, options, priors: priors(), ground_sd_m, origin, origin_along_m }
+        Self {
+            camera,
+            walker,
+            path,
+            frames,
+            options,
+            priors: priors(),
+            excess: Prior { mean: 0.0, sd: options.height_sd },
+            is_scale_seen: true,
+            ground_sd_m: GROUND_SD_M,
+            origin,
+            origin_along_m,
+        }
+    }
+
+    /// The same of a person whose height is only known as well as this.
+    pub fn of_height(mut self, height: &BodyHeight) -> Self {
+        let height_m = self.walker.body.height_m;
+        self.excess = Prior { mean: height.height_m / height_m - 1.0, sd: height.sd_m / height_m };
+        self
     }
 
     /// The same in an assumed camera, whose ground and whose direction of sight are assumed too: distance and heading
@@ -108,6 +131,7 @@ impl<'a> Problem<'a> {
         self.priors[WHOLE_HEADING].sd = ASSUMED_HEADING_SD_RAD;
         self.priors[WHOLE_ACROSS].sd = ASSUMED_ACROSS_SD_M;
         self.ground_sd_m = ASSUMED_GROUND_SD_M;
+        self.is_scale_seen = false;
         self
     }
 
@@ -283,7 +307,10 @@ impl<'a> Problem<'a> {
             arrow.add_whole_row(&[(n, 1.0)], prior.mean - unknowns.whole[n], prior.sd.powi(-2));
         }
         let excess: f64 = STATURE.iter().map(|&n| unknowns.whole[n]).sum();
-        arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), -excess, self.options.height_sd.powi(-2));
+        // An unknown height is held until the curves are found: long legs look like bent ones at first.
+        let Prior { mean, sd } =
+            if block == FRAME { self.excess } else { Prior { mean: 0.0, sd: self.options.height_sd } };
+        arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), mean - excess, sd.powi(-2));
         let joint_of = |unknown: usize| (unknown - FRAME_ANGLES) % JOINTS;
         for (k, frame) in unknowns.frames.iter().enumerate() {
             for (unknown, value) in frame.iter().enumerate().take(block).skip(FRAME_ANGLES) {
@@ -327,7 +354,14 @@ impl<'a> Problem<'a> {
             missed: seen.outer_missed / seen.outer.max(1.0),
             missed_inside: seen.inner_missed / seen.inner.max(1.0),
             worst_length_sd: lengths.fold(0.0, f64::max),
+            sole_m: self.is_scale_seen.then(|| self.mean_sole_m(&fitted.unknowns)),
         }
+    }
+
+    /// Mean height of the lower sole above the ground.
+    fn mean_sole_m(&self, unknowns: &Unknowns) -> f64 {
+        let soles: f64 = (0..self.frames.len()).map(|k| self.figure(unknowns, k).lowest_point().1.z).sum();
+        soles / self.frames.len() as f64
     }
 
     /// Step 7.
@@ -359,6 +393,7 @@ impl<'a> Problem<'a> {
         let curves = unknowns::curves(&self.walker.gait, whole, zero);
         WalkFit {
             body: body(&self.walker.body, whole),
+            height: self.height(fitted),
             path,
             curves,
             frames: all,
@@ -366,6 +401,24 @@ impl<'a> Problem<'a> {
             p_swapped,
             quality,
         }
+    }
+
+    /// The body height without the prior of the excess, which is taken out as it was put in: with estimate x and
+    /// variance v after all evidence, and prior m, s², the others say x' = v' (x / v - m / s²), 1 / v' = 1 / v - 1 / s².
+    fn height(&self, fitted: &Fitted) -> Option<BodyHeight> {
+        let excess: f64 = STATURE.iter().map(|&n| fitted.unknowns.whole[n]).sum();
+        let variance = fitted.solution.variance(&STATURE.map(|n| (n, 1.0)), &[]);
+        let Prior { mean, sd } = self.excess;
+        let weight = variance.recip() - sd.powi(-2);
+        let seen = (excess / variance - mean / sd.powi(2)) / weight;
+        let height_m = self.walker.body.height_m;
+        let stands = self.mean_sole_m(&fitted.unknowns).abs() < MOST_SOLE_M;
+        let is_seen = self.is_scale_seen && stands && weight > 0.0 && weight.is_finite();
+        is_seen.then(|| BodyHeight {
+            height_m: height_m * (1.0 + seen),
+            sd_m: (SD_FACTOR * height_m / weight.sqrt()).hypot(HEIGHT_MODEL_SD_M),
+            source: HeightSource::Measured,
+        })
     }
 
     /// The angles of a frame that the pictures determine, with standard deviations.
@@ -501,6 +554,10 @@ const PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
 /// 2 to 7 degrees and up to 30 cm off.
 const OFF_SD_RAD: f64 = 1.2;
 const OFF_ACROSS_SD_M: f64 = 5.0;
+/// Feet farther from the ground do not measure a height.
+const MOST_SOLE_M: f64 = 0.05;
+/// The same of the body height: hair, soles, and heads that are no cylinders.
+const HEIGHT_MODEL_SD_M: f64 = 0.015;
 /// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
 const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
 /// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and

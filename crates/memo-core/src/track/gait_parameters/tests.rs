@@ -1,3 +1,4 @@
+use super::super::height::BodyHeight;
 use super::super::search::tests::{camera, walker};
 use super::super::search::{Axis, Hypothesis, Path};
 use super::super::start::tests::report;
@@ -99,6 +100,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         walk,
         camera: camera(),
         camera_is_guessed: false,
+        height: BodyHeight::given(1.75),
         depth_sd_m: 0.1,
         start: report(path, beginning, direction),
         gait_speed_mps: 1.2,

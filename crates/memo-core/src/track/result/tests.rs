@@ -53,6 +53,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
         walk,
         camera: camera(),
         camera_is_guessed: false,
+        height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
         start: report(path, beginning, Direction::Forward),
         gait_speed_mps: 1.2,
@@ -279,4 +280,18 @@ fn rows_are_of_the_better_twin() {
     assert_eq!(walk.rows()[0].frame, 105);
     assert_eq!(walk.steps()[2].frame, 109);
     assert!(walk.p_swapped() < 0.5);
+}
+
+#[test]
+fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
+    let frames: Vec<_> = uneven_s(20).into_iter().map(|time_s| (time_s, Some(truth(time_s)))).collect();
+    let mut walk = followed(ACROSS, &frames, WalkOptions::default());
+    let known = walk.rows();
+    walk.height = BodyHeight::POPULATION;
+    for (known, assumed) in known.iter().zip(walk.rows()) {
+        let scale_sd = 0.1 / 1.7;
+        let expected = known.sd[2].hypot(scale_sd * assumed.torso_centre.z);
+        assert!((assumed.sd[2] - expected).abs() < 1e-12, "{assumed:?}");
+        assert_eq!(known.torso_centre, assumed.torso_centre);
+    }
 }

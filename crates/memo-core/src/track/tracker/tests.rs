@@ -1,6 +1,6 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
-use super::super::locate::locate;
+use super::super::locate::{Crown, locate};
 use super::super::score::EdgeLine;
 use super::super::search::tests::{camera, edges_of, walker};
 use super::super::search::{Axis, Path};
@@ -270,6 +270,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     walk.twins[1].steps = walk.twins[0].steps.clone();
     walk.twins[0].similarity_sum = 0.5 * count as f64;
     tracker.walking = Some(Active {
+        height: super::super::height::BodyHeight::given(1.75),
         camera: camera(),
         depth_sd_m: 0.1,
         start: report(PATH, BEGINNING, Direction::Forward),
@@ -499,7 +500,8 @@ fn a_walker_is_started_with_both_twins_through_the_start_frames() {
     assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
     assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.settled);
     let sightings: Vec<Sighting> = seen.iter().map(|(s, _)| *s).collect();
-    let course = locate(&sightings, &camera(), walker().level_crown_height_m()).unwrap();
+    let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
+    let course = locate(&sightings, &camera(), &crown).unwrap();
     assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
 }
 

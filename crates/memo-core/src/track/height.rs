@@ -1,0 +1,194 @@
+//! The height of the person: given, measured in a calibrated camera, or assumed.
+//!
+//! A calibrated camera shows where the ground is, so the row of the soles gives the distance, and with it the row of
+//! the crown gives the height. A walk starts with the height of the rectangles ([`start_height`]); the fit of the
+//! person ([`fit`](super::fit)) then measures it from the outlines of all frames ([`WalkFit::height`]). Without a
+//! calibrated camera, a small person nearby looks like a tall one far away. Then the height must be given, or that of
+//! the population is assumed and its standard deviation enters every length.
+//!
+//! [`WalkFit::height`]: super::fit::WalkFit::height
+
+use super::locate::{Sighting, person_midpoints};
+use super::options::TrackerOptions;
+use crate::model::position::{PositionOptions, height_on_ground};
+use crate::model::{Camera, Walker};
+
+/// Mean and standard deviation of the height of adults, metres. Men of 1.77 ± 0.07 m and women of 1.64 ± 0.07 m, as
+/// in many countries, equally frequent, have 1.705 ± 0.096 m.
+pub const POPULATION_HEIGHT_M: f64 = 1.70;
+/// See [`POPULATION_HEIGHT_M`].
+pub const POPULATION_SD_M: f64 = 0.10;
+/// Standard deviation of a given body height, metres: shoes and hair.
+pub const GIVEN_SD_M: f64 = 0.02;
+/// Standard deviation of a height from the rectangles of the start, metres, without shadows and reflections. Measured
+/// on the drawn walks of four people: 0.02 to 0.05.
+const RECTANGLE_SD_M: f64 = 0.05;
+/// A height from rectangles that is farther from the population's, in its standard deviations, is not used: shadows or
+/// reflections belong to the rectangle, or a limb alone.
+const MOST_POPULATION_SD: f64 = 3.5;
+/// A given height that is farther from a measured one contradicts it, standard deviations.
+const CONTRADICTION_SD: f64 = 3.0;
+
+/// Where a height comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum HeightSource {
+    /// It was given.
+    Given,
+    /// It was measured in a calibrated camera.
+    Measured,
+    /// It is that of the population.
+    Assumed,
+}
+
+impl HeightSource {
+    /// The name in files: `given`, `measured` or `assumed`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Measured => "measured",
+            Self::Assumed => "assumed",
+        }
+    }
+}
+
+/// Body height of a person with its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyHeight {
+    /// From the sole to the crown, metres.
+    pub height_m: f64,
+    /// Its standard deviation, metres.
+    pub sd_m: f64,
+    /// Where it comes from.
+    pub source: HeightSource,
+}
+
+impl BodyHeight {
+    /// The height of the population.
+    pub const POPULATION: Self =
+        Self { height_m: POPULATION_HEIGHT_M, sd_m: POPULATION_SD_M, source: HeightSource::Assumed };
+
+    /// A given height.
+    #[must_use]
+    pub fn given(height_m: f64) -> Self {
+        Self { height_m, sd_m: GIVEN_SD_M, source: HeightSource::Given }
+    }
+
+    /// Relative standard deviation of all lengths of a walk if this height sets its scale: 0 unless it is assumed.
+    pub(super) fn assumed_scale_sd(&self) -> f64 {
+        if self.source == HeightSource::Assumed { self.sd_m / self.height_m } else { 0.0 }
+    }
+
+    /// How far another measurement is from it, standard deviations of the difference.
+    fn distance_sd(&self, other: &Self) -> f64 {
+        (self.height_m - other.height_m).abs() / self.sd_m.hypot(other.sd_m)
+    }
+
+    /// True if it contradicts a measured height by more than three standard deviations.
+    #[must_use]
+    pub fn contradicts(&self, measured: &Self) -> bool {
+        self.distance_sd(measured) > CONTRADICTION_SD
+    }
+}
+
+/// The height with which a walk starts.
+pub(super) fn start_height(options: &TrackerOptions, sightings: &[Sighting]) -> BodyHeight {
+    let population = BodyHeight::POPULATION;
+    match (options.height_m, &options.camera) {
+        (Some(height_m), _) => BodyHeight::given(height_m),
+        (None, None) => population,
+        (None, Some(camera)) => {
+            let average = options.walker(POPULATION_HEIGHT_M, 1.3);
+            let seen = average.ok().and_then(|walker| from_rectangles(camera, sightings, &walker));
+            seen.map_or(population, |seen| combined(&population, &seen))
+        }
+    }
+}
+
+/// The height of a person whose rectangles stand on the ground; `average` walks with the share of the height by which
+/// bent legs lower the crown.
+fn from_rectangles(camera: &Camera, sightings: &[Sighting], average: &Walker) -> Option<BodyHeight> {
+    let midpoints = person_midpoints(sightings, camera).ok()?;
+    let weight = PositionOptions::default().bottom_weight;
+    let crown_m = height_on_ground(camera, &midpoints, weight).ok()?;
+    let height_m = crown_m * average.body.height_m / average.level_crown_height_m();
+    let off_m = (height_m - POPULATION_HEIGHT_M).abs();
+    (off_m < MOST_POPULATION_SD * POPULATION_SD_M).then_some(BodyHeight {
+        height_m,
+        sd_m: RECTANGLE_SD_M,
+        source: HeightSource::Measured,
+    })
+}
+
+/// Mean of two heights weighted by their variances, as measured.
+fn combined(a: &BodyHeight, b: &BodyHeight) -> BodyHeight {
+    let [of_a, of_b] = [a, b].map(|height| height.sd_m.powi(-2));
+    let height_m = (of_a * a.height_m + of_b * b.height_m) / (of_a + of_b);
+    BodyHeight { height_m, sd_m: (of_a + of_b).sqrt().recip(), source: HeightSource::Measured }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Rectangle;
+    use glam::DVec3;
+
+    /// Rectangles of a person with the crown of an average walker, whose feet have a reflection of some rows.
+    fn sightings(camera: &Camera, height_m: f64, reflected_px: usize) -> Vec<Sighting> {
+        let crown_m = TrackerOptions::default().walker(height_m, 1.3).unwrap().level_crown_height_m();
+        (0..13)
+            .map(|k| {
+                let foot = DVec3::new(-0.3 + 0.05 * f64::from(k), 0.4, 0.0);
+                let [sole, crown] = [0.0, crown_m].map(|z| camera.project(foot + DVec3::Z * z).unwrap());
+                let rectangle = Rectangle {
+                    left: (sole.x - 40.0) as usize,
+                    right: (sole.x + 40.0) as usize,
+                    top: (crown.y - 2.0).round() as usize,
+                    bottom: sole.y.round() as usize + reflected_px,
+                };
+                Sighting { time_s: 0.04 * f64::from(k), rectangle }
+            })
+            .collect()
+    }
+
+    fn camera() -> Camera {
+        Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap()
+    }
+
+    #[test]
+    fn a_calibrated_camera_shows_the_height_at_the_start() {
+        let options = TrackerOptions { camera: Some(camera()), ..TrackerOptions::default() };
+        for height_m in [1.5, 1.7, 1.9] {
+            let found = start_height(&options, &sightings(&camera(), height_m, 0));
+            assert_eq!(found.source, HeightSource::Measured);
+            // A fifth of the weight is the population's.
+            let expected_m = 0.8 * height_m + 0.2 * 1.7;
+            assert!((found.height_m - expected_m).abs() < 0.02, "{height_m}: {found:?}");
+            assert!((found.sd_m - 0.0447).abs() < 1e-4);
+        }
+        let mirrored = start_height(&options, &sightings(&camera(), 1.7, 200));
+        assert_eq!(mirrored, BodyHeight::POPULATION, "not the height of a person");
+    }
+
+    #[test]
+    fn a_height_is_given_or_that_of_the_population_without_a_camera() {
+        let seen = sightings(&camera(), 1.9, 0);
+        assert_eq!(start_height(&TrackerOptions::default(), &seen), BodyHeight::POPULATION);
+        let given = TrackerOptions { camera: Some(camera()), ..TrackerOptions::for_height(1.6) };
+        assert_eq!(start_height(&given, &seen), BodyHeight::given(1.6));
+    }
+
+    #[test]
+    fn heights_three_standard_deviations_apart_contradict_each_other() {
+        let measured = |height_m| BodyHeight { height_m, sd_m: 0.03, source: HeightSource::Measured };
+        let apart_m = 3.0 * 0.02f64.hypot(0.03);
+        assert!(!BodyHeight::given(1.7).contradicts(&measured(1.7 + apart_m - 1e-9)));
+        assert!(BodyHeight::given(1.7).contradicts(&measured(1.7 - apart_m - 1e-9)));
+    }
+
+    #[test]
+    fn only_an_assumed_height_leaves_the_scale_open() {
+        assert_eq!(BodyHeight::given(1.7).assumed_scale_sd(), 0.0);
+        assert!((BodyHeight::POPULATION.assumed_scale_sd() - 0.1 / 1.7).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,87 @@
+"""Sentences about what a walk was given or shows that does not go together, and about its scale.
+
+The core decides (`memo_core::track::height`, `memo_core::track::plausible`); these are its words.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from memo import _memo
+
+__all__ = [
+    "assumed_height_sentences",
+    "contradiction_sentences",
+    "implausible_sentences",
+    "measured_height_sentences",
+]
+
+_MOST_SOLE_M = 0.05
+"""Feet farther from the ground, on average, do not stand on it. Drawn walks: up to 0.01."""
+
+
+class Walk(Protocol):
+    """What is read of a walk."""
+
+    @property
+    def height(self) -> tuple[float, float, str]: ...
+    @property
+    def measured_height(self) -> tuple[float, float] | None: ...
+    @property
+    def height_is_contradicted(self) -> bool: ...
+    @property
+    def walk_ratio(self) -> tuple[float, float, float] | None: ...
+    @property
+    def fit(self) -> _memo.WalkFit | None: ...
+
+
+def assumed_height_sentences(walk: Walk) -> list[str]:
+    """Says that the scale is that of an average person, if it is."""
+    height_m, sd_m, source = walk.height
+    if source != "assumed":
+        return []
+    return [
+        f"No height and no camera were given, so the person is taken to be {height_m:.2f} m tall: all sizes, "
+        f"distances and speeds may be too large or too small by {2 * sd_m / height_m:.0%} (two standard "
+        "deviations)."
+    ]
+
+
+def measured_height_sentences(walk: Walk) -> list[str]:
+    """The measured height, where none was given, or where it contradicts the given one."""
+    height_m, sd_m, source = walk.height
+    if source == "measured":
+        return [
+            f"The person is {height_m:.2f} m tall, measured in the picture (standard deviation {sd_m:.2f} m)."
+        ]
+    return contradiction_sentences(walk)
+
+
+def contradiction_sentences(walk: Walk) -> list[str]:
+    """Says that the given height contradicts the picture by more than three standard deviations."""
+    if not walk.height_is_contradicted or walk.measured_height is None:
+        return []
+    seen_m, sd_m = walk.measured_height
+    return [
+        f"The given height of {walk.height[0]:.2f} m contradicts the picture, in which the person is "
+        f"{seen_m:.2f} m tall (standard deviation {sd_m:.2f} m): check height and camera."
+    ]
+
+
+def implausible_sentences(walk: Walk) -> list[str]:
+    """Says that steps and cadence do not go together, or that the feet do not stand on the ground."""
+    said = []
+    if walk.walk_ratio is not None:
+        ratio, least, most = walk.walk_ratio
+        if not least <= ratio <= most:
+            rate = "high" if ratio < least else "low"
+            said.append(
+                "People of this height do not walk so: their step length over cadence is "
+                f"{1000 * least:.1f} to {1000 * most:.1f} mm per step per minute, not {1000 * ratio:.1f}. "
+                f"Perhaps the frame rate is too {rate}."
+            )
+    sole_m = walk.fit.sole_m if walk.fit is not None else None
+    if sole_m is not None and abs(sole_m) > _MOST_SOLE_M:
+        where = "above" if sole_m > 0 else "below"
+        said.append(f"The feet are {100 * abs(sole_m):.0f} cm {where} the ground: check the camera.")
+    return said

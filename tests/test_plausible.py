@@ -1,0 +1,110 @@
+"""What is said of heights and paces that do not go together, and the height that is measured."""
+
+import os
+import types
+
+import memo
+import pytest
+from conftest import SHARED_DATA
+from memo import _memo
+from memo.gait import lookup
+from memo.plausible import (
+    assumed_height_sentences,
+    contradiction_sentences,
+    implausible_sentences,
+    measured_height_sentences,
+)
+from memo.video import VideoReader
+
+SCENE_FRAMES = 45
+WOMAN = SHARED_DATA / "video" / "sports2d_demo4"
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return memo.demo_scene(0, frames=SCENE_FRAMES)
+
+
+def tracked(scene, **given):
+    return memo.track(scene.frames, times_s=given.pop("times_s", scene.times_s), **given)
+
+
+def walk(**values):
+    usual = {
+        "height": (1.7, 0.02, "given"),
+        "measured_height": (1.71, 0.04),
+        "height_is_contradicted": False,
+        "walk_ratio": (0.006, 0.004, 0.011),
+        "fit": types.SimpleNamespace(sole_m=0.002),
+    }
+    return types.SimpleNamespace(**usual | values)
+
+
+def test_the_height_is_measured_in_a_calibrated_camera(scene):
+    track = tracked(scene, camera=scene.camera)
+    summary = track.summary
+    assert summary["height_source"] == "measured"
+    error_m = summary["height_m"] - scene.height_m
+    assert abs(error_m) < min(0.06, 1.96 * summary["height_sd_m"]), summary
+    assert any("tall, measured in the picture" in said for said in track.sentences)
+    assert summary["doubts"] == []
+
+
+def test_without_camera_and_height_the_scale_is_the_population_s(scene):
+    track, default = tracked(scene), _memo.defaults("track")
+    assert track.summary["height_m"] == default["height_m"] and track.summary["height_source"] == "assumed"
+    assert track.summary["height_sd_m"] == default["height_sd_m"]
+    assert track.sentences[0].startswith("No height and no camera were given")
+    scale_sd = default["height_sd_m"] / default["height_m"]
+    assert (track.columns["sd_z_m"] > scale_sd * track.columns["z_m"]).all()
+    for quantity in ("speed", "stride_length"):
+        row = lookup(track.gait_parameters, 0, quantity)
+        assert row["ci_high"] - row["ci_low"] > 2 * 1.959 * scale_sd * row["value"]
+
+
+def test_a_given_height_that_the_picture_contradicts_is_reported(scene):
+    track = tracked(scene, camera=scene.camera, height_m=scene.height_m + 0.25)
+    assert any("contradicts the picture" in said for said in track.sentences), track.sentences
+    assert any("contradicts the picture" in doubt for doubt in track.summary["doubts"])
+    assert track.summary["height_m"] == scene.height_m + 0.25
+
+
+@pytest.mark.skipif(not (WOMAN / "demo4.mp4").exists(), reason="no recordings")
+@pytest.mark.skipif("MEMO_FULL" not in os.environ, reason="tracks a video three times: MEMO_FULL=1")
+@pytest.mark.parametrize(("factor", "said"), [(1.0, []), (2.0, ["high"]), (0.5, ["low"])])
+def test_a_filmed_walk_at_a_wrong_frame_rate_is_suspected(factor, said):
+    with VideoReader(WOMAN / "demo4.mp4", start=45, stop=146) as video:
+        frames = [(frame.luma.copy(), frame.time_s / factor) for frame in video]
+    camera = memo.Camera.from_toml(WOMAN / "camera.toml")
+    lumas, times_s = zip(*frames, strict=True)
+    track = memo.track(lumas, times_s=times_s, height_m=1.65, camera=camera)
+    if factor < 1 and not track.walks:  # its steps are slower than those memo looks for
+        assert track.summary["status"] == "not walking"
+        return
+    doubts = track.summary["doubts"]
+    assert [
+        rate for rate in ("high", "low") for doubt in doubts if f"frame rate is too {rate}" in doubt
+    ] == said
+
+
+def test_what_is_as_usual_is_not_mentioned():
+    said = [
+        assumed_height_sentences,
+        measured_height_sentences,
+        contradiction_sentences,
+        implausible_sentences,
+    ]
+    assert [sentence for told in said for sentence in told(walk())] == []
+    assert implausible_sentences(walk(walk_ratio=None, fit=None)) == []
+
+
+def test_feet_off_the_ground_are_mentioned():
+    (above,) = implausible_sentences(walk(fit=types.SimpleNamespace(sole_m=0.12)))
+    (below,) = implausible_sentences(walk(fit=types.SimpleNamespace(sole_m=-0.22)))
+    assert "12 cm above the ground" in above and "22 cm below the ground" in below
+
+
+def test_a_ratio_outside_its_limits_is_mentioned():
+    for ratio, rate in ((0.0036, "high"), (0.0125, "low")):
+        (said,) = implausible_sentences(walk(walk_ratio=(ratio, 0.004, 0.011)))
+        assert f"frame rate is too {rate}" in said and "4.0 to 11.0 mm" in said
