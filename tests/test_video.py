@@ -8,7 +8,8 @@ from fractions import Fraction
 import av
 import numpy as np
 import pytest
-from memo.video import VideoDamageWarning, VideoError, VideoReader, _bt601
+from av.video.reformatter import ColorRange
+from memo.video import _LIMITED, VideoDamageWarning, VideoError, VideoReader, _bt601
 
 
 def read(path, **options):
@@ -55,13 +56,13 @@ def test_colour_video_becomes_bt601_luma(tmp_path):
     picture = av.VideoFrame.from_ndarray(rgb, format="rgb24").reformat(format="bgr24")
     write_pictures(tmp_path / "raw.avi", [picture, picture], "bgr24", "rawvideo")
     frames, _ = read(tmp_path / "raw.avi")
-    expected = rgb @ np.array([0.299, 0.587, 0.114])
+    expected = 16 + 219 / 255 * (rgb @ np.array([0.299, 0.587, 0.114]))
     assert np.abs(frames[1].luma - expected).max() <= 1.0
 
 
-def test_bt601_keeps_greys():
+def test_greys_have_the_same_level_in_colour():
     greys = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
-    np.testing.assert_array_equal(_bt601(greys)[0], np.arange(256))
+    np.testing.assert_array_equal(_bt601(greys)[0], _LIMITED)
 
 
 @pytest.mark.parametrize("pix_fmt", ["yuv420p10le", "yuyv422", "uyvy422", "nv12", "gray", "yuv444p"])
@@ -74,7 +75,42 @@ def test_luma_of_other_layouts(tmp_path, luma_frames, pix_fmt):
         grey = av.VideoFrame.from_ndarray(luma, format="gray")
     write_pictures(path, [grey.reformat(format=pix_fmt)], pix_fmt, codec)
     frames, _ = read(path)
-    assert np.abs(frames[0].luma.astype(int) - luma).max() <= 1
+    expected = 16 + 219 / 255 * luma if pix_fmt == "gray" else luma
+    assert np.abs(frames[0].luma - expected).max() <= 1.0
+
+
+LAYOUTS = [
+    ("full.mp4", "libx264", "yuvj420p"),
+    ("full.avi", "mjpeg", "yuvj420p"),
+    ("full10.mkv", "ffv1", "yuv420p10le"),
+    ("colour.nut", "rawvideo", "bgr24"),
+    ("grey.nut", "rawvideo", "gray"),
+    ("limited.mp4", "libx264", "yuv420p"),
+    ("limited10.mkv", "ffv1", "yuv420p10le"),
+]
+
+
+@pytest.mark.parametrize(("name", "codec", "pix_fmt"), LAYOUTS)
+def test_grey_levels_do_not_depend_on_the_range_of_the_video(tmp_path, name, codec, pix_fmt):
+    grey = np.repeat(np.arange(0, 256, 5, dtype=np.uint8), 2)[None].repeat(32, axis=0)[:, :96]
+    shade = av.VideoFrame.from_ndarray(
+        np.ascontiguousarray(grey[:, :, None].repeat(3, axis=2)), format="rgb24"
+    )
+    is_full = not name.startswith("limited")
+    picture = shade.reformat(format=pix_fmt, dst_color_range=ColorRange.JPEG if is_full else ColorRange.MPEG)
+    with av.open(str(tmp_path / name), "w") as container:
+        stream = container.add_stream(codec, rate=25, options={"qp": "0"} if codec == "libx264" else {})
+        stream.width, stream.height, stream.pix_fmt = picture.width, picture.height, pix_fmt
+        stream.codec_context.color_range = ColorRange.JPEG if is_full else ColorRange.MPEG
+        stream.codec_context.qmin = stream.codec_context.qmax = 1
+        picture.pts, picture.time_base = 0, Fraction(1, 25)
+        container.mux(stream.encode(picture))
+        container.mux(stream.encode(None))
+    frames, _ = read(tmp_path / name)
+    found = frames[0].luma.astype(float)
+    # Black is 16, white is 235 (ITU-R BT.601); JPEG is lossy.
+    assert np.abs(found - (16 + 219 / 255 * grey)).mean() <= 1.0, found[0]
+    assert abs(found.max() - (16 + 219 / 255 * grey.max())) <= 2.0
 
 
 @pytest.mark.parametrize(
@@ -278,7 +314,8 @@ def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames)
     with pytest.raises(VideoError, match="frame rate"):
         VideoReader(tmp_path)
     frames, reader = read(tmp_path, rate_hz=10)
-    np.testing.assert_array_equal([frame.luma for frame in frames], luma)
+    limited = np.rint(16 + 219 / 255 * luma.astype(float))
+    np.testing.assert_array_equal([frame.luma for frame in frames], limited)
     np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(11) / 10)
     assert reader.frame_count == 11
 

@@ -2,7 +2,9 @@
 
 It returns the luma plane as the camera stored it (without colour conversion: a conversion to
 `gray` differs from it by several grey levels), rotated upright by the display matrix, with the video's
-own time stamps. Frames are read one at a time, so memory does not grow with the length of the video.
+own time stamps. Luma of full range (0 to 255: images, and videos marked so) is brought to the limited range
+(16 to 235) of most video, so that the same scene has the same grey levels in every format. Frames are read
+one at a time, so memory does not grow with the length of the video.
 
 Limits: no seeking (a start frame is reached by decoding), no deinterlacing, no change of size in a video.
 """
@@ -21,6 +23,7 @@ from typing import Any
 import av
 import numpy as np
 import numpy.typing as npt
+from av.video.reformatter import ColorRange
 
 from memo.given import nothing_at
 from memo.pixels import averaged
@@ -285,24 +288,40 @@ def _natural_order(path: Path) -> list[tuple[int, str]]:
 
 
 def _luma(decoded: av.VideoFrame) -> Luma:
-    """The luma plane itself if there is one of 8 bits; else the nearest equivalent."""
+    """The luma plane itself if there is one of 8 bits and limited range; else the nearest equivalent."""
     kind = decoded.format
     if kind.is_rgb or kind.has_palette:
         return _bt601(np.asarray(decoded.to_ndarray(format="rgb24"), np.uint8))
+    is_full = _is_full_range(decoded)
     first = kind.components[0]
     own_plane = all(component.plane != first.plane for component in kind.components[1:])
     if first.bits != 8 or not own_plane or decoded.planes[0].line_size < 0:
-        decoded = decoded.reformat(format="yuv420p" if len(kind.components) > 1 else "gray")
+        same = ColorRange.JPEG if is_full else ColorRange.MPEG
+        wanted = "yuv420p" if len(kind.components) > 1 else "gray"
+        decoded = decoded.reformat(format=wanted, src_color_range=same, dst_color_range=same)
     plane = decoded.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
     luma: Luma = rows[: decoded.height, : decoded.width]
-    return luma
+    return _LIMITED[luma] if is_full else luma
+
+
+def _is_full_range(decoded: av.VideoFrame) -> bool:
+    """Whether luma is 0 to 255 from black to white, as in JPEG, and not 16 to 235, as in most video."""
+    name, stated = decoded.format.name, decoded.color_range
+    if stated != ColorRange.UNSPECIFIED:
+        return bool(stated == ColorRange.JPEG)
+    return name.startswith(("yuvj", "gray"))
+
+
+_LIMITED: Luma = np.rint(16 + np.arange(256) * 219 / 255).astype(np.uint8)
+"""Grey level in limited range of each one in full range (ITU-R BT.601)."""
 
 
 def _bt601(rgb: Luma) -> Luma:
-    """Y = 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601), rounded, in 16 bits of fixed point."""
-    red, green, blue = np.moveaxis(rgb.astype(np.uint16), 2, 0)
-    luma: Luma = ((77 * red + 150 * green + 29 * blue + 128) >> 8).astype(np.uint8)
+    """Y = 16 + 219 / 255 (0.299 R + 0.587 G + 0.114 B), ITU-R BT.601 in limited range, in fixed point."""
+    red, green, blue = np.moveaxis(rgb.astype(np.uint32), 2, 0)
+    weighted = 77 * red + 150 * green + 29 * blue
+    luma: Luma = (16 + (219 * weighted + 255 * 128) // (255 * 256)).astype(np.uint8)
     return luma
 
 
