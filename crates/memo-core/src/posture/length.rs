@@ -106,6 +106,36 @@ pub struct LengthFit {
     pub scale_from: ScaleFrom,
 }
 
+impl LengthFit {
+    /// Scales all lengths so that neck to sole is as in the prior.
+    ///
+    /// The height of a person on the ground and the distance that it implies determine each other: extents at a
+    /// distance that is too large are too large, and longer legs put the neck farther away. With a known height
+    /// the images give the proportions only.
+    fn keep_height_of(&mut self, prior: &LengthPrior) {
+        let factor = neck_to_ankle_m(&prior.lengths) / neck_to_ankle_m(&self.lengths);
+        self.lengths.to.0.iter_mut().chain(&mut self.lengths.rigid).for_each(|length_m| *length_m *= factor);
+        self.scale *= factor;
+        for estimate in &mut self.estimates {
+            let own_sq = estimate.sd_m.powi(2) - (self.scale_sd * estimate.length_m).powi(2);
+            estimate.length_m *= factor;
+            estimate.sd_m = own_sq.max(0.0).sqrt().hypot(prior.scale_sd * estimate.length_m);
+        }
+        for (joint, length_m) in Joint::ALL.into_iter().zip(self.lengths.to.0).skip(1) {
+            let own_sq = self.sd_m[joint].powi(2) - (self.scale_sd * length_m / factor).powi(2);
+            self.sd_m[joint] = own_sq.max(0.0).sqrt().hypot(prior.scale_sd * length_m);
+        }
+        (self.scale_sd, self.scale_from) = (prior.scale_sd, prior.scale_from);
+    }
+}
+
+/// Length of trunk, thigh and shank of an upright person.
+fn neck_to_ankle_m(lengths: &SegmentLengths) -> f64 {
+    let half_m = 0.5 * lengths.rigid[RigidDistance::Hips as usize];
+    let down_m = (lengths.to[Joint::RightHip].powi(2) - half_m * half_m).max(0.0).sqrt();
+    lengths.to[Joint::Pelvis] + down_m + lengths.to[Joint::RightKnee] + lengths.to[Joint::RightAnkle]
+}
+
 /// Why no lengths were estimated.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -282,7 +312,10 @@ pub fn estimate_from_sequence(
         if anchors.iter().all(Option::is_none) {
             return Err(error.into());
         }
-        let found = estimate(&rays, &anchors, up, prior, ground.map(|_| ScaleFrom::Ground))?;
+        let mut found = estimate(&rays, &anchors, up, prior, ground.map(|_| ScaleFrom::Ground))?;
+        if ground.is_some() && prior.scale_from == ScaleFrom::BodyHeight {
+            found.keep_height_of(prior);
+        }
         lengths = found.lengths;
         options.scale_sd = found.scale_sd;
         fit = Some(found);
