@@ -5,7 +5,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
 use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use memo_core::posture::lift::JointRays;
-use memo_core::posture::link::{LinkFrame, LinkOptions, link};
+use memo_core::posture::link::{FrontPoints, LinkFrame, LinkOptions, link};
 use memo_core::reproduce::stick_walker::StickWalker;
 use memo_core::synth::Random;
 use std::hint::black_box;
@@ -30,7 +30,7 @@ fn sequence() -> (Vec<LinkFrame>, SegmentLengths, LinkOptions) {
                 *ray = (*ray + noise_rad * DVec3::new(a, b, 0.0)).normalize();
             }
             rays.noise_rad = noise_rad;
-            LinkFrame { time_s, rays, neck: at[Joint::Neck as usize] }
+            LinkFrame { time_s, rays, neck: at[Joint::Neck as usize], front: FrontPoints::UNSEEN }
         })
         .collect();
     let options = LinkOptions {

@@ -1022,7 +1022,7 @@ def layout_or_names(d):
     return d.choice(layout, names), len(names)
 
 
-@case("stick_joints", "head_points")
+@case("stick_joints", "head_points", "foot_points")
 def _(d, name):
     layout, count = layout_or_names(d)
     frames = d.size(16)
@@ -1109,7 +1109,10 @@ def posture_options(d, frames):
 @case("posture")
 def _(d):
     frames = d.size(5, 1)
-    options = posture_options(d, frames) | d.options(head_points=lambda: d.numbers(0, 600, frames, 6, 2))
+    options = posture_options(d, frames) | d.options(
+        head_points=lambda: d.numbers(0, 600, frames, 6, 2),
+        foot_points=lambda: d.numbers(0, 600, frames, 4, 2),
+    )
     return _memo.posture(
         d.times(frames), stick_points(d, frames), d.numbers(0, 1, frames, 14), d.camera(), **options
     )

@@ -69,6 +69,7 @@ impl Recording {
             points_px: &self.points_px,
             weights: &self.weights,
             head_points_px: Some(&self.head_px),
+            foot_points_px: None,
         };
         postures(&sequence, &self.camera, options).unwrap()
     }
@@ -237,6 +238,7 @@ fn real_walks_look_like_walking() {
                 points_px: &recording.points_px,
                 weights: &recording.weights,
                 head_points_px: None,
+                foot_points_px: None,
             };
             for (label, lengths) in [("known", Some(walk.lengths)), ("estimated", None)] {
                 let options = SequenceOptions { lengths, noise_px: 1.0, ..SequenceOptions::default() };

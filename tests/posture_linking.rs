@@ -8,7 +8,7 @@ use crate::mocap;
 use glam::DVec3;
 use memo_core::model::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
 use memo_core::posture::lift::{JointRays, roots};
-use memo_core::posture::link::{LinkFrame, LinkOptions, LinkedPath, link};
+use memo_core::posture::link::{FrontPoints, LinkFrame, LinkOptions, LinkedPath, link};
 use memo_core::posture::prior::MotionPrior;
 
 /// Joints nearer than this count as the same, metres.
@@ -33,7 +33,7 @@ fn walk(name: &str, azimuth_deg: f64, noise_px: f64, seed: u64) -> Walk {
         options.moving_direction = Some(seen.heading);
         let ray = seen.rays.ray[Joint::Neck];
         let neck = ray * (seen.figure_in_camera[Joint::Neck].z / ray.z);
-        frames.push(LinkFrame { time_s, rays: seen.rays, neck });
+        frames.push(LinkFrame { time_s, rays: seen.rays, neck, front: FrontPoints::UNSEEN });
         truth.push(seen.figure_in_camera);
     }
     Walk { frames, truth, lengths, options }

@@ -17,10 +17,10 @@ Errors are in cm. `smooth` and `linked` are the mean distance of the 13 joints o
 they are, both relative to the neck; `flat` puts all joints as far away as the neck; `fast` is `smooth` over
 wrists and ankles. `facing` is the share of frames whose trunk is turned about the vertical by more than 60
 degrees, `lean` that of frames whose trunk's axis is off by more than 30 degrees. `signs` is the share of limb
-segments mirrored in depth in the smoothed motion, of those whose mirror image is more than 10 cm away. `ece` is
-the expected calibration error of `p_mirrored` on the same segments; `undec` is the share of frames that are
-undecided, `ratio` how many times as often limbs are mirrored there. `bias`, `rms` and `sd` are of the neck's
-distance: mean error, its RMS over clips, and the stated standard deviation.
+segments mirrored in depth in the smoothed motion, of those whose mirror image is more than 10 cm away. `ece`
+is the expected calibration error of `p_mirrored` on the same segments; `undec` is the share of these that are
+undecided, `ratio` how many times as often they are mirrored as the others. `bias`, `rms` and `sd` are of the
+neck's distance: mean error, its RMS over clips, and the stated standard deviation.
 
 Cannot do: real detections, occlusion, cameras with distortion.
 """
@@ -98,7 +98,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Score:
-    """What one call found. Lists of pairs: stated probability, 1 if mirrored; `undecided` likewise."""
+    """What one call found. The last three lists are of limb segments in depth."""
 
     job: Job
     smooth_cm: float
@@ -113,8 +113,6 @@ class Score:
     probabilities: tuple[float, ...]
     mirrored: tuple[int, ...]
     undecided: tuple[int, ...]
-    """Of the same segments: 1 where their frame is undecided."""
-    undecided_frames: float
     seconds: float
 
 
@@ -279,7 +277,6 @@ def compare(
         probabilities=tuple(np.round(probabilities, 4).tolist()),
         mirrored=tuple(mirrored.astype(int).tolist()),
         undecided=tuple(undecided.astype(int).tolist()),
-        undecided_frames=float(postures.undecided[rows].mean()),
         seconds=seconds,
     )
 
@@ -287,7 +284,7 @@ def compare(
 def signs(
     postures: memo.Postures, rows: np.ndarray, true: np.ndarray, rays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of limb segments in depth: the stated probability, whether mirrored, whether the frame is undecided."""
+    """Of limb segments in depth: the stated probability, whether mirrored, whether undecided."""
     units = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
     def along(figure: np.ndarray) -> np.ndarray:
@@ -297,8 +294,8 @@ def signs(
     extent, got = along(true), along(postures.smoothed_m[rows])
     stated = postures.p_mirrored[rows][:, list(LIMBS)]
     counted = (2 * np.abs(extent) > DISTINCT_M) & np.isfinite(got) & np.isfinite(stated)
-    open_frames = np.broadcast_to(postures.undecided[rows][:, None], extent.shape)
-    return stated[counted], (extent * got < 0)[counted], open_frames[counted]
+    undecided = postures.undecided_joints[rows][:, list(LIMBS)]
+    return stated[counted], (extent * got < 0)[counted], undecided[counted]
 
 
 # Tables
@@ -317,7 +314,7 @@ def pooled(scores: Sequence[Score]) -> dict[str, float]:
         "lean": 100.0 * _mean([score.lean for score in scores]),
         "signs": 100.0 * _mean(mirrored),
         "ece": calibration_error(stated, mirrored),
-        "undec": 100.0 * _mean([score.undecided_frames for score in scores]),
+        "undec": 100.0 * _mean(undecided),
         "ratio": rate / other if other else math.nan,
         "bias": _mean(bias),
         "rms": math.sqrt(_mean(bias**2)),

@@ -592,6 +592,11 @@ def test_stick_joints_of_a_track():
     np.testing.assert_array_equal(same, points)
     head, _ = memo.head_points("COCO_17", values[..., :2], values[..., 2])
     np.testing.assert_array_equal(head[0, 1:], values[0, [0, 2, 1, 4, 3], :2])
+    feet, weights = memo.foot_points("COCO_17", values[..., :2], values[..., 2])
+    assert np.isnan(feet).all() and feet.shape == (3, 4, 2) and (weights == 0).all()
+    body_25 = np.arange(50.0).reshape(1, 25, 2)
+    feet, _ = memo.foot_points("BODY_25", body_25, np.ones((1, 25)))
+    np.testing.assert_array_equal(feet[0], body_25[0, [22, 19, 24, 21]])  # R and L big toe, R and L heel
     with pytest.raises(ValueError, match="expected 17 points, got 16"):
         memo.stick_joints("COCO_17", np.zeros((3, 16, 2)), np.zeros((3, 16)))
     with pytest.raises(ValueError, match="shape"):

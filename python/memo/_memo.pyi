@@ -48,6 +48,7 @@ __all__ = [
     "edge_segments",
     "euler_angles",
     "follow_person",
+    "foot_points",
     "gait_curves",
     "guess_layout",
     "head_points",
@@ -532,6 +533,11 @@ def stick_joints(
     points: npt.NDArray[np.float64],
     scores: npt.NDArray[np.float64],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def foot_points(
+    layout_or_names: str | Sequence[str],
+    points: npt.NDArray[np.float64],
+    scores: npt.NDArray[np.float64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
 def head_points(
     layout_or_names: str | Sequence[str],
     points: npt.NDArray[np.float64],
@@ -623,6 +629,7 @@ def posture(
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
     head_points: npt.NDArray[np.float64] | None = None,
+    foot_points: npt.NDArray[np.float64] | None = None,
     group_m: float | None = None,
     max_groups: int | None = None,
     progress: Callable[[int, int], object] | None = None,

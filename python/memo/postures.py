@@ -48,7 +48,8 @@ _LIMB_ENDS = ("elbow", "wrist", "knee", "ankle")
 _DISTANCES_M = (0.1, 1000.0)
 _MOST_GROUPS = 1 << 31
 
-_UNDECIDED_NATS = math.log(4)  # probabilities 0.8 and 0.2
+_UNDECIDED_P = 0.2
+_UNDECIDED_NATS = math.log(1 / _UNDECIDED_P - 1)
 
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
@@ -159,7 +160,7 @@ class Postures:
     linked_breaks: tuple[tuple[str, ...], ...]
     """(T,) names of the constraints that the posture in the motion breaks."""
     smoothed_m: Array
-    """(T, 14, 3) metres: the same, smoothed."""
+    """(T, 14, 3) metres: the same, smoothed in space: close to the image points, with constant lengths."""
     sd_m: Array
     """(T, 14) standard deviation of each joint of the smoothed motion, metres."""
     gap_m: Array
@@ -167,8 +168,8 @@ class Postures:
     margin_nats: Array
     """(T,) how much more probable the motion is than the best other one in this frame; else infinite."""
     p_mirrored: Array
-    """(T, 14) probability that the segment ending at a joint, with its subtree, is mirrored in depth;
-    measured on walks, so only approximate for other motion."""
+    """(T, 14) probability that the segment ending at a joint, with its subtree, is mirrored in depth,
+    calibrated for each set of rules; with rules that do not fit the motion it is too small."""
     second: SecondBest | None
     """The second most probable motion, if there is a relevant one."""
     heading_source: str
@@ -198,8 +199,15 @@ class Postures:
 
     @property
     def undecided(self) -> npt.NDArray[np.bool_]:
-        """(T,) whether a joint is undecided: another motion has a probability over 0.2."""
+        """(T,) whether another motion has a probability over 0.2. For other motions than walking one often
+        has; `undecided_joints` says which joints differ."""
         return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
+
+    @property
+    def undecided_joints(self) -> npt.NDArray[np.bool_]:
+        """(T, 14) whether the segment that ends at a joint is undecided: mirrored with a probability over
+        0.2."""
+        return np.asarray(self.p_mirrored > _UNDECIDED_P, np.bool_)
 
     @property
     def limbs_known(self) -> bool:
@@ -315,7 +323,8 @@ def posture(
     `anchor`: source of the distance of the neck, "auto", "ground", "trunk", "extent", "head" or
     "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN if unknown, with its standard
     deviation `distance_sd_m`.
-    `moving_direction`: (3,) world, direction of walking; by default taken from the motion.
+    `moving_direction`: (3,) world, direction of walking; by default taken from the motion. With
+    "physical", the direction that the person mostly faces; by default not used.
     `unswap`: first exchange right and left where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures form one group if no joint differs by
     more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
@@ -356,7 +365,7 @@ def posture(
     _check_camera_fits(keypoints, camera)
     repair = sides.unswap(keypoints) if unswap else None
     used = keypoints if repair is None else repair.keypoints
-    points_px, weights, head_px = _stick_points(used)
+    points_px, weights = _stick_points(used)
     found = _memo.posture(
         used.times_s,
         points_px,
@@ -371,7 +380,8 @@ def posture(
         distance_m=distance_m,
         distance_sd_m=distance_sd_m,
         moving_direction=moving_direction,
-        head_points=head_px,
+        head_points=_points_seen(_memo.head_points, used, 1),
+        foot_points=_points_seen(_memo.foot_points, used, 0),
         group_m=group_m,
         max_groups=max_groups,
         progress=progress,
@@ -486,13 +496,17 @@ def _head_down(linked_m: Array) -> list[str]:
     ]
 
 
-def _stick_points(keypoints: Keypoints) -> tuple[Array, Array, Array | None]:
-    """The 14 joints (T, 14, 2), their weights (T, 14), and the points of the head, if any is visible."""
+def _stick_points(keypoints: Keypoints) -> tuple[Array, Array]:
+    """The 14 joints (T, 14, 2) and their weights (T, 14)."""
     # Older AlphaPose scores go up to 6; the core takes weights from 0 to 1.
     scores = np.clip(keypoints.scores, 0, 1)
-    points_px, weights = _memo.stick_joints(_detector(keypoints), keypoints.points, scores)
-    head_px, _ = _memo.head_points(_detector(keypoints), keypoints.points, scores)
-    return points_px, weights, head_px if np.isfinite(head_px[:, 1:]).any() else None
+    return _memo.stick_joints(_detector(keypoints), keypoints.points, scores)
+
+
+def _points_seen(part: Callable[..., tuple[Array, Array]], keypoints: Keypoints, first: int) -> Array | None:
+    """The points of head or feet, if any from the first on is visible: the head's neck alone shows none."""
+    points_px, _ = part(_detector(keypoints), keypoints.points, np.clip(keypoints.scores, 0, 1))
+    return points_px if np.isfinite(points_px[:, first:]).any() else None
 
 
 def _named(

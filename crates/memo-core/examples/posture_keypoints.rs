@@ -52,6 +52,7 @@ fn found(arguments: &[String]) -> Result<PostureSequence, Box<dyn Error>> {
         points_px: &points_px,
         weights: &weights,
         head_points_px: None,
+        foot_points_px: None,
     };
     Ok(postures(&sequence, &camera, &options)?)
 }

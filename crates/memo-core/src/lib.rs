@@ -70,6 +70,7 @@
 //!     points_px: &points_px,
 //!     weights: &weights,
 //!     head_points_px: None,
+//!     foot_points_px: None,
 //! };
 //! let options = SequenceOptions { height_m: Some(1.75), noise_px: 0.5, ..SequenceOptions::default() };
 //! let found = postures(&keypoints, &camera, &options)?;

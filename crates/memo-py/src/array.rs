@@ -304,14 +304,17 @@ pub fn times_from_numpy(times: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.try_readonly()?.as_array().iter().copied().collect())
 }
 
-/// Reads the six points of the head over time, shape (T, 6, 2).
-pub fn head_points_from_numpy(points: &Bound<'_, PyAny>) -> PyResult<Vec<[DVec2; 6]>> {
+/// Reads N points over time, shape (T, N, 2), such as those of the "head".
+pub fn points_of_part_from_numpy<const N: usize>(
+    points: &Bound<'_, PyAny>,
+    part: &str,
+) -> PyResult<Vec<[DVec2; N]>> {
     let track = track_from_numpy(points)?;
-    if track.joints != 6 {
-        let wanted = "wanted points of the head: numpy array of shape (T, 6, 2), dtype float64";
+    if track.joints != N {
+        let wanted = format!("wanted points of the {part}: numpy array of shape (T, {N}, 2), dtype float64");
         return Err(PyValueError::new_err(format!("{wanted}; got {}", describe(points)?)));
     }
-    Ok(track.points_px.chunks_exact(6).map(|row| std::array::from_fn(|i| row[i])).collect())
+    Ok(track.points_px.chunks_exact(N).map(|row| std::array::from_fn(|i| row[i])).collect())
 }
 
 /// Figures of 14 joints as an array of shape (figures, 14, 3).

@@ -86,6 +86,17 @@ pub fn head_points<'py>(
     collect(py, &layout_or_names, points, scores, Detector::head_points)
 }
 
+/// The 4 foot points right big toe, left big toe, right heel, left heel; formats as in `stick_joints`.
+#[pyfunction]
+pub fn foot_points<'py>(
+    py: Python<'py>,
+    layout_or_names: LayoutOrNames,
+    points: &Bound<'py, PyAny>,
+    scores: &Bound<'py, PyAny>,
+) -> PyResult<PointsAndWeights<'py>> {
+    collect(py, &layout_or_names, points, scores, Detector::foot_points)
+}
+
 fn collect<'py, const N: usize>(
     py: Python<'py>,
     layout_or_names: &LayoutOrNames,

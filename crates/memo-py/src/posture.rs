@@ -1,7 +1,7 @@
 //! Postures of a sequence of keypoints.
 
 use crate::array::{
-    head_points_from_numpy, numpy_from_column, numpy_from_figures, numpy_from_rows, points_from_numpy,
+    numpy_from_column, numpy_from_figures, numpy_from_rows, points_from_numpy, points_of_part_from_numpy,
     scores_from_numpy, times_from_numpy, track_from_numpy,
 };
 use crate::camera::PyCamera;
@@ -147,7 +147,7 @@ pub enum Distances {
 #[pyo3(signature = (
     times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=None, rules=None,
     strength=None, anchor=None, distance_m=None, distance_sd_m=None, moving_direction=None,
-    head_points=None, group_m=None, max_groups=None, progress=None
+    head_points=None, foot_points=None, group_m=None, max_groups=None, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn posture(
@@ -166,6 +166,7 @@ pub fn posture(
     distance_sd_m: Option<f64>,
     moving_direction: Option<[f64; 3]>,
     head_points: Option<&Bound<'_, PyAny>>,
+    foot_points: Option<&Bound<'_, PyAny>>,
     group_m: Option<f64>,
     max_groups: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -178,7 +179,8 @@ pub fn posture(
     }
     let weights = per_joint(&scores_from_numpy(weights, &track)?);
     let points_px: Vec<PerJoint<DVec2>> = per_joint(&track.points_px);
-    let head_points_px = head_points.map(head_points_from_numpy).transpose()?;
+    let head_points_px = head_points.map(|points| points_of_part_from_numpy(points, "head")).transpose()?;
+    let foot_points_px = foot_points.map(|points| points_of_part_from_numpy(points, "feet")).transpose()?;
     let usual = SequenceOptions::default();
     let options = SequenceOptions {
         lengths: lengths.map(lengths_from_names).transpose()?,
@@ -199,6 +201,7 @@ pub fn posture(
             points_px: &points_px,
             weights: &weights,
             head_points_px: head_points_px.as_deref(),
+            foot_points_px: foot_points_px.as_deref(),
         };
         postures_with_progress(&sequence, &camera, &options, progress)
     };

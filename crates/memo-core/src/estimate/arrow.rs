@@ -77,10 +77,19 @@ impl Banded {
 impl Arrow {
     /// Equations without terms: `frames` frames of `block` unknowns, and `whole` unknowns of the whole sequence.
     pub fn new(frames: usize, block: usize, whole: usize) -> Self {
+        Self::with_width(frames, block, whole, (3 * block).saturating_sub(1))
+    }
+
+    /// Equations of frames alone, whose terms touch no unknowns with indices farther apart than `width`.
+    pub fn banded(frames: usize, block: usize, width: usize) -> Self {
+        Self::with_width(frames, block, 0, width)
+    }
+
+    fn with_width(frames: usize, block: usize, whole: usize, width: usize) -> Self {
         let count = frames * block;
         Self {
             block,
-            frames: Banded::zeros(count, (3 * block).saturating_sub(1)),
+            frames: Banded::zeros(count, width),
             coupling: DMatrix::zeros(whole, count),
             whole: DMatrix::zeros(whole, whole),
             right_frames: vec![0.0; count],

@@ -35,6 +35,9 @@ use crate::model::skeleton::PELVIS_ON_TRUNK;
 /// Names of the head points in the order of table A.2.
 pub const HEAD_POINTS: [&str; 6] = ["neck", "nose", "right_eye", "left_eye", "right_ear", "left_ear"];
 
+/// Names of the points of the feet that show which way a person faces.
+pub const FOOT_POINTS: [&str; 4] = ["right_big_toe", "left_big_toe", "right_heel", "left_heel"];
+
 /// A right and a left point of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SidePair {
@@ -74,6 +77,7 @@ pub struct Detector {
     names: Vec<&'static str>,
     stick: [Source; 14],
     head: [Source; 6],
+    feet: [Source; 4],
 }
 
 impl Detector {
@@ -117,7 +121,8 @@ impl Detector {
         let head =
             HEAD_POINTS.map(|name| if name == "neck" { own("upper_neck").or(neck) } else { own(name) });
         let or_absent = |source: Option<Source>| source.unwrap_or(Source::Absent);
-        Self { stick: stick.map(or_absent), head: head.map(or_absent), names }
+        let feet = FOOT_POINTS.map(|name| or_absent(own(name)));
+        Self { stick: stick.map(or_absent), head: head.map(or_absent), feet, names }
     }
 
     /// The names of the detector's points in order.
@@ -150,6 +155,19 @@ impl Detector {
         scores: &[f64],
     ) -> Result<WeightedPoints<6>, DetectorError> {
         self.collect(&self.head, points_px, scores)
+    }
+
+    /// The points of the feet in one frame, in the order of [`FOOT_POINTS`].
+    ///
+    /// # Errors
+    ///
+    /// The number of points or scores differs from the number of names.
+    pub fn foot_points(
+        &self,
+        points_px: &[DVec2],
+        scores: &[f64],
+    ) -> Result<WeightedPoints<4>, DetectorError> {
+        self.collect(&self.feet, points_px, scores)
     }
 
     /// Which of [`HEAD_POINTS`] the detector can provide.

@@ -7,6 +7,6 @@ pub mod names;
 pub mod person;
 pub mod unswap;
 
-pub use detector::{Detector, HEAD_POINTS, SidePair, WeightedPoints};
+pub use detector::{Detector, FOOT_POINTS, HEAD_POINTS, SidePair, WeightedPoints};
 pub use layouts::{LAYOUTS, Layout};
 pub use names::{DetectorError, STICK_JOINTS, SwapGroup, joint_name, joint_names};

@@ -334,7 +334,7 @@ impl Problem<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LinkFrame, LinkOptions};
+    use super::super::{FrontPoints, LinkFrame, LinkOptions};
     use super::*;
     use crate::model::skeleton::SegmentLengths;
     use crate::posture::lift::JointRays;
@@ -350,7 +350,8 @@ mod tests {
             let place = |p: DVec3| camera_from_walker(p) + DVec3::new(0.0, -0.3, 4.0);
             let figure = PerJoint(figure.0.map(place));
             let rays = JointRays { noise_rad: 1e-3, ..JointRays::from_points(&figure) };
-            LinkFrame { time_s: t as f64 / 25.0, rays, neck: figure[Joint::Neck] }
+            let front = FrontPoints::UNSEEN;
+            LinkFrame { time_s: t as f64 / 25.0, rays, neck: figure[Joint::Neck], front }
         });
         let options =
             LinkOptions { up: Some(-DVec3::Y), moving_direction: Some(DVec3::X), ..LinkOptions::default() };

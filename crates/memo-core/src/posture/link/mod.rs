@@ -6,12 +6,18 @@
 //! is linked first, then both arms and both legs, each pair jointly, given the trunk and the other pair. Costs
 //! are negative log likelihoods, in nats. Limits of the body and habits of walking are soft ([`MotionPrior`]).
 //!
+//! Before linking, noise in the image is reduced (`denoise`); the cost of a trunk contains which way it faces in the
+//! image (`front`); afterwards the motion is smoothed in space (`motion`).
+//!
 //! Candidates are all roots, not only the survivors of the tree: a hard limit exceeded by one degree of noise
 //! would break the chain. Short gaps in a joint's track are interpolated for the decision only; the figures
 //! contain only what was seen.
 
+mod denoise;
 mod flip;
+mod front;
 mod limbs;
+mod motion;
 mod trunk;
 
 use glam::{DMat3, DVec3};
@@ -25,6 +31,7 @@ use crate::model::angles::trunk_axes;
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
 use crate::progress::{Progress, Stopped};
 use flip::Flip;
+pub use front::FrontPoints;
 use limbs::Limbs;
 use trunk::{Trunk, joints_of};
 
@@ -75,6 +82,8 @@ pub struct LinkFrame {
     pub rays: JointRays,
     /// The neck, camera axes, metres; NaN if it is not known, and then the frame is not used.
     pub neck: DVec3,
+    /// Points that show the person's front.
+    pub front: FrontPoints,
 }
 
 /// Options of [`link`].
@@ -88,6 +97,9 @@ pub struct LinkOptions {
     pub ground: Option<Ground>,
     /// The moving direction in camera axes; `None` uses the trunk's forward axis.
     pub moving_direction: Option<DVec3>,
+    /// The direction that the person mostly faces, camera axes, if it is known and is not the moving direction of
+    /// the prior.
+    pub facing: Option<DVec3>,
     /// Gaps of a joint's track up to this duration are interpolated for the decision, seconds: a quarter of a
     /// step.
     pub bridge_s: f64,
@@ -102,6 +114,7 @@ impl Default for LinkOptions {
             up: None,
             ground: None,
             moving_direction: None,
+            facing: None,
             bridge_s: 0.12,
             distinct_m: 0.10,
         }
@@ -137,9 +150,10 @@ pub struct LinkedPath {
     /// The posture of every frame, camera axes, metres. Every joint is at one of its roots; NaN if the joint, or
     /// a joint between it and the neck, was not seen.
     pub figures: Vec<StickFigure>,
-    /// The postures smoothed over time: joints stay on their rays, depths follow a steady motion.
+    /// The postures smoothed in space: near the image points, with constant lengths and small accelerations.
     pub smoothed: Vec<StickFigure>,
-    /// Standard deviation of each smoothed joint along its ray, relative to its starting joint, metres.
+    /// Standard deviation of each joint along its ray, relative to its starting joint, from the frames around it,
+    /// metres.
     pub sd_m: Vec<PerJoint<f64>>,
     /// Distance of each joint of `figures` from its starting joint, less the length of its segment, metres: more
     /// than 0 if there was no real root.
@@ -153,16 +167,16 @@ pub struct LinkedPath {
     /// For each frame, the smallest cost of placing one of its joints elsewhere, nats; infinite if none can be
     /// elsewhere.
     pub margin: Vec<f64>,
+    /// Probability that the segment that ends at a joint is mirrored in depth, 0 to 0.5; NaN if the joint is not
+    /// known. For limbs by the prior's [`MirrorOdds`](super::prior::MirrorOdds), for the trunk by its margin.
+    pub p_mirrored: Vec<PerJoint<f64>>,
 }
 
 impl LinkedPath {
     /// Probability that the segment that ends at a joint is mirrored in depth in a frame, 0 to 0.5; NaN if the
     /// joint is not known.
     pub fn probability_mirrored(&self, t: usize, joint: Joint) -> f64 {
-        if self.figures[t][joint].is_nan() {
-            return f64::NAN;
-        }
-        1.0 / (1.0 + self.mirror_margin[t][joint].exp())
+        self.p_mirrored[t][joint]
     }
 }
 
@@ -192,9 +206,10 @@ pub(super) fn link_with_progress(
     check(frames, options)?;
     let known: Vec<usize> = (0..frames.len()).filter(|&t| !frames[t].neck.is_nan()).collect();
     let seen: Vec<LinkFrame> = known.iter().map(|&t| frames[t]).collect();
-    // 1. Interpolate short gaps for the decision.
+    // 1. For the decision, interpolate short gaps and reduce the noise in the image.
     let bridged = bridge(&seen, options.bridge_s);
-    let problem = Problem { frames: &bridged, lengths, options };
+    let clean = denoise::denoised(&bridged);
+    let problem = Problem { frames: &clean, lengths, options };
     // 2. The trunk, then arms and legs in turn, each given the other. The limbs may show better which way the
     //    trunk faces, so the flipped trunk is tried as well.
     let trunks = Trunk::link(&problem);
@@ -216,8 +231,9 @@ pub(super) fn link_with_progress(
             delta: cost - best,
         })
         .collect();
-    // 3. Leaves of the tree, the second-best reading and margins.
-    let path = problem.path(&seen, trunk, limbs, &turned);
+    // 3. The motion smoothed in space, leaves of the tree, the second-best reading and margins.
+    let smoothed = motion::smoothed(&bridged, lengths, &limbs.smoothed);
+    let path = problem.path(&seen, trunk, limbs, &turned, smoothed);
     Ok(path.spread(&known, frames.len()))
 }
 
@@ -233,7 +249,9 @@ fn check(frames: &[LinkFrame], options: &LinkOptions) -> Result<(), LinkError> {
             return Err(LinkError::Neck { frame, neck });
         }
     }
-    for (parameter, value) in [("up", options.up), ("moving_direction", options.moving_direction)] {
+    for (parameter, value) in
+        [("up", options.up), ("moving_direction", options.moving_direction), ("facing", options.facing)]
+    {
         if let Some(value) = value.filter(|v| v.try_normalize().is_none()) {
             return Err(LinkError::Direction { parameter, value });
         }
@@ -344,9 +362,15 @@ impl Problem<'_> {
     }
 
     /// Leaves, margins and the second-best reading of a linked sequence.
-    fn path(&self, seen: &[LinkFrame], trunk: &Trunk, limbs: &Limbs, turned: &[Flip]) -> LinkedPath {
-        let leaves: Vec<Leaf> =
-            (0..seen.len()).map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &[])).collect();
+    fn path(
+        &self,
+        seen: &[LinkFrame],
+        trunk: &Trunk,
+        limbs: &Limbs,
+        turned: &[Flip],
+        smoothed: Vec<StickFigure>,
+    ) -> LinkedPath {
+        let leaves: Vec<Leaf> = (0..seen.len()).map(|t| self.leaf(&seen[t], &smoothed[t], &[])).collect();
         let whole = turned.iter().map(|&flip| (flip, joints_of(flip.mask)));
         let readings = trunk.readings().chain(limbs.readings()).chain(whole);
         let mut margin = vec![f64::INFINITY; seen.len()];
@@ -373,23 +397,18 @@ impl Problem<'_> {
             from: flip.from,
             to: flip.to,
             figures: (flip.from..flip.to)
-                .map(|t| self.leaf(&seen[t], &limbs.smoothed[t], &joints).figure)
+                .map(|t| self.leaf(&seen[t], &smoothed[t], &joints).figure)
                 .collect(),
             margin: flip.delta.max(0.0) / self.options.prior.overconfidence,
             joints,
         });
-        let mut smoothed = limbs.smoothed.clone();
         let mut sd_m = limbs.sd_m.clone();
-        for (t, frame) in seen.iter().enumerate() {
-            for joint in
-                Joint::ALL.into_iter().filter(|&joint| !frame.rays.sees(joint) && joint != Joint::Neck)
-            {
-                smoothed[t][joint] = DVec3::NAN;
-                sd_m[t][joint] = f64::NAN;
-            }
+        for (sd_m, frame) in sd_m.iter_mut().zip(seen) {
+            unseen(frame).for_each(|joint| sd_m[joint] = f64::NAN);
         }
         LinkedPath {
-            smoothed,
+            p_mirrored: self.probabilities(&leaves, &smoothed, &mirror_margin),
+            smoothed: only_seen(smoothed, seen),
             sd_m,
             second,
             margin,
@@ -397,6 +416,28 @@ impl Problem<'_> {
             gap_m: leaves.iter().map(|leaf| leaf.gap_m).collect(),
             figures: leaves.into_iter().map(|leaf| leaf.figure).collect(),
         }
+    }
+
+    /// Probabilities that the segments of the leaves are mirrored.
+    fn probabilities(
+        &self,
+        leaves: &[Leaf],
+        smoothed: &[StickFigure],
+        margin: &[PerJoint<f64>],
+    ) -> Vec<PerJoint<f64>> {
+        let of_joint = |t: usize, joint: Joint| {
+            if leaves[t].figure[joint].is_nan() {
+                return f64::NAN;
+            }
+            match joint.start() {
+                Some(start) if joint >= Joint::RightElbow => {
+                    let extent_m = (smoothed[t][joint] - smoothed[t][start]).dot(self.ray(t, joint));
+                    self.options.prior.mirrored.probability(extent_m, margin[t][joint])
+                }
+                _ => 1.0 / (1.0 + margin[t][joint].exp()),
+            }
+        };
+        (0..leaves.len()).map(|t| PerJoint(Joint::ALL.map(|joint| of_joint(t, joint)))).collect()
     }
 
     /// The leaf of the tree whose segments point to the same side along their rays as the figure's, except those
@@ -422,6 +463,19 @@ impl Problem<'_> {
         }
         leaf
     }
+}
+
+/// The joints that a frame does not show; its neck is known.
+fn unseen(frame: &LinkFrame) -> impl Iterator<Item = Joint> + '_ {
+    Joint::ALL.into_iter().filter(|&joint| joint != Joint::Neck && !frame.rays.sees(joint))
+}
+
+/// The figures without the joints that their frames do not show.
+fn only_seen(mut figures: Vec<StickFigure>, seen: &[LinkFrame]) -> Vec<StickFigure> {
+    for (figure, frame) in figures.iter_mut().zip(seen) {
+        unseen(frame).for_each(|joint| figure[joint] = DVec3::NAN);
+    }
+    figures
 }
 
 /// A leaf of the interpretation tree.
@@ -458,6 +512,7 @@ impl LinkedPath {
             gap_m: at(self.gap_m, known, frames, nothing),
             margin: at(self.margin, known, frames, f64::NAN),
             mirror_margin: at(self.mirror_margin, known, frames, nothing),
+            p_mirrored: at(self.p_mirrored, known, frames, nothing),
             second: self.second.map(|second| {
                 let [from, to] = [known[second.from], known[second.to - 1] + 1];
                 let inside: Vec<usize> = (second.from..second.to).map(|t| known[t] - from).collect();

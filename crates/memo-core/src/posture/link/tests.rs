@@ -20,6 +20,7 @@ fn sequence(yaw_rad: f64) -> (Vec<StickFigure>, Vec<LinkFrame>, SegmentLengths, 
             time_s: t as f64 / 25.0,
             rays: JointRays::from_points(figure),
             neck: figure[Joint::Neck],
+            front: FrontPoints::UNSEEN,
         })
         .collect();
     let options = LinkOptions {
@@ -45,10 +46,10 @@ fn a_walk_is_found_from_all_sides() {
         let path = link(&frames, &lengths, &options).unwrap();
         let near = share(&path.smoothed, &truth);
         assert!(near >= 0.99, "{yaw_deg} deg: {near}");
-        // Joints stay on their rays.
+        // Without noise, joints stay close to their rays.
         for (figure, frame) in path.smoothed.iter().zip(&frames) {
             for joint in Joint::ALL {
-                assert!(figure[joint].cross(frame.rays.ray[joint]).length() < 1e-9, "{yaw_deg} {joint:?}");
+                assert!(figure[joint].cross(frame.rays.ray[joint]).length() < 0.02, "{yaw_deg} {joint:?}");
             }
         }
     }
@@ -79,8 +80,22 @@ fn what_is_mirrored_in_the_second_reading_is_the_least_sure() {
     let (_, frames, lengths, options) = sequence(std::f64::consts::FRAC_PI_4);
     let path = link(&frames, &lengths, &options).unwrap();
     let second = path.second.clone().unwrap();
-    let stated = path.probability_mirrored(second.from, second.joints[0]);
-    assert!(stated >= second.probability() - 1e-12 && stated <= 0.5);
+    assert!(path.mirror_margin[second.from][second.joints[0]] <= second.margin);
+    let odds = options.prior.mirrored;
+    for (t, frame) in frames.iter().enumerate() {
+        for joint in Joint::ALL.into_iter().skip(1) {
+            let margin = path.mirror_margin[t][joint];
+            let expected = match joint.class() {
+                _ if matches!(joint, Joint::RightHip | Joint::LeftHip) => 1.0 / (1.0 + margin.exp()),
+                Some('b' | 'c' | 'd') => {
+                    odds.probability(path.smoothed[t].segment(joint).dot(frame.rays.ray[joint]), margin)
+                }
+                _ => 1.0 / (1.0 + margin.exp()),
+            };
+            // The rays of the links are those of the frames smoothed over time.
+            assert!((path.probability_mirrored(t, joint) - expected).abs() < 0.02, "{t} {joint:?}");
+        }
+    }
     assert_eq!(path.probability_mirrored(0, Joint::Neck), 0.0);
 }
 
@@ -178,7 +193,8 @@ fn the_number_of_threads_changes_nothing() {
 /// A problem of frames without joints, at these times.
 fn timed(times_s: &[f64]) -> Vec<LinkFrame> {
     let rays = JointRays::from_points(&StickFigure::UNKNOWN);
-    times_s.iter().map(|&time_s| LinkFrame { time_s, rays, neck: DVec3::new(0.0, 0.0, 4.0) }).collect()
+    let neck = DVec3::new(0.0, 0.0, 4.0);
+    times_s.iter().map(|&time_s| LinkFrame { time_s, rays, neck, front: FrontPoints::UNSEEN }).collect()
 }
 
 /// A ray missing for a short time is interpolated linearly in time; one missing for longer stays missing.
@@ -330,7 +346,7 @@ fn the_cheaper_body_is_chosen_limbs_and_all() {
         let path = link(&frames, &lengths, &options).unwrap();
         for (figure, chosen) in path.smoothed.iter().zip(&trunks[best].smoothed) {
             for joint in [Joint::RightShoulder, Joint::LeftShoulder, Joint::Pelvis, Joint::RightHip] {
-                assert!(figure[joint].distance(chosen[joint]) < 1e-9, "{yaw_deg} {joint:?} {costs:?}");
+                assert!(figure[joint].distance(chosen[joint]) < 0.05, "{yaw_deg} {joint:?} {costs:?}");
             }
         }
         println!("{yaw_deg}: {costs:?}");

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::super::prior::{Soft, chi_sq};
 use super::flip::{Chain, Flip};
+use super::front::Front;
 use super::{Problem, place};
 use crate::estimate::smooth::{Measured, smooth_track};
 use crate::estimate::viterbi::least_path;
@@ -24,8 +25,8 @@ const KEPT: usize = 8;
 /// Share of a usual spread that is constant over a sequence.
 const STEADY_SHARE: f64 = 0.7;
 
-/// Sets of segments that may be mirrored together: one segment, both shoulders, both hips.
-const MASKS: [usize; 7] = [1, 2, 4, 8, 16, 3, 24];
+/// Sets of segments that may be mirrored together: one segment, both shoulders, both hips, all four.
+const MASKS: [usize; 8] = [1, 2, 4, 8, 16, 3, 24, TURN];
 
 /// The set that flips a trunk: shoulders and hips.
 const TURN: usize = 27;
@@ -59,7 +60,10 @@ impl Trunk {
     pub fn link(problem: &Problem) -> Vec<Self> {
         let readings: Vec<[Reading; READINGS]> = (0..problem.frames.len())
             .into_par_iter()
-            .map(|t| std::array::from_fn(|bits| problem.trunk_reading(t, bits)))
+            .map(|t| {
+                let front = Front::find(problem, t);
+                std::array::from_fn(|bits| problem.trunk_reading(t, bits, front.as_ref()))
+            })
             .collect();
         let kept: Vec<Vec<usize>> = readings.iter().map(cheapest).collect();
         let counts: Vec<usize> = kept.iter().map(Vec::len).collect();
@@ -126,7 +130,7 @@ fn cheapest(readings: &[Reading; READINGS]) -> Vec<usize> {
 }
 
 impl Problem<'_> {
-    fn trunk_reading(&self, t: usize, bits: usize) -> Reading {
+    fn trunk_reading(&self, t: usize, bits: usize, front: Option<&Front>) -> Reading {
         let mut figure = StickFigure::UNKNOWN;
         figure[Joint::Neck] = self.frames[t].neck;
         let mut extents = [Measured::NOTHING; 5];
@@ -143,7 +147,8 @@ impl Problem<'_> {
             PerJoint(std::array::from_fn(|joint| extents.get(joint.wrapping_sub(1)).map_or(0.0, |e| e.sd)));
         let cost =
             self.rigid_cost(t, &figure, &sd_m) + self.weight(t) * self.attitude_cost(t, &figure, &sd_m);
-        Reading { extents, cost: 0.5 * cost }
+        let front = front.map_or(0.0, |front| self.weight(t) * front.cost(&figure));
+        Reading { extents, cost: 0.5 * cost + front }
     }
 
     /// Twice the cost of the distances within torso and hip part.
@@ -275,7 +280,7 @@ impl Problem<'_> {
 mod tests {
     use glam::DMat3;
 
-    use super::super::{LinkFrame, LinkOptions};
+    use super::super::{FrontPoints, LinkFrame, LinkOptions};
     use super::*;
     use crate::model::skeleton::SegmentLengths;
     use crate::posture::lift::JointRays;
@@ -291,6 +296,7 @@ mod tests {
             time_s: t as f64 / 25.0,
             rays: JointRays::from_points(&figure),
             neck: figure[Joint::Neck],
+            front: FrontPoints::UNSEEN,
         });
         let options =
             LinkOptions { up: Some(-DVec3::Y), moving_direction: Some(-DVec3::Z), ..LinkOptions::default() };

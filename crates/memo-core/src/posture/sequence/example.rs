@@ -27,7 +27,8 @@ pub(super) struct Walk {
 impl Walk {
     pub fn sequence(&self) -> KeypointSequence<'_> {
         let Self { times_s, points_px, weights, .. } = self;
-        KeypointSequence { times_s, points_px, weights, head_points_px: self.head_points_px.as_deref() }
+        let head_points_px = self.head_points_px.as_deref();
+        KeypointSequence { times_s, points_px, weights, head_points_px, foot_points_px: None }
     }
 
     /// The head of a frame as the camera would see it without noise: Table A.2, facing the walking direction.

@@ -27,7 +27,9 @@ use thiserror::Error;
 use super::anchor::{AnchorError, AnchorSource, Ground};
 use super::constraint::Constraint;
 use super::lift::JointRays;
-use super::link::{Alternative, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress};
+use super::link::{
+    Alternative, FrontPoints, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress,
+};
 use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
 use crate::model::camera::{Camera, CameraError};
@@ -53,6 +55,9 @@ pub struct KeypointSequence<'a> {
     /// The six points of the head in the order of [`crate::posture::head::HeadPoint::ALL`], distorted pixels;
     /// NaN: missing.
     pub head_points_px: Option<&'a [[DVec2; 6]]>,
+    /// The four points of the feet in the order of [`crate::keypoints::FOOT_POINTS`], distorted pixels; NaN:
+    /// missing.
+    pub foot_points_px: Option<&'a [[DVec2; 4]]>,
 }
 
 /// Why no postures were found.
@@ -250,6 +255,7 @@ fn check(sequence: &KeypointSequence, options: &SequenceOptions) -> Result<(), S
     let mut counts =
         vec![("frames of points", sequence.points_px.len()), ("frames of weights", sequence.weights.len())];
     counts.extend(sequence.head_points_px.map(|head| ("frames of head points", head.len())));
+    counts.extend(sequence.foot_points_px.map(|feet| ("frames of foot points", feet.len())));
     if let AnchorChoice::Given { distance_m, .. } = &options.anchor
         && distance_m.len() != 1
     {
@@ -306,10 +312,8 @@ fn rays(
             // Not `weight < min_weight`: an unknown weight (NaN) counts as too small.
             if weight.is_nan() || weight < options.min_weight {
                 light += 1;
-            } else if let Some(ideal_px) =
-                camera.undistort(pixel).ok().filter(|p| pixel.is_finite() && p.is_finite())
-            {
-                *ray = ((ideal_px - camera.centre_px) / camera.focal_px).extend(1.0).normalize();
+            } else if let Some(seen) = pixel_ray(camera, pixel) {
+                *ray = seen;
             } else {
                 outside += 1;
             }
@@ -344,20 +348,42 @@ fn link_frames(
             time_s: scene.sequence.times_s[t],
             rays: scene.rays[t],
             neck: if frames[t].is_ok() { necks[t] } else { DVec3::NAN },
+            front: front_points(scene, t),
         })
         .collect();
+    let direction = heading.direction.map(|direction| scene.camera.rotation * direction);
     let options = LinkOptions {
         prior: scene.options.motion.prior(),
         up: Some(scene.up()),
         ground: scene.ground,
         // Without a motion, people may move sideways: the prior is relative to the trunk's own direction.
-        moving_direction: heading
-            .direction
-            .filter(|_| scene.options.motion.needs_heading())
-            .map(|direction| scene.camera.rotation * direction),
+        moving_direction: direction.filter(|_| scene.options.motion.needs_heading()),
+        facing: direction
+            .filter(|_| !scene.options.motion.needs_heading() && heading.from == HeadingFrom::Given),
         ..LinkOptions::default()
     };
     link_with_progress(&link_frames, &scene.lengths.lengths, &options, progress)
+}
+
+/// The rays to feet and face in a frame.
+fn front_points(scene: &neck::Scene, t: usize) -> FrontPoints {
+    let ray = |pixel: DVec2| pixel_ray(scene.camera, pixel).unwrap_or(DVec3::NAN);
+    let mut found = FrontPoints::UNSEEN;
+    if let Some(feet) = scene.sequence.foot_points_px {
+        let [right_toe, left_toe, right_heel, left_heel] = feet[t].map(ray);
+        (found.toes, found.heels) = ([right_toe, left_toe], [right_heel, left_heel]);
+    }
+    if let Some(head) = scene.sequence.head_points_px {
+        let [_, nose, _, _, right_ear, left_ear] = head[t].map(ray);
+        (found.nose, found.ears) = (nose, [right_ear, left_ear]);
+    }
+    found
+}
+
+/// The ray of a distorted pixel; `None` if it is not finite or the lens maps nothing to it.
+fn pixel_ray(camera: &Camera, pixel: DVec2) -> Option<DVec3> {
+    let ideal_px = camera.undistort(pixel).ok().filter(|p| pixel.is_finite() && p.is_finite())?;
+    Some(((ideal_px - camera.centre_px) / camera.focal_px).extend(1.0).normalize())
 }
 
 /// Standard deviations of the joints of the smoothed figures, with each frame on its own.

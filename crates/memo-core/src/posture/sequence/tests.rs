@@ -307,7 +307,7 @@ fn the_neck_alone_is_no_posture() {
 /// The chosen postures are those of [`link`](crate::posture::link::link) with ground, vertical and direction.
 #[test]
 fn frames_are_linked_on_the_ground_and_in_the_moving_direction() {
-    use crate::posture::link::link;
+    use crate::posture::link::{FrontPoints, link};
     let walk = walk(60.0, 16, 1.0);
     for motion in [Motion::Walking, Motion::Physical] {
         let found = walk.postures(&SequenceOptions { motion, ..with_lengths() }).unwrap();
@@ -318,6 +318,7 @@ fn frames_are_linked_on_the_ground_and_in_the_moving_direction() {
                 time_s: walk.times_s[t],
                 rays: rays[t],
                 neck: rays[t].ray[Joint::Neck] * found.neck.distance_m[t],
+                front: FrontPoints::UNSEEN,
             })
             .collect();
         let heading = walk.camera.rotation * found.heading.direction.unwrap();
