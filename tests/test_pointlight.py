@@ -130,6 +130,9 @@ def test_a_walk_of_whole_cycles_has_the_nearest_speed():
     assert speed == pytest.approx(0.9, abs=0.01)
     with pytest.raises(ValueError, match="either frames or cycles"):
         memo.walker_motion(10, cycles=1)
+    for speed in (-1.0, 0.0, float("nan"), 1e-9):
+        with pytest.raises(ValueError, match="cycle in frames"):
+            memo.walker_motion(cycles=1, speed_mps=speed)
 
 
 def test_actors_share_a_picture_and_keep_what_they_show():

@@ -260,10 +260,13 @@ impl SampledWalkOptions {
     ///
     /// No cycle, or a speed, rate or stride that is not positive and finite.
     pub fn of_whole_cycles(self, walker: &Walker, cycles: usize) -> Result<Self, MotionError> {
-        let in_cycle = (self.cycle_s(walker) * self.rate_hz).round().max(1.0);
+        let in_cycle = (self.cycle_s(walker) * self.rate_hz).round();
         let frames = in_cycle * cycles as f64;
-        if !(1.0..=MOST_FRAMES as f64).contains(&frames) {
-            return Err(MotionError::Walk { parameter: "number of frames", value: frames });
+        let most = MOST_FRAMES as f64;
+        for (parameter, value) in [("cycle in frames", in_cycle), ("number of frames", frames)] {
+            if !(1.0..=most).contains(&value) {
+                return Err(MotionError::Walk { parameter, value });
+            }
         }
         let speed_mps = stride_length_m(walker) * self.rate_hz / in_cycle;
         Ok(Self { frames: frames as usize, speed_mps, ..self })
@@ -342,6 +345,27 @@ mod tests {
         let travelled = path[59] - path[0];
         assert!((travelled.truncate().length() - 1.3 * 59.0 / 60.0).abs() < 1e-9);
         assert!((travelled.y / travelled.x - 0.8f64.tan()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn whole_cycles_have_whole_frames_and_the_nearest_speed() {
+        let walker = Walker {
+            body: Body::from_height(1.75).unwrap(),
+            gait: Gait::dense(),
+            style: GaitStyle::default(),
+        };
+        for speed_mps in [0.4, 1.3, 2.0] {
+            let asked = SampledWalkOptions { speed_mps, ..SampledWalkOptions::default() };
+            let whole = asked.of_whole_cycles(&walker, 3).unwrap();
+            assert!((whole.cycle_s(&walker) * 60.0 * 3.0 - whole.frames as f64).abs() < 1e-9);
+            assert!((whole.speed_mps / speed_mps - 1.0).abs() < 0.5 / (asked.cycle_s(&walker) * 60.0 - 0.5));
+        }
+        for speed_mps in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-9] {
+            let bad = SampledWalkOptions { speed_mps, ..SampledWalkOptions::default() };
+            assert!(bad.of_whole_cycles(&walker, 1).is_err(), "{speed_mps}");
+        }
+        assert!(SampledWalkOptions::default().of_whole_cycles(&walker, 0).is_err());
+        assert!(SampledWalkOptions::default().of_whole_cycles(&walker, usize::MAX).is_err());
     }
 
     #[test]
