@@ -145,11 +145,12 @@ fn walks_without_noise_are_linked_to_the_true_posture() {
 
 #[test]
 #[cfg_attr(not(recordings), ignore = "skipped: no recordings (set MEMO_SHARED_DATA)")]
-fn walks_at_3_px_of_noise_keep_nine_joints_in_ten() {
+fn walks_at_3_px_of_noise_are_smoothed_to_the_true_posture() {
+    // The roots of noisy rays are no measure here: the smoothed motion leaves them.
     for azimuth_deg in [0.0, 45.0, 90.0] {
         let score = view(azimuth_deg, 3.0);
-        assert!(score.joints_near_leaf >= 92.0, "{}", score.joints_near_leaf);
-        assert!(score.smoothed_cm <= 4.0, "{}", score.smoothed_cm);
+        assert!(score.frames_near_truth >= 80.0, "{}", score.frames_near_truth);
+        assert!(score.smoothed_cm <= 3.0, "{}", score.smoothed_cm);
     }
 }
 

@@ -133,8 +133,8 @@ mod tests {
     use crate::image::Rectangle;
     use glam::DVec3;
 
-    /// Rectangles of a person with the crown of an average walker, whose feet have a reflection of some rows.
-    fn sightings(camera: &Camera, height_m: f64, reflected_px: usize) -> Vec<Sighting> {
+    /// Rectangles of a person with the crown of an average walker.
+    fn sightings(camera: &Camera, height_m: f64) -> Vec<Sighting> {
         let crown_m = TrackerOptions::default().walker(height_m, 1.3).unwrap().level_crown_height_m();
         (0..13)
             .map(|k| {
@@ -144,7 +144,7 @@ mod tests {
                     left: (sole.x - 40.0) as usize,
                     right: (sole.x + 40.0) as usize,
                     top: (crown.y - 2.0).round() as usize,
-                    bottom: sole.y.round() as usize + reflected_px,
+                    bottom: sole.y.round() as usize,
                 };
                 Sighting { time_s: 0.04 * f64::from(k), rectangle }
             })
@@ -159,20 +159,20 @@ mod tests {
     fn a_calibrated_camera_shows_the_height_at_the_start() {
         let options = TrackerOptions { camera: Some(camera()), ..TrackerOptions::default() };
         for height_m in [1.5, 1.7, 1.9] {
-            let found = start_height(&options, &sightings(&camera(), height_m, 0));
+            let found = start_height(&options, &sightings(&camera(), height_m));
             assert_eq!(found.source, HeightSource::Measured);
             // A fifth of the weight is the population's.
             let expected_m = 0.8 * height_m + 0.2 * 1.7;
             assert!((found.height_m - expected_m).abs() < 0.02, "{height_m}: {found:?}");
             assert!((found.sd_m - 0.0447).abs() < 1e-4);
         }
-        let mirrored = start_height(&options, &sightings(&camera(), 1.7, 200));
-        assert_eq!(mirrored, BodyHeight::POPULATION, "not the height of a person");
+        let small = start_height(&options, &sightings(&camera(), 1.2));
+        assert_eq!(small, BodyHeight::POPULATION, "not the height of an adult");
     }
 
     #[test]
     fn a_height_is_given_or_that_of_the_population_without_a_camera() {
-        let seen = sightings(&camera(), 1.9, 0);
+        let seen = sightings(&camera(), 1.9);
         assert_eq!(start_height(&TrackerOptions::default(), &seen), BodyHeight::POPULATION);
         let given = TrackerOptions { camera: Some(camera()), ..TrackerOptions::for_height(1.6) };
         assert_eq!(start_height(&given, &seen), BodyHeight::given(1.6));
