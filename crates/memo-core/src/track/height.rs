@@ -1,7 +1,7 @@
 //! The height of the person: given, measured in a calibrated camera, or assumed.
 //!
 //! A calibrated camera shows where the ground is, so the row of the soles gives the distance, and with it the row of
-//! the crown gives the height. A walk starts with the height of the rectangles ([`start_height`]); the fit of the
+//! the crown gives the height. A walk starts with the height of the rectangles (`start_height`); the fit of the
 //! person ([`fit`](super::fit)) then measures it from the outlines of all frames ([`WalkFit::height`]). Without a
 //! calibrated camera, a small person nearby looks like a tall one far away. Then the height must be given, or that of
 //! the population is assumed and its standard deviation enters every length.
