@@ -580,7 +580,7 @@ class Asymmetries:
 
 
 def asymmetries(clips: Sequence[ClipScore], parameter: str) -> Asymmetries:
-    """The clips whose steps are called asymmetric, and those whose steps are; a clip with several walks counts once."""
+    """Clips whose steps are called asymmetric, and those whose are; several walks of a clip count once."""
     lists: dict[str, list[str]] = {name: [] for name in ("symmetric", "false", "asymmetric", "found")}
     for clip in clips:
         said = [found for found in clip.gait if found.parameter == parameter]

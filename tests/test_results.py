@@ -140,6 +140,8 @@ def test_results_of_the_core_keep_every_field():
         assert repr(again) == repr(found) and len(repr(found)) < 120
         for name in [name for name in dir(found) if not name.startswith("_")]:
             ours, theirs = getattr(again, name), getattr(found, name)
+            if callable(ours):
+                continue
             if name in ("chains", "links"):
                 ours, theirs = list(map(repr, ours)), list(map(repr, theirs))
             np.testing.assert_equal(ours, theirs, err_msg=name)

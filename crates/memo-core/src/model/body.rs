@@ -424,7 +424,7 @@ mod tests {
         let values = std::array::from_fn(|n| 0.1 * (n + 1) as f64);
         let posture = Posture::from_array(&values);
         assert_eq!(posture.to_array(), values);
-        assert_eq!((posture.left.hip, posture.pelvis_rotation), (values[6], values[13]));
+        assert_eq!((posture.left.hip, posture.pelvis_rotation), (values[7], values[15]));
     }
 
     #[test]
