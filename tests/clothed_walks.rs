@@ -2,7 +2,7 @@
 //! sides, events, places, angles, intervals, and what does not walk.
 //!
 //! The bounds are floors under what was measured on other seeds, not aims; `--nocapture` prints the figures, and
-//! `MEMO_FULL=1` draws eight times as many. Not tested is what is known to fail: the steps of somebody who limps.
+//! `MEMO_FULL=1` draws eight times as many.
 
 use memo_core::synth::{ClothedOptions, ClothedScene, FootContact, Mover};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};

@@ -514,8 +514,8 @@ def _fit(walk: _memo.Walk | StoredWalk) -> dict[str, Any]:
 def _fits(fit: _memo.WalkFit) -> str:
     """How well: "well", "in part" or "poorly".
 
-    Of 94 drawn walks, 79 miss less of the outline than the first limit, and one of these has a hip or knee
-    that is more than 4 degrees off; of the 15 others, 8 have.
+    Of 65 drawn walks of motion-captured people, 51 fit well, all with hip and knee within 3 and 4 degrees
+    RMS; of the 14 others, 9 are farther off. Of 90 people in clothes, 3 fit well with a knee 5 to 6 off.
     """
     if fit.missed >= 0.1 or fit.residual_px >= 0.007 * fit.height_px:
         return "poorly"
