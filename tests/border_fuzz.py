@@ -952,7 +952,7 @@ def results():
     made = [
         *(walk, shown, limbs, window, window.chains[0], window.chains[0].links[0], postures),
         _memo.SecondMotion(["neck"], 0, joints, 1.0, 0.3),
-        _memo.WalkFit(0.6, 200.0, 0.01, 0.02, 1.5, 0.01, {"thigh": 0.4}, np.zeros((2, 5, 50))),
+        _memo.WalkFit(0.6, 200.0, 0.01, 0.02, 1.5, 0.01, False, "well", {"thigh": 0.4}, np.zeros((2, 5, 50))),
         *_memo.unswap(walk.times_s, shown.positions_px, groups={"legs": {"hip": [(6, 9)]}}).values(),
         memo.calibrate_points(places, camera.project(places), camera.size),
         memo.calibrate_walker(*ends, camera.size, 1.75, focal_px=camera.matrix[0, 0]),

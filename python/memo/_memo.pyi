@@ -290,8 +290,13 @@ class WalkFit:
     missed_inside: Final[float]
     """The same of the lines inside the body."""
     worst_length_sd: Final[float]
-    sole_m: Final[float | None]
     """The farthest that a length of the body is from its mean over people, standard deviations."""
+    sole_m: Final[float | None]
+    """Mean height of the lower sole above the ground, metres; None in an assumed camera."""
+    is_off_ground: Final[bool]
+    """Whether the feet do not stand on the ground of a calibrated camera."""
+    verdict: Final[str]
+    """How well the model fits: "well", "in part" (look at the overlay) or "poorly"."""
     lengths_m: Final[dict[str, float]]
     """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
     curves_deg: Final[npt.NDArray[np.float64]]

@@ -1,13 +1,17 @@
-"""Sentences about what a walk was given or shows that does not go together, and about its scale.
+"""Sentences about the body height of a walk and about values that contradict each other.
 
-The core decides (`memo_core::track::height`, `memo_core::track::plausible`); these are its words.
+The core decides (`memo_core::track::height`, `plausible` and `fit`); this module words it.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
-from memo import _memo
+if TYPE_CHECKING:
+    from memo import _memo
+    from memo.tracking import StoredWalk
+
+    Walk: TypeAlias = _memo.Walk | StoredWalk
 
 __all__ = [
     "assumed_height_sentences",
@@ -15,24 +19,6 @@ __all__ = [
     "implausible_sentences",
     "measured_height_sentences",
 ]
-
-_MOST_SOLE_M = 0.05
-"""Feet farther from the ground, on average, do not stand on it. Drawn walks: up to 0.01."""
-
-
-class Walk(Protocol):
-    """What is read of a walk."""
-
-    @property
-    def height(self) -> tuple[float, float, str]: ...
-    @property
-    def measured_height(self) -> tuple[float, float] | None: ...
-    @property
-    def height_is_contradicted(self) -> bool: ...
-    @property
-    def walk_ratio(self) -> tuple[float, float, float] | None: ...
-    @property
-    def fit(self) -> _memo.WalkFit | None: ...
 
 
 def assumed_height_sentences(walk: Walk) -> list[str]:
@@ -80,8 +66,7 @@ def implausible_sentences(walk: Walk) -> list[str]:
                 f"{1000 * least:.1f} to {1000 * most:.1f} mm per step per minute, not {1000 * ratio:.1f}. "
                 f"Perhaps the frame rate is too {rate}."
             )
-    sole_m = walk.fit.sole_m if walk.fit is not None else None
-    if sole_m is not None and abs(sole_m) > _MOST_SOLE_M:
-        where = "above" if sole_m > 0 else "below"
-        said.append(f"The feet are {100 * abs(sole_m):.0f} cm {where} the ground: check the camera.")
+    if walk.fit is not None and walk.fit.is_off_ground and walk.fit.sole_m is not None:
+        where = "above" if walk.fit.sole_m > 0 else "below"
+        said.append(f"The feet are {100 * abs(walk.fit.sole_m):.0f} cm {where} the ground: check the camera.")
     return said

@@ -503,23 +503,12 @@ def _fit(walk: _memo.Walk | StoredWalk) -> dict[str, Any]:
         return {"measured": False, "problem": walk.fit_problem}
     return {
         "measured": True,
-        "fits": _fits(fit),
+        "fits": fit.verdict,
         "outline_off_px": fit.residual_px,
         "outline_missed_percent": 100 * fit.missed,
         "worst_length_sd": fit.worst_length_sd,
         "lengths_m": fit.lengths_m,
     }
-
-
-def _fits(fit: _memo.WalkFit) -> str:
-    """How well: "well", "in part" or "poorly".
-
-    Of 65 drawn walks of motion-captured people, 51 fit well, all with hip and knee within 3 and 4 degrees
-    RMS; of the 14 others, 9 are farther off. Of 90 people in clothes, 3 fit well with a knee 5 to 6 off.
-    """
-    if fit.missed >= 0.1 or fit.residual_px >= 0.007 * fit.height_px:
-        return "poorly"
-    return "well" if fit.missed < 0.023 and fit.worst_length_sd < 3 else "in part"
 
 
 def fit_sentence(walk: _memo.Walk | StoredWalk) -> str | None:
@@ -530,8 +519,8 @@ def fit_sentence(walk: _memo.Walk | StoredWalk) -> str | None:
             return None
         return f"Its joint angles were not measured: {walk.fit_problem}."
     seen = f"its outline within {fit.residual_px:.1f} px, {fit.missed:.0%} of it not seen"
-    if _fits(fit) == "well":
+    if fit.verdict == "well":
         return f"The model fits the person well: {seen}."
     if fit.worst_length_sd >= 3:
         seen += f", a length of the body {fit.worst_length_sd:.1f} standard deviations from the average"
-    return f"The model fits the person {_fits(fit)}: {seen}. Check the overlay before use."
+    return f"The model fits the person {fit.verdict}: {seen}. Check the overlay before use."

@@ -22,6 +22,10 @@ result! {
         worst_length_sd: f64 = fit.quality.worst_length_sd,
         /// Mean height of the lower sole above the ground, metres; None in an assumed camera.
         sole_m: Option<f64> = fit.quality.sole_m,
+        /// Whether the feet do not stand on the ground of a calibrated camera.
+        is_off_ground: bool = fit.quality.is_off_ground(),
+        /// How well the model fits: "well", "in part" (look at the overlay) or "poorly".
+        verdict: String = fit.quality.verdict().name().to_owned(),
         /// Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm.
         lengths_m: HashMap<String, f64> = lengths_m(&fit.body),
         /// The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and

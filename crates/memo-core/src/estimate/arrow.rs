@@ -7,6 +7,13 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// The change of velocity between two intervals, for motion whose velocity is a random walk: the factors of three
+/// successive values whose sum it is, and its variance if that of the walk is one per second.
+pub fn velocity_change(before_s: f64, after_s: f64) -> ([f64; 3], f64) {
+    // Of a random walk over time, the velocities at the middles of the intervals are (before + after) / 2 apart.
+    ([1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s], 0.5 * (before_s + after_s))
+}
+
 /// Normal equations H x = b, to which terms are added.
 #[derive(Debug, Clone)]
 pub struct Arrow {

@@ -12,7 +12,7 @@ use super::gait_parameters::GaitQuantity;
 use super::height::POPULATION_HEIGHT_M;
 use super::result::TrackedWalk;
 
-/// Limits of the walk ratio of a person 1.70 m tall, m per step per minute. 28 drawn walks of nine people at 0.9 to
+/// Limits of the walk ratio of a person 1.70 m tall, m per step per minute. 28 drawn walks of six people at 0.9 to
 /// 1.5 m/s, among them crouched, limping and brisk ones, and a filmed one have 0.0048 to 0.0074.
 const USUAL: [f64; 2] = [0.0040, 0.0095];
 

@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use super::LinkFrame;
 use super::denoise::image_point;
-use crate::estimate::arrow::Arrow;
+use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, RigidDistance, SegmentLengths, StickFigure};
 
 /// Unknowns of a frame: three coordinates of each joint.
@@ -203,9 +203,8 @@ impl MotionFit<'_> {
     fn change_of_velocity(&self, t: usize) -> Option<([f64; 3], f64)> {
         let time_s = |t: usize| Some(self.frames.get(t)?.time_s);
         let [before_s, after_s] = [time_s(t)? - time_s(t.checked_sub(1)?)?, time_s(t + 1)? - time_s(t)?];
-        let factors = [1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s];
-        let variance = ACCELERATION_STEP_S * 0.5 * (before_s + after_s);
-        (before_s.max(after_s) <= LONGEST_STEP_S).then_some((factors, variance))
+        let (factors, variance_s) = velocity_change(before_s, after_s);
+        (before_s.max(after_s) <= LONGEST_STEP_S).then_some((factors, ACCELERATION_STEP_S * variance_s))
     }
 
     /// Changes of velocity between a frame's neighbours.

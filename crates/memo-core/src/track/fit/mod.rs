@@ -21,6 +21,7 @@ pub mod contacts;
 pub(crate) mod edge_search;
 mod lines;
 mod problem;
+mod quality;
 mod seen;
 mod sides;
 mod unknowns;
@@ -36,6 +37,7 @@ use glam::DVec3;
 use thiserror::Error;
 
 pub(crate) use problem::{FitFrame, Problem};
+pub use quality::{FitQuality, FitVerdict};
 pub use unknowns::JOINTS;
 
 /// Options of the fit.
@@ -99,23 +101,6 @@ pub enum FitError {
         /// Mean distance of the other edges, as a share of the body height.
         residual: f64,
     },
-}
-
-/// How well the contours of the fitted person lie on the edges of the frames.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct FitQuality {
-    /// Mean distance of edges from the outline, pixels.
-    pub residual_px: f64,
-    /// Height of the person in the middle of the walk, pixels.
-    pub height_px: f64,
-    /// Share of the outline on whose normal no edge was found.
-    pub missed: f64,
-    /// The same of the lines inside the body.
-    pub missed_inside: f64,
-    /// The farthest that a length of the body is from its mean over people, standard deviations.
-    pub worst_length_sd: f64,
-    /// Mean height of the lower sole above the ground, metres; `None` in an assumed camera, whose ground is assumed.
-    pub sole_m: Option<f64>,
 }
 
 /// Angles of one side with their standard deviations, radians; `None` where the frames do not show the limb.

@@ -11,7 +11,7 @@ use super::unknowns::{
     posture, priors, slopes,
 };
 use super::{FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit};
-use crate::estimate::arrow::{Arrow, Solution};
+use crate::estimate::arrow::{Arrow, Solution, velocity_change};
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::{BodyHeight, HeightSource};
 use crate::track::search::{Hypothesis, Path};
@@ -321,16 +321,15 @@ impl<'a> Problem<'a> {
                 arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -value, sd.powi(-2));
             }
         }
-        // Velocities change as in a random walk: their change between two intervals has a variance in proportion to
-        // the time between their middles.
+        // Velocities change as in a random walk.
         for k in 1..unknowns.frames.len().saturating_sub(1) {
             let time = |k: usize| self.frames[k].time_s;
             let (before_s, after_s) = (time(k) - time(k - 1), time(k + 1) - time(k));
-            let factors = [1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s];
+            let (factors, variance_s) = velocity_change(before_s, after_s);
             for (unknown, rate) in RATES.iter().enumerate().take(block) {
                 let terms = [0, 1, 2].map(|n| (arrow.index(k - 1 + n, unknown), factors[n]));
                 let now: f64 = (0..3).map(|n| factors[n] * unknowns.frames[k - 1 + n][unknown]).sum();
-                arrow.add_row(&terms, -now, 1.0 / (rate * rate * 0.5 * (before_s + after_s)));
+                arrow.add_row(&terms, -now, 1.0 / (rate * rate * variance_s));
             }
         }
     }
@@ -393,7 +392,7 @@ impl<'a> Problem<'a> {
         let curves = unknowns::curves(&self.walker.gait, whole, zero);
         WalkFit {
             body: body(&self.walker.body, whole),
-            height: self.height(fitted),
+            height: self.height(fitted, &quality),
             path,
             curves,
             frames: all,
@@ -405,15 +404,14 @@ impl<'a> Problem<'a> {
 
     /// The body height without the prior of the excess, which is taken out as it was put in: with estimate x and
     /// variance v after all evidence, and prior m, s², the others say x' = v' (x / v - m / s²), 1 / v' = 1 / v - 1 / s².
-    fn height(&self, fitted: &Fitted) -> Option<BodyHeight> {
+    fn height(&self, fitted: &Fitted, quality: &FitQuality) -> Option<BodyHeight> {
         let excess: f64 = STATURE.iter().map(|&n| fitted.unknowns.whole[n]).sum();
         let variance = fitted.solution.variance(&STATURE.map(|n| (n, 1.0)), &[]);
         let Prior { mean, sd } = self.excess;
         let weight = variance.recip() - sd.powi(-2);
         let seen = (excess / variance - mean / sd.powi(2)) / weight;
         let height_m = self.walker.body.height_m;
-        let stands = self.mean_sole_m(&fitted.unknowns).abs() < MOST_SOLE_M;
-        let is_seen = self.is_scale_seen && stands && weight > 0.0 && weight.is_finite();
+        let is_seen = self.is_scale_seen && !quality.is_off_ground() && weight > 0.0 && weight.is_finite();
         is_seen.then(|| BodyHeight {
             height_m: height_m * (1.0 + seen),
             sd_m: (SD_FACTOR * height_m / weight.sqrt()).hypot(HEIGHT_MODEL_SD_M),
@@ -554,8 +552,6 @@ const PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
 /// 2 to 7 degrees and up to 30 cm off.
 const OFF_SD_RAD: f64 = 1.2;
 const OFF_ACROSS_SD_M: f64 = 5.0;
-/// Feet farther from the ground do not measure a height.
-const MOST_SOLE_M: f64 = 0.05;
 /// The same of the body height: hair, soles, and heads that are no cylinders.
 const HEIGHT_MODEL_SD_M: f64 = 0.015;
 /// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
