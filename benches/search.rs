@@ -31,7 +31,7 @@ fn grid_search(c: &mut Criterion) {
         Walker { body: Body::from_height(1.75).unwrap(), gait: Gait::dense(), style: GaitStyle::default() };
     let camera = Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap();
     let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
     let edges = edges(&scene, &truth);
     let options = SimilarityOptions::default();

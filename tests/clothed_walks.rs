@@ -4,6 +4,7 @@
 //! The bounds are floors under what was measured on other seeds, not aims; `--nocapture` prints the figures, and
 //! `MEMO_FULL=1` draws eight times as many.
 
+use glam::DVec2;
 use memo_core::synth::{ClothedOptions, ClothedScene, FootContact, Mover};
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
 use memo_core::track::options::TrackerOptions;
@@ -282,4 +283,50 @@ fn what_is_carried_stands_or_rolls_is_no_walk() {
     }
     println!("{} of {shown} taken for walks: {taken:?}", taken.len());
     assert!(40 * taken.len() <= shown, "{taken:?}");
+}
+
+/// Two people who cross, the second 0.9 m farther away.
+fn crossing(seeds: [u64; 2]) -> (ClothedScene, [ClothedScene; 2]) {
+    let one = |seed, leftward| {
+        let (leftward, slant_rad) = (Some(leftward), Some(0.0));
+        scene(ClothedOptions { seed, leftward, slant_rad, ..ClothedOptions::default() })
+    };
+    let [near, far] = [one(seeds[0], false), one(seeds[1], true)];
+    (near.clone().joined_by(far.clone(), DVec2::new(0.0, BEHIND_M)), [near, far])
+}
+
+const BEHIND_M: f64 = 0.9;
+
+#[test]
+fn two_people_who_cross_are_followed_through_it_and_never_exchanged() {
+    for seeds in [[3, 4], [5, 2]].into_iter().take(many(1) as usize) {
+        let (both, each) = crossing(seeds);
+        let options = TrackerOptions { camera: Some(both.camera.clone()), ..TrackerOptions::default() };
+        let mut tracker = Tracker::new(options).unwrap();
+        for frame in 0..both.len() {
+            tracker.update(&both.frame(frame).as_frame(), both.time_s(frame)).unwrap();
+        }
+        tracker.finish().unwrap();
+        let walks = tracker.take_finished();
+        let people: Vec<usize> = walks.iter().map(|walk| walk.person).collect();
+        assert_eq!(people.len(), 2, "{seeds:?}: {people:?}");
+        assert_ne!(people[0], people[1], "{seeds:?}");
+        for walk in &walks {
+            let rows = walk.rows();
+            let is_near = rows[0].heading_rad.cos() > 0.0;
+            let (scene, shift_m) = if is_near { (&each[0], 0.0) } else { (&each[1], BEHIND_M) };
+            assert!(rows.len() > 60, "{seeds:?}: {} frames", rows.len());
+            let off = |row: &Row| {
+                let truth = scene.truth(row.frame).unwrap();
+                let off_m = row.torso_centre.truncate() - truth.torso_centre.truncate();
+                [off_m.x, off_m.y - shift_m, phase_off(row.phase, truth.phase)]
+            };
+            let offs: Vec<[f64; 3]> = rows.iter().map(off).collect();
+            let [along, across] = [0, 1].map(|k| rms(offs.iter().map(|off| off[k])));
+            let phase = median(offs.iter().map(|off| off[2].abs()).collect());
+            println!("{seeds:?} near {is_near}: along {along:.3}, across {across:.3} m, phase {phase:.3}");
+            assert!(along < 0.08 && across < 0.25, "{seeds:?}: {along}, {across}");
+            assert!(phase < 0.05 || walk.p_swapped() > OPEN, "{seeds:?}: {phase}, {}", walk.p_swapped());
+        }
+    }
 }

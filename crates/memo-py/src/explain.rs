@@ -12,7 +12,8 @@ use glam::{DVec2, DVec3, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::visibility::visible_contours;
 use memo_core::model::{
-    Body, Camera, Gait, GaitStyle, PosedBody, Posture, Proportions, VisibilityOptions, Walker,
+    Body, Camera, EllipticCylinder, Gait, GaitStyle, Others, PosedBody, Posture, Proportions,
+    VisibilityOptions, Walker,
 };
 use memo_core::track::evidence::{Evidence, EvidenceStream};
 use memo_core::track::explain::{Explanation, explain};
@@ -44,6 +45,7 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyRe
     dict.set_item("heights", steps.iter().map(|s| s.look.heights.count).collect::<Vec<_>>())?;
     dict.set_item("along_m", steps.iter().map(|s| s.look.best.along_m).collect::<Vec<_>>())?;
     dict.set_item("height_of_torso_m", steps.iter().map(|s| s.look.best.height_m).collect::<Vec<_>>())?;
+    dict.set_item("shared", steps.iter().map(|s| s.shared).collect::<Vec<_>>())?;
     dict.set_item("similarity", steps.iter().map(|s| s.similarity).collect::<Vec<_>>())?;
     dict.set_item("phase", steps.iter().map(|s| s.look.best.phase).collect::<Vec<_>>())?;
     let drawn = walk.fitted().map_or(body, |fit| &fit.body);
@@ -91,7 +93,7 @@ impl Recorded {
     }
 
     fn scene(&self) -> Scene<'_> {
-        Scene { walker: &self.walker, camera: &self.camera, path: &self.path }
+        Scene::new(&self.walker, &self.camera, &self.path)
     }
 }
 
@@ -280,7 +282,11 @@ impl PyExplainer {
             let message = format!("{:?} lies outside frames of {width}x{height} pixels", look.window);
             return Err(refused("window_px", message));
         }
-        let scene = self.walks[index].scene();
+        let around = self.walks.iter().enumerate().filter(|(k, _)| *k != index);
+        let bodies = around.filter_map(|(_, walk)| walk.drawn.get(&evidence.frame));
+        let cylinders: Vec<EllipticCylinder> = bodies.flat_map(|body| body.cylinders).collect();
+        let others = Others::new(&cylinders, self.walks[index].camera.position());
+        let scene = self.walks[index].scene().among(&others);
         let why =
             pooled(py, || explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))?
                 .map_err(value_error)?;

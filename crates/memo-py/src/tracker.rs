@@ -21,7 +21,7 @@ use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::Tracker;
+use memo_core::track::tracker::{Now, Tracker};
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -30,11 +30,19 @@ use pyo3::types::PyDict;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Tracks one walker at a time in a stream of grey frames; memory does not grow with the length of the stream.
+/// Tracks everybody who walks through a stream of grey frames; memory does not grow with the length of the stream.
 ///
 /// An interrupted call keeps running in the background: its frame is processed, and the next call waits for it.
 #[pyclass(name = "Tracker", module = "memo._memo", frozen)]
 pub struct PyTracker(Arc<Shared>);
+
+/// Body heights, metres.
+#[derive(FromPyObject)]
+enum Heights {
+    Everybody(f64),
+    /// Of people in order of appearance.
+    Each(Vec<f64>),
+}
 
 /// A tracker shared by calls, one at a time.
 struct Shared {
@@ -136,7 +144,7 @@ impl PyTracker {
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
-        height_m: Option<f64>,
+        height_m: Option<Heights>,
         camera: Option<PyCamera>,
         fov_deg: Option<f64>,
         gait: &str,
@@ -149,7 +157,16 @@ impl PyTracker {
         full_velocity: Option<f32>,
         part_weights: Option<[f32; 14]>,
     ) -> PyResult<Self> {
-        let mut options = TrackerOptions { height_m, ..TrackerOptions::default() };
+        let mut options = TrackerOptions::default();
+        match height_m {
+            Some(Heights::Everybody(height_m)) => options.height_m = Some(height_m),
+            Some(Heights::Each(heights_m)) => {
+                let mut heights_m = heights_m.into_iter();
+                options.height_m = heights_m.next();
+                options.further_heights_m = heights_m.collect();
+            }
+            None => {}
+        }
         options.camera = camera.map(|camera| camera.0);
         if let Some(degrees) = fov_deg {
             options.field_of_view_rad = degrees.to_radians();
@@ -194,20 +211,11 @@ impl PyTracker {
         Ok(self.read(py, Tracker::take_finished)?.into_iter().map(PyWalk::new).collect())
     }
 
-    /// Filtered state of the current walk: a dict of time, position, phase, speed and `p_swapped`, or None.
-    fn current<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(now) = self.read(py, |tracker| tracker.current())? else { return Ok(None) };
-        let dict = PyDict::new(py);
-        dict.set_item("frame", now.frame)?;
-        dict.set_item("time_s", now.time_s)?;
-        dict.set_item("x_m", now.torso_centre.x)?;
-        dict.set_item("y_m", now.torso_centre.y)?;
-        dict.set_item("z_m", now.torso_centre.z)?;
-        dict.set_item("heading_rad", now.heading_rad)?;
-        dict.set_item("phase", now.phase)?;
-        dict.set_item("p_swapped", now.p_swapped)?;
-        dict.set_item("speed_mps", now.speed_mps)?;
-        Ok(Some(dict))
+    /// Filtered states of everybody who is followed, in order of appearance: dicts of person, time, position, phase,
+    /// speed and `p_swapped`.
+    fn people<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let people = self.read(py, |tracker| tracker.people())?;
+        people.iter().map(|now| now_as_dict(py, now)).collect()
     }
 
     /// Counts over the whole stream; if nobody was followed, they show why.
@@ -220,6 +228,21 @@ impl PyTracker {
         dict.set_item("refused_starts", report.refused_starts)?;
         Ok(dict)
     }
+}
+
+fn now_as_dict<'py>(py: Python<'py>, now: &Now) -> PyResult<Bound<'py, PyDict>> {
+    dict!(py, {
+        person: now.person,
+        frame: now.frame,
+        time_s: now.time_s,
+        x_m: now.torso_centre.x,
+        y_m: now.torso_centre.y,
+        z_m: now.torso_centre.z,
+        heading_rad: now.heading_rad,
+        phase: now.phase,
+        p_swapped: now.p_swapped,
+        speed_mps: now.speed_mps,
+    })
 }
 
 /// The defaults of a track.
@@ -394,6 +417,12 @@ impl PyWalk {
         }
         dict.set_item("p_other_direction", start.p_other_direction)?;
         Ok(dict)
+    }
+
+    /// Number of the person, in order of appearance.
+    #[getter]
+    fn person(&self) -> usize {
+        self.walk.person
     }
 
     /// Body height, its standard deviation (metres), and where it comes from: "given", "measured" or "assumed".

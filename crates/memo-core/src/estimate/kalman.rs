@@ -52,6 +52,16 @@ impl FilterOptions {
         }
         Ok(())
     }
+
+    /// The noise of measurements of which this share was visible: its variance grows with the inverse square.
+    #[must_use]
+    pub fn of_visible_share(&self, share: f64) -> Self {
+        let of = |noise: Noise| Noise {
+            measurement_variance: noise.measurement_variance / (share * share).max(f64::MIN_POSITIVE),
+            ..noise
+        };
+        Self { along: of(self.along), vertical: of(self.vertical), phase: of(self.phase) }
+    }
 }
 
 /// Position and velocity of one coordinate, with their covariance.

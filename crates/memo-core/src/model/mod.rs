@@ -29,4 +29,6 @@ pub use position::{
 };
 pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
 pub use surface::{NO_PART, SurfaceError, SurfaceMap, surface_map};
-pub use visibility::{PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours};
+pub use visibility::{
+    Others, PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours,
+};

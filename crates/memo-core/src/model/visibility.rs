@@ -137,17 +137,30 @@ impl PreparedView {
         options: &VisibilityOptions,
         out: &mut Vec<VisibleSegment>,
     ) {
+        self.visible_contours_among(cylinders, Others::NONE, camera_position, options, out);
+    }
+
+    /// The same of a body that other bodies may hide.
+    pub fn visible_contours_among(
+        &mut self,
+        cylinders: &[EllipticCylinder],
+        others: &Others,
+        camera_position: DVec3,
+        options: &VisibilityOptions,
+        out: &mut Vec<VisibleSegment>,
+    ) {
         out.clear();
         self.prepare(cylinders, camera_position);
-        if self.occluders.iter().any(|o| matches!(o.shadow, Shadow::Everything)) {
+        let shadows = self.occluders.iter().map(|o| &o.shadow).chain(&others.shadows);
+        if shadows.into_iter().any(|shadow| matches!(shadow, Shadow::Everything)) {
             return;
         }
         for (part, cylinder) in cylinders.iter().enumerate() {
             for line in side_lines(cylinder, camera_position).iter().flatten() {
-                self.push_visible(part, line, out);
+                self.push_visible(part, line, others, out);
             }
             if options.rims {
-                self.push_visible_rims(part, cylinder, options.rim_chords, out);
+                self.push_visible_rims(part, cylinder, options.rim_chords, others, out);
             }
         }
     }
@@ -169,24 +182,32 @@ impl PreparedView {
         part: usize,
         cylinder: &EllipticCylinder,
         chords: usize,
+        others: &Others,
         out: &mut Vec<VisibleSegment>,
     ) {
         let mut rim_chords = std::mem::take(&mut self.chords);
         rim_chords.clear();
         rims(cylinder, self.camera_position, chords, &mut rim_chords);
         for chord in rim_chords.iter().filter(|chord| chord.aspect != RimAspect::Hidden) {
-            self.push_visible(part, &chord.contour, out);
+            self.push_visible(part, &chord.contour, others, out);
         }
         self.chords = rim_chords;
     }
 
-    /// Appends the pieces of one contour that the other parts do not hide.
-    fn push_visible(&mut self, part: usize, contour: &Contour, out: &mut Vec<VisibleSegment>) {
+    /// Appends the pieces of one contour that neither the other parts nor other bodies hide.
+    fn push_visible(
+        &mut self,
+        part: usize,
+        contour: &Contour,
+        others: &Others,
+        out: &mut Vec<VisibleSegment>,
+    ) {
         let chord = Chord { a: contour.start - self.camera_position, b: contour.end - self.camera_position };
         let farthest = self.towards.dot(chord.a).max(self.towards.dot(chord.b));
         self.hidden.clear();
-        for occluder in self.occluders.iter().filter(|o| o.part != part && !o.is_behind(farthest)) {
-            match occluder.shadow.hidden_interval(&chord) {
+        let own = self.occluders.iter().filter(|o| o.part != part && !o.is_behind(farthest));
+        for shadow in own.map(|occluder| &occluder.shadow).chain(&others.shadows) {
+            match shadow.hidden_interval(&chord) {
                 Some(Interval { t0, t1 }) if t0 <= 0.0 && t1 >= 1.0 => return,
                 Some(hidden) => self.hidden.push(hidden),
                 None => {}
@@ -246,6 +267,31 @@ fn least_along(cylinder: &EllipticCylinder, camera_position: DVec3, direction: D
     let along = cylinder.world_from_cylinder.matrix3.transpose() * direction;
     let reach = (along.truncate() * cylinder.semi_axes).length() + along.z.abs() * cylinder.half_length;
     direction.dot(cylinder.centre() - camera_position) - reach
+}
+
+/// What other bodies hide from a camera. The hidden sets are relative to the camera, so they are prepared once for all
+/// places of the body behind them.
+#[derive(Debug, Clone, Default)]
+pub struct Others {
+    shadows: Vec<Shadow>,
+}
+
+impl Others {
+    /// No other body.
+    pub const NONE: &'static Self = {
+        static NONE: Others = Others { shadows: Vec::new() };
+        &NONE
+    };
+
+    /// Bodies of elliptic cylinders, seen by a camera.
+    pub fn new(cylinders: &[EllipticCylinder], camera_position: DVec3) -> Self {
+        Self { shadows: cylinders.iter().filter_map(|k| Shadow::new(k, camera_position)).collect() }
+    }
+
+    /// True if there is no other body.
+    pub fn is_empty(&self) -> bool {
+        self.shadows.is_empty()
+    }
 }
 
 /// The hidden set S of one part in one view.

@@ -257,7 +257,7 @@ impl SynthScene {
 
     /// The posed body. A foot that lands farther ahead swings about a hip angle with a constant offset.
     fn posed(&self, hypothesis: &Hypothesis) -> PosedBody {
-        let scene = Scene { walker: &self.walker, camera: &self.camera, path: &self.path };
+        let scene = Scene::new(&self.walker, &self.camera, &self.path);
         let sizes = &self.walker.body.proportions;
         let leg_m = (sizes.hip_height - sizes.ankle_height) * self.walker.body.height_m;
         let turn_rad = 0.5 * self.options.uneven.right_reach_m / leg_m;

@@ -1,16 +1,19 @@
 //! The current walk: whether it continues, its path, and the fit of the person at its end.
 
+use super::crowd::{Expected, body_box, expected};
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, FitFrame, Problem, WalkFit};
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
+use super::people::{Now, Sign};
 use super::result::smoothed_hypotheses;
-use super::search::Hypothesis;
+use super::search::{Hypothesis, Scene};
 use super::start::{StartReport, start};
-use super::walk::{Beginning, FrameEdges, Step, Walk};
-use crate::model::{Camera, Walker};
+use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
+use crate::model::body::PART_COUNT;
+use crate::model::{Camera, EllipticCylinder, Walker};
 
 /// Nobody walks slower than this, m/s.
 pub(super) const SLOWEST_MPS: f64 = 0.25;
@@ -30,12 +33,31 @@ const RECENT_FRAMES: usize = 12;
 /// A walk ends if the mean similarity of those frames is below this share of the walk's mean.
 const LOST_SHARE: f64 = 0.45;
 
+/// Frames in which less of the person is visible decide nothing.
+const DECIDING_SHARE: f32 = 0.3;
+/// A person who is hidden for longer is given up, seconds.
+const LONGEST_HIDDEN_S: f64 = 2.0;
+
+/// Mean similarity of frames by the share that is visible; `None` if they show too little.
+fn matched(steps: &[Step]) -> Option<f64> {
+    let visible: f32 = steps.iter().map(|s| s.visible).sum();
+    let found: f32 = steps.iter().map(|s| s.similarity * s.visible).sum();
+    (visible >= DECIDING_SHARE * steps.len() as f32).then(|| f64::from(found / visible))
+}
+
+/// Mean similarity of a twin by the share that is visible.
+fn mean_similarity(twin: &Twin) -> f64 {
+    twin.similarity_sum / twin.visible_sum.max(f64::MIN_POSITIVE)
+}
+
 /// Frames kept for fitting.
 type Kept = [(Option<Sighting>, FrameEdges)];
 
 /// The current walk.
 #[derive(Debug)]
 pub(super) struct Active {
+    /// Number of the person, in order of appearance.
+    pub(super) person: usize,
     pub(super) camera: Camera,
     /// The body height with which the walk started.
     pub(super) height: BodyHeight,
@@ -54,6 +76,75 @@ pub(super) struct Active {
 }
 
 impl Active {
+    /// The filtered state of the better twin.
+    pub(super) fn now(&self, options: &TrackerOptions) -> Option<Now> {
+        let step = self.walk.last()?;
+        let hypothesis = step.state.hypothesis();
+        Some(Now {
+            person: self.person,
+            frame: step.frame,
+            time_s: step.time_s,
+            torso_centre: self.scene().pose(&hypothesis).torso_centre,
+            heading_rad: self.walk.path.heading_rad,
+            phase: hypothesis.phase,
+            p_swapped: self.walk.swap_probability(&options.walk.swap),
+            speed_mps: step.state.along.velocity,
+        })
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene::new(&self.walk.walker, &self.camera, &self.walk.path)
+    }
+
+    /// The body in the last frame.
+    pub(super) fn body(&self) -> Option<[EllipticCylinder; PART_COUNT]> {
+        Some(self.scene().pose(&self.walk.last()?.state.hypothesis()).cylinders)
+    }
+
+    /// Where the person is and goes on the ground.
+    pub(super) fn sign(&self) -> Option<Sign> {
+        self.sign_at(self.steps().len().checked_sub(1)?)
+    }
+
+    /// The frames of the better twin.
+    fn steps(&self) -> &[Step] {
+        &self.walk.twins[self.walk.best()].steps
+    }
+
+    /// Number of frames before a time.
+    fn frames_before(&self, time_s: f64) -> usize {
+        self.steps().partition_point(|step| step.time_s < time_s)
+    }
+
+    /// Where the person was and went in the last frame before a time.
+    pub(super) fn sign_before(&self, time_s: f64) -> Option<Sign> {
+        self.sign_at(self.frames_before(time_s).checked_sub(1)?)
+    }
+
+    /// Drops the frames from a time on.
+    pub(super) fn end_before(&mut self, time_s: f64) {
+        self.walk.keep(0..self.frames_before(time_s));
+    }
+
+    /// Where the person was and went in a frame.
+    pub(super) fn sign_at(&self, index: usize) -> Option<Sign> {
+        let step = self.steps().get(index)?;
+        let path = &self.walk.path;
+        Some(Sign {
+            time_s: step.time_s,
+            place_m: path.point(step.state.along.position, 0.0).truncate(),
+            velocity_mps: step.state.along.velocity * path.direction(),
+        })
+    }
+
+    /// The person as followed in the last frame.
+    pub(super) fn as_followed(&self) -> Option<Expected> {
+        let twins = [self.walk.best(), 1 - self.walk.best()].map(|twin| self.walk.twins[twin].steps.last());
+        let [Some(best), Some(other)] = twins else { return None };
+        let [low, high] = body_box(&self.camera, &self.body()?)?;
+        Some(expected(&self.scene(), [&best.state, &other.state], best.look.window, high.y - low.y))
+    }
+
     /// True if in the last frames the person stood still or the model matched little.
     pub(super) fn is_over(&self) -> bool {
         let twin = &self.walk.twins[self.walk.best()];
@@ -67,9 +158,15 @@ impl Active {
         let cycles = (last.state.phase.position - first.state.phase.position).abs();
         let elapsed_s = last.time_s - first.time_s;
         let stopped = covered_m < SLOWEST_MPS * elapsed_s || cycles < SLOWEST_HZ * elapsed_s;
-        let similarity = recent.iter().map(|s| f64::from(s.similarity)).sum::<f64>() / RECENT_FRAMES as f64;
-        let lost = similarity < LOST_SHARE * twin.similarity_sum / count as f64;
-        stopped || lost
+        stopped || matched(recent).is_some_and(|found| found < LOST_SHARE * mean_similarity(twin))
+    }
+
+    /// True if for some time too little of the person was visible for a decision.
+    pub(super) fn is_hidden(&self) -> bool {
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let Some(last) = steps.last() else { return false };
+        let seen = steps.iter().rev().find(|step| step.visible >= DECIDING_SHARE);
+        last.time_s - seen.unwrap_or(&steps[0]).time_s > LONGEST_HIDDEN_S
     }
 
     /// True if the moving thing walked: over all frames it moved on, and its displacement per cycle is possible
@@ -89,16 +186,18 @@ impl Active {
             && STRIDE_HEIGHTS.contains(&stride)
     }
 
-    /// Removes the frames before the person appeared and those after the walk was over.
+    /// Removes the frames before the person appeared and those after the walk was over or the person was gone.
     ///
     /// A person who appears between two frames also changes the empty frame, because eq. (1) uses both
     /// neighbours.
     pub(super) fn trim(&mut self) {
         let twin = &self.walk.twins[self.walk.best()];
-        let low = LOST_SHARE * twin.similarity_sum / twin.steps.len() as f64;
+        let low = LOST_SHARE * mean_similarity(twin);
         let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
+        let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE;
+        let gone = twin.steps.iter().rev().take_while(is_gone).count();
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
-        let end = twin.steps.len() - over;
+        let end = twin.steps.len() - over.max(gone);
         self.walk.keep(absent.min(end)..end);
     }
 
@@ -227,6 +326,7 @@ mod tests {
     fn active(steps: Vec<Step>) -> Active {
         let mut walk = Walk::new(walker(), PATH, BEGINNING);
         walk.twins[0].similarity_sum = steps.iter().map(|s| f64::from(s.similarity)).sum();
+        walk.twins[0].visible_sum = steps.len() as f64;
         walk.twins[0].steps = steps;
         walk.twins[1].steps = walk.twins[0].steps.clone();
         Active {
@@ -236,6 +336,7 @@ mod tests {
             start: report(PATH, BEGINNING, Direction::Forward),
             walk,
             average: walker(),
+            person: 0,
             kept: Vec::new(),
             gait_speed_mps: 1.2,
             settled: false,
@@ -253,7 +354,7 @@ mod tests {
         let heights = Axis::around(1.15, 0.1, 0.02);
         let look = Look { window: WINDOW, heights, best: state.hypothesis() };
         let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
-        Step { frame, time_s, state, measured, similarity, look }
+        Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, look }
     }
 
     /// A good walk of `count` frames whose last twelve have these speeds and this similarity.
@@ -367,7 +468,7 @@ mod tests {
     /// walks along `seen`.
     fn kept(path: &Path, seen: &Path) -> Vec<(Option<Sighting>, FrameEdges)> {
         let (walker, camera) = (walker(), camera());
-        let scene = Scene { walker: &walker, camera: &camera, path };
+        let scene = Scene::new(&walker, &camera, path);
         let crown_m = walker.level_crown_height_m();
         let frame = |k: usize| {
             let time_s = 0.1 * k as f64;
@@ -381,7 +482,10 @@ mod tests {
                 top: (crown.y - 2.0).round() as usize,
                 bottom: sole.y.round() as usize,
             };
-            (Some(Sighting { time_s, rectangle }), FrameEdges { frame: k, time_s, window: WINDOW, edges })
+            (
+                Some(Sighting { time_s, rectangle }),
+                FrameEdges { frame: k, time_s, window: WINDOW, edges, others: Vec::new(), shared: false },
+            )
         };
         (0..12).map(frame).collect()
     }

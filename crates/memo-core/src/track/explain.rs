@@ -6,6 +6,8 @@
 //! curve over the cycle is for one position: that of the best grid point. The search itself also moved the body
 //! along the path and up and down at every phase, but only near the predicted phase. So a phase far away could
 //! score somewhat higher at another position.
+//!
+//! Where other people are near, their bodies hide contours as in tracking, but their edges are not taken out.
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, WindowEdges};
 use super::score::{ModelLine, Similarity, similarity};

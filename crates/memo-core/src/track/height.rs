@@ -91,10 +91,15 @@ impl BodyHeight {
     }
 }
 
-/// The height with which a walk starts.
-pub(super) fn start_height(options: &TrackerOptions, sightings: &[Sighting]) -> BodyHeight {
+/// The height with which a walk starts: the given one, or the one that a known camera shows.
+pub(super) fn start_height(
+    options: &TrackerOptions,
+    height_m: Option<f64>,
+    camera: Option<&Camera>,
+    sightings: &[Sighting],
+) -> BodyHeight {
     let population = BodyHeight::POPULATION;
-    match (options.height_m, &options.camera) {
+    match (height_m, camera) {
         (Some(height_m), _) => BodyHeight::given(height_m),
         (None, None) => population,
         (None, Some(camera)) => {
@@ -103,6 +108,14 @@ pub(super) fn start_height(options: &TrackerOptions, sightings: &[Sighting]) -> 
             seen.map_or(population, |seen| combined(&population, &seen))
         }
     }
+}
+
+/// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m.
+pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
+    let weight = PositionOptions::default().bottom_weight;
+    let midpoints = person_midpoints(&[*sighting], camera).ok();
+    let height_m = midpoints.and_then(|midpoints| height_on_ground(camera, &midpoints, weight).ok());
+    height_m.is_some_and(|height_m| (1.0..2.4).contains(&height_m))
 }
 
 /// The height of a person whose rectangles stand on the ground; `average` walks with the share of the height by which
@@ -159,23 +172,24 @@ mod tests {
     fn a_calibrated_camera_shows_the_height_at_the_start() {
         let options = TrackerOptions { camera: Some(camera()), ..TrackerOptions::default() };
         for height_m in [1.5, 1.7, 1.9] {
-            let found = start_height(&options, &sightings(&camera(), height_m));
+            let found =
+                start_height(&options, None, options.camera.as_ref(), &sightings(&camera(), height_m));
             assert_eq!(found.source, HeightSource::Measured);
             // A fifth of the weight is the population's.
             let expected_m = 0.8 * height_m + 0.2 * 1.7;
             assert!((found.height_m - expected_m).abs() < 0.02, "{height_m}: {found:?}");
             assert!((found.sd_m - 0.0447).abs() < 1e-4);
         }
-        let small = start_height(&options, &sightings(&camera(), 1.2));
+        let small = start_height(&options, None, options.camera.as_ref(), &sightings(&camera(), 1.2));
         assert_eq!(small, BodyHeight::POPULATION, "not the height of an adult");
     }
 
     #[test]
     fn a_height_is_given_or_that_of_the_population_without_a_camera() {
         let seen = sightings(&camera(), 1.9);
-        assert_eq!(start_height(&TrackerOptions::default(), &seen), BodyHeight::POPULATION);
-        let given = TrackerOptions { camera: Some(camera()), ..TrackerOptions::for_height(1.6) };
-        assert_eq!(start_height(&given, &seen), BodyHeight::given(1.6));
+        assert_eq!(start_height(&TrackerOptions::default(), None, None, &seen), BodyHeight::POPULATION);
+        let given = start_height(&TrackerOptions::default(), Some(1.6), Some(&camera()), &seen);
+        assert_eq!(given, BodyHeight::given(1.6));
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Model-based tracking: similarity of model and edges, search, starting phase, filter, tracker.
 
 mod active;
+mod candidate;
 mod column;
+mod crowd;
 pub mod cycles;
 pub mod evidence;
 pub mod explain;
@@ -11,6 +13,7 @@ pub mod height;
 pub mod locate;
 pub mod normal_gait;
 pub mod options;
+mod people;
 pub mod plausible;
 pub mod result;
 pub mod score;

@@ -41,6 +41,9 @@ pub struct TrackerOptions {
     /// Body height of the person, metres. `None` measures it in a calibrated camera; without one, that of the
     /// population is assumed ([`height`](super::height)).
     pub height_m: Option<f64>,
+    /// Body heights of further people in order of appearance, metres. If there are none, everybody has `height_m`;
+    /// otherwise people beyond the list are measured.
+    pub further_heights_m: Vec<f64>,
     /// The camera; `None` assumes one from field of view and body height.
     pub camera: Option<Camera>,
     /// Horizontal field of view of an assumed camera, radians.
@@ -67,6 +70,7 @@ impl Default for TrackerOptions {
     fn default() -> Self {
         Self {
             height_m: None,
+            further_heights_m: Vec::new(),
             camera: None,
             field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
             gait: GaitChoice::default(),
@@ -99,6 +103,16 @@ impl TrackerOptions {
         OptionError::unless(is_above, "high_hz", "at least low_hz and at most 100", self.cadence.high_hz)?;
         self.evidence.check()?;
         self.walk.check()
+    }
+
+    /// The given height of a person, by order of appearance.
+    pub fn height_of(&self, person: usize) -> Option<f64> {
+        match person.checked_sub(1) {
+            Some(further) if !self.further_heights_m.is_empty() => {
+                self.further_heights_m.get(further).copied()
+            }
+            _ => self.height_m,
+        }
     }
 
     /// The average walker of a body height in metres; the gait is made for this speed, m/s.

@@ -20,6 +20,8 @@ pub use crate::model::skeleton::Side;
 /// A finished walk with all intermediate results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedWalk {
+    /// Number of the person, in order of appearance. One person can have several walks.
+    pub person: usize,
     /// Both twins with all their steps.
     pub walk: Walk,
     /// The camera, given or assumed.
@@ -156,7 +158,7 @@ impl TrackedWalk {
 
     /// The walker, camera and path of the walk.
     pub fn scene(&self) -> Scene<'_> {
-        Scene { walker: &self.walk.walker, camera: &self.camera, path: &self.walk.path }
+        Scene::new(&self.walk.walker, &self.camera, &self.walk.path)
     }
 
     /// Steps of the better twin: measurements and filtered states.

@@ -7,7 +7,7 @@
 
 use super::column::{ColumnScorer, LANES, Lanes, LineLanes, Projection};
 use super::score::{EdgeLine, ModelLine, SimilarityOptions};
-use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment, visible_contours};
+use crate::model::visibility::{Others, PreparedView, VisibilityOptions, VisibleSegment};
 use crate::model::{Camera, PosedBody, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -63,9 +63,22 @@ pub struct Scene<'a> {
     pub camera: &'a Camera,
     /// The line walked and the direction the body faces.
     pub path: &'a Path,
+    /// Other people, who may stand in front.
+    pub others: &'a Others,
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    /// A person alone.
+    pub fn new(walker: &'a Walker, camera: &'a Camera, path: &'a Path) -> Self {
+        Self { walker, camera, path, others: Others::NONE }
+    }
+
+    /// The same person among others.
+    #[must_use]
+    pub fn among(self, others: &'a Others) -> Self {
+        Self { others, ..self }
+    }
+
     /// The body of a hypothesis, placed in the world.
     pub fn pose(&self, hypothesis: &Hypothesis) -> PosedBody {
         let centre = self.path.point(hypothesis.along_m, hypothesis.height_m);
@@ -85,8 +98,23 @@ impl Scene<'_> {
     /// The visible contours of a hypothesis, in the world.
     pub fn visible(&self, hypothesis: &Hypothesis, options: &VisibilityOptions) -> Vec<VisibleSegment> {
         let mut visible = Vec::new();
-        visible_contours(&self.pose(hypothesis).cylinders, self.camera.position(), options, &mut visible);
+        let (body, eye) = (self.pose(hypothesis), self.camera.position());
+        let view = &mut PreparedView::default();
+        view.visible_contours_among(&body.cylinders, self.others, eye, options, &mut visible);
         visible
+    }
+
+    /// Share of the contours, by length in space, that no other person hides.
+    pub fn visible_share(&self, hypothesis: &Hypothesis) -> f32 {
+        if self.others.is_empty() {
+            return 1.0;
+        }
+        let length = |scene: &Self| {
+            let visible = scene.visible(hypothesis, &LINES_ONLY);
+            visible.iter().map(|s| s.start.distance(s.end)).sum::<f64>()
+        };
+        let alone = length(&Self { others: Others::NONE, ..*self });
+        if alone > 0.0 { (length(self) / alone) as f32 } else { 0.0 }
     }
 
     /// The visible side lines of a hypothesis in ideal pixels, clipped to the image.
@@ -339,7 +367,8 @@ impl Column {
         //    moving the camera the other way.
         let place = scene.path.point(along_m, heights.centre) - scene.path.point(0.0, 0.0);
         let seen_from = scene.camera.position() - place;
-        self.view.visible_contours(&body.cylinders, seen_from, &LINES_ONLY, &mut self.visible);
+        let (view, visible) = (&mut self.view, &mut self.visible);
+        view.visible_contours_among(&body.cylinders, scene.others, seen_from, &LINES_ONLY, visible);
         // 2. The visible pieces raised to each height, and the edges that can match them there.
         let projection = Projection::new(scene.camera, place);
         for (block, scores) in out.chunks_mut(LANES).enumerate() {

@@ -16,7 +16,7 @@ use super::search::{Grid, Hypothesis, Path, Scene, search};
 use super::swap::swap_probability;
 use super::walk::{Beginning, FrameEdges, WalkOptions};
 use crate::estimate::line::line_through;
-use crate::model::{Camera, Walker};
+use crate::model::{Camera, Others, Walker};
 use std::f64::consts::TAU;
 
 /// Similarity of one frame over the whole cycle, at equally spaced phases from 0.
@@ -325,10 +325,12 @@ fn face(
     let sign = if turned { -1.0 } else { 1.0 };
     let turn = if turned { std::f64::consts::PI } else { 0.0 };
     let path = Path { heading_rad: course.path.heading_rad + turn, ..course.path };
-    let scene = Scene { walker, camera, path: &path };
+    let scene = Scene::new(walker, camera, &path);
     let height_m = walker.level_torso_height_m();
     let mut faced = Faced { path, curves: Vec::new(), hypotheses: Vec::new() };
     for (frame, along) in frames.iter().zip(&course.along_m) {
+        let others = Others::new(&frame.others, camera.position());
+        let scene = scene.among(&others);
         let grid = Grid::whole_cycle(sign * along, height_m);
         let curve = search(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines).curve();
         let scores = curve.iter().map(|(_, score)| *score).collect();

@@ -1,15 +1,13 @@
 //! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
 //!
-//! 1. It looks for a moving region that could be a person.
-//! 2. It starts on 13 frames of that region ([`TrackerOptions::start_frames`]).
-//! 3. It follows both half-cycle twins with filters.
+//! 1. It looks for moving regions that could be people and that nobody explains who is followed already.
+//! 2. It starts on 13 frames of such a region ([`TrackerOptions::start_frames`]).
+//! 3. It follows both half-cycle twins with filters. Nearer people hide farther ones (`crowd`).
 //! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed.
-//! 5. It ends the walk when the person leaves the image or stops walking, fits the person to all its frames
-//!    ([`fit`](super::fit)), and looks for a person again.
+//! 5. It ends the walk when the person leaves the image or stops walking, and fits the person to all its frames
+//!    ([`fit`](super::fit)). Whoever walks on where the person was expected has the same number (`people`).
 //!
-//! It tracks one person at a time: the largest moving region that is fully visible.
-//!
-//! Memory does not grow with the length of the stream. The tracker keeps two frames, the edges of at most
+//! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the edges of at most
 //! [`TrackerOptions::path_frames`] or `start_frames` frames, whichever is more, the rows of the current walk and, for
 //! the fit, 32 frames of the stream and the part of each frame of the walk that shows the person. A walk longer than
 //! [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`] without a fit, is returned in
@@ -19,21 +17,24 @@
 //! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as
 //! well, but enlarged to 1440p it was taken for backward walking.
 
-use super::active::{Active, SLOWEST_MPS};
+use super::active::Active;
+use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
+use super::crowd::{Expected, body_box, clear_explained, expected, keep_near, keep_own, keep_unowned};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
 use super::fit::views::{Backdrop, Piece};
-use super::height::{BodyHeight, GIVEN_SD_M, start_height};
-use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
+use super::height::is_of_a_person;
+use super::locate::Sighting;
 use super::options::TrackerOptions;
+use super::people::Identities;
+pub use super::people::Now;
 use super::result::TrackedWalk;
-use super::search::{Hypothesis, Scene};
-use super::start::{StartReport, start};
-use super::walk::{FrameEdges, Walk};
-use crate::image::{Frame, Rectangle};
+use super::search::Scene;
+use super::walk::FrameEdges;
+use crate::image::{Frame, GroupOptions, Mask, Rectangle, Region, group_regions, regions};
 use crate::model::body::BodyError;
-use crate::model::{Body, Camera, GaitStyle, Walker};
+use crate::model::{Body, Camera, EllipticCylinder};
 use crate::option_error::OptionError;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use thiserror::Error;
 
 /// Why tracking stopped with an error.
@@ -70,19 +71,12 @@ pub enum TrackError {
 
 /// A walk of this many frames is returned and continues as a new walk.
 pub const LONGEST_WALK: usize = 20_000;
-/// A candidate is dropped after this many consecutive frames without it.
-const MISSED_FRAMES: usize = 3;
-/// Speed of a comfortable walk, used before the speed is known, m/s.
-const COMFORTABLE_MPS: f64 = 1.3;
-/// Nobody walks faster than this, m/s.
-const FASTEST_MPS: f64 = 3.0;
-/// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
-/// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
-const LEAST_CONTRAST: f64 = 1.22;
-/// Gaits other than the average with which a walk can start.
-const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle::CROUCHED];
-/// Another gait starts if it is more similar than the average one by this factor.
-const OTHER_GAIN: f64 = 1.05;
+/// At most this many candidates are kept at a time, the largest regions.
+const MOST_CANDIDATES: usize = 3;
+/// A walk that is over is returned after this many frames, in which somebody may start where it ended.
+const FADING_FRAMES: usize = 25;
+/// A start this near to somebody who is followed is the same person, metres.
+const SAME_PLACE_M: f64 = 0.3;
 /// A walk ends when this share of the body's height or width is outside the image.
 const OUTSIDE_SHARE: f64 = 0.4;
 /// Edges are searched this far around the predicted body, pixels.
@@ -101,36 +95,18 @@ pub struct SeekReport {
     pub refused_starts: usize,
 }
 
-/// The latest filtered estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Now {
-    /// Number of the frame.
-    pub frame: usize,
-    /// Its time, seconds.
-    pub time_s: f64,
-    /// Centre of the torso, metres.
-    pub torso_centre: DVec3,
-    /// Direction the body faces, radians about world Z.
-    pub heading_rad: f64,
-    /// Gait phase in [0, 1), 0 = right heel strike (initial contact).
-    pub phase: f64,
-    /// Probability, from the frames so far, that left and right are swapped.
-    pub p_swapped: f64,
-    /// Speed along the path, m/s.
-    pub speed_mps: f64,
-}
-
 /// A tracker for one stream of frames.
 #[derive(Debug)]
 pub struct Tracker {
     options: TrackerOptions,
     stream: EvidenceStream,
-    seen: Vec<(Sighting, FrameEdges)>,
-    /// The pictures of `seen`, kept only for a fit.
-    seen_pieces: Vec<Piece>,
     backdrop: Backdrop,
-    missed: usize,
-    walking: Option<Active>,
+    candidates: Vec<Candidate>,
+    /// Everybody who is followed.
+    people: Vec<Active>,
+    /// Walks that are over, and since when. Somebody may start there again.
+    fading: Vec<(usize, Active)>,
+    identities: Identities,
     finished: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
@@ -148,11 +124,11 @@ impl Tracker {
         Ok(Self {
             options,
             stream,
-            seen: Vec::new(),
-            seen_pieces: Vec::new(),
             backdrop: Backdrop::default(),
-            missed: 0,
-            walking: None,
+            candidates: Vec::new(),
+            people: Vec::new(),
+            fading: Vec::new(),
+            identities: Identities::default(),
             finished: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
@@ -180,7 +156,9 @@ impl Tracker {
         if let Some(evidence) = stream.finish()? {
             self.advance(&evidence)?;
         }
-        self.end_walk();
+        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
+        let all: Vec<Active> = fading.chain(std::mem::take(&mut self.people)).collect();
+        all.into_iter().for_each(|active| self.end_walk(active));
         Ok(())
     }
 
@@ -190,21 +168,18 @@ impl Tracker {
         std::mem::take(&mut self.finished)
     }
 
-    /// The filtered state of the better twin at the last processed frame; `None` while nobody is followed.
+    /// The state of the person who appeared first of those who are followed at the last processed frame; `None` while
+    /// nobody is followed.
     pub fn current(&self) -> Option<Now> {
-        let active = self.walking.as_ref()?;
-        let step = active.walk.last()?;
-        let hypothesis = step.state.hypothesis();
-        let scene = Scene { walker: &active.walk.walker, camera: &active.camera, path: &active.walk.path };
-        Some(Now {
-            frame: step.frame,
-            time_s: step.time_s,
-            torso_centre: scene.pose(&hypothesis).torso_centre,
-            heading_rad: active.walk.path.heading_rad,
-            phase: hypothesis.phase,
-            p_swapped: active.walk.swap_probability(&self.options.walk.swap),
-            speed_mps: step.state.along.velocity,
-        })
+        self.people().into_iter().next()
+    }
+
+    /// The filtered states of everybody who is followed, each of the better twin, in order of appearance.
+    pub fn people(&self) -> Vec<Now> {
+        let mut people: Vec<Now> =
+            self.people.iter().filter_map(|active| active.now(&self.options)).collect();
+        people.sort_by_key(|now| now.person);
+        people
     }
 
     /// The options in use.
@@ -227,203 +202,44 @@ impl Tracker {
         Err(TrackError::CameraSize { camera_width, camera_height, width, height })
     }
 
+    /// 1. Where everybody is expected; whoever has left the image ends.
+    /// 2. Everybody is followed, near to far.
+    /// 3. Walks that are over end.
+    /// 4. Changes that nobody explains may be somebody else.
     fn advance(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
         if self.options.fit.is_some() {
             self.backdrop.push(evidence.frame, &evidence.grey);
         }
-        if self.walking.is_some() { self.follow(evidence) } else { self.seek(evidence) }
+        let expected = self.expect(evidence);
+        let regions = evidence.candidates(&self.options.evidence);
+        self.follow(evidence, &expected, &regions)?;
+        self.end_walks(evidence);
+        self.seek(evidence, regions)
     }
 
-    /// Collects sightings of one candidate and tries to start when there are enough.
-    fn seek(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
-        match self.sighting(evidence, None) {
-            Some(sighting) => {
-                let edges = self.edges(evidence, &grown(&sighting.rectangle, evidence, WINDOW_MARGIN_PX))?;
-                if self
-                    .seen
-                    .last()
-                    .is_some_and(|(last, _)| !same_person(&last.rectangle, &sighting.rectangle))
-                {
-                    self.forget();
-                }
-                if self.options.fit.is_some() {
-                    self.seen_pieces.push(Piece::new(evidence.frame, &evidence.grey, sighting.rectangle));
-                }
-                self.seen.push((sighting, edges));
-                self.missed = 0;
-            }
-            None => {
-                self.missed += 1;
-                if self.missed > MISSED_FRAMES {
-                    self.forget();
-                }
+    /// Sorts the people by distance and predicts each.
+    fn expect(&mut self, evidence: &Evidence) -> Vec<Expected> {
+        let mut all = Vec::new();
+        for active in std::mem::take(&mut self.people) {
+            match self.predicted(&active, evidence) {
+                Some(expected) => all.push((active, expected)),
+                None => self.end_walk(active),
             }
         }
-        if self.seen.len() >= self.options.start_frames {
-            self.try_start(evidence);
-        }
-        Ok(())
+        all.sort_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m));
+        let expected;
+        (self.people, expected) = all.into_iter().unzip();
+        expected
     }
 
-    /// Drops the candidate.
-    fn forget(&mut self) {
-        self.seen.clear();
-        self.seen_pieces.clear();
-    }
-
-    /// The candidate if it is fully visible: the largest region, or the one that overlaps `expected`.
-    fn sighting(&mut self, evidence: &Evidence, expected: Option<&Rectangle>) -> Option<Sighting> {
-        let candidates = evidence.candidates(&self.options.evidence);
-        let region = candidates.iter().find(|r| expected.is_none_or(|e| overlaps(&r.rectangle, e)))?;
-        let rectangle = region.rectangle;
-        self.report.frames_with_candidate += 1;
-        if touches_border(&rectangle, evidence.grey.width()) {
-            self.report.frames_cut_off += 1;
-            return None;
-        }
-        Some(Sighting { time_s: evidence.time_s, rectangle })
-    }
-
-    fn edges(&self, evidence: &Evidence, window: &Rectangle) -> Result<FrameEdges, TrackError> {
-        let camera = self.walking.as_ref().map(|active| &active.camera).or(self.options.camera.as_ref());
-        let edges = evidence.edges(window, camera, &self.options.evidence)?.lines;
-        Ok(FrameEdges { frame: evidence.frame, time_s: evidence.time_s, window: *window, edges })
-    }
-
-    /// Starts a walk on the collected sightings, or drops the oldest ones.
-    fn try_start(&mut self, evidence: &Evidence) {
-        let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
-        match self.begin(size) {
-            Some(mut active) => {
-                active.pieces = std::mem::take(&mut self.seen_pieces);
-                self.forget();
-                self.walking = Some(active);
-            }
-            None => {
-                self.report.refused_starts += 1;
-                let dropped = self.options.start_frames / 3;
-                self.seen.drain(..dropped);
-                self.seen_pieces.drain(..dropped.min(self.seen_pieces.len()));
-            }
-        }
-    }
-
-    /// 1. Camera and course from the rectangles.
-    /// 2. Lines of phase over the whole cycle, of several gaits; the most similar gait starts.
-    /// 3. Both twins followed through the start frames.
-    fn begin(&self, size: [u32; 2]) -> Option<Active> {
-        let sightings: Vec<Sighting> = self.seen.iter().map(|(s, _)| *s).collect();
-        if feet_cut_off(&sightings, size[1] as usize) {
-            return None;
-        }
-        let height = start_height(&self.options, &sightings);
-        let average = self.started(&sightings, size, &height, &GaitStyle::default())?;
-        let similarity = |started: &Started| started.start.lines.best.similarity;
-        let others = if self.options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
-        let Started { camera, course, walker, start } = others
-            .iter()
-            .filter_map(|style| self.started(&sightings, size, &height, style))
-            .filter(|other| similarity(other) > OTHER_GAIN * similarity(&average))
-            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
-            .unwrap_or(average);
-        // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
-        if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
-            return None;
-        }
-        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
-        let kept: Vec<_> = self.seen.iter().map(|(s, e)| (Some(*s), e.clone())).collect();
-        for (_, edges) in &kept {
-            walk.follow(edges, &camera, &self.options.walk);
-        }
-        Some(Active {
-            camera,
-            height,
-            depth_sd_m: course.depth_sd_m,
-            start,
-            walk,
-            average: Walker { style: GaitStyle::default(), ..walker },
-            kept,
-            gait_speed_mps: course.speed_mps,
-            settled: false,
-            pieces: Vec::new(),
-        })
-    }
-
-    /// The course and the lines of phase of one gait; `None` for things that do not move like a walker.
-    fn started(
-        &self,
-        sightings: &[Sighting],
-        size: [u32; 2],
-        height: &BodyHeight,
-        style: &GaitStyle,
-    ) -> Option<Started> {
-        let styled = |speed_mps: f64| {
-            Some(Walker { style: *style, ..self.options.walker(height.height_m, speed_mps).ok()? })
-        };
-        let (camera, course) =
-            self.course(sightings, size, styled(COMFORTABLE_MPS)?.level_crown_height_m(), height).ok()?;
-        if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
-            return None;
-        }
-        let walker = styled(course.speed_mps)?;
-        let edges: Vec<&FrameEdges> = self.seen.iter().map(|(_, e)| e).collect();
-        let start = start(&edges, &course, &walker, &camera, &self.options.cadence, &self.options.walk)?;
-        Some(Started { camera, course, walker, start })
-    }
-
-    fn course(
-        &self,
-        sightings: &[Sighting],
-        size: [u32; 2],
-        crown_m: f64,
-        height: &BodyHeight,
-    ) -> Result<(Camera, Course), LocateError> {
-        let Some(camera) = &self.options.camera else {
-            // The assumed camera has the scale of the height, so in it the height is known. Its error moves the walk
-            // nearer or farther with all its lengths.
-            let camera = camera_from_sightings(sightings, size, self.options.field_of_view_rad, crown_m)?;
-            let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
-            let course = locate(sightings, &camera, &crown)?;
-            let distance_m = course.path.distance(camera.position().truncate());
-            let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
-            return Ok((camera, Course { depth_sd_m, ..course }));
-        };
-        let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_m })?;
-        Ok((camera.clone(), course))
-    }
-
-    /// Follows the person into a frame, or ends the walk.
-    fn follow(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
-        let Some(window) = self.predicted_window(evidence) else {
-            self.end_walk();
-            return self.seek(evidence);
-        };
-        let sighting = self.sighting(evidence, Some(&window));
-        let edges = self.edges(evidence, &window)?;
-        let Some(active) = &mut self.walking else { return Ok(()) };
-        active.walk.follow(&edges, &active.camera, &self.options.walk);
-        if self.options.fit.is_some() {
-            active.pieces.push(Piece::new(evidence.frame, &evidence.grey, window));
-        }
-        if !active.settled {
-            active.kept.push((sighting, edges));
-            if active.kept.len() >= self.options.path_frames {
-                active.settle(&self.backdrop, &self.options);
-            }
-        }
-        // On a wrong path a walk can seem to be over, so the path is looked for first.
-        if active.settled && (active.is_over() || active.walk.twins[0].steps.len() >= self.longest_walk) {
-            self.end_walk();
-        }
-        Ok(())
-    }
-
-    /// The image rectangle in which the body is expected; `None` if too much of it is outside the image.
-    fn predicted_window(&self, evidence: &Evidence) -> Option<Rectangle> {
-        let active = self.walking.as_ref()?;
-        let predicted = active.walk.predict(active.walk.best(), evidence.time_s, &self.options.walk.filter);
-        let scene = Scene { walker: &active.walk.walker, camera: &active.camera, path: &active.walk.path };
-        let (low, high) = body_box(&scene, &predicted.hypothesis())?;
+    /// Where a person is expected; `None` if too much of the body is outside the image.
+    fn predicted(&self, active: &Active, evidence: &Evidence) -> Option<Expected> {
+        let best = active.walk.best();
+        let predict = |twin| active.walk.predict(twin, evidence.time_s, &self.options.walk.filter);
+        let (predicted, other) = (predict(best), predict(1 - best));
+        let scene = Scene::new(&active.walk.walker, &active.camera, &active.walk.path);
+        let body = scene.pose(&predicted.hypothesis()).cylinders;
+        let [low, high] = body_box(&active.camera, &body)?;
         let size = DVec2::new(evidence.grey.width() as f64, evidence.grey.height() as f64);
         let (low_in, high_in) = (low.max(DVec2::ZERO), high.min(size - 1.0));
         let shown = (high_in - low_in) / (high - low);
@@ -434,81 +250,241 @@ impl Tracker {
             DVec2::new(predicted.along.position_sd().min(0.2), predicted.height.position_sd().min(0.1));
         let scale = (high.y - low.y) / active.walk.walker.body.height_m;
         let margin = reach * scale + WINDOW_MARGIN_PX;
-        let (low, high) = ((low - margin).max(DVec2::ZERO), (high + margin).min(size - 1.0));
-        Some(Rectangle {
-            left: low.x as usize,
-            top: low.y as usize,
-            right: high.x as usize,
-            bottom: high.y as usize,
-        })
+        let (low_in, high_in) = ((low - margin).max(DVec2::ZERO), (high + margin).min(size - 1.0));
+        let window = Rectangle {
+            left: low_in.x as usize,
+            top: low_in.y as usize,
+            right: high_in.x as usize,
+            bottom: high_in.y as usize,
+        };
+        Some(expected(&scene, [&predicted, &other], window, high.y - low.y))
     }
 
-    fn end_walk(&mut self) {
-        if let Some(mut active) = self.walking.take() {
-            active.settle(&self.backdrop, &self.options);
-            active.trim();
-            if !active.is_walk() {
-                self.report.refused_starts += 1;
-                return;
+    /// Follows everybody into a frame.
+    fn follow(
+        &mut self,
+        evidence: &Evidence,
+        expected: &[Expected],
+        regions: &[Region],
+    ) -> Result<(), TrackError> {
+        for (k, own) in expected.iter().enumerate() {
+            let meeting: Vec<usize> =
+                (0..expected.len()).filter(|&other| other != k && own.meets(&expected[other])).collect();
+            // 1. Nearer people, whose places in this frame are known, stand in front.
+            let nearer = meeting.iter().filter(|&&other| other < k);
+            let others: Vec<EllipticCylinder> =
+                nearer.filter_map(|&other| self.people[other].body()).flatten().collect();
+            // 2. Edges of one's own.
+            let mut edges = self.edges(evidence, &own.window, Some(&self.people[k].camera))?;
+            keep_own(
+                &mut edges.edges,
+                own,
+                &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
+            );
+            let is_contested = self.candidates.iter().any(|candidate| candidate.is_in(&own.window));
+            if is_contested {
+                keep_near(&mut edges.edges, own);
             }
-            let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
-            let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
-            let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
-            self.finished.push(TrackedWalk {
-                walk: active.walk,
-                height,
-                camera: active.camera,
-                depth_sd_m: active.depth_sd_m,
-                start: active.start,
-                camera_is_guessed: self.options.camera.is_none(),
-                gait_speed_mps: active.gait_speed_mps,
-                fit,
-                options: self.options.walk,
-            });
+            edges.shared = is_contested || !meeting.is_empty();
+            edges.others.clone_from(&others);
+            // 3. A rectangle that nobody else is in.
+            let overlaps = |region: &&Region| region.rectangle.gap(&own.window) == [0, 0];
+            let region = if meeting.is_empty() { regions.iter().find(overlaps) } else { None };
+            let sighting = region.and_then(|region| whole(region, evidence));
+            let active = &mut self.people[k];
+            active.walk.follow(&edges, &active.camera, &self.options.walk);
+            if self.options.fit.is_some() {
+                active.pieces.push(Piece::new(evidence.frame, &evidence.grey, own.window, others));
+                self.backdrop.occupy(evidence.frame, own.window);
+            }
+            if !active.settled {
+                active.kept.push((sighting, edges));
+                if active.kept.len() >= self.options.path_frames {
+                    active.settle(&self.backdrop, &self.options);
+                }
+            }
         }
+        Ok(())
+    }
+
+    /// Ends walks that are over. On a wrong path a walk can seem to be over, so the path is looked for first.
+    fn end_walks(&mut self, evidence: &Evidence) {
+        let (frame, longest) = (evidence.frame, self.longest_walk);
+        let is_long = |active: &mut Active| active.settled && active.walk.twins[0].steps.len() >= longest;
+        let mut ended: Vec<Active> = self.people.extract_if(.., is_long).collect();
+        let is_over = |active: &mut Active| active.settled && (active.is_over() || active.is_hidden());
+        self.fading.extend(self.people.extract_if(.., is_over).map(|active| (frame, active)));
+        let is_gone = |(end, _): &mut (usize, Active)| *end + FADING_FRAMES < frame;
+        ended.extend(self.fading.extract_if(.., is_gone).map(|(_, active)| active));
+        ended.into_iter().for_each(|active| self.end_walk(active));
+    }
+
+    /// The number of somebody who starts to be followed. A walk can leave its person, who turns or slows. Who starts
+    /// where that person was is the same person, whose first walk ends there.
+    fn identified(&mut self, new: &Active) -> usize {
+        let Some(start) = new.sign_at(0) else { return self.identities.count() };
+        let leads = |(_, old): &(usize, Active)| {
+            old.sign_before(start.time_s).is_some_and(|end| end.leads_to(&start))
+        };
+        let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };
+        let (_, mut old) = self.fading.remove(n);
+        old.end_before(start.time_s);
+        let person = old.person;
+        self.end_walk(old);
+        self.identities.is_back(person);
+        person
+    }
+
+    /// Adds the regions that nobody explains to the candidates, and starts those that walk.
+    fn seek(&mut self, evidence: &Evidence, regions: Vec<Region>) -> Result<(), TrackError> {
+        self.report.frames_with_candidate += usize::from(!regions.is_empty());
+        let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
+        self.report.frames_cut_off += usize::from(is_cut_off);
+        let regions = if self.people.is_empty() { regions } else { self.unexplained(evidence) };
+        self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
+        let camera = if self.people.is_empty() { None } else { self.camera() };
+        let can_be = |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting));
+        let whole = regions.iter().filter_map(|region| whole(region, evidence));
+        let sightings: Vec<Sighting> = whole.filter(can_be).take(MOST_CANDIDATES).collect();
+        for sighting in sightings {
+            let seen = self.seen(evidence, sighting)?;
+            let rectangle = &sighting.rectangle;
+            let known = self.candidates.iter_mut().find(|c| c.missed > 0 && c.is_at(rectangle));
+            match known {
+                Some(candidate) => candidate.add(seen),
+                None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
+            }
+        }
+        self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
+        self.start(evidence);
+        Ok(())
+    }
+
+    /// Regions of change that the bodies of the people do not explain.
+    fn unexplained(&self, evidence: &Evidence) -> Vec<Region> {
+        let mut mask: Mask = evidence.firm_mask.clone();
+        for active in &self.people {
+            if let Some(seen) = active.as_followed() {
+                clear_explained(&mut mask, &active.camera, &seen.body, seen.height_px);
+            }
+        }
+        let group: &GroupOptions = &self.options.evidence.group;
+        group_regions(&regions(&mask, group.min_part_area), group)
+    }
+
+    /// What a candidate shows in a frame, without the edges of people who are followed.
+    fn seen(&mut self, evidence: &Evidence, sighting: Sighting) -> Result<Seen, TrackError> {
+        let window = grown(&sighting.rectangle, evidence, WINDOW_MARGIN_PX);
+        let mut edges = self.edges(evidence, &window, self.camera())?;
+        for active in &self.people {
+            let Some(expected) = active.as_followed() else { continue };
+            if expected.window.gap(&window) == [0, 0] {
+                edges.shared = true;
+                keep_unowned(&mut edges.edges, &[&expected]);
+                edges.others.extend(expected.body);
+            }
+        }
+        let piece = self.options.fit.map(|_| {
+            self.backdrop.occupy(evidence.frame, sighting.rectangle);
+            Piece::new(evidence.frame, &evidence.grey, sighting.rectangle, edges.others.clone())
+        });
+        Ok(Seen { sighting, edges, piece })
+    }
+
+    fn edges(
+        &self,
+        evidence: &Evidence,
+        window: &Rectangle,
+        camera: Option<&Camera>,
+    ) -> Result<FrameEdges, TrackError> {
+        let edges = evidence.edges(window, camera, &self.options.evidence)?.lines;
+        let (frame, time_s, window) = (evidence.frame, evidence.time_s, *window);
+        Ok(FrameEdges { frame, time_s, window, edges, others: Vec::new(), shared: false })
+    }
+
+    /// The given camera, or the one assumed for somebody who is followed.
+    fn camera(&self) -> Option<&Camera> {
+        self.options.camera.as_ref().or(self.people.first().map(|active| &active.camera))
+    }
+
+    /// Starts walks on candidates that have enough frames, or drops their oldest ones.
+    fn start(&mut self, evidence: &Evidence) {
+        let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
+        for n in (0..self.candidates.len()).rev() {
+            let candidate = &self.candidates[n];
+            if candidate.seen.len() < self.frames_to_start() || candidate.missed > 0 {
+                continue;
+            }
+            let height_m = self.options.height_of(self.identities.count());
+            let given = Given { options: &self.options, camera: self.camera(), height_m, size };
+            match candidate.begin(&given).filter(|active| self.is_somebody_else(active)) {
+                Some(mut active) => {
+                    self.candidates.remove(n);
+                    active.person = self.identified(&active);
+                    self.people.push(active);
+                }
+                None => {
+                    self.report.refused_starts += 1;
+                    self.candidates[n].refuse(&self.options);
+                }
+            }
+        }
+    }
+
+    /// Somebody who comes near a followed person is soon hidden or mistaken for that person, so half as many frames
+    /// must do.
+    fn frames_to_start(&self) -> usize {
+        let all = self.options.start_frames;
+        if self.people.is_empty() { all } else { all.div_ceil(2) }
+    }
+
+    /// False if somebody is followed where a walk would start.
+    fn is_somebody_else(&self, new: &Active) -> bool {
+        let place = |active: &Active| active.sign().map(|sign| sign.place_m);
+        let near =
+            |other: &Active| place(other).zip(place(new)).is_some_and(|(a, b)| a.distance(b) < SAME_PLACE_M);
+        !self.people.iter().any(near)
+    }
+
+    fn end_walk(&mut self, mut active: Active) {
+        active.settle(&self.backdrop, &self.options);
+        active.trim();
+        if !active.is_walk() {
+            self.report.refused_starts += 1;
+            self.identities.withdraw(active.person);
+            return;
+        }
+        if let Some(sign) = active.sign() {
+            self.identities.end(active.person, sign);
+        }
+        let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
+        let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
+        let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
+        self.finished.push(TrackedWalk {
+            person: active.person,
+            walk: active.walk,
+            height,
+            camera: active.camera,
+            depth_sd_m: active.depth_sd_m,
+            start: active.start,
+            camera_is_guessed: self.options.camera.is_none(),
+            gait_speed_mps: active.gait_speed_mps,
+            fit,
+            options: self.options.walk,
+        });
     }
 }
 
-/// A start with one gait.
-struct Started {
-    camera: Camera,
-    course: Course,
-    walker: Walker,
-    start: StartReport,
-}
-
-/// Bounding box of the body in the image, pixels.
-fn body_box(scene: &Scene<'_>, hypothesis: &Hypothesis) -> Option<(DVec2, DVec2)> {
-    let posed = scene.pose(hypothesis);
-    let mut bounds = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for cylinder in &posed.cylinders {
-        let end = cylinder.world_from_cylinder.matrix3.z_axis * cylinder.half_length;
-        for point in [cylinder.centre() + end, cylinder.centre() - end] {
-            let pixel = scene.camera.project(point)?;
-            bounds = (bounds.0.min(pixel), bounds.1.max(pixel));
-        }
-    }
-    Some(bounds)
+/// The sighting of a region that the image border does not cut.
+fn whole(region: &Region, evidence: &Evidence) -> Option<Sighting> {
+    let rectangle = region.rectangle;
+    let is_cut = touches_border(&rectangle, evidence.grey.width());
+    (!is_cut).then_some(Sighting { time_s: evidence.time_s, rectangle })
 }
 
 /// Reflections may reach the lower border, so only the sides and the top count.
 fn touches_border(r: &Rectangle, width: usize) -> bool {
     r.left <= 1 || r.top <= 1 || r.right + 2 >= width
-}
-
-/// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
-fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
-    2 * sightings.iter().filter(|s| s.rectangle.bottom + 2 >= height).count() > sightings.len()
-}
-
-fn overlaps(a: &Rectangle, b: &Rectangle) -> bool {
-    a.gap(b) == [0, 0]
-}
-
-/// True if two rectangles of neighbouring frames can enclose the same person.
-fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
-    let ratio = a.height() as f64 / b.height() as f64;
-    overlaps(a, b) && (0.6..1.6).contains(&ratio)
 }
 
 /// A rectangle enlarged by a margin, clipped to the image.

@@ -9,7 +9,7 @@ use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_ST
 use super::swap::{SwapModel, swap_probability};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
 use crate::image::Rectangle;
-use crate::model::{Camera, Walker};
+use crate::model::{Camera, EllipticCylinder, Others, Walker};
 use crate::option_error::OptionError;
 
 /// Options of the following stage.
@@ -41,6 +41,9 @@ const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
 /// Standard deviation of the torso's height given the ground and the leg length, metres. The paper's 10 cm is the
 /// standard deviation given the contours of one frame.
 const GROUND_SD_M: f64 = 0.02;
+
+/// A person of whom less is visible is not measured: the filter predicts.
+const LEAST_VISIBLE: f32 = 0.05;
 
 /// The filtered state of one twin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,6 +124,10 @@ pub struct Step {
     pub measured: Option<Hypothesis>,
     /// Similarity of the best grid point; 0 if nothing matched.
     pub similarity: f32,
+    /// Share of the person's contours that no other person hides, 0 to 1.
+    pub visible: f32,
+    /// True if other people were near.
+    pub shared: bool,
     /// Where the twin was searched.
     pub look: Look,
 }
@@ -130,8 +137,10 @@ pub struct Step {
 pub struct Twin {
     /// All frames so far.
     pub steps: Vec<Step>,
-    /// Sum of the similarities of all frames, including frames dropped from `steps`.
+    /// Sum over all frames, including those dropped from `steps`, of the similarity times the visible share.
     pub similarity_sum: f64,
+    /// Sum of the visible shares of the same frames.
+    pub visible_sum: f64,
 }
 
 /// State at the beginning of a walk.
@@ -158,8 +167,12 @@ pub struct FrameEdges {
     pub time_s: f64,
     /// The part of the image from which they were taken.
     pub window: Rectangle,
-    /// Straight edges in ideal pixels.
+    /// Straight edges in ideal pixels, without those of other people.
     pub edges: Vec<EdgeLine>,
+    /// The bodies of other people near the window, who may stand in front.
+    pub others: Vec<EllipticCylinder>,
+    /// True if other people were near, so that edges may have been left to them.
+    pub shared: bool,
 }
 
 /// A person being followed.
@@ -179,20 +192,22 @@ pub struct Walk {
 impl Walk {
     /// A walk at its beginning, with no frame followed.
     pub fn new(walker: Walker, path: Path, beginning: Beginning) -> Self {
-        let twin = Twin { steps: Vec::new(), similarity_sum: 0.0 };
+        let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0 };
         Self { walker, path, beginning, twins: [twin.clone(), twin], first_time_s: None }
     }
 
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
-        let scene = Scene { walker: &self.walker, camera, path: &self.path };
+        let others = Others::new(&edges.others, camera.position());
+        let scene = Scene::new(&self.walker, camera, &self.path).among(&others);
         let step = |twin: usize| {
             let predicted = self.predict(twin, edges.time_s, &options.filter);
             match_frame(edges, &scene, &predicted, options)
         };
         let (first, second) = rayon::join(|| step(0), || step(1));
         for (twin, step) in self.twins.iter_mut().zip([first, second]) {
-            twin.similarity_sum += f64::from(step.similarity);
+            twin.similarity_sum += f64::from(step.similarity * step.visible);
+            twin.visible_sum += f64::from(step.visible);
             twin.steps.push(step);
         }
         self.first_time_s.get_or_insert(edges.time_s);
@@ -262,11 +277,23 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
     let grid = predicted.grid();
     let found = search(&edges.edges, scene, &grid, &options.similarity, options.hidden_lines);
     let similarity = found.best_score();
-    let measured = (similarity > 0.0).then(|| found.refined());
-    let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &options.filter));
+    let visible = scene.visible_share(&predicted.hypothesis());
+    let measured = (similarity > 0.0 && visible >= LEAST_VISIBLE).then(|| found.refined());
+    // A part of the contours measures less well than all of them.
+    let filter = options.filter.of_visible_share(visible.into());
+    let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &filter));
     let best = measured.map_or(predicted.hypothesis(), |_| found.best());
     let look = Look { window: edges.window, heights: grid.height, best };
-    Step { frame: edges.frame, time_s: edges.time_s, state, measured, similarity, look }
+    Step {
+        frame: edges.frame,
+        time_s: edges.time_s,
+        state,
+        measured,
+        similarity,
+        visible,
+        shared: edges.shared,
+        look,
+    }
 }
 
 #[cfg(test)]
@@ -298,12 +325,12 @@ mod tests {
     /// The contours of the planted walker as edges.
     fn planted(frame: usize, time_s: f64) -> FrameEdges {
         let (walker, camera) = (walker(), camera());
-        let edges = edges_of(&Scene { walker: &walker, camera: &camera, path: &PATH }, &truth(time_s));
-        FrameEdges { frame, time_s, window: WINDOW, edges }
+        let edges = edges_of(&Scene::new(&walker, &camera, &PATH), &truth(time_s));
+        FrameEdges { frame, time_s, window: WINDOW, edges, others: Vec::new(), shared: false }
     }
 
     fn empty(frame: usize, time_s: f64) -> FrameEdges {
-        FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new() }
+        FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new(), others: Vec::new(), shared: false }
     }
 
     /// Filter noise that differs between coordinates.
@@ -329,7 +356,16 @@ mod tests {
             phase: ConstantVelocity::new(measured.phase, 0.9, 0.01, 0.01),
         };
         let look = Look { window: WINDOW, heights: Axis::around(1.0, 0.1, 0.02), best: measured };
-        Step { frame: 0, time_s, state, measured: Some(measured), similarity, look }
+        Step {
+            frame: 0,
+            time_s,
+            state,
+            measured: Some(measured),
+            similarity,
+            visible: 1.0,
+            shared: false,
+            look,
+        }
     }
 
     #[test]

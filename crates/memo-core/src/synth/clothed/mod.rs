@@ -146,6 +146,8 @@ pub struct ClothedScene {
     sway: [f64; 2],
     room: Room,
     empty: Image<f32>,
+    /// Other movers in the room, and by how much their paths are shifted.
+    companions: Vec<(ClothedScene, DVec3)>,
 }
 
 /// Period of the slow variation of the rate, cycles.
@@ -192,7 +194,16 @@ impl ClothedScene {
             sway: [random.uniform(0.0, 0.03) * SWAY_CYCLES / TAU, random.uniform(0.0, TAU)],
             room,
             empty,
+            companions: Vec::new(),
         })
+    }
+
+    /// The same room and camera with the mover of another scene in it too, whose path is shifted on the floor by this
+    /// many metres. Its truth is that of the other scene, shifted.
+    #[must_use]
+    pub fn joined_by(mut self, other: Self, shift_m: DVec2) -> Self {
+        self.companions.push((other, shift_m.extend(0.0)));
+        self
     }
 
     /// Number of frames.
@@ -274,6 +285,16 @@ impl ClothedScene {
 
     /// The solids in the room at a time, and the spheres near the floor that cast the contact shadow.
     fn solids(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
+        let (mut solids, mut shadows) = self.own_solids(time_s);
+        for (other, shift_m) in &self.companions {
+            let (of_other, shadows_of_other) = other.solids(time_s);
+            solids.extend(of_other.into_iter().map(|solid| solid.moved(*shift_m)));
+            shadows.extend(shadows_of_other.into_iter().map(|(centre, radius)| (centre + *shift_m, radius)));
+        }
+        (solids, shadows)
+    }
+
+    fn own_solids(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
         if self.options.mover == Mover::Trolley {
             return self.trolley(time_s);
         }

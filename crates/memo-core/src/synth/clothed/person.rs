@@ -26,6 +26,13 @@ pub(super) struct Solid {
     pub(super) cloth: Cloth,
 }
 
+impl Solid {
+    pub(super) fn moved(self, by_m: DVec3) -> Self {
+        let ends = self.shape.ends.map(|end| end + by_m);
+        Self { shape: RoundCone { ends, ..self.shape }, ..self }
+    }
+}
+
 /// A person's clothes and skin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clothes {

@@ -6,6 +6,7 @@
 //! of either sign. No threshold decides; the strongest step counts, the less the farther it is from the line.
 
 use crate::image::Image;
+use crate::model::EllipticCylinder;
 use glam::DVec2;
 
 /// A piece of a frame and of the empty scene behind it.
@@ -17,6 +18,8 @@ pub struct View {
     pub grey: Image<u8>,
     /// Those of the empty scene, of the same size.
     pub background: Image<u8>,
+    /// The bodies of other people near it.
+    pub others: Vec<EllipticCylinder>,
 }
 
 /// What kind of line is searched.
@@ -141,7 +144,7 @@ mod tests {
             grey.row_mut(y)[40..45].fill(20);
             background.row_mut(y)[40..45].fill(20);
         }
-        View { corner: [100, 50], grey, background }
+        View { corner: [100, 50], grey, background, others: Vec::new() }
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {

@@ -15,7 +15,7 @@ use super::unknowns::{
 };
 use crate::model::body::Part;
 use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
-use crate::model::{Body, Camera, ContourKind, Distortion, EllipticCylinder, PosedBody, side_lines};
+use crate::model::{Body, Camera, ContourKind, Distortion, EllipticCylinder, Others, PosedBody, side_lines};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 /// The figure of one frame in the world.
@@ -99,14 +99,23 @@ const CROWN_PART: f64 = 0.5;
 /// End ellipses are drawn with this many chords.
 const RIM_CHORDS: usize = 12;
 
-/// Writes sample points into the workspace, about `spacing_px` apart.
-pub fn samples(figure: &Figure, camera: &Camera, whole: &[f64], spacing_px: f64, work: &mut Workspace) {
+/// Writes sample points into the workspace, about `spacing_px` apart. The bodies of other people hide contours, and a
+/// contour before or beside them does not border on the background.
+pub fn samples(
+    figure: &Figure,
+    others: &[EllipticCylinder],
+    camera: &Camera,
+    whole: &[f64],
+    spacing_px: f64,
+    work: &mut Workspace,
+) {
     let Workspace { view, visible, samples, .. } = work;
     samples.clear();
     let (cylinders, eye) = (&figure.posed.cylinders, camera.position());
     let options = VisibilityOptions { rims: true, rim_chords: RIM_CHORDS };
-    view.visible_contours(cylinders, eye, &options, visible);
-    let outlines = cylinders.map(|cylinder| outline_px(&cylinder, camera, eye));
+    view.visible_contours_among(cylinders, &Others::new(others, eye), eye, &options, visible);
+    let outlines: Vec<_> =
+        cylinders.iter().chain(others).map(|cylinder| outline_px(cylinder, camera, eye)).collect();
     for segment in visible.iter() {
         let part = Part::ALL[segment.part];
         let Some(line) = Line::new(segment, part, &cylinders[segment.part], whole, camera) else { continue };
@@ -410,7 +419,7 @@ mod tests {
         let mut work = Workspace::default();
         let mut whole = q[BODY..].to_vec();
         whole.resize(WHOLE, 0.0);
-        samples(&figure(q), &camera(), &whole, spacing_px, &mut work);
+        samples(&figure(q), &[], &camera(), &whole, spacing_px, &mut work);
         work.samples
     }
 

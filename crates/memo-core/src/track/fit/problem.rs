@@ -263,12 +263,12 @@ impl<'a> Problem<'a> {
     ) -> (DMatrix<f64>, DVector<f64>, Seen) {
         let figure = self.figure(unknowns, frame);
         let Room { work, slopes: room_slopes } = room;
-        samples(&figure, self.camera, &unknowns.whole, width.spacing_px(), work);
+        let view = &self.frames[frame].view;
+        samples(&figure, &view.others, self.camera, &unknowns.whole, width.spacing_px(), work);
         let mut normal = DMatrix::<f64>::zeros(FIGURE, FIGURE);
         let mut right = DVector::<f64>::zeros(FIGURE);
         let mut seen = Seen::default();
         let Workspace { samples, motion, looks, .. } = work;
-        let view = &self.frames[frame].view;
         for sample in samples.iter() {
             let border = if sample.is_outer { Border::Outer } else { Border::Inner };
             let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, looks) else {
@@ -625,7 +625,7 @@ mod tests {
         let grey = Image::filled(640, 480, 90u8);
         let frame = |k: usize| FitFrame {
             time_s: 0.04 * k as f64,
-            view: View { corner: [0, 0], grey: grey.clone(), background: grey.clone() },
+            view: View { corner: [0, 0], grey: grey.clone(), background: grey.clone(), others: Vec::new() },
             start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
         };
         let fit = |count: usize| {

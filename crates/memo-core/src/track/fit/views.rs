@@ -5,6 +5,7 @@
 
 use super::edge_search::View;
 use crate::image::{Image, Rectangle};
+use crate::model::EllipticCylinder;
 use rayon::prelude::*;
 
 /// The empty scene is the median of half this many frames to this many.
@@ -15,9 +16,17 @@ const LEAST_EMPTY: usize = 5;
 /// Frames spread evenly over a stream.
 #[derive(Debug, Clone, Default)]
 pub struct Backdrop {
-    frames: Vec<(usize, Image<u8>)>,
+    frames: Vec<Kept>,
     /// Only frames with a multiple of this number are kept.
     every: usize,
+}
+
+/// A frame of the stream and where people are in it.
+#[derive(Debug, Clone)]
+struct Kept {
+    frame: usize,
+    image: Image<u8>,
+    people: Vec<Rectangle>,
 }
 
 /// Part of a frame around the person.
@@ -31,11 +40,13 @@ pub struct Piece {
     pub kept: Rectangle,
     /// Its grey values.
     pub grey: Image<u8>,
+    /// The bodies of other people near it.
+    pub others: Vec<EllipticCylinder>,
 }
 
 impl Piece {
     /// The part of a frame within a margin about a window.
-    pub fn new(frame: usize, image: &Image<u8>, window: Rectangle) -> Self {
+    pub fn new(frame: usize, image: &Image<u8>, window: Rectangle, others: Vec<EllipticCylinder>) -> Self {
         let margin = (window.height() as f64 * MARGIN).ceil() as usize;
         let kept = Rectangle {
             left: window.left.saturating_sub(margin),
@@ -43,7 +54,7 @@ impl Piece {
             right: (window.right + margin).min(image.width() - 1),
             bottom: (window.bottom + margin).min(image.height() - 1),
         };
-        Self { frame, window, kept, grey: cut(image, &kept) }
+        Self { frame, window, kept, grey: cut(image, &kept), others }
     }
 }
 
@@ -65,10 +76,17 @@ impl Backdrop {
         if !frame.is_multiple_of(every) {
             return;
         }
-        self.frames.push((frame, image.clone()));
+        self.frames.push(Kept { frame, image: image.clone(), people: Vec::new() });
         if self.frames.len() > MOST_FRAMES {
             self.every = 2 * every;
-            self.frames.retain(|(frame, _)| frame.is_multiple_of(2 * every));
+            self.frames.retain(|kept| kept.frame.is_multiple_of(2 * every));
+        }
+    }
+
+    /// Notes that somebody is in this part of a frame, which therefore does not show the empty scene.
+    pub fn occupy(&mut self, frame: usize, window: Rectangle) {
+        if let Some(kept) = self.frames.iter_mut().rev().find(|kept| kept.frame == frame) {
+            kept.people.push(window);
         }
     }
 
@@ -76,13 +94,8 @@ impl Backdrop {
     pub fn views<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
         let pieces: Vec<&Piece> = pieces.collect();
         let Some(whole) = pieces.iter().map(|p| p.kept).reduce(|a, b| a.union(&b)) else { return Vec::new() };
-        let windows: Vec<Option<&Rectangle>> = self
-            .frames
-            .iter()
-            .map(|(frame, _)| pieces.iter().find(|p| p.frame == *frame).map(|p| &p.window))
-            .collect();
         let rows: Vec<Vec<u8>> =
-            (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole, &windows)).collect();
+            (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole)).collect();
         let behind = |piece: &Piece| {
             let kept = piece.kept;
             let mut background = Image::filled(kept.width(), kept.height(), 0);
@@ -90,25 +103,28 @@ impl Backdrop {
                 let row = &rows[kept.top - whole.top + y];
                 background.row_mut(y).copy_from_slice(&row[kept.left - whole.left..=kept.right - whole.left]);
             }
-            View { corner: [kept.left, kept.top], grey: piece.grey.clone(), background }
+            View {
+                corner: [kept.left, kept.top],
+                grey: piece.grey.clone(),
+                background,
+                others: piece.others.clone(),
+            }
         };
         pieces.into_iter().map(behind).collect()
     }
 
-    /// One row of the empty scene: the median of the frames in which the person is elsewhere, or of all frames where
+    /// One row of the empty scene: the median of the frames in which people are elsewhere, or of all frames where
     /// these are too few.
-    fn empty_row(&self, y: usize, whole: &Rectangle, windows: &[Option<&Rectangle>]) -> Vec<u8> {
+    fn empty_row(&self, y: usize, whole: &Rectangle) -> Vec<u8> {
         let mut values = Vec::with_capacity(self.frames.len());
         let mut median = |x: usize| {
-            let is_free = |window: &Option<&Rectangle>| {
-                window.is_none_or(|w| !((w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y)))
-            };
+            let is_in = |w: &Rectangle| (w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y);
             values.clear();
-            let of = self.frames.iter().zip(windows);
-            values.extend(of.filter(|(_, w)| is_free(w)).map(|((_, image), _)| image.row(y)[x]));
+            let free = self.frames.iter().filter(|kept| !kept.people.iter().any(is_in));
+            values.extend(free.map(|kept| kept.image.row(y)[x]));
             if values.len() < LEAST_EMPTY {
                 values.clear();
-                values.extend(self.frames.iter().map(|(_, image)| image.row(y)[x]));
+                values.extend(self.frames.iter().map(|kept| kept.image.row(y)[x]));
             }
             let middle = values.len() / 2;
             if values.is_empty() { 0 } else { *values.select_nth_unstable(middle).1 }
@@ -141,8 +157,12 @@ mod tests {
     fn behind_the_person_is_the_empty_scene() {
         for frames in [8, 50] {
             let mut backdrop = Backdrop::default();
-            (0..frames).for_each(|k| backdrop.push(k, &frame(k)));
-            let pieces: Vec<Piece> = (0..frames).map(|k| Piece::new(k, &frame(k), window(k))).collect();
+            for k in 0..frames {
+                backdrop.push(k, &frame(k));
+                backdrop.occupy(k, window(k));
+            }
+            let pieces: Vec<Piece> =
+                (0..frames).map(|k| Piece::new(k, &frame(k), window(k), Vec::new())).collect();
             let views = backdrop.views(pieces.iter());
             assert_eq!(views.len(), frames);
             let mut wrong = 0;
@@ -163,7 +183,7 @@ mod tests {
     fn frames_of_a_long_stream_are_thinned_evenly() {
         let mut backdrop = Backdrop::default();
         (0..1000).for_each(|k| backdrop.push(k, &Image::filled(2, 2, 0)));
-        let kept: Vec<usize> = backdrop.frames.iter().map(|f| f.0).collect();
+        let kept: Vec<usize> = backdrop.frames.iter().map(|f| f.frame).collect();
         assert!((MOST_FRAMES / 2..=MOST_FRAMES).contains(&kept.len()), "{}", kept.len());
         assert!(kept.windows(2).all(|w| w[1] - w[0] == backdrop.every), "{kept:?}");
         assert!(*kept.last().unwrap() + backdrop.every >= 1000 && kept[0] == 0);
@@ -171,7 +191,8 @@ mod tests {
 
     #[test]
     fn pieces_stay_within_the_image() {
-        let piece = Piece::new(3, &frame(0), Rectangle { left: 0, top: 2, right: 199, bottom: 59 });
+        let piece =
+            Piece::new(3, &frame(0), Rectangle { left: 0, top: 2, right: 199, bottom: 59 }, Vec::new());
         assert_eq!((piece.kept.left, piece.kept.top, piece.kept.right, piece.kept.bottom), (0, 0, 199, 59));
         assert!(Backdrop::default().views([].iter()).is_empty());
     }

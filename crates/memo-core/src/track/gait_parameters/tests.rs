@@ -91,12 +91,22 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         let hypothesis = Hypothesis { along_m, height_m: 1.15, phase: phase.rem_euclid(1.0) };
         let window = Rectangle { left: 0, top: 0, right: 9, bottom: 9 };
         let look = Look { window, heights: Axis::around(1.15, 0.1, 0.02), best: hypothesis };
-        Step { frame, time_s, state, measured: Some(hypothesis), similarity: 0.5, look }
+        Step {
+            frame,
+            time_s,
+            state,
+            measured: Some(hypothesis),
+            similarity: 0.5,
+            visible: 1.0,
+            shared: false,
+            look,
+        }
     };
     let mut walk = Walk::new(walker(), path, beginning);
     walk.twins[0].steps = measured.iter().enumerate().map(step).collect();
     walk.twins[0].similarity_sum = 0.5 * measured.len() as f64;
     TrackedWalk {
+        person: 0,
         walk,
         camera: camera(),
         camera_is_guessed: false,

@@ -43,13 +43,23 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
             best: state.hypothesis(),
         };
         let similarity = if seen.is_some() { 0.5 } else { 0.0 };
-        Step { frame: 5 + 2 * frame, time_s: *time_s, state, measured, similarity, look }
+        Step {
+            frame: 5 + 2 * frame,
+            time_s: *time_s,
+            state,
+            measured,
+            similarity,
+            visible: 1.0,
+            shared: false,
+            look,
+        }
     };
     let steps: Vec<Step> = frames.iter().enumerate().map(step).collect();
     let mut walk = Walk::new(walker(), path, beginning);
     walk.twins[0].similarity_sum = 5.0;
     walk.twins[0].steps = steps;
     TrackedWalk {
+        person: 0,
         walk,
         camera: camera(),
         camera_is_guessed: false,

@@ -90,7 +90,7 @@ fn a_flat_top_stays_where_it_is_and_of_equals_the_first_is_best() {
     assert_eq!(axis.refined(2, |_| 0.4), 0.0);
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let empty = search(&[], &scene, &uneven_grid(), &SimilarityOptions::default(), HiddenLines::default());
     assert_eq!((empty.best_index, empty.best_score()), (0, 0.0));
 }
@@ -129,7 +129,7 @@ fn an_axis_reaches_its_half_width_to_the_nearest_step() {
 fn a_pose_leads_back_to_its_hypothesis() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::new(0.4, -0.7), heading_rad: 2.3 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     for phase in [0.0, 0.13, 0.4, 0.77] {
         let truth = Hypothesis { along_m: 0.6, height_m: 1.21, phase };
         let found = scene.hypothesis_at(scene.pose(&truth).torso_centre, phase);
@@ -144,7 +144,7 @@ fn a_pose_leads_back_to_its_hypothesis() {
 fn every_height_of_a_high_column_is_compared_as_its_searched_lines() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::new(0.1, 0.2), heading_rad: 0.2 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
     let edges = edges_of(&scene, &truth);
     let one = |centre: f64| Axis { centre, step: 0.02, count: 1 };
@@ -167,7 +167,7 @@ fn a_planted_walker_is_found_in_both_directions() {
     let height_m = walker.level_torso_height_m();
     for heading_rad in [0.0, std::f64::consts::PI] {
         let path = Path { origin: DVec2::ZERO, heading_rad };
-        let scene = Scene { walker: &walker, camera: &camera, path: &path };
+        let scene = Scene::new(&walker, &camera, &path);
         for (i, phase) in [0.13, 0.37, 0.62, 0.88].into_iter().enumerate() {
             let truth = Hypothesis { along_m: 0.3 * i as f64 - 0.5, height_m, phase };
             let edges = edges_of(&scene, &truth);
@@ -193,7 +193,7 @@ fn a_planted_walker_is_found_in_both_directions() {
 fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::new(0.2, 0.1), heading_rad: 0.3 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
     let edges = edges_of(&scene, &Hypothesis { phase: 0.45, ..truth });
     let grid = Grid::printed(&truth);
@@ -214,7 +214,7 @@ fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing()
 fn fast_scores_equal_the_plain_similarity() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
     let mut edges = edges_of(&scene, &truth);
     for (i, edge) in edges.iter_mut().enumerate() {
@@ -248,12 +248,10 @@ fn fast_scores_equal_the_plain_similarity() {
 fn every_instruction_set_gives_the_same_bits() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::ZERO, heading_rad: 0.4 };
-    let scene = Scene { walker: &walker, camera: &camera, path: &path };
+    let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.2, height_m: walker.level_torso_height_m(), phase: 0.3 };
     let (edges, options) = (edges_of(&scene, &truth), SimilarityOptions::default());
-    let mut visible = Vec::new();
-    let posed = scene.pose(&Hypothesis { phase: 0.35, ..truth });
-    visible_contours(&posed.cylinders, camera.position(), &LINES_ONLY, &mut visible);
+    let visible = scene.visible(&Hypothesis { phase: 0.35, ..truth }, &LINES_ONLY);
     let on = |arch: pulp::Arch| {
         arch.dispatch(Raised {
             scorer: &ColumnScorer::new(&edges, &options),

@@ -214,9 +214,16 @@ fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
             height_m: walker.level_torso_height_m(),
             phase: (0.2 + sign * rate_hz * elapsed_s).rem_euclid(1.0),
         };
-        let edges = edges_of(&Scene { walker: &walker, camera: &camera, path: &path }, &hypothesis);
+        let edges = edges_of(&Scene::new(&walker, &camera, &path), &hypothesis);
         let window = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
-        FrameEdges { frame: 10 + k, time_s: 7.0 + elapsed_s, window, edges }
+        FrameEdges {
+            frame: 10 + k,
+            time_s: 7.0 + elapsed_s,
+            window,
+            edges,
+            others: Vec::new(),
+            shared: false,
+        }
     };
     let frames = (0..5).map(frame).collect();
     (frames, course, camera)

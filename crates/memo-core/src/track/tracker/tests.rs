@@ -1,12 +1,10 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
-use super::super::locate::{Crown, locate};
-use super::super::score::EdgeLine;
-use super::super::search::tests::{camera, edges_of, walker};
-use super::super::search::{Axis, Path};
+use super::super::search::tests::{camera, walker};
+use super::super::search::{Axis, Hypothesis, Path};
 use super::super::start::Direction;
 use super::super::start::tests::report;
-use super::super::walk::{Beginning, Look, State, Step};
+use super::super::walk::{Beginning, Look, State, Step, Walk};
 use super::*;
 use crate::estimate::kalman::ConstantVelocity;
 use crate::image::flow::FlowOptions;
@@ -57,7 +55,7 @@ fn kept_after(frames: &[bool]) -> usize {
         let boxes: &[Rectangle] = if *is_there { &[person(100 + k)] } else { &[] };
         tracker.advance(&evidence(k, boxes)).unwrap();
     }
-    tracker.seen.len()
+    tracker.candidates.first().map_or(0, |candidate| candidate.seen.len())
 }
 
 #[test]
@@ -76,29 +74,11 @@ fn another_person_s_rectangle_begins_anew() {
         for (k, rectangle) in [person(100), second].into_iter().enumerate() {
             tracker.advance(&evidence(k, &[rectangle])).unwrap();
         }
-        tracker.seen.len()
+        tracker.candidates.iter().map(|c| c.seen.len()).max().unwrap_or(0)
     };
     assert_eq!(kept(person(179)), 2, "they overlap");
     assert_eq!(kept(person(300)), 1, "somewhere else");
     assert_eq!(kept(boxed(100, 399, 50, 100)), 1, "half as high");
-}
-
-#[test]
-fn rectangles_of_one_person_overlap_and_are_about_as_high() {
-    let first = boxed(100, 399, 80, 200);
-    for (second, is_same) in [
-        (boxed(100, 399, 80, 126), true),
-        (boxed(100, 399, 80, 124), false),
-        (boxed(100, 399, 80, 332), true),
-        (boxed(100, 399, 80, 336), false),
-        (boxed(150, 399, 20, 200), true),
-        (boxed(180, 399, 80, 200), true),
-        (boxed(181, 399, 80, 200), false),
-        (boxed(100, 199, 80, 190), true),
-        (boxed(100, 198, 80, 190), false),
-    ] {
-        assert_eq!(same_person(&first, &second), is_same, "{second:?}");
-    }
 }
 
 #[test]
@@ -110,17 +90,6 @@ fn sides_and_top_cut_a_person_off_and_the_bottom_does_not() {
     {
         assert!(touches_border(&cut, 640), "{cut:?}");
     }
-}
-
-#[test]
-fn feet_are_cut_off_where_most_rectangles_reach_the_last_rows() {
-    let seen = |bottoms: &[usize]| -> Vec<Sighting> {
-        let sighting = |b: &usize| Sighting { time_s: 0.0, rectangle: boxed(100, *b, 80, 200) };
-        bottoms.iter().map(sighting).collect()
-    };
-    assert!(feet_cut_off(&seen(&[478, 479, 400, 478]), 480));
-    assert!(!feet_cut_off(&seen(&[478, 479, 400, 400]), 480), "a half is not most");
-    assert!(!feet_cut_off(&seen(&[477, 477, 477]), 480));
 }
 
 #[test]
@@ -214,10 +183,14 @@ fn the_report_counts_frames_candidates_borders_and_refused_starts() {
     }
     let counts = tracker.seek_report();
     assert_eq!((counts.frames_with_candidate, counts.frames_cut_off, counts.refused_starts), (2, 1, 0));
-    tracker.seen.clear();
+    tracker.candidates.clear();
     (10..23).for_each(|k| tracker.advance(&evidence(k, &[person(400)])).unwrap());
     assert_eq!(tracker.seek_report().refused_starts, 1);
-    assert_eq!(tracker.seen.len(), 13 - 4, "the oldest third is dropped");
+    assert_eq!(
+        tracker.candidates.iter().map(|c| c.seen.len()).max().unwrap_or(0),
+        13 - 4,
+        "the oldest third is dropped"
+    );
     let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
     (0..3).for_each(|k| tracker.update(&frame.as_frame(), f64::from(k)).unwrap());
     assert_eq!(tracker.seek_report().frames, 3);
@@ -228,19 +201,18 @@ fn sightings_do_not_pile_up_while_nobody_starts() {
     let mut tracker = tracker();
     for k in 0..120 {
         tracker.advance(&evidence(k, &[person(400)])).unwrap();
-        assert!(tracker.seen.len() < options().start_frames);
+        assert!(tracker.candidates.iter().map(|c| c.seen.len()).max().unwrap_or(0) < options().start_frames);
     }
-    assert!(tracker.walking.is_none() && tracker.seek_report().refused_starts > 20);
+    assert!(tracker.people.is_empty() && tracker.seek_report().refused_starts > 20);
 }
 
 #[test]
-fn followed_is_who_overlaps_the_expected_place_and_sought_the_largest() {
+fn up_to_three_regions_are_sought_at_a_time_the_largest_first() {
     let mut tracker = tracker();
-    let (large, small) = (boxed(100, 449, 100, 300), person(450));
-    let evidence = evidence(0, &[large, small]);
-    assert_eq!(tracker.sighting(&evidence, None).unwrap().rectangle, large);
-    assert_eq!(tracker.sighting(&evidence, Some(&person(430))).unwrap().rectangle, small);
-    assert!(tracker.sighting(&evidence, Some(&boxed(300, 399, 80, 200))).is_none());
+    let boxes = [boxed(20, 449, 100, 300), person(150), boxed(260, 399, 80, 190), boxed(400, 399, 80, 180)];
+    tracker.advance(&evidence(0, &boxes)).unwrap();
+    let sought: Vec<Rectangle> = tracker.candidates.iter().map(|c| c.seen[0].sighting.rectangle).collect();
+    assert_eq!(sought, boxes[..3]);
 }
 
 const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
@@ -258,7 +230,7 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
     };
     let best = state.hypothesis();
     let look = Look { window: boxed(100, 399, 80, 200), heights: Axis::around(height_m, 0.1, 0.02), best };
-    Step { frame, time_s, state, measured: Some(best), similarity: 0.5, look }
+    Step { frame, time_s, state, measured: Some(best), similarity: 0.5, visible: 1.0, shared: false, look }
 }
 
 /// A tracker that has followed a person through `count` frames; the person is now at x metres.
@@ -269,7 +241,9 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     walk.twins[0].steps = steps.collect();
     walk.twins[1].steps = walk.twins[0].steps.clone();
     walk.twins[0].similarity_sum = 0.5 * count as f64;
-    tracker.walking = Some(Active {
+    walk.twins[0].visible_sum = count as f64;
+    tracker.people.push(Active {
+        person: 0,
         height: super::super::height::BodyHeight::given(1.75),
         camera: camera(),
         depth_sd_m: 0.1,
@@ -291,12 +265,13 @@ fn a_long_walk_is_handed_out_and_followed_on_as_a_new_one() {
         tracker.longest_walk = longest;
         tracker.advance(&evidence(29, &[person(280)])).unwrap();
         let walks = tracker.take_finished();
-        assert_eq!((walks.len(), tracker.walking.is_none()), (handed_out, handed_out == 1));
+        assert_eq!((walks.len(), tracker.people.is_empty()), (handed_out, handed_out == 1));
         assert!(tracker.take_finished().is_empty(), "handed out once");
         if handed_out == 1 {
             assert_eq!(walks[0].rows().len(), 30);
             (30..33).for_each(|k| tracker.advance(&evidence(k, &[person(280)])).unwrap());
-            assert_eq!(tracker.seen.len(), 3, "sought again");
+            let sought = tracker.candidates.iter().map(|c| c.seen.len()).max();
+            assert_eq!(sought, Some(4), "sought again from the same frame on");
         }
     }
     assert_eq!(tracker().longest_walk, LONGEST_WALK);
@@ -306,7 +281,7 @@ fn a_long_walk_is_handed_out_and_followed_on_as_a_new_one() {
 /// A tracker that has followed a person for 60 frames; in the last 15 the person stood still.
 fn following_to_a_stop() -> Tracker {
     let mut tracker = following(60, 0.0, 1.2);
-    for twin in &mut tracker.walking.as_mut().unwrap().walk.twins {
+    for twin in &mut tracker.people.first_mut().unwrap().walk.twins {
         let stop = twin.steps[44].state;
         twin.steps[45..].iter_mut().for_each(|step| step.state = stop);
     }
@@ -317,15 +292,18 @@ fn following_to_a_stop() -> Tracker {
 fn who_stands_still_is_let_go_once_the_path_is_known() {
     for turned in [true, false] {
         let mut tracker = following_to_a_stop();
-        tracker.walking.as_mut().unwrap().settled = turned;
+        tracker.people.first_mut().unwrap().settled = turned;
         tracker.advance(&evidence(60, &[])).unwrap();
-        assert_eq!(tracker.walking.is_none(), turned);
+        assert_eq!(tracker.people.is_empty(), turned);
+        (61..86).for_each(|k| tracker.advance(&evidence(k, &[])).unwrap());
+        assert!(tracker.take_finished().is_empty(), "somebody may start there");
+        tracker.advance(&evidence(86, &[])).unwrap();
         assert_eq!(tracker.take_finished().len(), usize::from(turned));
         assert_eq!(tracker.seek_report().refused_starts, 0);
     }
     let mut walks_on = following(40, 0.0, 1.2);
     walks_on.advance(&evidence(40, &[])).unwrap();
-    assert!(walks_on.walking.is_some());
+    assert!(!walks_on.people.is_empty());
 }
 
 #[test]
@@ -342,10 +320,10 @@ fn who_never_got_on_is_refused_at_the_end() {
 fn frames_are_kept_until_there_are_enough_for_the_path() {
     let mut tracker = following(20, -0.5, 1.2);
     tracker.options.path_frames = 3;
-    tracker.walking.as_mut().unwrap().settled = false;
+    tracker.people.first_mut().unwrap().settled = false;
     for (k, (kept, turned)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
         tracker.advance(&evidence(20 + k, &[])).unwrap();
-        let active = tracker.walking.as_ref().unwrap();
+        let active = tracker.people.first().unwrap();
         assert_eq!((active.kept.len(), active.settled), (kept, turned), "frame {k}");
     }
 }
@@ -353,7 +331,7 @@ fn frames_are_kept_until_there_are_enough_for_the_path() {
 /// The share of the body's box outside the image, horizontally and vertically, at x metres with the torso at z.
 fn outside(along_m: f64, height_m: f64) -> [f64; 2] {
     let (walker, camera) = (walker(), camera());
-    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
+    let scene = Scene::new(&walker, &camera, &PATH);
     let posed = scene.pose(&Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * 0.04 });
     let ends = posed.cylinders.iter().flat_map(|c| {
         [-1.0, 1.0].map(|s| c.centre() + s * c.half_length * c.world_from_cylinder.matrix3.z_axis)
@@ -373,9 +351,9 @@ fn a_walk_ends_where_four_tenths_of_the_body_are_outside() {
     let height_m = walker().level_torso_height_m();
     let follows = |along_m: f64, height_m: f64| {
         let mut tracker = following(1, along_m, 0.0);
-        let active = tracker.walking.as_mut().unwrap();
+        let active = tracker.people.first_mut().unwrap();
         active.walk.twins[0].steps[0].state.height.position = height_m;
-        tracker.predicted_window(&evidence(1, &[])).is_some()
+        tracker.predicted(&tracker.people[0], &evidence(1, &[])).is_some()
     };
     // Horizontally at both sides, and at the top.
     let right = (0..400).map(|k| 0.01 * f64::from(k)).map(|x| ((x, height_m), outside(x, height_m)[0]));
@@ -395,19 +373,19 @@ fn a_walk_ends_where_four_tenths_of_the_body_are_outside() {
 fn who_left_is_handed_out_and_the_same_frame_is_searched_for_the_next() {
     let mut tracker = following(20, 4.0, 1.2);
     tracker.advance(&evidence(20, &[person(100)])).unwrap();
-    assert_eq!((tracker.take_finished().len(), tracker.seen.len()), (1, 1));
+    assert_eq!((tracker.take_finished().len(), tracker.candidates[0].seen.len()), (1, 1));
 }
 
 #[test]
 fn the_window_is_the_body_s_box_with_a_margin_that_grows_with_the_uncertainty() {
     let (walker, camera) = (walker(), camera());
-    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
+    let scene = Scene::new(&walker, &camera, &PATH);
     let window = |position_variance: f64| {
         let mut tracker = following(1, 0.0, 0.0);
-        let state = &mut tracker.walking.as_mut().unwrap().walk.twins[0].steps[0].state;
+        let state = &mut tracker.people.first_mut().unwrap().walk.twins[0].steps[0].state;
         state.along.covariance = [position_variance, 0.0, 0.0];
         state.height.covariance = [position_variance, 0.0, 0.0];
-        tracker.predicted_window(&evidence(0, &[])).unwrap()
+        tracker.predicted(&tracker.people[0], &evidence(0, &[])).unwrap().window
     };
     let posed = scene.pose(&step(0, 0.0, 0.0).state.hypothesis());
     let joints = posed.right.to_array().into_iter().chain(posed.left.to_array());
@@ -432,7 +410,7 @@ fn the_window_is_the_body_s_box_with_a_margin_that_grows_with_the_uncertainty() 
 #[test]
 fn what_is_handed_out_is_trimmed_and_knows_its_camera() {
     let mut tracker = following(30, 0.0, 1.2);
-    let steps = &mut tracker.walking.as_mut().unwrap().walk.twins[0].steps;
+    let steps = &mut tracker.people.first_mut().unwrap().walk.twins[0].steps;
     steps[..2].iter_mut().for_each(|step| step.similarity = 0.0);
     tracker.finish().unwrap();
     let walk = tracker.take_finished().remove(0);
@@ -463,76 +441,55 @@ fn the_current_estimate_is_the_last_step_of_the_better_twin() {
     assert!(now.p_swapped < 0.01);
 }
 
-/// Five sightings of a person at this speed, with the contours of a walker; `drop_px` moves the rectangles down.
-fn seen_walking(speed_mps: f64, drop_px: f64) -> Vec<(Sighting, FrameEdges)> {
-    let (walker, camera) = (walker(), camera());
-    let scene = Scene { walker: &walker, camera: &camera, path: &PATH };
-    let crown_m = walker.level_crown_height_m();
-    let frame = |k: usize| {
-        let time_s = 0.1 * k as f64;
-        let along_m = -0.4 + speed_mps * time_s;
-        let height_m = walker.level_torso_height_m();
-        let hypothesis = Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s };
-        let [sole, crown] = [0.0, crown_m].map(|z| camera.project(PATH.point(along_m, z)).unwrap());
-        let rectangle = Rectangle {
-            left: (sole.x - 40.0).round() as usize,
-            right: (sole.x + 40.0).round() as usize,
-            top: (crown.y - 2.0 + drop_px).round() as usize,
-            bottom: (sole.y + drop_px).round() as usize,
-        };
-        let edges = edges_of(&scene, &hypothesis);
-        (Sighting { time_s, rectangle }, FrameEdges { frame: k, time_s, window: rectangle, edges })
-    };
-    (0..5).map(frame).collect()
-}
-
-fn begun(seen: Vec<(Sighting, FrameEdges)>) -> Option<Active> {
-    let mut tracker = tracker();
-    (tracker.options.start_frames, tracker.seen) = (5, seen);
-    tracker.begin([640, 480])
+/// Two people of 1.75 m who walk at this distance behind each other across the image.
+fn following_two(gap_m: f64) -> Tracker {
+    let mut tracker = following(40, 0.0, 1.2);
+    let behind = Path { origin: DVec2::new(0.0, gap_m), ..PATH };
+    let mut second = following(40, 0.0, 1.2).people.remove(0);
+    second.walk.path = behind;
+    second.person = 1;
+    tracker.people.push(second);
+    tracker
 }
 
 #[test]
-fn a_walker_is_started_with_both_twins_through_the_start_frames() {
-    let seen = seen_walking(1.3, 0.0);
-    let active = begun(seen.clone()).expect("a walker");
-    assert!((active.start.beginning.speed_mps - 1.3).abs() < 0.1 && active.start.contrast() > 1.22);
-    assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
-    assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].0) && !active.settled);
-    let sightings: Vec<Sighting> = seen.iter().map(|(s, _)| *s).collect();
-    let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
-    let course = locate(&sightings, &camera(), &crown).unwrap();
-    assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+fn who_stands_in_front_hides_who_is_behind() {
+    let mut tracker = following_two(0.8);
+    tracker.people.swap(0, 1);
+    tracker.advance(&evidence(40, &[])).unwrap();
+    let visible: Vec<f32> = tracker.people.iter().map(|active| active.walk.last().unwrap().visible).collect();
+    assert_eq!((tracker.people[0].person, visible[0]), (0, 1.0), "near to far");
+    assert!((0.02..0.4).contains(&visible[1]), "{visible:?}");
 }
 
 #[test]
-fn nobody_walks_slower_than_a_quarter_metre_a_second_or_faster_than_three() {
-    for (speed_mps, walks) in [(0.2, false), (0.3, true), (2.9, true), (3.2, false)] {
-        assert_eq!(begun(seen_walking(speed_mps, 0.0)).is_some(), walks, "{speed_mps} m/s");
-    }
+fn everybody_is_told_in_order_of_appearance() {
+    let mut tracker = following_two(0.8);
+    tracker.people.swap(0, 1);
+    let people: Vec<usize> = tracker.people().iter().map(|now| now.person).collect();
+    assert_eq!(people, [0, 1]);
+    assert_eq!(tracker.current().unwrap().person, 0);
 }
 
 #[test]
-fn what_has_no_legs_or_feet_is_not_started() {
-    // Two upright lines that slide along fit all phases equally.
-    let mut slides = seen_walking(1.3, 0.0);
-    for (sighting, frame) in &mut slides {
-        let r = sighting.rectangle;
-        let upright = |x: usize| EdgeLine {
-            start: [x as f32, r.top as f32],
-            end: [x as f32, r.bottom as f32],
-            gradient: 20.0,
-            velocity: 0.0,
-        };
-        frame.edges = vec![upright(r.left + 20), upright(r.right - 20)];
-    }
-    assert!(begun(slides).is_none());
-    let mut cut_off = seen_walking(1.3, 0.0);
-    cut_off[..3].iter_mut().for_each(|(sighting, _)| sighting.rectangle.bottom = 479);
-    let reflected = {
-        let mut seen = seen_walking(1.3, 0.0);
-        seen[..2].iter_mut().for_each(|(sighting, _)| sighting.rectangle.bottom = 479);
-        seen
-    };
-    assert!(begun(cut_off).is_none() && begun(reflected).is_some(), "most feet below the picture, or few");
+fn nobody_is_started_on_the_changes_of_somebody_who_is_followed() {
+    let mut tracker = following(40, 0.0, 1.2);
+    let expected = tracker.predicted(&tracker.people[0], &evidence(40, &[])).unwrap();
+    let [low, high] = body_box(&camera(), &expected.body).unwrap();
+    let middle = (0.5 * (low.x + high.x)) as usize;
+    let hips = (0.5 * (low.y + high.y)) as usize;
+    let body = Rectangle { left: middle - 15, top: low.y as usize, right: middle + 15, bottom: hips };
+    tracker.advance(&evidence(40, &[body])).unwrap();
+    assert!(tracker.candidates.is_empty(), "{:?}", tracker.candidates);
+    tracker.advance(&evidence(41, &[body, person(20)])).unwrap();
+    let sought: Vec<Rectangle> = tracker.candidates.iter().map(|c| c.seen[0].sighting.rectangle).collect();
+    assert_eq!(sought, [person(20)]);
+}
+
+#[test]
+fn heights_are_those_of_people_in_order_of_appearance() {
+    let mut options = TrackerOptions::for_height(1.8);
+    assert_eq!([0, 1, 2].map(|person| options.height_of(person)), [Some(1.8); 3]);
+    options.further_heights_m = vec![1.6];
+    assert_eq!([0, 1, 2].map(|person| options.height_of(person)), [Some(1.8), Some(1.6), None]);
 }

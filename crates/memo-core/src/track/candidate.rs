@@ -1,0 +1,312 @@
+//! A moving region that may be a person: its frames, and the start of a walk on them (Rohr 1994, section 6).
+
+use super::active::{Active, SLOWEST_MPS};
+use super::fit::views::Piece;
+use super::height::{BodyHeight, GIVEN_SD_M, start_height};
+use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
+use super::options::TrackerOptions;
+use super::start::{StartReport, start};
+use super::walk::{FrameEdges, Walk};
+use crate::image::Rectangle;
+use crate::model::{Camera, GaitStyle, Walker};
+
+/// A candidate is dropped after this many consecutive frames without it.
+pub(super) const MISSED_FRAMES: usize = 3;
+/// Speed of a comfortable walk, used before the speed is known, m/s.
+const COMFORTABLE_MPS: f64 = 1.3;
+/// Nobody walks faster than this, m/s.
+const FASTEST_MPS: f64 = 3.0;
+/// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
+/// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
+const LEAST_CONTRAST: f64 = 1.22;
+/// Gaits other than the average with which a walk can start.
+const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle::CROUCHED];
+/// Another gait starts if it is more similar than the average one by this factor.
+const OTHER_GAIN: f64 = 1.05;
+
+/// One frame of a candidate.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    pub sighting: Sighting,
+    pub edges: FrameEdges,
+    /// Its picture, kept only for a fit.
+    pub piece: Option<Piece>,
+}
+
+/// The frames of one candidate.
+#[derive(Debug, Default)]
+pub(super) struct Candidate {
+    pub seen: Vec<Seen>,
+    /// Frames without it since the last one.
+    pub missed: usize,
+}
+
+/// What a walk starts from.
+pub(super) struct Given<'a> {
+    pub options: &'a TrackerOptions,
+    /// The given camera, or the one assumed for the people who are followed already.
+    pub camera: Option<&'a Camera>,
+    /// The given height.
+    pub height_m: Option<f64>,
+    /// Width and height of the frames.
+    pub size: [u32; 2],
+}
+
+impl Candidate {
+    /// True if a rectangle may enclose the same thing as the last one.
+    pub fn is_at(&self, rectangle: &Rectangle) -> bool {
+        self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
+    }
+
+    /// True if it was last seen in a part of the image.
+    pub fn is_in(&self, window: &Rectangle) -> bool {
+        self.seen.last().is_some_and(|last| last.sighting.rectangle.gap(window) == [0, 0])
+    }
+
+    pub fn add(&mut self, seen: Seen) {
+        self.seen.push(seen);
+        self.missed = 0;
+    }
+
+    /// Drops the oldest frames after a refused start.
+    pub fn refuse(&mut self, options: &TrackerOptions) {
+        self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
+    }
+
+    /// Starts a walk; `None` for things that do not move like a walker.
+    ///
+    /// 1. Camera and course from the rectangles.
+    /// 2. Lines of phase over the whole cycle, of several gaits; the most similar gait starts.
+    /// 3. Both twins followed through the start frames.
+    pub fn begin(&self, given: &Given<'_>) -> Option<Active> {
+        let options = given.options;
+        let sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
+        if feet_cut_off(&sightings, given.size[1] as usize) {
+            return None;
+        }
+        let height = start_height(options, given.height_m, given.camera, &sightings);
+        let average = self.started(&sightings, given, &height, &GaitStyle::default())?;
+        let similarity = |started: &Started| started.start.lines.best.similarity;
+        let others = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
+        let Started { camera, course, walker, start } = others
+            .iter()
+            .filter_map(|style| self.started(&sightings, given, &height, style))
+            .filter(|other| similarity(other) > OTHER_GAIN * similarity(&average))
+            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
+            .unwrap_or(average);
+        // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
+        if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
+            return None;
+        }
+        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
+        for seen in &self.seen {
+            walk.follow(&seen.edges, &camera, &options.walk);
+        }
+        Some(Active {
+            person: 0,
+            camera,
+            height,
+            depth_sd_m: course.depth_sd_m,
+            start,
+            walk,
+            average: Walker { style: GaitStyle::default(), ..walker },
+            kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
+            gait_speed_mps: course.speed_mps,
+            settled: false,
+            pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
+        })
+    }
+
+    /// The course and the lines of phase of one gait; `None` for things that do not move like a walker.
+    fn started(
+        &self,
+        sightings: &[Sighting],
+        given: &Given<'_>,
+        height: &BodyHeight,
+        style: &GaitStyle,
+    ) -> Option<Started> {
+        let options = given.options;
+        let styled = |speed_mps: f64| {
+            Some(Walker { style: *style, ..options.walker(height.height_m, speed_mps).ok()? })
+        };
+        let crown_m = styled(COMFORTABLE_MPS)?.level_crown_height_m();
+        let (camera, course) = course(sightings, given, crown_m, height).ok()?;
+        if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
+            return None;
+        }
+        let walker = styled(course.speed_mps)?;
+        let edges: Vec<&FrameEdges> = self.seen.iter().map(|seen| &seen.edges).collect();
+        let start = start(&edges, &course, &walker, &camera, &options.cadence, &options.walk)?;
+        Some(Started { camera, course, walker, start })
+    }
+}
+
+/// A start with one gait.
+struct Started {
+    camera: Camera,
+    course: Course,
+    walker: Walker,
+    start: StartReport,
+}
+
+fn course(
+    sightings: &[Sighting],
+    given: &Given<'_>,
+    crown_m: f64,
+    height: &BodyHeight,
+) -> Result<(Camera, Course), LocateError> {
+    let Some(camera) = given.camera else {
+        // The assumed camera has the scale of the height, so in it the height is known. Its error moves the walk
+        // nearer or farther with all its lengths.
+        let field_of_view_rad = given.options.field_of_view_rad;
+        let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m)?;
+        let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
+        let course = locate(sightings, &camera, &crown)?;
+        let distance_m = course.path.distance(camera.position().truncate());
+        let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
+        return Ok((camera, Course { depth_sd_m, ..course }));
+    };
+    let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_m })?;
+    Ok((camera.clone(), course))
+}
+
+/// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
+fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
+    2 * sightings.iter().filter(|s| s.rectangle.bottom + 2 >= height).count() > sightings.len()
+}
+
+/// True if two rectangles of neighbouring frames can enclose the same person.
+fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
+    let ratio = a.height() as f64 / b.height() as f64;
+    a.gap(b) == [0, 0] && (0.6..1.6).contains(&ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::EdgeLine;
+    use super::super::search::tests::{camera, edges_of, walker};
+    use super::super::search::{Hypothesis, Path, Scene};
+    use super::*;
+    use glam::DVec2;
+
+    const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+
+    /// An upright box with its lower left corner at this position.
+    fn boxed(left: usize, bottom: usize, width: usize, height: usize) -> Rectangle {
+        Rectangle { left, top: bottom + 1 - height, right: left + width - 1, bottom }
+    }
+
+    #[test]
+    fn rectangles_of_one_person_overlap_and_are_about_as_high() {
+        let first = boxed(100, 399, 80, 200);
+        for (second, is_same) in [
+            (boxed(100, 399, 80, 126), true),
+            (boxed(100, 399, 80, 124), false),
+            (boxed(100, 399, 80, 332), true),
+            (boxed(100, 399, 80, 336), false),
+            (boxed(150, 399, 20, 200), true),
+            (boxed(180, 399, 80, 200), true),
+            (boxed(181, 399, 80, 200), false),
+            (boxed(100, 199, 80, 190), true),
+            (boxed(100, 198, 80, 190), false),
+        ] {
+            assert_eq!(same_person(&first, &second), is_same, "{second:?}");
+        }
+    }
+
+    #[test]
+    fn feet_are_cut_off_where_most_rectangles_reach_the_last_rows() {
+        let seen = |bottoms: &[usize]| -> Vec<Sighting> {
+            let sighting = |b: &usize| Sighting { time_s: 0.0, rectangle: boxed(100, *b, 80, 200) };
+            bottoms.iter().map(sighting).collect()
+        };
+        assert!(feet_cut_off(&seen(&[478, 479, 400, 478]), 480));
+        assert!(!feet_cut_off(&seen(&[478, 479, 400, 400]), 480), "a half is not most");
+        assert!(!feet_cut_off(&seen(&[477, 477, 477]), 480));
+    }
+
+    /// Five sightings of a person at this speed, with the contours of a walker.
+    fn seen_walking(speed_mps: f64) -> Vec<Seen> {
+        let (walker, camera) = (walker(), camera());
+        let scene = Scene::new(&walker, &camera, &PATH);
+        let crown_m = walker.level_crown_height_m();
+        let frame = |k: usize| {
+            let time_s = 0.1 * k as f64;
+            let along_m = -0.4 + speed_mps * time_s;
+            let height_m = walker.level_torso_height_m();
+            let hypothesis = Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s };
+            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(PATH.point(along_m, z)).unwrap());
+            let rectangle = Rectangle {
+                left: (sole.x - 40.0).round() as usize,
+                right: (sole.x + 40.0).round() as usize,
+                top: (crown.y - 2.0).round() as usize,
+                bottom: (sole.y).round() as usize,
+            };
+            let edges = edges_of(&scene, &hypothesis);
+            let edges =
+                FrameEdges { frame: k, time_s, window: rectangle, edges, others: Vec::new(), shared: false };
+            Seen { sighting: Sighting { time_s, rectangle }, edges, piece: None }
+        };
+        (0..5).map(frame).collect()
+    }
+
+    fn begun(seen: Vec<Seen>) -> Option<Active> {
+        let options = TrackerOptions {
+            camera: Some(camera()),
+            fit: None,
+            start_frames: 5,
+            ..TrackerOptions::for_height(1.75)
+        };
+        let camera = options.camera.as_ref();
+        let given = Given { options: &options, camera, height_m: Some(1.75), size: [640, 480] };
+        Candidate { seen, missed: 0 }.begin(&given)
+    }
+
+    #[test]
+    fn a_walker_is_started_with_both_twins_through_the_start_frames() {
+        let seen = seen_walking(1.3);
+        let active = begun(seen.clone()).expect("a walker");
+        assert!((active.start.beginning.speed_mps - 1.3).abs() < 0.1 && active.start.contrast() > 1.22);
+        assert_eq!((active.walk.twins[0].steps.len(), active.walk.twins[1].steps.len()), (5, 5));
+        assert!(active.kept.len() == 5 && active.kept[4].0 == Some(seen[4].sighting) && !active.settled);
+        let sightings: Vec<Sighting> = seen.iter().map(|seen| seen.sighting).collect();
+        let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
+        let course = locate(&sightings, &camera(), &crown).unwrap();
+        assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+    }
+
+    #[test]
+    fn nobody_walks_slower_than_a_quarter_metre_a_second_or_faster_than_three() {
+        for (speed_mps, walks) in [(0.2, false), (0.3, true), (2.9, true), (3.2, false)] {
+            assert_eq!(begun(seen_walking(speed_mps)).is_some(), walks, "{speed_mps} m/s");
+        }
+    }
+
+    #[test]
+    fn what_has_no_legs_or_feet_is_not_started() {
+        // Two upright lines that slide along fit all phases equally.
+        let mut slides = seen_walking(1.3);
+        for seen in &mut slides {
+            let r = seen.sighting.rectangle;
+            let upright = |x: usize| EdgeLine {
+                start: [x as f32, r.top as f32],
+                end: [x as f32, r.bottom as f32],
+                gradient: 20.0,
+                velocity: 0.0,
+            };
+            seen.edges.edges = vec![upright(r.left + 20), upright(r.right - 20)];
+        }
+        assert!(begun(slides).is_none());
+        let mut cut_off = seen_walking(1.3);
+        cut_off[..3].iter_mut().for_each(|seen| seen.sighting.rectangle.bottom = 479);
+        let reflected = {
+            let mut seen = seen_walking(1.3);
+            seen[..2].iter_mut().for_each(|seen| seen.sighting.rectangle.bottom = 479);
+            seen
+        };
+        assert!(
+            begun(cut_off).is_none() && begun(reflected).is_some(),
+            "most feet below the picture, or few"
+        );
+    }
+}

@@ -1,0 +1,243 @@
+//! Several people in one frame: where each is expected, whose edges are whose, and what nobody explains.
+//!
+//! People are followed side by side, each with filters and searches of their own. Three things keep them apart:
+//!
+//! * Nearer bodies hide farther ones in the hidden-line removal ([`Others`](crate::model::Others)).
+//! * An edge belongs to one person. A wholly visible person would otherwise drift onto the edges of somebody behind.
+//! * Changes that the bodies explain start nobody.
+
+use super::score::{EdgeLine, ModelLine};
+use super::search::Scene;
+use super::walk::State;
+use crate::image::{Mask, Rectangle};
+use crate::model::body::PART_COUNT;
+use crate::model::{Camera, EllipticCylinder};
+use glam::{DVec2, Vec2};
+
+/// An edge within this distance of another person's contours, and nearer to them by this much, belongs to that
+/// person; shares of that person's height in the image. Of a person of 200 pixels 8 and 3 pixels.
+const OWNED: f32 = 0.04;
+const NEARER: f32 = 0.015;
+/// What an angle of 90 degrees between edge and contour counts, share of the height.
+const TURNED: f32 = 0.075;
+/// Where somebody unknown is near, edges belong to a person only within this share of the height.
+const CONTESTED: f32 = 0.06;
+/// Changes within this share of the height of a body are explained by it.
+const EXPLAINED: f64 = 0.05;
+
+/// One person as expected in a frame.
+#[derive(Debug, Clone)]
+pub(super) struct Expected {
+    /// Where the body is searched.
+    pub window: Rectangle,
+    /// Height in the image, pixels.
+    pub height_px: f64,
+    /// Distance from the camera, metres.
+    pub distance_m: f64,
+    /// Visible contours of both twins, ideal pixels.
+    pub lines: Vec<ModelLine>,
+    /// The body of the better twin.
+    pub body: [EllipticCylinder; PART_COUNT],
+}
+
+impl Expected {
+    /// True if the windows of both touch.
+    pub fn meets(&self, other: &Self) -> bool {
+        self.window.gap(&other.window) == [0, 0]
+    }
+
+    /// How far an edge is from the contours, as a share of the person's height.
+    fn cost(&self, edge: &EdgeLine) -> f32 {
+        let scale = self.height_px as f32;
+        self.lines
+            .iter()
+            .map(|line| distance(line, edge) / scale + TURNED * turn(line, edge))
+            .fold(f32::INFINITY, f32::min)
+    }
+}
+
+/// Contours, window and body of a person at a predicted state. The edges of both twins are the person's own.
+pub(super) fn expected(scene: &Scene<'_>, twins: [&State; 2], window: Rectangle, height_px: f64) -> Expected {
+    let body = scene.pose(&twins[0].hypothesis());
+    let lines = twins.iter().flat_map(|state| scene.lines(&state.hypothesis())).collect();
+    let distance_m = body.torso_centre.distance(scene.camera.position());
+    Expected { window, height_px, distance_m, lines, body: body.cylinders }
+}
+
+/// Removes the edges that belong to another person.
+pub(super) fn keep_own(edges: &mut Vec<EdgeLine>, own: &Expected, others: &[&Expected]) {
+    if others.is_empty() {
+        return;
+    }
+    edges.retain(|edge| {
+        let cost = own.cost(edge);
+        !others.iter().any(|other| {
+            let of_other = other.cost(edge);
+            of_other < OWNED && of_other + NEARER <= cost
+        })
+    });
+}
+
+/// Removes the edges that are far from the contours of the person, because somebody unknown is near.
+pub(super) fn keep_near(edges: &mut Vec<EdgeLine>, own: &Expected) {
+    edges.retain(|edge| own.cost(edge) < CONTESTED);
+}
+
+/// Removes the edges of people who are followed.
+pub(super) fn keep_unowned(edges: &mut Vec<EdgeLine>, others: &[&Expected]) {
+    edges.retain(|edge| !others.iter().any(|other| other.cost(edge) < OWNED));
+}
+
+/// Mean distance of the two ends and the middle of an edge from a contour, pixels.
+fn distance(line: &ModelLine, edge: &EdgeLine) -> f32 {
+    let [start, end] = [line.start, line.end].map(Vec2::from);
+    let along = end - start;
+    let off = |point: Vec2| {
+        let share = (point - start).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+        point.distance(start + along * share.clamp(0.0, 1.0))
+    };
+    let [a, b] = [edge.start, edge.end].map(Vec2::from);
+    (off(a) + off(b) + off(0.5 * (a + b))) / 3.0
+}
+
+/// Sine of the angle between an edge and a contour, without direction.
+fn turn(line: &ModelLine, edge: &EdgeLine) -> f32 {
+    let direction = |a: [f32; 2], b: [f32; 2]| (Vec2::from(b) - Vec2::from(a)).normalize_or_zero();
+    direction(line.start, line.end).perp_dot(direction(edge.start, edge.end)).abs()
+}
+
+/// Clears the changes that a body explains: within a margin of its parts.
+pub(super) fn clear_explained(mask: &mut Mask, camera: &Camera, body: &[EllipticCylinder], height_px: f64) {
+    let margin_px = EXPLAINED * height_px;
+    for part in body {
+        let axis = part.world_from_cylinder.matrix3.z_axis * part.half_length;
+        let [Some(a), Some(b)] = [part.centre() - axis, part.centre() + axis].map(|p| camera.project(p))
+        else {
+            continue;
+        };
+        let depth_m = camera.camera_from_world(part.centre()).z;
+        let radius_px = part.semi_axes.max_element() * camera.focal_px.y / depth_m + margin_px;
+        clear_capsule(mask, [a, b], radius_px);
+    }
+}
+
+/// Clears all pixels within a radius of a segment.
+fn clear_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64) {
+    let (low, high) = (a.min(b) - radius_px, a.max(b) + radius_px);
+    let size = DVec2::new(mask.width() as f64, mask.height() as f64);
+    if high.min_element() < 0.0 || low.x >= size.x || low.y >= size.y {
+        return;
+    }
+    let (low, high) = (low.max(DVec2::ZERO).as_u64vec2(), high.min(size - 1.0).as_u64vec2());
+    let along = b - a;
+    for y in low.y..=high.y {
+        for x in low.x..=high.x {
+            let point = DVec2::new(x as f64, y as f64);
+            let share =
+                ((point - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            if point.distance_squared(a + along * share) <= radius_px * radius_px {
+                mask.set(x as usize, y as usize, false);
+            }
+        }
+    }
+}
+
+/// Bounding box of a body in the image, pixels.
+pub(super) fn body_box(camera: &Camera, body: &[EllipticCylinder]) -> Option<[DVec2; 2]> {
+    let mut bounds = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    for cylinder in body {
+        let end = cylinder.world_from_cylinder.matrix3.z_axis * cylinder.half_length;
+        for point in [cylinder.centre() + end, cylinder.centre() - end] {
+            let pixel = camera.project(point)?;
+            bounds = [bounds[0].min(pixel), bounds[1].max(pixel)];
+        }
+    }
+    Some(bounds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::tests::{camera, walker};
+    use super::super::search::{Hypothesis, Path};
+    use super::*;
+    use crate::image::Image;
+
+    fn edge(start: [f32; 2], end: [f32; 2]) -> EdgeLine {
+        EdgeLine { start, end, gradient: 20.0, velocity: 0.0 }
+    }
+
+    /// Somebody of 200 pixels with one upright contour.
+    fn person(x: f32) -> Expected {
+        let body = posed();
+        Expected {
+            window: Rectangle { left: 0, top: 0, right: 639, bottom: 479 },
+            height_px: 200.0,
+            distance_m: 5.0,
+            lines: vec![ModelLine { part: 1, start: [x, 100.0], end: [x, 200.0] }],
+            body,
+        }
+    }
+
+    fn posed() -> [EllipticCylinder; PART_COUNT] {
+        let (walker, camera) = (walker(), camera());
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+        let height_m = walker.level_torso_height_m();
+        let hypothesis = Hypothesis { along_m: 0.0, height_m, phase: 0.2 };
+        Scene::new(&walker, &camera, &path).pose(&hypothesis).cylinders
+    }
+
+    #[test]
+    fn an_edge_belongs_to_whom_it_is_nearest_or_to_both() {
+        let upright = |x: f32| edge([x, 110.0], [x, 190.0]);
+        // Edges between two people whose contours are 20 pixels apart: 8 pixels and 3 pixels nearer make an owner.
+        for (x, first, second) in [
+            (300.0, true, false),
+            (307.0, true, false),
+            (309.0, true, true),
+            (311.0, true, true),
+            (313.0, false, true),
+            (320.0, false, true),
+        ] {
+            let kept = |own: f32, other: f32| {
+                let mut edges = vec![upright(x)];
+                keep_own(&mut edges, &person(own), &[&person(other)]);
+                !edges.is_empty()
+            };
+            assert_eq!((kept(300.0, 320.0), kept(320.0, 300.0)), (first, second), "{x}");
+        }
+        let mut alone = vec![upright(500.0)];
+        keep_own(&mut alone, &person(300.0), &[]);
+        assert_eq!(alone.len(), 1, "without others every edge stays");
+    }
+
+    #[test]
+    fn a_turned_or_distant_edge_is_nobody_s() {
+        let across = edge([296.0, 150.0], [304.0, 150.0]);
+        let mut edges =
+            vec![across, edge([310.0, 110.0], [310.0, 190.0]), edge([302.0, 110.0], [302.0, 190.0])];
+        keep_unowned(&mut edges, &[&person(300.0)]);
+        assert_eq!(edges.len(), 2, "90 degrees count 15 pixels, and 10 pixels are more than 8");
+        let mut near = vec![edge([311.0, 110.0], [311.0, 190.0]), edge([313.0, 110.0], [313.0, 190.0])];
+        keep_near(&mut near, &person(300.0));
+        assert_eq!(near.len(), 1, "12 pixels");
+    }
+
+    #[test]
+    fn a_body_explains_the_changes_on_and_about_it() {
+        let (body, camera) = (posed(), camera());
+        let mut mask = Image::filled(640, 480, true);
+        clear_explained(&mut mask, &camera, &body, 200.0);
+        for part in &body {
+            let pixel = camera.project(part.centre()).unwrap();
+            assert!(!mask.at(pixel.x as usize, pixel.y as usize));
+        }
+        let [low, high] = body_box(&camera, &body).unwrap();
+        let far = |x: usize, y: usize| {
+            let point = DVec2::new(x as f64, y as f64);
+            (point - point.clamp(low, high)).length() > 40.0
+        };
+        for (x, y) in (0..480).step_by(7).flat_map(|y| (0..640).step_by(7).map(move |x| (x, y))) {
+            assert!(mask.at(x, y) || !far(x, y), "{x}, {y}");
+        }
+    }
+}

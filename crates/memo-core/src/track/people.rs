@@ -1,0 +1,149 @@
+//! Who is who: numbers of people over the walks of one stream.
+//!
+//! A walk can end because a person was hidden, stood still or could not be told from the background. A walk that
+//! starts soon after where that person would be by then, in the same direction, is the same person's.
+
+use glam::{DVec2, DVec3};
+
+/// The latest filtered estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Now {
+    /// Number of the person, in order of appearance.
+    pub person: usize,
+    /// Number of the frame.
+    pub frame: usize,
+    /// Its time, seconds.
+    pub time_s: f64,
+    /// Centre of the torso, metres.
+    pub torso_centre: DVec3,
+    /// Direction the body faces, radians about world Z.
+    pub heading_rad: f64,
+    /// Gait phase in [0, 1), 0 = right heel strike (initial contact).
+    pub phase: f64,
+    /// Probability, from the frames so far, that left and right are swapped.
+    pub p_swapped: f64,
+    /// Speed along the path, m/s.
+    pub speed_mps: f64,
+}
+
+/// Where and how somebody walks at a time, on the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sign {
+    pub time_s: f64,
+    pub place_m: DVec2,
+    pub velocity_mps: DVec2,
+}
+
+/// A person is expected back for this long, seconds.
+const EXPECTED_S: f64 = 3.0;
+/// How far from the expected place, metres, and how much farther per second.
+const PLACE_M: f64 = 0.8;
+const PLACE_M_PER_S: f64 = 0.3;
+/// Cosine of the largest turn: 60 degrees.
+const SAME_WAY: f64 = 0.5;
+
+/// The numbers given so far.
+#[derive(Debug, Default)]
+pub(super) struct Identities {
+    count: usize,
+    ended: Vec<(usize, Sign)>,
+}
+
+impl Identities {
+    /// How many people appeared.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The person who ended nearest to where this walk starts, or a new one.
+    pub fn appear(&mut self, sign: &Sign) -> usize {
+        self.ended.retain(|(_, end)| sign.time_s - end.time_s <= EXPECTED_S);
+        let nearest = |(n, (_, end)): (usize, &(usize, Sign))| Some((n, end.distance_to(sign)?));
+        let known = self.ended.iter().enumerate().filter_map(nearest).min_by(|a, b| a.1.total_cmp(&b.1));
+        match known {
+            Some((n, _)) => self.ended.swap_remove(n).0,
+            None => {
+                self.count += 1;
+                self.count - 1
+            }
+        }
+    }
+
+    /// Notes the end of a person's walk.
+    pub fn end(&mut self, person: usize, sign: Sign) {
+        self.ended.push((person, sign));
+    }
+
+    /// Forgets the end of a person's walk, because the person walks on.
+    pub fn is_back(&mut self, person: usize) {
+        self.ended.retain(|(ended, _)| *ended != person);
+    }
+
+    /// Takes the number of something back that did not walk, if it was the last one given.
+    pub fn withdraw(&mut self, person: usize) {
+        if person + 1 == self.count {
+            self.count -= 1;
+        }
+    }
+}
+
+impl Sign {
+    /// True if a later walk starts where this one would be by then.
+    pub fn leads_to(&self, later: &Self) -> bool {
+        self.distance_to(later).is_some()
+    }
+
+    /// How far a later walk starts from where this one would be by then, metres; `None` if it is somebody else's.
+    fn distance_to(&self, later: &Self) -> Option<f64> {
+        let elapsed_s = later.time_s - self.time_s;
+        let off_m = (self.place_m + elapsed_s * self.velocity_mps).distance(later.place_m);
+        let ways = [self, later].map(|sign| sign.velocity_mps.normalize_or_zero());
+        let is_same = elapsed_s >= 0.0
+            && off_m <= PLACE_M + PLACE_M_PER_S * elapsed_s
+            && ways[0].dot(ways[1]) >= SAME_WAY;
+        is_same.then_some(off_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sign(time_s: f64, x: f64, speed_mps: f64) -> Sign {
+        Sign { time_s, place_m: DVec2::new(x, 5.0), velocity_mps: DVec2::new(speed_mps, 0.0) }
+    }
+
+    #[test]
+    fn who_comes_back_where_expected_keeps_the_number() {
+        let mut people = Identities::default();
+        assert_eq!([people.appear(&sign(0.0, 0.0, 1.2)), people.appear(&sign(0.5, 4.0, -1.0))], [0, 1]);
+        people.end(0, sign(2.0, 2.4, 1.2));
+        people.end(1, sign(2.0, 2.5, -1.0));
+        // One second later the first is expected at 3.6 m, the second at 1.5 m.
+        assert_eq!(people.appear(&sign(3.0, 3.9, 1.2)), 0);
+        assert_eq!(people.appear(&sign(3.0, 1.2, -1.1)), 1);
+        assert_eq!(people.count(), 2);
+    }
+
+    #[test]
+    fn elsewhere_later_or_the_other_way_is_somebody_else() {
+        for other in [sign(3.0, 4.8, 1.2), sign(3.0, 3.6, -1.2), sign(5.1, 6.1, 1.2), sign(1.9, 2.3, 1.2)] {
+            let mut people = Identities::default();
+            people.appear(&sign(0.0, 0.0, 1.2));
+            people.end(0, sign(2.0, 2.4, 1.2));
+            assert_eq!(people.appear(&other), 1, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn the_last_number_is_taken_back_from_what_did_not_walk() {
+        let mut people = Identities::default();
+        for x in [0.0, 9.0, 18.0] {
+            people.appear(&sign(0.0, x, 1.0));
+        }
+        people.withdraw(0);
+        assert_eq!(people.count(), 3, "an earlier number stays");
+        people.withdraw(2);
+        assert_eq!(people.appear(&sign(0.0, 30.0, 1.0)), 2);
+    }
+}
