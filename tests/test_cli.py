@@ -313,7 +313,8 @@ def test_tables_survive_writing(tmp_path, core):
     assert back["frame"].dtype == np.int64
     for name in TRACK_COLUMNS:
         np.testing.assert_allclose(back[name], columns[name], atol=0.005)
-    events = [{"time_s": 0.25, "frame": 6.25, "event": "toe_off", "side": "left"}]
+    event = {"time_s": 0.25, "frame": 6.25, "event": "toe_off", "side": "left"}
+    events = [event | {"walk": 0, "person": 0}, event | {"walk": 2, "person": 1}]
     write_events_csv(tmp_path / "events.csv", events)
     assert read_events_csv(tmp_path / "events.csv") == events
 

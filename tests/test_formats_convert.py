@@ -41,7 +41,7 @@ def write_track(folder, times_s=None):
             columns[f"{joint}_{axis}_m"] = points[FRAMES, k, i]
     write_track_csv(folder / "track.csv", columns)
     event = {"frame": 15.5, "event": "heel_strike", "side": "right"}
-    write_events_csv(folder / "events.csv", [event | {"time_s": 0.62}, event | {"time_s": 2.5}])
+    write_events_csv(folder / "events.csv", [event | {"time_s": 0.62}, event | {"time_s": 2.5, "walk": 1}])
     return points
 
 

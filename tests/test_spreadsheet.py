@@ -130,7 +130,7 @@ def write_all_columns(path):
 
 
 def write_events(path):
-    rows = [dict(zip(EVENT_COLUMNS, (0.5, 1.25, name, name), strict=True)) for name in NAMES]
+    rows = [dict(zip(EVENT_COLUMNS, (0.5, 1.25, name, name, 0, 1), strict=True)) for name in NAMES]
     write_events_csv(path, rows)
     assert read_events_csv(path) == rows
 

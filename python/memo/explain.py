@@ -162,16 +162,23 @@ def _explained(
     progress: Callable[[int, int], object] | None,
 ) -> Iterator[Why]:
     first, video = run["frames"][0], reader.path
+    # Where other people are near, their bodies are those of the fit, and their edges are not left out.
     similarities = {
-        first + frame: similarity
-        for walk in run["walks"]
-        for frame, similarity in zip(walk["frame"], walk.get("similarity", ()), strict=False)
+        (number, first + frame): similarity
+        for number, walk in enumerate(run["walks"])
+        for frame, similarity, shared in zip(
+            walk["frame"],
+            walk.get("similarity", ()),
+            walk.get("shared", [False] * len(walk["frame"])),
+            strict=False,
+        )
+        if not shared
     }
     left = set(wanted)
     with reader:
         for found, luma in _found(reader, explainer, run["shrink"], count, progress):
             why = _why(found, luma, first, run["shrink"])
-            tracked = similarities.get(why.frame, why.chosen_similarity)
+            tracked = similarities.get((why.walk, why.frame), why.chosen_similarity)
             if abs(why.chosen_similarity - tracked) > _SAME_SIMILARITY:
                 raise RunError(
                     f"{video}: not the video of {file}: the similarity in frame {why.frame} was "

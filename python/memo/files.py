@@ -57,14 +57,19 @@ TRACK_COLUMNS = (
     *("sd_x_m", "sd_y_m", "sd_z_m", "sd_phase"),
     *(f"{first}{side}_{angle}_deg" for side in SIDES for angle in ANGLES for first in ("", "sd_")),
     *(f"{joint}_{axis}" for joint in JOINTS for axis in ("x_m", "y_m", "z_m", "u_px", "v_px")),
-    *("similarity", "walk"),
+    *("similarity", "walk", "person"),
 )
-"""Columns of `track.csv`, in order; `walk` counts the walks of a video from 0."""
+"""Columns of `track.csv`, in order; `walk` and `person` count the walks and the people of a video from 0."""
 
-_SINCE_FIT = {name for name in TRACK_COLUMNS if name.endswith("_deg") and ("sd_" in name or "ankle" in name)}
+_OF_PEOPLE = {"walk", "person"}
+"""Columns that tables of events of run.json's schemas 1 and 2 do not have."""
+
+_SINCE_FIT = {"person"} | {
+    name for name in TRACK_COLUMNS if name.endswith("_deg") and ("sd_" in name or "ankle" in name)
+}
 """Columns that tables of run.json's schemas 1 and 2 do not have."""
 
-EVENT_COLUMNS = ("time_s", "frame", "event", "side")
+EVENT_COLUMNS = ("time_s", "frame", "event", "side", "walk", "person")
 """Columns of `events.csv`, in order; `frame` has a fraction if the event is between two frames."""
 
 FLIP_COLUMNS = ("frame", "time_s", "last_frame", "group", "levels", "verdict", "probability", "reason")
@@ -89,6 +94,7 @@ _DIGITS = {
     "probability": 6,
     "similarity": 5,
     "walk": 0,
+    "person": 0,
     "cycle": 0,
 }
 
@@ -155,14 +161,17 @@ def read_track_csv(path: str | PathLike[str]) -> dict[str, Column]:
     """
     present = set(read_text_columns(path))
     names = [name for name in TRACK_COLUMNS if name in present or name not in _SINCE_FIT]
-    columns = _with_absent(read_typed_columns(path, names, whole=("frame", "walk")))
+    whole = tuple(name for name in ("frame", "walk", "person") if name in names)
+    columns = _with_absent(read_typed_columns(path, names, whole=whole))
     return columns_of_video(columns, shrink_of_table(path))
 
 
 def _with_absent(columns: Mapping[str, Column]) -> dict[str, Column]:
-    """All columns of a track; those that tables written before did not have are unknown."""
+    """All columns of a track; those that tables written before did not have are unknown, and each walk is
+    another person's."""
     unknown = np.full(len(columns["frame"]), np.nan)
-    return {name: columns.get(name, unknown) for name in TRACK_COLUMNS}
+    absent = {name: columns["walk"] if name == "person" else unknown for name in TRACK_COLUMNS}
+    return {name: columns.get(name, absent[name]) for name in TRACK_COLUMNS}
 
 
 def read_track(path: str | PathLike[str]) -> dict[str, Column]:
@@ -192,8 +201,12 @@ def read_track(path: str | PathLike[str]) -> dict[str, Column]:
 
 
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:
-    """Writes gait events: dicts with the keys of `EVENT_COLUMNS`."""
-    rows = ([_texts(name, np.asarray([event[name]]))[0] for name in EVENT_COLUMNS] for event in events)
+    """Writes gait events: dicts with the keys of `EVENT_COLUMNS`; walk and person are 0 if not given."""
+    first = {"walk": 0, "person": 0}
+    rows = (
+        [_texts(name, np.asarray([{**first, **event}[name]]))[0] for name in EVENT_COLUMNS]
+        for event in events
+    )
     write_table(path, EVENT_COLUMNS, rows)
 
 
@@ -204,8 +217,11 @@ def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]
 
 
 def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
-    """Reads a file of `write_events_csv`."""
-    columns = read_typed_columns(path, EVENT_COLUMNS, texts=("event", "side"))
+    """Reads a file of `write_events_csv`; those of run.json's schemas 1 and 2 have no walk and no person."""
+    present = set(read_text_columns(path))
+    names = [name for name in EVENT_COLUMNS if name in present or name not in _OF_PEOPLE]
+    whole = tuple(name for name in names if name in _OF_PEOPLE)
+    columns = read_typed_columns(path, names, whole=whole, texts=("event", "side"))
     if np.isnan([columns["time_s"], columns["frame"]]).any():
         raise ValueError(f"{path}: an event without its time or frame")
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)

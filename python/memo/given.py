@@ -10,7 +10,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,17 @@ def checked_fov(fov_deg: float) -> float:
     return fov_deg
 
 
+def heights(text: str | None) -> float | list[float] | None:
+    """One height of everybody, or heights of people in order of appearance as in 1.80,1.65; metres."""
+    if text is None:
+        return None
+    try:
+        each = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"--height {text} is not a height in metres, or several as in 1.80,1.65") from None
+    return each[0] if len(each) == 1 else each
+
+
 def checked_height(height_m: float) -> float:
     """The height of a person, metres."""
     if 50 <= height_m <= 250:
@@ -94,10 +105,17 @@ def checked_height(height_m: float) -> float:
 
 
 def tracker_options(
-    height_m: float | None, camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None
+    height_m: float | Sequence[float] | None,
+    camera: Path | None,
+    reading: Mapping[str, Any],
+    fov_deg: float | None,
 ) -> dict[str, Any]:
     """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
-    options: dict[str, Any] = {} if height_m is None else {"height_m": checked_height(height_m)}
+    options: dict[str, Any] = {}
+    if isinstance(height_m, Sequence):
+        options["height_m"] = [checked_height(one) for one in height_m]
+    elif height_m is not None:
+        options["height_m"] = checked_height(height_m)
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
     for name, value in reading.items():

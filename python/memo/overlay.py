@@ -6,7 +6,7 @@ which is anti-aliased to one pixel and exact along straight stretches. No image 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
@@ -25,7 +25,7 @@ from memo.pixels import of_averaged, of_video
 from memo.unfinished import complete_file
 from memo.video import Frame, Luma
 
-__all__ = ["draw_row", "draw_segments", "draw_text", "write_overlay"]
+__all__ = ["draw_row", "draw_rows", "draw_segments", "draw_text", "write_overlay"]
 
 Rgb = npt.NDArray[np.uint8]
 Segments = npt.NDArray[np.float64]
@@ -36,6 +36,8 @@ CONTOUR: Colour = (240, 228, 66)
 RIGHT: Colour = (230, 110, 0)
 LEFT: Colour = (86, 180, 233)
 WHITE: Colour = (255, 255, 255)
+PEOPLE: tuple[Colour, ...] = (CONTOUR, (0, 158, 115), (204, 121, 167), (213, 94, 0), (0, 114, 178))
+"""Of the contours of people, in order of appearance."""
 
 _CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
 _LEGIBLE_HEIGHT_PX = 480
@@ -59,12 +61,14 @@ def write_overlay(
     The video keeps the time stamps of `frames`; `rate_hz` is only its nominal rate. `shrink`: pixels of the
     track per pixel of the frames, along each axis; the overlay is as large as the frames.
     """
-    rows = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
+    rows: dict[int, list[int]] = {}
+    for row, frame in enumerate(track.columns["frame"]):
+        rows.setdefault(int(frame), []).append(row)
     written = 0
     with complete_file(path) as temporary, _h264(str(temporary), rate_hz) as write, _behind(write) as encode:
         for frame in frames:
             if frame.index in rows:
-                rgb = draw_row(frame.luma, track, rows[frame.index], shrink=shrink)
+                rgb = draw_rows(frame.luma, track, rows[frame.index], shrink=shrink)
             else:
                 rgb = _enlarged(frame.luma, _scale(frame.luma))
                 draw_text(rgb, f"frame {frame.index} at {frame.time_s:.2f} s")
@@ -81,28 +85,53 @@ def draw_row(luma: Luma, track: Any, row: int, *, shrink: int = 1) -> Rgb:
     A small frame is enlarged by a whole number, so that lines and letters stay thin. `shrink`: pixels of the
     track per pixel of `luma`, along each axis.
     """
+    return draw_rows(luma, track, [row], shrink=shrink)
+
+
+def draw_rows(luma: Luma, track: Any, rows: Sequence[int], *, shrink: int = 1) -> Rgb:
+    """A frame with everybody in it: its rows of the track, each as `draw_row` draws one. Of several people,
+    each has a colour and a number."""
     scale = _scale(luma)
     rgb = _enlarged(luma, scale)
     width_px = max(1.0, rgb.shape[0] / 360)
+    columns = track.columns
 
     def draw(segments: Segments, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
         enlarged = of_video(of_averaged(segments, shrink), scale)
         draw_segments(rgb, enlarged, colour, width_px, opacity=opacity)
 
-    contours = track.contours(row)
-    if len(contours):
-        draw(np.stack(contours), CONTOUR, width_px)
-    for side, colour in (("left", LEFT), ("right", RIGHT)):
-        draw(_trail(track.columns, side, row), colour, width_px, opacity=0.5)
-        draw(_limbs(track.columns, side, row), colour, 1.5 * width_px)
-    frame, time_s, phase, p_swapped = (
-        track.columns[name][row] for name in ("frame", "time_s", "phase", "p_swapped")
-    )
-    draw_text(rgb, f"frame {frame} at {time_s:.2f} s, phase {phase:.2f}")
-    draw_text(rgb, f"P(left and right swapped) {p_swapped:.0%}", line=1)
-    draw_text(rgb, "right", RIGHT, line=2)
-    draw_text(rgb, "left", LEFT, line=3)
+    several = bool((columns["person"] > 0).any())
+    for row in rows:
+        contours = track.contours(row)
+        if len(contours):
+            colour = PEOPLE[int(columns["person"][row]) % len(PEOPLE)] if several else CONTOUR
+            draw(np.stack(contours), colour, width_px)
+        for side, colour in (("left", LEFT), ("right", RIGHT)):
+            draw(_trail(columns, side, row), colour, width_px, opacity=0.5)
+            draw(_limbs(columns, side, row), colour, 1.5 * width_px)
+    _legend(rgb, columns, rows, several)
     return rgb
+
+
+def _legend(rgb: Rgb, columns: Mapping[str, Any], rows: Sequence[int], several: bool) -> None:
+    """Time, phase and the sides; of several people a line each."""
+    first = rows[0]
+    when = f"frame {columns['frame'][first]} at {columns['time_s'][first]:.2f} s"
+    if not several:
+        draw_text(rgb, f"{when}, phase {columns['phase'][first]:.2f}")
+        draw_text(rgb, f"P(left and right swapped) {columns['p_swapped'][first]:.0%}", line=1)
+        sides = 2
+    else:
+        draw_text(rgb, f"{when}; P: left and right swapped")
+        for line, row in enumerate(sorted(rows, key=lambda row: int(columns["person"][row])), start=1):
+            person = int(columns["person"][row])
+            text = (
+                f"person {person + 1}: phase {columns['phase'][row]:.2f}, P {columns['p_swapped'][row]:.0%}"
+            )
+            draw_text(rgb, text, PEOPLE[person % len(PEOPLE)], line=line)
+        sides = 1 + len(rows)
+    draw_text(rgb, "right", RIGHT, line=sides)
+    draw_text(rgb, "left", LEFT, line=sides + 1)
 
 
 def draw_segments(
@@ -203,9 +232,10 @@ def _limbs(columns: dict[str, Any], side: str, row: int) -> Segments:
 
 
 def _trail(columns: dict[str, Any], side: str, row: int) -> Segments:
-    """Positions of the ankle of one side during the last second."""
+    """Positions of the ankle of one side during the last second of the same walk."""
+    walk = np.flatnonzero(columns["walk"] == columns["walk"][row])[0]
     time_s = columns["time_s"]
-    first = int(np.searchsorted(time_s, time_s[row] - _TRAIL_S))
+    first = walk + int(np.searchsorted(time_s[walk : row + 1], time_s[row] - _TRAIL_S))
     return _segments(_joint(columns, side, "ankle")[first : row + 1])
 
 

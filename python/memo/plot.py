@@ -64,7 +64,7 @@ def plot_start(ax: Axes, track: Any) -> Axes:
     (Fig. 23)."""
     frames, phases = np.asarray(track.start["frame"]), np.asarray(track.start["phase"])
     ax.plot(frames, phases, **{**MEASURED, "markersize": 7, "label": "best in the frame"})
-    line = _phase_line(track.columns)
+    line = _phase_line(track.columns, frames)
     if line is not None:
         ends = np.linspace(frames[0], frames[-1], 200)
         for offset, style, label in ((0.0, "-", "tracked"), (0.5, ":", "half a cycle away")):
@@ -85,7 +85,7 @@ def plot_motion(axes: Sequence[Sequence[Axes]], track: Any) -> Sequence[Sequence
     for (left, right), key in zip(axes, ("x", "z", "phase"), strict=True):
         name = key if key == "phase" else f"{key}_m"
         left.plot(measured_frames, measured[key], **MEASURED)
-        curve = (columns[name], frames, columns[f"sd_{name}"])
+        curve = _apart(columns["walk"], columns[name], frames, columns[f"sd_{name}"])
         value, at, sd = _cut_at_wraps(*curve) if key == "phase" else curve
         right.plot(at, value, color=NEUTRAL, linewidth=1.2)
         right.fill_between(at, value - sd, value + sd, color=NEUTRAL, alpha=0.25, linewidth=0)
@@ -121,17 +121,18 @@ def plot_over_time(ax: Axes, track: Any, what: str) -> Axes:
     time_s = columns["time_s"]
     if what in ANGLES:
         for side, colour in SIDE_COLOURS.items():
-            ax.plot(time_s, columns[f"{side}_{what}_deg"], color=colour, linewidth=1.2, label=side)
+            at, value = _apart(columns["walk"], time_s, columns[f"{side}_{what}_deg"])
+            ax.plot(at, value, color=colour, linewidth=1.2, label=side)
         for event in track.events:
             if event["event"] == "heel_strike":
                 ax.axvline(event["time_s"], color=SIDE_COLOURS[event["side"]], linewidth=0.6, linestyle=":")
         ax.set(ylabel=f"{what} flexion, degrees")
         _legend_above(ax)
     elif what in columns:
-        value, sd = columns[what], columns.get(f"sd_{what}", np.full(len(time_s), np.nan))
-        at = time_s
+        sd = columns.get(f"sd_{what}", np.full(len(time_s), np.nan))
+        value, at, sd = _apart(columns["walk"], columns[what], time_s, sd)
         if what == "phase":
-            value, at, sd = _cut_at_wraps(value, time_s, sd)
+            value, at, sd = _cut_at_wraps(value, at, sd)
         ax.plot(at, value, color=NEUTRAL, linewidth=1.2)
         ax.fill_between(at, value - sd, value + sd, color=NEUTRAL, alpha=0.25, linewidth=0)
         ax.set(ylabel=what)
@@ -207,9 +208,15 @@ def _save(
     return path
 
 
-def _phase_line(columns: dict[str, Any]) -> Callable[[npt.NDArray[np.float64]], Any] | None:
-    """The straight line through the tracked phases, for comparison with the starting phase."""
-    frames, phases = columns["frame"], columns["phase"]
+def _phase_line(
+    columns: dict[str, Any], start: npt.NDArray[np.int64]
+) -> Callable[[npt.NDArray[np.float64]], Any] | None:
+    """The straight line through the tracked phases of the walk that starts in these frames, for comparison
+    with the starting phase: of several, the longest."""
+    walks = columns["walk"][np.isin(columns["frame"], start)]
+    lengths = {walk: int((columns["walk"] == walk).sum()) for walk in walks.tolist()}
+    own = columns["walk"] == max(lengths, key=lambda walk: lengths[walk], default=0)
+    frames, phases = columns["frame"][own], columns["phase"][own]
     if len(frames) < 2:
         return None
     return np.polynomial.Polynomial.fit(frames, np.unwrap(phases, period=1.0), 1)
@@ -220,6 +227,12 @@ def _cut_at_wraps(phases: npt.ArrayLike, *others: npt.ArrayLike) -> list[npt.NDA
     wrapped = np.mod(phases, 1.0)
     anew = 1 + np.flatnonzero(np.abs(np.diff(wrapped)) > 0.5)
     return [np.insert(np.asarray(values, np.float64), anew, np.nan) for values in (wrapped, *others)]
+
+
+def _apart(walks: npt.ArrayLike, *others: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
+    """The others with a NaN between two walks: no line is drawn from one to the next."""
+    anew = 1 + np.flatnonzero(np.diff(walks))
+    return [np.insert(np.asarray(values, np.float64), anew, np.nan) for values in others]
 
 
 def _legend_above(ax: Axes) -> None:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.cycles import cycle_table, departure_sentences
-from memo.files import TRACK_COLUMNS
+from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
@@ -35,15 +35,16 @@ LIKELY_SWAPPED = 0.2
 
 _log = logging.getLogger(__name__)
 
-_WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64}
+_WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64, "person": np.int64}
 
 
 class Tracker:
-    """Tracks one walker at a time through a stream of frames, in bounded memory.
+    """Tracks everybody who walks through a stream of frames, in bounded memory.
 
-    `height_m` is the body height from crown to sole. None measures it in the image of `camera`; without a
-    camera either, that of the population is assumed, and standard deviations and intervals of all lengths
-    contain its spread. Without `camera`, one is assumed from the image size, the horizontal field of view
+    `height_m` is the body height from crown to sole, of everybody or of each person in order of appearance;
+    people beyond such a list are measured. None measures it in the image of `camera`; without a camera
+    either, that of the population is assumed, and standard deviations and intervals of all lengths contain
+    its spread. Without `camera`, one is assumed from the image size, the horizontal field of view
     `fov_deg` and the height. The results lag one frame behind the input.
 
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
@@ -59,7 +60,7 @@ class Tracker:
 
     def __init__(
         self,
-        height_m: float | None = None,
+        height_m: float | Sequence[float] | None = None,
         camera: _memo.Camera | None = None,
         *,
         fov_deg: float | None = None,
@@ -94,11 +95,15 @@ class Tracker:
     def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> dict[str, float] | None:
         """Takes the next frame, (H, W) uint8; times must increase.
 
-        Returns the filtered state of the walker being followed (keys `frame, time_s, x_m, y_m, z_m,
-        heading_rad, phase, p_swapped, speed_mps`), or None if there is none.
+        Returns the filtered state of the first person being followed (keys `person, frame, time_s, x_m, y_m,
+        z_m, heading_rad, phase, p_swapped, speed_mps`), or None if there is none; `people` has everybody's.
         """
         self._core.update(frame, time_s)
-        return self._core.current()
+        return next(iter(self._core.people()), None)
+
+    def people(self) -> list[dict[str, float]]:
+        """The filtered states of everybody who is followed, in order of appearance: as from `update`."""
+        return self._core.people()
 
     def take_finished(self) -> list[_memo.Walk]:
         """The walks that have ended since the last call; on an endless stream, call it regularly."""
@@ -115,7 +120,7 @@ class Tracker:
     def __repr__(self) -> str:
         seen = self._core.seek_report()["frames"]
         return (
-            f"Tracker({'following' if self._core.current() else 'seeking'}, "
+            f"Tracker({'following' if self._core.people() else 'seeking'}, "
             f"{counted(seen, 'frame')} without a walker)"
         )
 
@@ -123,7 +128,7 @@ class Tracker:
 def track(
     frames: Iterable[npt.NDArray[np.uint8]],
     *,
-    height_m: float | None = None,
+    height_m: float | Sequence[float] | None = None,
     times_s: Iterable[float] | None = None,
     fps: float | None = None,
     camera: _memo.Camera | None = None,
@@ -139,9 +144,10 @@ def track(
     full_velocity: float | None = None,
     part_weights: Sequence[float] | None = None,
 ) -> Track:
-    """Tracks a walker through frames, (H, W) uint8 each, given `times_s` or `fps`.
+    """Tracks everybody who walks through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
-    `height_m`: body height; None measures or assumes it (`Tracker`).
+    `height_m`: body height, or those of people in order of appearance; None measures or assumes it
+    (`Tracker`).
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
@@ -202,6 +208,7 @@ class StoredWalk:
 
     tables: dict[str, Any]
     camera: _memo.Camera
+    person: int
     direction: str
     p_other_direction: float
     p_swapped: float
@@ -296,15 +303,29 @@ class Track:
         """One array per column of `track.csv`; one walk after another."""
         if not self.walks:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
-        tables = [{**walk.columns(), "walk": np.full(len(walk), k)} for k, walk in enumerate(self.walks)]
+        people = self.people
+        tables = [
+            {**walk.columns(), "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
+            for k, walk in enumerate(self.walks)
+        ]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
         return columns_of_video(columns, self.shrink)
 
     @property
+    def people(self) -> list[int]:
+        """The person of each walk, counted from 0 in order of appearance."""
+        order = {person: k for k, person in enumerate(sorted({walk.person for walk in self.walks}))}
+        return [order[walk.person] for walk in self.walks]
+
+    @property
     def events(self) -> list[dict[str, Any]]:
-        """Heel strikes and toe-offs: `time_s, frame, event, side`."""
-        names = ("time_s", "frame", "event", "side")
-        return [dict(zip(names, event, strict=True)) for walk in self.walks for event in walk.events()]
+        """Heel strikes and toe-offs, one walk after another: `time_s, frame, event, side, walk, person`."""
+        people = self.people
+        return [
+            dict(zip(EVENT_COLUMNS, (*event, k, people[k]), strict=True))
+            for k, walk in enumerate(self.walks)
+            for event in walk.events()
+        ]
 
     @property
     def gait_parameters(self) -> dict[str, npt.NDArray[Any]]:
@@ -334,7 +355,9 @@ class Track:
             told += symmetry_sentences(self.gait_parameters, index)
             if walk.p_swapped <= LIKELY_SWAPPED:
                 told += departure_sentences(walk.departures())
-            several = f"Walk {index + 1} of {len(self.walks)}: " if len(self.walks) > 1 else ""
+            several = f"Walk {index + 1} of {len(self.walks)}" if len(self.walks) > 1 else ""
+            several += f" (person {self.people[index] + 1})" if max(self.people) > 0 else ""
+            several += ": " if several else ""
             said += [several + sentence for sentence in told]
         return said
 
@@ -349,9 +372,10 @@ class Track:
                 "direction": self._way(walk),
                 "gait": walk.direction,
                 "p_swapped": walk.p_swapped,
+                "person": person,
                 **walk.record(),
             }
-            for walk in self.walks
+            for walk, person in zip(self.walks, self.people, strict=True)
         ]
 
     @property
@@ -405,12 +429,18 @@ class Track:
         "nobody"), `message` as a sentence, and the figures of the longest walk."""
         main = self._main
         if main is None:
-            return {"status": self._why_nobody(), "message": _NOBODY[self._why_nobody()], "walks": 0}
+            return {
+                "status": self._why_nobody(),
+                "message": _NOBODY[self._why_nobody()],
+                "walks": 0,
+                "people": 0,
+            }
         speed, cadence = self._pace(main)
         return {
             "status": "tracked" if main.direction == "forward" else "walking backwards",
             "message": self._message(main),
             "walks": len(self.walks),
+            "people": max(self.people) + 1,
             "direction": self._way(main),
             "gait": main.direction,
             "p_other_gait": main.p_other_direction,

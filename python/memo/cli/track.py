@@ -1,4 +1,4 @@
-"""`memo track`: tracks one person through a video.
+"""`memo track`: tracks everybody who walks through a video.
 
 (Typer reads annotations where they stand, hence no `from __future__ import annotations` here.)
 """
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Interrupt, complain, guarded, with_steps
 from memo.exits import Exit
-from memo.given import frame_range, tracker_options
+from memo.given import frame_range, heights, tracker_options
 from memo.recording import Recorded, Recording, track_recording
 
 if TYPE_CHECKING:
@@ -42,10 +42,12 @@ def add_track(app: "typer.Typer") -> None:
         camera_size: CameraSize = None,
         camera_v_up: CameraVUp = None,
         height: Annotated[
-            float | None,
+            str | None,
             typer.Option(
-                help="Height of the walker, metres. Without it, the height is measured with --camera, and "
-                "assumed to be 1.70 m, with a standard deviation of 0.10 m, otherwise."
+                help="Height of the walker, metres, or of several people in order of appearance: 1.80,1.65. "
+                "Without it, heights are measured with --camera, and assumed to be 1.70 m, with a standard "
+                "deviation of 0.10 m, otherwise.",
+                metavar="METRES",
             ),
         ] = None,
         fov_deg: Annotated[
@@ -75,12 +77,12 @@ def add_track(app: "typer.Typer") -> None:
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
-        """Tracks one person who walks through VIDEO."""
+        """Tracks everybody who walks through VIDEO."""
         delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
 
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
-            options = tracker_options(height, camera, reading, fov_deg)
+            options = tracker_options(heights(height), camera, reading, fov_deg)
             asked = frame_range(frames)
             return _track(Recording(video, options, asked, fps, shrink, overlay, plots, page), delivery)
 

@@ -55,7 +55,7 @@ def write_motchallenge(
         of = track.columns
         boxes = boxes_from_contours(map(track.contours, range(len(track))))
     lines = []
-    for row in np.lexsort([of["walk"], of["frame"]]).tolist():
+    for row in np.lexsort([of["person"], of["frame"]]).tolist():
         box = boxes[row]
         if not np.isfinite(box).all():
             continue
@@ -63,7 +63,7 @@ def write_motchallenge(
         sure, x, y = (of[name][row] for name in ("similarity", "x_m", "y_m"))
         ground = (x, y, 0.0) if up == "z" else (x, 0.0, 0.0 - y)
         cells = [
-            f"{of['frame'][row] + 1:.0f},{of['walk'][row] + 1:.0f}",
+            f"{of['frame'][row] + 1:.0f},{of['person'][row] + 1:.0f}",
             *(f"{value:.2f}" for value in (*(box[:2] + 1), *size)),
             f"{sure:.5f}" if math.isfinite(sure) else "-1",
             *(

@@ -53,6 +53,9 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     if not chosen.any():
         raise FormatError(f"there is no walk {walk}, only {columns['walk'].min()} to {columns['walk'].max()}")
     times_s = columns["time_s"][chosen]
+    if (np.diff(times_s) <= 0).any():
+        last = columns["walk"].max()
+        raise FormatError(f"several people walk at the same time: choose one of the walks 0 to {last}")
     names = tuple(joint for joint in JOINTS if np.isfinite(columns[f"{joint}_x_m"][chosen]).any())
     points = (
         np.stack(
@@ -72,7 +75,7 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     kept = [
         GaitEvent(event["time_s"], event["event"], event["side"])
         for event in events
-        if walk is None or times_s[0] <= event["time_s"] <= times_s[-1]
+        if walk is None or (event.get("walk", walk) == walk and times_s[0] <= event["time_s"] <= times_s[-1])
     ]
     metadata = {"format": "track", "up": "z", "unit": "m"}
     return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes))

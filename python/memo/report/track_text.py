@@ -174,6 +174,7 @@ def _walks(run: RunFolder) -> str:
         rows.append(
             (
                 str(walk + 1),
+                str(int(table["person"][first]) + 1),
                 f"{table['frame'][first]} to {table['frame'][last]}",
                 f"{number(table['time_s'][first])} to {number(table['time_s'][last])}",
                 f"{number(table['x_m'][first])} to {number(table['x_m'][last])}",
@@ -181,7 +182,7 @@ def _walks(run: RunFolder) -> str:
                 number(p_swapped, 3),
             )
         )
-    header = ("walk", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
+    header = ("walk", "person", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
     return rows_table("Walks in this video (the files count them from 0)", header, rows)
 
 
@@ -233,7 +234,7 @@ def _events(run: RunFolder) -> str:
     several = len(_swapped(run)) > 1
     rows = [
         (
-            *((_walk_at(run, event["frame"]),) if several else ()),
+            *((_walk_of(run, event),) if several else ()),
             text(str(event["event"]).replace("_", " ")),
             text(event["side"]),
             number(event["time_s"], 3),
@@ -245,9 +246,10 @@ def _events(run: RunFolder) -> str:
     return rows_table("Heel strikes and toe-offs", header, rows)
 
 
-def _walk_at(run: RunFolder, frame: float) -> str:
-    """Number of the walk, from 1, that a moment belongs to: that of the nearest tracked frame."""
-    return str(int(run.columns["walk"][np.argmin(np.abs(run.columns["frame"] - frame))]) + 1)
+def _walk_of(run: RunFolder, event: Mapping[str, Any]) -> str:
+    """Number of the walk of an event, from 1; in tables without it, that of the nearest tracked frame."""
+    nearest = np.argmin(np.abs(run.columns["frame"] - event["frame"]))
+    return str(int(event.get("walk", run.columns["walk"][nearest])) + 1)
 
 
 def _how(run: RunFolder) -> str:
