@@ -25,6 +25,7 @@ use memo_core::wording::counted;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
 /// The record of a walk, as plain numbers: with the video, it is enough to compare the walk's frames again.
@@ -54,6 +55,10 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyRe
     dict.set_item("drawn_torso_m", rows.iter().map(|r| r.torso_centre.to_array()).collect::<Vec<_>>())?;
     dict.set_item("drawn_heading_rad", rows.iter().map(|r| r.heading_rad).collect::<Vec<_>>())?;
     dict.set_item("drawn_posture_rad", rows.iter().map(|r| r.posture.to_array()).collect::<Vec<_>>())?;
+    if !walk.camera_turns.is_empty() {
+        let turns: Vec<_> = walk.camera_turns.iter().map(|turn| turn.to_array()).collect();
+        dict.set_item("camera_turn_rad", turns)?;
+    }
     Ok(dict)
 }
 
@@ -64,6 +69,8 @@ struct Recorded {
     path: Path,
     looks: HashMap<usize, Look>,
     drawn: HashMap<usize, PosedBody>,
+    /// Rotation vectors of the camera by frame; empty if it stood still.
+    turns: HashMap<usize, DVec3>,
 }
 
 /// Maximum number of heights of a grid; the tracker's own has eleven.
@@ -89,7 +96,16 @@ impl Recorded {
             path: Path { origin, heading_rad: number(record, "heading_rad")? },
             looks: looks(record)?,
             drawn,
+            turns: turns(record)?,
         })
+    }
+
+    /// The camera that took a frame.
+    fn camera_of(&self, frame: usize) -> Cow<'_, Camera> {
+        match self.turns.get(&frame) {
+            None => Cow::Borrowed(&self.camera),
+            Some(turn) => Cow::Owned(self.camera.turned(*turn)),
+        }
     }
 
     fn scene(&self) -> Scene<'_> {
@@ -109,7 +125,8 @@ pub fn recorded_contours<'py>(
     let mut visible = Vec::new();
     let contours = |frame: i64| {
         visible.clear();
-        if let Some(posed) = usize::try_from(frame).ok().and_then(|frame| walk.drawn.get(&frame)) {
+        let frame = usize::try_from(frame).unwrap_or(usize::MAX);
+        if let Some(posed) = walk.drawn.get(&frame) {
             visible_contours(
                 &posed.cylinders,
                 walk.camera.position(),
@@ -117,7 +134,7 @@ pub fn recorded_contours<'py>(
                 &mut visible,
             );
         }
-        segments_with_parts(py, &visible, &walk.camera)
+        segments_with_parts(py, &visible, &walk.camera_of(frame))
     };
     frames.into_iter().map(contours).collect()
 }
@@ -138,6 +155,17 @@ fn drawn(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, PosedBody>> {
         Ok((frames[k], body.pose(torso, headings[k], &posture)))
     };
     (0..frames.len()).map(posed).collect()
+}
+
+/// The rotations of the camera, by frame; runs of a camera at rest, and older ones, have none.
+fn turns(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, DVec3>> {
+    if !record.contains("camera_turn_rad")? {
+        return Ok(HashMap::new());
+    }
+    let frames: Vec<usize> = value(record, "frame")?;
+    let turns: Vec<[f64; 3]> = column(record, "camera_turn_rad", frames.len())?;
+    let turn = |(frame, turn)| Ok((frame, DVec3::from_array(finite("camera_turn_rad", turn)?)));
+    frames.into_iter().zip(turns).map(turn).collect()
 }
 
 /// The options of a tracker.
@@ -239,7 +267,7 @@ impl PyExplainer {
     ) -> PyResult<Self> {
         let options = options_of(tracker)?;
         let walks = records.iter().map(|r| Recorded::read(r)).collect::<PyResult<_>>()?;
-        let stream = Some(EvidenceStream::new(options.evidence));
+        let stream = Some(options.evidence_stream());
         Ok(Self { options, walks, wanted, stream })
     }
 
@@ -262,7 +290,7 @@ impl PyExplainer {
 
     /// Returns the explanation of the last frame.
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(stream) = self.stream.take() else { return Ok(None) };
+        let Some(mut stream) = self.stream.take() else { return Ok(None) };
         let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
         evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
     }

@@ -19,6 +19,7 @@ mod posture;
 mod reproduce;
 mod result;
 mod score;
+mod steady;
 mod synth;
 mod tracker;
 mod unswap;
@@ -83,6 +84,8 @@ mod _memo {
     };
     #[pymodule_export]
     use super::score::similarity;
+    #[pymodule_export]
+    use super::steady::PySteadier;
     #[pymodule_export]
     use super::synth::{PyClothedScene, PyScene};
     #[pymodule_export]

@@ -7,8 +7,9 @@ use crate::defaults::dict;
 use crate::error::value_error;
 use crate::explain::record_of;
 use crate::fit::WalkFit;
+use crate::steady::{MotionTuple, loss_tuple, motion_tuple};
 use crate::wait::{LOOK, watched};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use memo_core::image::BackgroundOptions;
 use memo_core::image::flow::FlowOptions;
 use memo_core::model::visibility::visible_contours;
@@ -21,6 +22,7 @@ use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
 use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
+use memo_core::track::steady::SteadyOptions;
 use memo_core::track::tracker::{Now, Tracker};
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
@@ -140,7 +142,7 @@ impl PyTracker {
     #[new]
     #[pyo3(signature = (
         height_m=None, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, compensate_gain=false,
-        background=false, measure="rohr", full_gradient=None, full_velocity=None, part_weights=None
+        background=false, steady=true, measure="rohr", full_gradient=None, full_velocity=None, part_weights=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
@@ -152,6 +154,7 @@ impl PyTracker {
         start_frames: i64,
         compensate_gain: bool,
         background: bool,
+        steady: bool,
         measure: &str,
         full_gradient: Option<f32>,
         full_velocity: Option<f32>,
@@ -179,6 +182,7 @@ impl PyTracker {
         };
         options.evidence.change.compensate_gain = compensate_gain;
         options.evidence.background = background.then(BackgroundOptions::default);
+        options.steady = steady.then(SteadyOptions::default);
         options.evidence.flow = full_velocity.map(|_| FlowOptions::default());
         let similarity = &mut options.walk.similarity;
         similarity.measure = match measure {
@@ -216,6 +220,17 @@ impl PyTracker {
     fn people<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let people = self.read(py, |tracker| tracker.people())?;
         people.iter().map(|now| now_as_dict(py, now)).collect()
+    }
+
+    /// What was found of the camera in each of the last 25 000 frames: (frame, state, turn_rad, shift_px, rms_px,
+    /// support), state "still", "turned", "unknown" or "lost"; empty with `steady=False`.
+    fn camera_motion(&self, py: Python<'_>) -> PyResult<Vec<MotionTuple>> {
+        self.read(py, |tracker| tracker.camera_motions().map(motion_tuple).collect())
+    }
+
+    /// Where a view of the camera ended: (first frame of another view, "cut", "zoom" or "other view").
+    fn lost_views(&self, py: Python<'_>) -> PyResult<Vec<(usize, &'static str)>> {
+        self.read(py, |tracker| tracker.losses().iter().map(loss_tuple).collect())
     }
 
     /// Counts over the whole stream; if nobody was followed, they show why.
@@ -273,6 +288,15 @@ impl PyWalk {
     fn column(&self, value: impl Fn(&Row) -> f64) -> Vec<f64> {
         self.rows.iter().map(value).collect()
     }
+
+    /// A point of each row in pixels of its frame, as the camera of that frame saw it.
+    fn pixels(&self, point: impl Fn(&Row) -> DVec3) -> (Vec<f64>, Vec<f64>) {
+        let pixel = |(k, row): (usize, &Row)| {
+            let pixel = self.walk.camera_of(k).project(point(row)).unwrap_or(DVec2::NAN);
+            (pixel.x, pixel.y)
+        };
+        self.rows.iter().enumerate().map(pixel).collect()
+    }
 }
 
 /// Segments (n, 2, 2) and the body part of each (n,).
@@ -323,12 +347,12 @@ impl PyWalk {
             }
             for (i, joint) in SideJoints::NAMES.into_iter().enumerate() {
                 let at = |r: &Row| if side == "right" { r.right.to_array()[i] } else { r.left.to_array()[i] };
-                let pixel = |r: &Row| self.walk.camera.project(at(r)).unwrap_or(DVec2::NAN);
                 set(&format!("{side}_{joint}_x_m"), self.column(|r| at(r).x))?;
                 set(&format!("{side}_{joint}_y_m"), self.column(|r| at(r).y))?;
                 set(&format!("{side}_{joint}_z_m"), self.column(|r| at(r).z))?;
-                set(&format!("{side}_{joint}_u_px"), self.column(|r| pixel(r).x))?;
-                set(&format!("{side}_{joint}_v_px"), self.column(|r| pixel(r).y))?;
+                let (u_px, v_px) = self.pixels(at);
+                set(&format!("{side}_{joint}_u_px"), u_px)?;
+                set(&format!("{side}_{joint}_v_px"), v_px)?;
             }
         }
         set("similarity", self.column(|r| r.similarity))?;
@@ -384,7 +408,7 @@ impl PyWalk {
         numpy_from_rows(py, self.walk.steps().iter().map(|step| row(&step.measured)).collect())
     }
 
-    /// Visible contours of the model in a row, in image pixels: (segments, 2, 2), and the body part of each
+    /// Visible contours of the model in a row, in pixels of its frame: (segments, 2, 2), and the body part of each
     /// segment.
     fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
         if row >= self.rows.len() {
@@ -394,7 +418,7 @@ impl PyWalk {
         let mut visible = Vec::new();
         let cylinders = self.walk.pose_of(row, &self.rows[row]).cylinders;
         visible_contours(&cylinders, self.walk.camera.position(), &VisibilityOptions::DRAWN, &mut visible);
-        segments_with_parts(py, &visible, &self.walk.camera)
+        segments_with_parts(py, &visible, &self.walk.camera_of(row))
     }
 
     /// The starting phase: frames, best phase of each, similarity (frames, phases), and the lines chosen by the

@@ -8,7 +8,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::Matrix3x4;
 use thiserror::Error;
 
@@ -387,6 +387,13 @@ impl Camera {
     pub fn shrunk(&self, n: u32) -> Result<Self, CameraError> {
         let scaled = self.scaled(1.0 / f64::from(n))?;
         Self { size: self.size.map(|side| side / n), ..scaled }.validated()
+    }
+
+    /// The camera after a rotation about its centre by a rotation vector, radians, camera axes.
+    #[must_use]
+    pub fn turned(&self, turn_rad: DVec3) -> Self {
+        let turned = DMat3::from_quat(DQuat::from_scaled_axis(turn_rad));
+        Self { rotation: turned * self.rotation, translation: turned * self.translation, ..self.clone() }
     }
 
     /// The matrix K of `h (u, v, 1)ᵀ = K x_cam`.

@@ -11,9 +11,12 @@ use super::people::{Now, Sign};
 use super::result::smoothed_hypotheses;
 use super::search::{Hypothesis, Scene};
 use super::start::{StartReport, start};
+use super::steady::CameraMotion;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
+use glam::DVec3;
+use std::collections::HashMap;
 
 /// Nobody walks slower than this, m/s.
 pub(super) const SLOWEST_MPS: f64 = 0.25;
@@ -199,6 +202,23 @@ impl Active {
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
         let end = twin.steps.len() - over.max(gone);
         self.walk.keep(absent.min(end)..end);
+    }
+
+    /// Drops the frames from this one on.
+    pub(super) fn drop_from(&mut self, frame: usize) {
+        let steps = &self.walk.twins[0].steps;
+        let end = steps.partition_point(|step| step.frame < frame);
+        self.walk.keep(0..end);
+        self.kept.retain(|(_, edges)| edges.frame < frame);
+    }
+
+    /// The rotations of the camera in the frames of the walk; none if it stood still in all of them.
+    pub(super) fn turns<'a>(&self, motions: impl Iterator<Item = &'a CameraMotion>) -> Vec<DVec3> {
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let known: HashMap<usize, DVec3> = motions.map(|motion| (motion.frame, motion.turn_rad)).collect();
+        let turns: Vec<DVec3> =
+            steps.iter().map(|step| known.get(&step.frame).copied().unwrap_or(DVec3::ZERO)).collect();
+        if turns.iter().any(|turn| *turn != DVec3::ZERO) { turns } else { Vec::new() }
     }
 
     /// Starts again on an oblique path if the kept frames show one, and with the person's own body and gait. This

@@ -1,9 +1,11 @@
 //! Evidence of each frame for tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and 4.3).
 //!
 //! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two
-//! frames are kept, whatever the length of the stream.
+//! frames are kept, whatever the length of the stream. With a [`Steadier`], frames of a moving camera are first turned
+//! into the camera of the first frame; what a frame does not show there is no evidence.
 
 use super::score::EdgeLine;
+use super::steady::{CameraMotion, Loss, Steadied, Steadier};
 use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chains};
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
@@ -127,9 +129,22 @@ pub struct Evidence {
     pub firm_mask: Mask,
     /// Velocities of the changed pixels towards the next frame; `None` if not requested or not determined.
     pub velocity: Option<FlowField>,
+    /// Of a steadied frame, the pixels that it or its neighbours do not show, with those near them.
+    pub unseen: Option<Mask>,
 }
 
+/// Pixels this near to those not shown are not used: the windows of change and edge detection reach 2 px.
+const UNSEEN_MARGIN_PX: f64 = 4.0;
+
 impl Evidence {
+    /// True if a rectangle touches what the frame does not show, at its top or a side.
+    pub fn is_cut_off(&self, r: &Rectangle) -> bool {
+        let Some(unseen) = &self.unseen else { return false };
+        let (right, top) = ((r.right + 1).min(unseen.width() - 1), r.top.saturating_sub(1));
+        let at_side = |y: usize| unseen.at(r.left.saturating_sub(1), y) || unseen.at(right, y);
+        (r.top..=r.bottom).any(at_side) || unseen.row(top)[r.left..=r.right].contains(&true)
+    }
+
     /// Candidate regions, largest first.
     pub fn candidates(&self, options: &EvidenceOptions) -> Vec<Region> {
         group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
@@ -167,11 +182,15 @@ impl Evidence {
         self.velocity.as_ref().and_then(at).map_or(0.0, |velocity| velocity.length() as f32)
     }
 
-    /// The dilated change mask; `None` if nothing changed in the window.
+    /// The dilated change mask without unseen pixels; if nothing changed in the window, all seen pixels, or `None`.
     fn mask_near(&self, window: &Window) -> Option<Mask> {
         let rows = window.y..window.y + window.height;
         let moved = rows.clone().any(|y| self.mask.row(y)[window.x..window.x + window.width].contains(&true));
-        moved.then(|| dilate(&self.mask, EDGE_MARGIN_PX))
+        let near = moved.then(|| dilate(&self.mask, EDGE_MARGIN_PX));
+        let Some(unseen) = &self.unseen else { return near };
+        let mut near = near.unwrap_or_else(|| Image::filled(unseen.width(), unseen.height(), true));
+        clear(&mut near, unseen);
+        Some(near)
     }
 }
 
@@ -183,15 +202,47 @@ pub struct EvidenceStream {
     waiting: Option<(usize, f64, Image<u8>)>,
     background: Option<Background>,
     frames: usize,
+    steadier: Option<Steadier>,
+    /// What the last three frames do not show, the latest last.
+    unseen: [Option<Mask>; 3],
 }
 
 impl EvidenceStream {
-    /// A stream without frames.
+    /// A stream without frames, of a camera at rest.
     pub fn new(options: EvidenceOptions) -> Self {
-        Self { options, detectors: detectors(&options), waiting: None, background: None, frames: 0 }
+        Self {
+            options,
+            detectors: detectors(&options),
+            waiting: None,
+            background: None,
+            frames: 0,
+            steadier: None,
+            unseen: [const { None }; 3],
+        }
     }
 
-    /// Adds a frame and returns the evidence of the frame before; `None` for the first frame.
+    /// The same stream, of a camera that may move.
+    #[must_use]
+    pub fn steadied_by(self, steadier: Option<Steadier>) -> Self {
+        Self { steadier, ..self }
+    }
+
+    /// The camera in the latest frames; none without a steadier.
+    pub fn camera_motions(&self) -> impl Iterator<Item = &CameraMotion> {
+        self.steadier.iter().flat_map(|steadier| steadier.motions())
+    }
+
+    /// The views that have ended.
+    pub fn losses(&self) -> &[Loss] {
+        self.steadier.as_ref().map_or(&[], |steadier| steadier.losses())
+    }
+
+    /// The end of a view, once; there is no evidence of frames before and after it together.
+    pub fn take_loss(&mut self) -> Option<Loss> {
+        self.steadier.as_mut()?.take_loss()
+    }
+
+    /// Adds a frame and returns the evidence of the frame before; `None` for the first frame of a view.
     pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
         if !time_s.is_finite() {
             return Err(EvidenceError::Time { time_s });
@@ -201,15 +252,62 @@ impl EvidenceStream {
         {
             return Err(EvidenceError::TimeOrder { previous_s, time_s });
         }
+        let number = self.frames;
+        self.frames += 1;
+        let Some(steadier) = &mut self.steadier else {
+            return self.push_steady(number, frame, time_s);
+        };
+        let steadied = steadier.push(frame)?;
+        if steadier.has_news() {
+            self.begin_view();
+        }
+        let (picture, unseen) = match steadied {
+            Steadied::AsGiven => (None, None),
+            Steadied::Moved { picture, unseen } => (Some(picture), Some(unseen)),
+            Steadied::Lost => return Ok(None),
+        };
+        self.unseen.rotate_left(1);
+        self.unseen[2] = unseen;
+        match &picture {
+            None => self.push_steady(number, frame, time_s),
+            Some(picture) => self.push_steady(number, &picture.as_frame(), time_s),
+        }
+    }
+
+    /// Forgets the frames of a view that has ended.
+    fn begin_view(&mut self) {
+        self.detectors = detectors(&self.options);
+        self.waiting = None;
+        self.background = None;
+        self.unseen = [const { None }; 3];
+    }
+
+    fn push_steady(
+        &mut self,
+        number: usize,
+        frame: &Frame<'_>,
+        time_s: f64,
+    ) -> Result<Option<Evidence>, EvidenceError> {
         let [low, firm] = &mut self.detectors;
         let masks = low.push(frame)?.zip(firm.push(frame)?);
-        let before = self.waiting.replace((self.frames, time_s, frame.to_image()));
-        self.frames += 1;
+        let before = self.waiting.replace((number, time_s, frame.to_image()));
         self.evidence(before, masks, Some(frame))
     }
 
+    /// What the waiting frame or a neighbour does not show, with a margin.
+    fn unseen_near(&self) -> Option<Mask> {
+        let mut all: Option<Mask> = None;
+        for mask in self.unseen.iter().flatten() {
+            match &mut all {
+                None => all = Some(mask.clone()),
+                Some(all) => all.pixels_mut().iter_mut().zip(mask.pixels()).for_each(|(a, b)| *a |= b),
+            }
+        }
+        all.map(|all| dilate(&all, UNSEEN_MARGIN_PX))
+    }
+
     /// The evidence of the last frame; `None` if there were fewer than two frames.
-    pub fn finish(mut self) -> Result<Option<Evidence>, EvidenceError> {
+    pub fn finish(&mut self) -> Result<Option<Evidence>, EvidenceError> {
         let last = self.waiting.take();
         let [low, firm] = std::mem::replace(&mut self.detectors, detectors(&self.options));
         self.evidence(last, low.finish().zip(firm.finish()), None)
@@ -224,6 +322,11 @@ impl EvidenceStream {
         let (Some((frame, time_s, grey)), Some((mut low, mut firm))) = (frame, masks) else {
             return Ok(None);
         };
+        let unseen = self.unseen_near();
+        if let Some(unseen) = &unseen {
+            clear(&mut low, unseen);
+            clear(&mut firm, unseen);
+        }
         self.add_foreground(&grey, &mut low, &mut firm)?;
         let tidy = |mask: &Mask| Ok::<Mask, OptionError>(fill_holes(&clean(mask, &self.options.clean)?));
         let (mask, firm_mask) = (tidy(&low)?, tidy(&firm)?);
@@ -231,7 +334,7 @@ impl EvidenceStream {
             (Some(options), Some(next)) => velocity_field(&grey.as_frame(), next, &mask, options).ok(),
             _ => None,
         };
-        Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity }))
+        Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity, unseen }))
     }
 
     /// Adds pixels that differ from the background to the change masks, then updates the background where the low
@@ -250,6 +353,11 @@ impl EvidenceStream {
         }
         Ok(background.update(&grey.as_frame(), Some(low))?)
     }
+}
+
+/// Clears the pixels of a mask that are not seen.
+fn clear(mask: &mut Mask, unseen: &Mask) {
+    mask.pixels_mut().iter_mut().zip(unseen.pixels()).for_each(|(pixel, unseen)| *pixel &= !unseen);
 }
 
 /// Change detectors with the low threshold and with the rectangle's threshold.
@@ -295,7 +403,7 @@ mod tests {
         fill(&mut grey, 80..100, 30..65, 180);
         let mut mask = Image::filled(SIZE[0], SIZE[1], false);
         (28..67).for_each(|y| mask.row_mut(y)[18..36].fill(true));
-        Evidence { frame: 3, time_s: 0.12, grey, firm_mask: mask.clone(), mask, velocity: None }
+        Evidence { frame: 3, time_s: 0.12, grey, firm_mask: mask.clone(), mask, velocity: None, unseen: None }
     }
 
     const WHOLE: Rectangle = Rectangle { left: 0, top: 0, right: 119, bottom: 89 };

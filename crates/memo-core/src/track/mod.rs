@@ -19,6 +19,7 @@ pub mod result;
 pub mod score;
 pub mod search;
 pub mod start;
+pub mod steady;
 pub mod swap;
 pub mod tracker;
 pub mod walk;

@@ -1,8 +1,9 @@
 //! Options of the tracker.
 
-use super::evidence::EvidenceOptions;
+use super::evidence::{EvidenceOptions, EvidenceStream};
 use super::fit::FitOptions;
 use super::start::CadenceRange;
+use super::steady::{Steadier, SteadyOptions};
 use super::walk::WalkOptions;
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
@@ -61,6 +62,8 @@ pub struct TrackerOptions {
     pub cadence: CadenceRange,
     /// Options of the stages from pixels to regions and edges.
     pub evidence: EvidenceOptions,
+    /// Steadying of a camera that moves; `None` takes every frame as it is.
+    pub steady: Option<SteadyOptions>,
     /// Options of search and filter.
     pub walk: WalkOptions,
 }
@@ -79,6 +82,7 @@ impl Default for TrackerOptions {
             path_frames: 40,
             cadence: CadenceRange::default(),
             evidence: EvidenceOptions::default(),
+            steady: Some(SteadyOptions::default()),
             walk: WalkOptions::default(),
         }
     }
@@ -102,6 +106,7 @@ impl TrackerOptions {
         let is_above = self.cadence.high_hz >= self.cadence.low_hz && self.cadence.high_hz <= 100.0;
         OptionError::unless(is_above, "high_hz", "at least low_hz and at most 100", self.cadence.high_hz)?;
         self.evidence.check()?;
+        self.steady.map_or(Ok(()), |steady| steady.check())?;
         self.walk.check()
     }
 
@@ -113,6 +118,12 @@ impl TrackerOptions {
             }
             _ => self.height_m,
         }
+    }
+
+    /// The evidence of a new stream of frames.
+    pub fn evidence_stream(&self) -> EvidenceStream {
+        let steadier = |steady| Steadier::new(steady, self.camera.as_ref(), self.field_of_view_rad);
+        EvidenceStream::new(self.evidence).steadied_by(self.steady.map(steadier))
     }
 
     /// The average walker of a body height in metres; the gait is made for this speed, m/s.

@@ -79,6 +79,11 @@ impl Identities {
         self.ended.retain(|(ended, _)| *ended != person);
     }
 
+    /// Expects nobody back.
+    pub fn forget_ended(&mut self) {
+        self.ended.clear();
+    }
+
     /// Takes the number of something back that did not walk, if it was the last one given.
     pub fn withdraw(&mut self, person: usize) {
         if person + 1 == self.count {

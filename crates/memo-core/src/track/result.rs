@@ -14,6 +14,7 @@ use super::walk::{Step, Walk, WalkOptions};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
 use crate::model::{Camera, PosedBody, Posture, SideJoints};
 use glam::DVec3;
+use std::borrow::Cow;
 
 pub use crate::model::skeleton::Side;
 
@@ -24,8 +25,10 @@ pub struct TrackedWalk {
     pub person: usize,
     /// Both twins with all their steps.
     pub walk: Walk,
-    /// The camera, given or assumed.
+    /// The camera, given or assumed; of a camera that moves, in the first frame of its view.
     pub camera: Camera,
+    /// Rotation vector of `frame_camera_from_first_camera` of each row, radians; empty if the camera stood still.
+    pub camera_turns: Vec<DVec3>,
     /// True if no camera was given.
     pub camera_is_guessed: bool,
     /// The body height that the walk was tracked with: given, measured or assumed.
@@ -148,6 +151,14 @@ impl TrackedWalk {
         match self.fitted() {
             Some(fit) => fit.pose(index),
             None => self.scene().pose(&row.hypothesis),
+        }
+    }
+
+    /// The camera of the frame of a row: its pixels are those of the frame as it was given.
+    pub fn camera_of(&self, index: usize) -> Cow<'_, Camera> {
+        match self.camera_turns.get(index).filter(|turn| **turn != DVec3::ZERO) {
+            None => Cow::Borrowed(&self.camera),
+            Some(turn) => Cow::Owned(self.camera.turned(*turn)),
         }
     }
 

@@ -29,6 +29,7 @@ use super::people::Identities;
 pub use super::people::Now;
 use super::result::TrackedWalk;
 use super::search::Scene;
+use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::image::{Frame, GroupOptions, Mask, Rectangle, Region, group_regions, regions};
 use crate::model::body::BodyError;
@@ -119,7 +120,7 @@ impl Tracker {
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
         options.height_m.map(Body::from_height).transpose()?;
         options.check()?;
-        let stream = EvidenceStream::new(options.evidence);
+        let stream = options.evidence_stream();
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
         Ok(Self {
             options,
@@ -143,17 +144,17 @@ impl Tracker {
         }
         self.check_camera(frame)?;
         self.report.frames += 1;
-        if let Some(evidence) = self.stream.push(frame, time_s)? {
-            self.advance(&evidence)?;
+        let evidence = self.stream.push(frame, time_s)?;
+        if let Some(loss) = self.stream.take_loss() {
+            self.end_view(&loss);
         }
-        Ok(())
+        evidence.map_or(Ok(()), |evidence| self.advance(&evidence))
     }
 
     /// Ends the stream: processes the last frame and ends the current walk.
     pub fn finish(&mut self) -> Result<(), TrackError> {
         self.is_finished = true;
-        let stream = std::mem::replace(&mut self.stream, EvidenceStream::new(self.options.evidence));
-        if let Some(evidence) = stream.finish()? {
+        if let Some(evidence) = self.stream.finish()? {
             self.advance(&evidence)?;
         }
         let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
@@ -190,6 +191,31 @@ impl Tracker {
     /// Counts of candidates and refused starts so far.
     pub fn seek_report(&self) -> SeekReport {
         self.report
+    }
+
+    /// What was found of the camera in the latest frames.
+    pub fn camera_motions(&self) -> impl Iterator<Item = &CameraMotion> {
+        self.stream.camera_motions()
+    }
+
+    /// Where a view of the camera ended.
+    pub fn losses(&self) -> &[Loss] {
+        self.stream.losses()
+    }
+
+    /// Ends all walks before the view ended; what follows is another scene.
+    fn end_view(&mut self, loss: &Loss) {
+        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
+        let all: Vec<Active> = fading.chain(std::mem::take(&mut self.people)).collect();
+        for mut active in all {
+            active.drop_from(loss.frame.saturating_sub(1));
+            if active.walk.twins[0].steps.len() >= self.options.start_frames {
+                self.end_walk(active);
+            }
+        }
+        self.candidates.clear();
+        self.identities.forget_ended();
+        self.backdrop = Backdrop::default();
     }
 
     fn check_camera(&self, frame: &Frame<'_>) -> Result<(), TrackError> {
@@ -462,6 +488,7 @@ impl Tracker {
         let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
         self.finished.push(TrackedWalk {
             person: active.person,
+            camera_turns: active.turns(self.stream.camera_motions()),
             walk: active.walk,
             height,
             camera: active.camera,
@@ -478,7 +505,7 @@ impl Tracker {
 /// The sighting of a region that the image border does not cut.
 fn whole(region: &Region, evidence: &Evidence) -> Option<Sighting> {
     let rectangle = region.rectangle;
-    let is_cut = touches_border(&rectangle, evidence.grey.width());
+    let is_cut = touches_border(&rectangle, evidence.grey.width()) || evidence.is_cut_off(&rectangle);
     (!is_cut).then_some(Sighting { time_s: evidence.time_s, rectangle })
 }
 

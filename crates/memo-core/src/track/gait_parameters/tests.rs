@@ -107,6 +107,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
     walk.twins[0].similarity_sum = 0.5 * measured.len() as f64;
     TrackedWalk {
         person: 0,
+        camera_turns: Vec::new(),
         walk,
         camera: camera(),
         camera_is_guessed: false,

@@ -60,6 +60,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
     walk.twins[0].steps = steps;
     TrackedWalk {
         person: 0,
+        camera_turns: Vec::new(),
         walk,
         camera: camera(),
         camera_is_guessed: false,

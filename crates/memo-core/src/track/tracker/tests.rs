@@ -40,6 +40,7 @@ fn evidence(frame: usize, boxes: &[Rectangle]) -> Evidence {
         firm_mask: mask.clone(),
         mask,
         velocity: None,
+        unseen: None,
     }
 }
 

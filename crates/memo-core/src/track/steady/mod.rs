@@ -1,0 +1,518 @@
+//! Steadying of a camera held in the hand: every frame is turned into the camera of the first one.
+//!
+//! 1. The rotation of the camera is estimated from the strongest gradients of a key frame, spread over the picture
+//!    (`template`), from coarse to fine (`pyramid`), with weights that leave out people (`estimate`; Baker and Matthews
+//!    2004, *Lucas-Kanade 20 Years On*, inverse compositional). It starts at the rotation of the frame before.
+//! 2. If the picture has moved by [`SteadyOptions::still_px`] or more, it is interpolated in the camera of the first
+//!    frame (`warp`). Otherwise it is left as it is, bit for bit: a tripod costs the estimate only.
+//! 3. A frame that overlaps the key frame little, or agrees with it less and less, becomes the next key frame; its rotation
+//!    is chained with that of the key frame before.
+//! 4. If a frame and those after it agree with each other but not with the key frames, the shot has changed. If the focal
+//!    length changes, the picture is zoomed. Both end the view ([`Loss`]).
+//!
+//! Limits: the camera only rotates. A camera that is carried along changes the perspective: near a wall it cannot be told
+//! from a rotation, and forwards it looks like a zoom. Without a calibration the rotation is that of the assumed field of
+//! view; a wrong one leaves part of a pan uncorrected towards the sides. A rolling shutter is not modelled.
+
+mod estimate;
+mod pyramid;
+mod template;
+mod warp;
+
+use crate::image::{Frame, FrameError, Image, Mask};
+use crate::model::Camera;
+use crate::option_error::OptionError;
+use estimate::{Comparison, Estimate};
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use pyramid::Pyramid;
+use std::collections::VecDeque;
+use template::{Template, pixel_of};
+use thiserror::Error;
+use warp::Warp;
+
+/// Rotation from the first view's camera to that of a frame.
+pub type Turned = DMat3;
+
+/// Why no rotation can be estimated from a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SteadyError {
+    /// The picture has too few gradients.
+    #[error("a picture with {points} points of strong gradient at one scale: a rotation needs {needed}")]
+    NoTexture {
+        /// Points found on the scale with the fewest.
+        points: usize,
+        /// Points needed.
+        needed: usize,
+    },
+}
+
+/// Options of the steadying.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyOptions {
+    /// Frames in which every pixel is nearer than this to its place in the first frame are left as they are, pixels.
+    /// Default 0.3: jitter up to 0.5 px does not disturb tracking, and on a tripod the estimate scatters by less.
+    pub still_px: f64,
+    /// Share of the key frame's points that a rotation must explain. Default 0.35: a person who covers a third of the
+    /// picture leaves twice as much.
+    pub least_support: f64,
+    /// Relative change of the focal length, as displacement of the corners in pixels, from which the picture is taken for
+    /// zoomed. Default 3.
+    pub most_zoom_px: f64,
+}
+
+impl Default for SteadyOptions {
+    fn default() -> Self {
+        Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0 }
+    }
+}
+
+impl SteadyOptions {
+    /// Refuses options outside their ranges.
+    pub fn check(&self) -> Result<(), OptionError> {
+        OptionError::unless_at_least_0("still_px", self.still_px)?;
+        let is_share = self.least_support > 0.0 && self.least_support < 1.0;
+        OptionError::unless(is_share, "least_support", "between 0 and 1", self.least_support)?;
+        OptionError::unless_positive("most_zoom_px", self.most_zoom_px)
+    }
+}
+
+/// What was found of the camera in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CameraState {
+    /// Where it was in the first frame: the frame was left as it is.
+    Still,
+    /// Turned: the frame was steadied.
+    Turned,
+    /// Too little in the picture shows a rotation: the frame got the rotation of the one before.
+    Unknown,
+    /// The view has ended (see [`Loss`]); the frame was not used.
+    Lost,
+}
+
+impl CameraState {
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Still => "still",
+            Self::Turned => "turned",
+            Self::Unknown => "unknown",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// The camera in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraMotion {
+    /// Number of the frame, from 0.
+    pub frame: usize,
+    /// What was found.
+    pub state: CameraState,
+    /// Rotation vector of `frame_camera_from_first_camera`, radians, camera axes; zero unless the frame was steadied.
+    pub turn_rad: DVec3,
+    /// Displacement of the picture against the first view, largest and root mean square over it, pixels.
+    pub shift_px: [f64; 2],
+    /// Share of the key frame's points that the rotation explains; NaN where none was estimated.
+    pub support: f64,
+}
+
+impl CameraMotion {
+    /// The rotation of `frame_camera_from_first_camera`.
+    pub fn turned(&self) -> Turned {
+        matrix(self.turn_rad)
+    }
+}
+
+/// Why a view ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LossReason {
+    /// From one frame to the next the picture is another one.
+    Cut,
+    /// The focal length changes, or the camera is carried forwards or backwards.
+    Zoom,
+    /// The picture has become another one over several frames.
+    OtherView,
+}
+
+impl LossReason {
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "cut",
+            Self::Zoom => "zoom",
+            Self::OtherView => "other view",
+        }
+    }
+}
+
+/// The end of a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loss {
+    /// The first frame that does not belong to the view.
+    pub frame: usize,
+    /// What happened.
+    pub reason: LossReason,
+}
+
+/// A frame for the stages that need a camera at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Steadied {
+    /// The frame as it is.
+    AsGiven,
+    /// The picture in the camera of the first frame, and the pixels that the frame does not show.
+    Moved {
+        /// The picture; what it does not show is filled from the first frame.
+        picture: Image<u8>,
+        /// Pixels not shown.
+        unseen: Mask,
+    },
+    /// No frame of the view.
+    Lost,
+}
+
+/// Frames that must agree with each other before another shot is taken for one; after a sudden change, and otherwise.
+const NEW_SHOT_FRAMES: [usize; 2] = [3, 25];
+/// Support falls at a cut from one frame to the next by this much.
+const CUT_FALL: f64 = 0.25;
+/// Frames in which a zoom must be seen.
+const ZOOM_FRAMES: usize = 5;
+/// A frame that shares less than this with the key frame, or supports it less, becomes a key frame.
+const KEY_OVERLAP: f64 = 0.6;
+const KEY_SUPPORT: f64 = 0.55;
+/// The first key frame and the latest of this number in all are kept.
+const MOST_KEYS: usize = 12;
+/// Motions kept: of the longest walk and more.
+const MOST_MOTIONS: usize = 25_000;
+/// Losses kept.
+const MOST_LOSSES: usize = 100;
+/// The coarsest level has about this many pixels along its shorter side.
+const COARSEST_PX: usize = 100;
+
+/// A frame to which others are compared.
+#[derive(Debug, Clone)]
+struct Key {
+    template: Template,
+    /// `key_from_first`.
+    turned: Turned,
+    /// Relative change of the focal length against the first frame.
+    zoom: f64,
+}
+
+/// The first view: its camera, the picture and the grid of its rays.
+#[derive(Debug)]
+struct View {
+    camera: Camera,
+    warp: Warp,
+    picture: Image<u8>,
+}
+
+/// Frames that do not agree with the key frames but may agree with each other.
+#[derive(Debug)]
+struct Other {
+    key: Key,
+    picture: Image<u8>,
+    /// The first of the frames that agree, and their number.
+    frame: usize,
+    agreeing: usize,
+    is_sudden: bool,
+}
+
+/// Steadies a stream of frames.
+#[derive(Debug)]
+pub struct Steadier {
+    options: SteadyOptions,
+    given: Option<Camera>,
+    field_of_view_rad: f64,
+    view: Option<View>,
+    keys: Vec<Key>,
+    last: Turned,
+    last_support: f64,
+    other: Option<Other>,
+    zooming: usize,
+    is_lost: bool,
+    frames: usize,
+    motions: VecDeque<CameraMotion>,
+    losses: Vec<Loss>,
+    news: Option<Loss>,
+}
+
+impl Steadier {
+    /// A steadier for a new stream; without a camera, one of this horizontal field of view is assumed.
+    pub fn new(options: SteadyOptions, camera: Option<&Camera>, field_of_view_rad: f64) -> Self {
+        Self {
+            options,
+            given: camera.cloned(),
+            field_of_view_rad,
+            view: None,
+            keys: Vec::new(),
+            last: DMat3::IDENTITY,
+            last_support: 0.0,
+            other: None,
+            zooming: 0,
+            is_lost: false,
+            frames: 0,
+            motions: VecDeque::new(),
+            losses: Vec::new(),
+            news: None,
+        }
+    }
+
+    /// Steadies the next frame.
+    ///
+    /// # Errors
+    ///
+    /// The size of the frame differs from the frames before.
+    pub fn push(&mut self, frame: &Frame<'_>) -> Result<Steadied, FrameError> {
+        let number = self.frames;
+        if let Some(view) = &self.view {
+            view.picture.as_frame().check_same_size(frame)?;
+        }
+        self.frames += 1;
+        let pyramid = Pyramid::new(*frame, levels(frame));
+        if self.view.is_none() {
+            self.open(frame, &pyramid);
+            return Ok(self.noted(number, None, frame));
+        }
+        let found = self.compared(&pyramid);
+        match found {
+            Some((key, estimate)) => self.follow(number, key, &estimate, &pyramid),
+            None => self.look_for_another_shot(number, frame, &pyramid),
+        }
+        Ok(self.noted(number, found.map(|(_, estimate)| estimate), frame))
+    }
+
+    /// The camera in the frames so far, of the last 25 000 of them.
+    pub fn motions(&self) -> &VecDeque<CameraMotion> {
+        &self.motions
+    }
+
+    /// The views that have ended, the first 100 of them.
+    pub fn losses(&self) -> &[Loss] {
+        &self.losses
+    }
+
+    /// True if a view has ended since the last [`Steadier::take_loss`].
+    pub fn has_news(&self) -> bool {
+        self.news.is_some()
+    }
+
+    /// The end of a view, once.
+    pub fn take_loss(&mut self) -> Option<Loss> {
+        self.news.take()
+    }
+
+    /// Makes a frame the first one of a view if it shows enough.
+    fn open(&mut self, frame: &Frame<'_>, pyramid: &Pyramid<'_>) {
+        let size = [frame.width() as u32, frame.height() as u32];
+        let assumed = || Camera::level(size, self.field_of_view_rad, 1.0, 1.0).ok();
+        let Some(camera) = self.given.clone().or_else(assumed).filter(|c| c.size == size) else { return };
+        let Ok(template) = Template::new(pyramid, &camera) else { return };
+        let key = Key { template, turned: DMat3::IDENTITY, zoom: 0.0 };
+        let warp = Warp::new(&camera);
+        self.begin(key, View { camera, warp, picture: frame.to_image() });
+    }
+
+    fn begin(&mut self, key: Key, view: View) {
+        self.view = Some(view);
+        self.keys = vec![key];
+        self.last = DMat3::IDENTITY;
+        self.last_support = 1.0;
+        self.other = None;
+        self.zooming = 0;
+        self.is_lost = false;
+    }
+
+    /// The estimate against the nearest key frame, or after a jump against it or the first one: its key and rotation.
+    fn compared(&self, pyramid: &Pyramid<'_>) -> Option<(usize, Estimate)> {
+        let view = self.view.as_ref()?;
+        let comparison = Comparison { pyramid, camera: &view.camera };
+        let nearest = self.nearest_key();
+        let to = |key: usize| self.last * self.keys[key].turned.transpose();
+        let good = |estimate: &Estimate| estimate.is_supported(self.options.least_support);
+        let of = |key: usize, from: &Turned| comparison.estimate(&self.keys[key].template, from).filter(good);
+        let jumped = |key: usize, from: &Turned| of(key, &comparison.jump(&self.keys[key].template, from));
+        let first = || (nearest != 0 || self.is_lost).then(|| jumped(0, &DMat3::IDENTITY)).flatten();
+        let near = of(nearest, &to(nearest)).or_else(|| jumped(nearest, &to(nearest)));
+        near.map(|estimate| (nearest, estimate)).or_else(|| first().map(|estimate| (0, estimate)))
+    }
+
+    /// The key frame that looks nearest to where the camera last looked.
+    fn nearest_key(&self) -> usize {
+        let angle = |key: &Key| vector(&(self.last * key.turned.transpose())).length();
+        (0..self.keys.len())
+            .min_by(|a, b| angle(&self.keys[*a]).total_cmp(&angle(&self.keys[*b])))
+            .unwrap_or(0)
+    }
+
+    /// Takes over an estimate: rotation, zoom, and whether the frame becomes a key frame.
+    fn follow(&mut self, number: usize, key: usize, estimate: &Estimate, pyramid: &Pyramid<'_>) {
+        let Some(view) = &self.view else { return };
+        self.last = estimate.rotation * self.keys[key].turned;
+        self.last_support = estimate.support;
+        self.other = None;
+        let zoom = self.keys[key].zoom + estimate.zoom[0];
+        let corner_px =
+            0.5 * DVec2::new(f64::from(view.camera.size[0]), f64::from(view.camera.size[1])).length();
+        let is_zoomed =
+            zoom.abs() * corner_px > self.options.most_zoom_px && zoom.abs() > 4.0 * estimate.zoom[1];
+        self.zooming = if is_zoomed { self.zooming + 1 } else { 0 };
+        if is_zoomed && self.is_lost {
+            return;
+        }
+        self.is_lost = false;
+        if self.zooming >= ZOOM_FRAMES {
+            self.lose(Loss { frame: number + 1 - ZOOM_FRAMES, reason: LossReason::Zoom });
+            self.reopen_without_camera(None);
+            return;
+        }
+        let shared = shared_with(&view.camera, &estimate.rotation);
+        if shared < KEY_OVERLAP || estimate.support < KEY_SUPPORT {
+            let Ok(template) = Template::new(pyramid, &view.camera) else { return };
+            if self.keys.len() >= MOST_KEYS {
+                self.keys.remove(1);
+            }
+            self.keys.push(Key { template, turned: self.last, zoom });
+        }
+    }
+
+    /// A frame that no key frame explains: another shot if enough frames after it agree with it.
+    fn look_for_another_shot(&mut self, number: usize, frame: &Frame<'_>, pyramid: &Pyramid<'_>) {
+        let Some(view) = &self.view else { return };
+        let comparison = Comparison { pyramid, camera: &view.camera };
+        let agrees = self.other.as_ref().is_some_and(|other| {
+            let found = comparison.estimate(&other.key.template, &other.key.turned);
+            found.is_some_and(|e| e.is_supported(self.options.least_support))
+        });
+        if let Some(other) = self.other.as_mut().filter(|_| agrees) {
+            other.agreeing += 1;
+            let reason = if other.is_sudden { LossReason::Cut } else { LossReason::OtherView };
+            if other.agreeing >= NEW_SHOT_FRAMES[usize::from(!other.is_sudden)] && !self.is_lost {
+                let loss = Loss { frame: other.frame, reason };
+                self.lose(loss);
+                let other = self.other.take();
+                self.reopen_without_camera(other);
+            }
+            return;
+        }
+        let support = comparison.estimate(&self.keys[self.nearest_key()].template, &self.last);
+        let fallen = self.last_support - support.map_or(0.0, |e| e.support);
+        let is_sudden = self.other.is_none() && fallen > CUT_FALL;
+        let key = Template::new(pyramid, &view.camera).ok();
+        self.other = key.map(|template| Other {
+            key: Key { template, turned: DMat3::IDENTITY, zoom: 0.0 },
+            picture: frame.to_image(),
+            frame: number,
+            agreeing: 1,
+            is_sudden,
+        });
+    }
+
+    fn lose(&mut self, loss: Loss) {
+        self.is_lost = true;
+        self.zooming = 0;
+        self.news = Some(loss);
+        if self.losses.len() < MOST_LOSSES {
+            self.losses.push(loss);
+        }
+    }
+
+    /// Without a given camera, what follows is a view of its own. A given camera is that of the first view alone.
+    fn reopen_without_camera(&mut self, other: Option<Other>) {
+        if self.given.is_some() {
+            return;
+        }
+        match (other, self.view.take()) {
+            (Some(other), Some(View { camera, warp, .. })) => {
+                self.begin(other.key, View { camera, warp, picture: other.picture });
+            }
+            _ => {
+                self.keys.clear();
+                self.is_lost = false;
+            }
+        }
+    }
+
+    /// Records the camera in a frame and steadies the frame.
+    fn noted(&mut self, number: usize, estimate: Option<Estimate>, frame: &Frame<'_>) -> Steadied {
+        let support = estimate.map_or(f64::NAN, |e| e.support);
+        let shift_px = self.view.as_ref().map_or([0.0; 2], |view| displacement_px(&view.camera, &self.last));
+        let is_moved = !(shift_px[0] < self.options.still_px);
+        let state = match estimate {
+            _ if self.is_lost => CameraState::Lost,
+            None => CameraState::Unknown,
+            Some(_) if is_moved => CameraState::Turned,
+            Some(_) => CameraState::Still,
+        };
+        let turn_rad = if is_moved && !self.is_lost { vector(&self.last) } else { DVec3::ZERO };
+        if self.motions.len() == MOST_MOTIONS {
+            self.motions.pop_front();
+        }
+        self.motions.push_back(CameraMotion { frame: number, state, turn_rad, shift_px, support });
+        match &self.view {
+            _ if self.is_lost => Steadied::Lost,
+            Some(view) if is_moved => {
+                let (picture, unseen) = view.warp.steadied(frame, &view.camera, &self.last, &view.picture);
+                Steadied::Moved { picture, unseen }
+            }
+            _ => Steadied::AsGiven,
+        }
+    }
+}
+
+/// Number of levels of a picture.
+fn levels(frame: &Frame<'_>) -> usize {
+    let shorter = frame.width().min(frame.height());
+    (0..5).take_while(|level| shorter >> level >= COARSEST_PX).count().max(1)
+}
+
+/// Places spread over a picture, 7 by 7 with the corners, pixels.
+fn places(camera: &Camera) -> impl Iterator<Item = DVec2> {
+    let last = DVec2::new(f64::from(camera.size[0] - 1), f64::from(camera.size[1] - 1));
+    (0..49).map(move |k| last * DVec2::new(f64::from(k % 7), f64::from(k / 7)) / 6.0)
+}
+
+/// Places of a picture and where the turned camera shows them, pixels; `None` where it does not.
+fn moved(camera: &Camera, turned: &Turned) -> impl Iterator<Item = (DVec2, Option<DVec2>)> {
+    places(camera).map(|place| {
+        let ray = |ideal: DVec2| ((ideal - camera.centre_px) / camera.focal_px).extend(1.0);
+        let seen = camera.undistort(place).ok().and_then(|ideal| pixel_of(camera, turned, ray(ideal)));
+        (place, seen)
+    })
+}
+
+/// Largest and root mean square displacement over the picture, pixels.
+fn displacement_px(camera: &Camera, turned: &Turned) -> [f64; 2] {
+    let (mut largest, mut sum, mut count) = (0.0f64, 0.0, 0.0);
+    for (place, seen) in moved(camera, turned) {
+        let off = seen.map(|seen| seen.distance(place));
+        largest = largest.max(off.unwrap_or(0.0));
+        sum += off.map_or(0.0, |off| off * off);
+        count += f64::from(u8::from(off.is_some()));
+    }
+    [largest, (sum / f64::max(count, 1.0)).sqrt()]
+}
+
+/// Share of the picture that a turned camera still shows.
+fn shared_with(camera: &Camera, turned: &Turned) -> f64 {
+    let last = DVec2::new(f64::from(camera.size[0] - 1), f64::from(camera.size[1] - 1));
+    let is_inside = |seen: DVec2| seen.cmpge(DVec2::ZERO).all() && seen.cmple(last).all();
+    moved(camera, turned).filter(|(_, seen)| seen.is_some_and(is_inside)).count() as f64 / 49.0
+}
+
+/// Rotation vector of a rotation.
+fn vector(turned: &Turned) -> DVec3 {
+    DQuat::from_mat3(turned).normalize().to_scaled_axis()
+}
+
+/// The rotation of a rotation vector.
+fn matrix(turn_rad: DVec3) -> Turned {
+    DMat3::from_quat(DQuat::from_scaled_axis(turn_rad))
+}
+
+#[cfg(test)]
+mod tests;
