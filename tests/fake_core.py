@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table
 from memo.files import JOINTS, TRACK_COLUMNS
 from memo.gait import gait_table
@@ -62,6 +63,7 @@ class Track:
         times_s = np.asarray(times_s, float)
         self._given = (times_s, status)
         self.camera = camera
+        self.camera_motion = CameraMotion()
         self.columns = walk(times_s, camera)
         self.events = [
             {"time_s": float(times_s[i]), "frame": i + 0.25, "event": "heel_strike", "side": side}

@@ -254,6 +254,7 @@ class Tracker:
         start_frames: int = 13,
         compensate_gain: bool = False,
         background: bool = False,
+        steady: bool = True,
         measure: str = "rohr",
         full_gradient: float | None = None,
         full_velocity: float | None = None,
@@ -264,6 +265,23 @@ class Tracker:
     def take_finished(self) -> list[Walk]: ...
     def people(self) -> list[dict[str, float]]: ...
     def seek_report(self) -> dict[str, int]: ...
+    def camera_motion(self) -> list[tuple[int, str, list[float], float, float, float]]: ...
+    def lost_views(self) -> list[tuple[int, str]]: ...
+
+@final
+class Steadier:
+    """Steadies frames of a camera held in the hand, as `Tracker` does.
+
+    A frame's `state` is "still", "turned", "unknown" or "lost"; a frame that was turned back has `picture`, as
+    the camera of the first frame would have seen it, and `unseen`, the pixels that it does not show.
+    `turn_rad` is the rotation vector from the first frame's camera to the frame's, camera axes.
+    """
+
+    def __new__(
+        cls, camera: Camera | None = None, *, fov_deg: float | None = None, still_px: float | None = None
+    ) -> Self: ...
+    def update(self, frame: npt.NDArray[np.uint8]) -> dict[str, Any]: ...
+    def losses(self) -> list[tuple[int, str]]: ...
 
 @final
 class Explainer:

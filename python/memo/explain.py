@@ -5,7 +5,8 @@ A run's folder stores the search region of the tracker in every frame, the perso
 eqs. (7)-(11) and the similarity over the whole gait cycle are reproduced exactly: by the same code, at the
 best point of the tracker's grid. The phase in `track.csv` is near that point, not equal to it: it is refined
 between grid points and smoothed over all frames. The similarity is the one in `track.csv`. Pixels and
-lengths in pixels are those of the video, even if the tracker was given pictures averaged down.
+lengths in pixels are those of the video, even if the tracker was given pictures averaged down. Frames of a
+camera that moved are compared as the first frame's camera would have seen them, and shown like this.
 """
 
 from __future__ import annotations
@@ -128,7 +129,8 @@ def explain(
         raise RunError(f"{run_folder}: frame {unknown[0]} was not tracked; tracked are {seen}")
     path = _video(run, file, video)
     try:
-        tracker = _memo.Tracker(**run["options"])
+        # Older runs took the frames as they were.
+        tracker = _memo.Tracker(**{"steady": False, **run["options"]})
         explainer = _memo.Explainer(tracker, run["walks"], {frame - first for frame in wanted})
     except (TypeError, ValueError, OverflowError) as error:
         raise RunError(f"{file}: {error}") from None
@@ -205,11 +207,25 @@ def _found(
         if progress is not None:
             progress(done, total)
         if found is not None:  # from the previous frame
-            yield found, found["luma"] if shrink == 1 else before
+            yield found, _whole(found["luma"], before, shrink)
         before = whole
     found = explainer.finish()
     if found is not None:
-        yield found, found["luma"] if shrink == 1 else before
+        yield found, _whole(found["luma"], before, shrink)
+
+
+def _whole(
+    compared: npt.NDArray[np.uint8], whole: npt.NDArray[np.uint8], shrink: int
+) -> npt.NDArray[np.uint8]:
+    """The picture of the video that was compared; of a steadied one that was averaged, the average enlarged."""
+    if shrink == 1:
+        return compared
+    if np.array_equal(compared, averaged(whole, shrink)):
+        return whole
+    shown = np.zeros_like(whole)
+    enlarged = np.kron(compared, np.ones((shrink, shrink), np.uint8))
+    shown[: enlarged.shape[0], : enlarged.shape[1]] = enlarged
+    return shown
 
 
 _PLACES = ("edge_points", "segments", "model")

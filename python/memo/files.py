@@ -93,6 +93,7 @@ _DIGITS = {
     "p_mirrored": 4,
     "probability": 6,
     "similarity": 5,
+    "support": 4,
     "walk": 0,
     "person": 0,
     "cycle": 0,

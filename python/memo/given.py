@@ -109,6 +109,7 @@ def tracker_options(
     camera: Path | None,
     reading: Mapping[str, Any],
     fov_deg: float | None,
+    steady: bool = True,
 ) -> dict[str, Any]:
     """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
     options: dict[str, Any] = {}
@@ -125,6 +126,8 @@ def tracker_options(
         options["camera"] = load_camera(camera, **reading)
     if fov_deg is not None:
         options["fov_deg"] = checked_fov(fov_deg)
+    if not steady:
+        options["steady"] = False
     return options
 
 

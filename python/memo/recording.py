@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import memo
+from memo.camera_motion import CameraMotion, write_camera_motion_csv
 from memo.cycles import write_cycles_csv
 from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Recorded", "Recording", "Stop", "follow", "track_recording", "write_results", "write_tables"]
 
 _DRAWN = (
+    "camera_motion.csv",
     "overlay.mp4",
     "motion.png",
     "angles.png",
@@ -92,6 +94,7 @@ class Recorded:
     camera: Any
     shrink: int
     records: list[dict[str, Any]]
+    camera_motion: CameraMotion
     run: tuple[Mapping[str, Any], Source, int, bool]
     """Options, source, frames read and whether frames were left: the input of `write_run`."""
     written: list[Path] = field(default_factory=list)
@@ -297,6 +300,7 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
     if source.shrink > 1:
         track = track.of_video(source.shrink, source.size)
     first_frame = source.frames[0]
+    track.camera_motion = replace(track.camera_motion, first_frame=first_frame)
 
     def renumbered(table: Mapping[str, Any]) -> dict[str, Any]:
         return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else {**table}
@@ -314,12 +318,13 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
         camera=track.camera,
         shrink=source.shrink,
         records=track.records,
+        camera_motion=track.camera_motion,
         run=(tracker.options, source, frames_read, interrupted),
     )
 
 
 def write_tables(recorded: Recorded, out: Path) -> None:
-    """Writes the tables and run.json; removes pictures of an earlier run."""
+    """Writes the tables and run.json; removes pictures and the camera's motion of an earlier run."""
     for stale in _DRAWN:  # from an earlier run: they do not match the new tables
         (out / stale).unlink(missing_ok=True)
     names = ("track.csv", "events.csv", "gait_parameters.csv", "cycles.csv")
@@ -329,3 +334,6 @@ def write_tables(recorded: Recorded, out: Path) -> None:
     write_gait_parameters_csv(gait, recorded.gait_parameters)
     write_cycles_csv(cycles, recorded.cycles)
     recorded.written = [table, events, gait, cycles, write_run(out, recorded, *recorded.run)]
+    if recorded.camera_motion.moved:
+        recorded.written.append(out / "camera_motion.csv")
+        write_camera_motion_csv(recorded.written[-1], recorded.camera_motion)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
@@ -52,6 +53,8 @@ class Tracker:
     `start_frames`: number of frames in the starting phase.
     `compensate_gain`: follow exposure drift between frames.
     `background`: keep a slowly varying background, for people who stop.
+    `steady`: estimate how the camera turns, and turn frames back to the view of the first one. Frames of a
+    camera at rest are left as they are.
     `measure`: "rohr" (eq. 7) or "lowe" (eq. 10).
     `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
     per frame) are weighted in proportion, w_G and w_V of eq. 11; None weights all equally.
@@ -115,7 +118,10 @@ class Tracker:
         """Ends the stream and returns all walks not returned before."""
         self._core.finish()
         self._walks += self._core.take_finished()
-        found = Track(self._walks, self._core.seek_report(), self._camera)
+        motion = CameraMotion(
+            self._core.camera_motion(), self._core.lost_views(), camera_given=self._camera is not None
+        )
+        found = Track(self._walks, self._core.seek_report(), self._camera, camera_motion=motion)
         _log.info("%s", found.summary["message"])
         return found
 
@@ -286,6 +292,7 @@ class Track:
         *,
         shrink: int = 1,
         video_size: tuple[int, int] | None = None,
+        camera_motion: CameraMotion | None = None,
     ) -> None:
         self.walks: list[_memo.Walk | StoredWalk] = list(walks)
         self.seek_report: dict[str, int] = seek_report
@@ -293,6 +300,8 @@ class Track:
         """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
         self._camera = camera
         self._video_size = video_size
+        self.camera_motion: CameraMotion = camera_motion or CameraMotion()
+        """The camera in every frame; the world of the results is that of the first one."""
 
     def of_video(self, shrink: int, size: tuple[int, int] | None = None) -> Track:
         """The same track in pixels of the video whose frames were averaged `shrink` by `shrink`, as
@@ -300,7 +309,10 @@ class Track:
 
         It changes the columns in pixels, the contours and the camera.
         """
-        return Track(self.walks, self.seek_report, self._camera, shrink=shrink, video_size=size)
+        motion = replace(self.camera_motion, shrink=shrink)
+        return Track(
+            self.walks, self.seek_report, self._camera, shrink=shrink, video_size=size, camera_motion=motion
+        )
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -344,9 +356,9 @@ class Track:
     @property
     def sentences(self) -> list[str]:
         """The findings in sentences, one walk after another."""
+        said = self.camera_motion.sentences
         if not self.walks:
-            return [self.summary["message"]]
-        said = []
+            return [self.summary["message"], *said]
         for index, walk in enumerate(self.walks):
             told = [*assumed_height_sentences(walk), self._message(walk)]
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
@@ -438,6 +450,7 @@ class Track:
                 "message": _NOBODY[self._why_nobody()],
                 "walks": 0,
                 "people": 0,
+                "camera_motion": self.camera_motion.summary,
             }
         speed, cadence = self._pace(main)
         return {
@@ -458,6 +471,7 @@ class Track:
             "measured_height_sd_m": main.measured_height[1] if main.measured_height else None,
             "doubts": [*contradiction_sentences(main), *implausible_sentences(main)],
             "fit": _fit(main),
+            "camera_motion": self.camera_motion.summary,
         }
 
     @classmethod
@@ -483,8 +497,10 @@ class Track:
 
     @staticmethod
     def _way(walk: _memo.Walk | StoredWalk) -> str:
-        hip_px = walk.columns()["right_hip_u_px"]
-        return "left to right" if hip_px[-1] > hip_px[0] else "right to left"
+        columns = walk.columns()
+        ends = np.column_stack([columns[f"right_hip_{axis}_m"][[0, -1]] for axis in "xyz"])
+        first_px, last_px = walk.camera.project(ends)[:, 0]  # in one view, wherever the camera looked
+        return "left to right" if last_px > first_px else "right to left"
 
     def _why_nobody(self) -> str:
         seek = self.seek_report

@@ -53,6 +53,13 @@ def add_track(app: "typer.Typer") -> None:
         fov_deg: Annotated[
             float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
         ] = None,
+        steady: Annotated[
+            bool,
+            typer.Option(
+                help="Turn frames back to the view of the first one, for a camera held in the hand. Frames of "
+                "a camera at rest are not changed."
+            ),
+        ] = True,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         fps: Annotated[
             float | None, typer.Option(help="True frame rate, in place of the time stamps, for slow motion.")
@@ -82,7 +89,7 @@ def add_track(app: "typer.Typer") -> None:
 
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
-            options = tracker_options(heights(height), camera, reading, fov_deg)
+            options = tracker_options(heights(height), camera, reading, fov_deg, steady)
             asked = frame_range(frames)
             return _track(Recording(video, options, asked, fps, shrink, overlay, plots, page), delivery)
 

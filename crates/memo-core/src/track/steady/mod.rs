@@ -180,7 +180,7 @@ const NEW_SHOT_FRAMES: [usize; 2] = [3, 25];
 /// Support falls at a cut from one frame to the next by this much.
 const CUT_FALL: f64 = 0.25;
 /// Frames in which a zoom must be seen.
-const ZOOM_FRAMES: usize = 5;
+const ZOOM_FRAMES: usize = 4;
 /// A frame that shares less than this with the key frame, or supports it less, becomes a key frame.
 const KEY_OVERLAP: f64 = 0.6;
 const KEY_SUPPORT: f64 = 0.55;
@@ -219,7 +219,8 @@ struct Other {
     /// The first of the frames that agree, and their number.
     frame: usize,
     agreeing: usize,
-    is_sudden: bool,
+    /// Why the view has ended, if it has.
+    reason: LossReason,
 }
 
 /// Steadies a stream of frames.
@@ -276,14 +277,15 @@ impl Steadier {
         let pyramid = Pyramid::new(*frame, levels(frame));
         if self.view.is_none() {
             self.open(frame, &pyramid);
-            return Ok(self.noted(number, None, frame));
+            let support = self.view.as_ref().map(|_| 1.0);
+            return Ok(self.noted(number, support, frame));
         }
         let found = self.compared(&pyramid);
         match found {
             Some((key, estimate)) => self.follow(number, key, &estimate, &pyramid),
             None => self.look_for_another_shot(number, frame, &pyramid),
         }
-        Ok(self.noted(number, found.map(|(_, estimate)| estimate), frame))
+        Ok(self.noted(number, found.map(|(_, estimate)| estimate.support), frame))
     }
 
     /// The camera in the frames so far, of the last 25 000 of them.
@@ -390,9 +392,9 @@ impl Steadier {
         });
         if let Some(other) = self.other.as_mut().filter(|_| agrees) {
             other.agreeing += 1;
-            let reason = if other.is_sudden { LossReason::Cut } else { LossReason::OtherView };
-            if other.agreeing >= NEW_SHOT_FRAMES[usize::from(!other.is_sudden)] && !self.is_lost {
-                let loss = Loss { frame: other.frame, reason };
+            let needed = NEW_SHOT_FRAMES[usize::from(other.reason == LossReason::OtherView)];
+            if other.agreeing >= needed && !self.is_lost {
+                let loss = Loss { frame: other.frame, reason: other.reason };
                 self.lose(loss);
                 let other = self.other.take();
                 self.reopen_without_camera(other);
@@ -401,14 +403,18 @@ impl Steadier {
         }
         let support = comparison.estimate(&self.keys[self.nearest_key()].template, &self.last);
         let fallen = self.last_support - support.map_or(0.0, |e| e.support);
-        let is_sudden = self.other.is_none() && fallen > CUT_FALL;
+        let reason = match self.other {
+            _ if self.zooming > 0 => LossReason::Zoom,
+            None if fallen > CUT_FALL => LossReason::Cut,
+            _ => LossReason::OtherView,
+        };
         let key = Template::new(pyramid, &view.camera).ok();
         self.other = key.map(|template| Other {
             key: Key { template, turned: DMat3::IDENTITY, zoom: 0.0 },
             picture: frame.to_image(),
             frame: number,
             agreeing: 1,
-            is_sudden,
+            reason,
         });
     }
 
@@ -438,11 +444,10 @@ impl Steadier {
     }
 
     /// Records the camera in a frame and steadies the frame.
-    fn noted(&mut self, number: usize, estimate: Option<Estimate>, frame: &Frame<'_>) -> Steadied {
-        let support = estimate.map_or(f64::NAN, |e| e.support);
+    fn noted(&mut self, number: usize, support: Option<f64>, frame: &Frame<'_>) -> Steadied {
         let shift_px = self.view.as_ref().map_or([0.0; 2], |view| displacement_px(&view.camera, &self.last));
         let is_moved = !(shift_px[0] < self.options.still_px);
-        let state = match estimate {
+        let state = match support {
             _ if self.is_lost => CameraState::Lost,
             None => CameraState::Unknown,
             Some(_) if is_moved => CameraState::Turned,
@@ -452,6 +457,7 @@ impl Steadier {
         if self.motions.len() == MOST_MOTIONS {
             self.motions.pop_front();
         }
+        let support = support.unwrap_or(f64::NAN);
         self.motions.push_back(CameraMotion { frame: number, state, turn_rad, shift_px, support });
         match &self.view {
             _ if self.is_lost => Steadied::Lost,

@@ -1,1 +1,302 @@
+use super::*;
+use crate::model::Distortion;
+use proptest::prelude::*;
 
+const SIZE: [u32; 2] = [320, 240];
+
+fn camera() -> Camera {
+    Camera::level(SIZE, 0.9, 1.0, 5.0).unwrap()
+}
+
+/// A number in [0, 1) of a place on a lattice.
+fn hashed(seed: u32, x: i32, y: i32) -> f64 {
+    let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+    f64::from(h ^ (h >> 15)) / 4_294_967_296.0
+}
+
+/// A smooth random texture, grey levels about 120: lattice noise with a period of `scale` pixels.
+fn texture(seed: u32, at: DVec2, scale: f64) -> f64 {
+    let place = at / scale;
+    let low = place.floor();
+    let (t, x, y) = (place - low, low.x as i32, low.y as i32);
+    let ease = t * t * (3.0 - 2.0 * t);
+    let line = |y: i32| hashed(seed, x, y) * (1.0 - ease.x) + hashed(seed, x + 1, y) * ease.x;
+    120.0 + 130.0 * (line(y) * (1.0 - ease.y) + line(y + 1) * ease.y - 0.5)
+}
+
+/// A wall far away, as a camera sees it that is turned from the first view and has its focal length enlarged; what covers
+/// the wall is given by its place and grey value.
+struct Shot<'a> {
+    camera: &'a Camera,
+    turned: Turned,
+    zoom: f64,
+    seed: u32,
+    noise: f64,
+}
+
+impl Shot<'_> {
+    fn of(camera: &Camera, turn_rad: [f64; 3]) -> Shot<'_> {
+        Shot { camera, turned: matrix(turn_rad.into()), zoom: 0.0, seed: 1, noise: 2.0 }
+    }
+
+    /// Drawn from the wall outwards: each pixel's ray is turned back to the first view. This does not share a line with
+    /// the estimate, which goes the other way.
+    fn drawn(&self, tone: impl Fn(f64) -> f64, cover: impl Fn(DVec2) -> Option<f64>) -> Image<u8> {
+        let mut random =
+            crate::synth::Random::new(u64::from(self.seed) + 77 + (self.turned.x_axis.y * 1e6) as u64);
+        let [width, height] = SIZE.map(|side| side as usize);
+        let mut grey = |k: usize| {
+            let pixel = DVec2::new((k % width) as f64, (k / width) as f64);
+            let ideal = self.camera.undistort(pixel).unwrap();
+            let ray =
+                ((ideal - self.camera.centre_px) / self.camera.focal_px / (1.0 + self.zoom)).extend(1.0);
+            let first = self.turned.transpose() * ray;
+            let wall = first.truncate() / first.z * self.camera.focal_px + self.camera.centre_px;
+            let seen = cover(pixel).unwrap_or_else(|| texture(self.seed, wall, 7.0));
+            (tone(seen) + self.noise * f64::from(random.normal_pair()[0])).round().clamp(0.0, 255.0) as u8
+        };
+        Image::from_vec(width, height, (0..width * height).map(&mut grey).collect()).unwrap()
+    }
+
+    fn plain(&self) -> Image<u8> {
+        self.drawn(|grey| grey, |_| None)
+    }
+}
+
+fn steadier(camera: Option<&Camera>) -> Steadier {
+    Steadier::new(SteadyOptions::default(), camera, 0.9)
+}
+
+fn pushed(steadier: &mut Steadier, image: &Image<u8>) -> (Steadied, CameraMotion) {
+    let steadied = steadier.push(&image.as_frame()).unwrap();
+    (steadied, *steadier.motions().back().unwrap())
+}
+
+/// Largest distance between where two rotations show the places of the picture, pixels.
+fn apart_px(camera: &Camera, a: &Turned, b: &Turned) -> f64 {
+    let pairs = moved(camera, a).zip(moved(camera, b));
+    pairs.map(|((_, a), (_, b))| a.unwrap().distance(b.unwrap())).fold(0.0, f64::max)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// A rotation by up to 8 px and 1.5 degrees of roll, while a third of the picture is covered by something that moves
+    /// by itself and the lamp flickers.
+    #[test]
+    fn a_planted_rotation_is_recovered_behind_a_moving_thing(
+        pan in -0.02f64..0.02, tilt in -0.02f64..0.02, roll in -0.026f64..0.026,
+        gain in 0.8f64..1.2, offset in -12.0f64..12.0, bent in any::<bool>(),
+    ) {
+        let lens = Distortion::Brown { k1: -0.2, k2: 0.05, p1: 0.001, p2: -0.001, k3: 0.0 };
+        let camera = Camera { distortion: if bent { lens } else { Distortion::None }, ..camera() };
+        let covered = |left: f64| move |at: DVec2| {
+            (left..left + 107.0).contains(&at.x).then(|| texture(9, at - DVec2::X * left, 5.0))
+        };
+        let first = Shot::of(&camera, [0.0; 3]).drawn(|grey| grey, covered(60.0));
+        let second = Shot::of(&camera, [tilt, pan, roll]).drawn(|grey| gain * grey + offset, covered(72.0));
+        let mut steadier = steadier(Some(&camera));
+        pushed(&mut steadier, &first);
+        let (_, motion) = pushed(&mut steadier, &second);
+        let off_px = apart_px(&camera, &motion.turned(), &matrix(DVec3::new(tilt, pan, roll)));
+        prop_assert!(off_px < 0.05, "{off_px} px, {motion:?}");
+        prop_assert!((0.4..0.8).contains(&motion.support), "{motion:?}");
+    }
+}
+
+/// The turned-back picture is that of the first view, and what the frame does not show is known.
+#[test]
+fn a_turned_frame_is_turned_back() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    let first = Shot { noise: 0.0, ..Shot::of(&camera, [0.0; 3]) }.plain();
+    pushed(&mut steadier, &first);
+    let turned = Shot { noise: 0.0, ..Shot::of(&camera, [0.012, -0.02, 0.015]) };
+    let (Steadied::Moved { picture, unseen }, motion) = pushed(&mut steadier, &turned.plain()) else {
+        panic!("left as it was")
+    };
+    assert_eq!(motion.state, CameraState::Turned);
+    let mut square = (0.0, 0.0);
+    for (k, (a, b)) in picture.pixels().iter().zip(first.pixels()).enumerate() {
+        let pixel = DVec2::new((k % 320) as f64, (k / 320) as f64);
+        let ray = ((pixel - camera.centre_px) / camera.focal_px).extend(1.0);
+        let at = pixel_of(&camera, &turned.turned, ray).unwrap();
+        let inside = at.cmpge(DVec2::splat(0.1)).all() && at.cmple(DVec2::new(318.9, 238.9)).all();
+        let outside = at.cmplt(DVec2::splat(-0.1)).any() || at.cmpgt(DVec2::new(319.1, 239.1)).any();
+        assert!(!(inside && unseen.pixels()[k]) && !(outside && !unseen.pixels()[k]), "{pixel} {at}");
+        if inside {
+            square = (square.0 + f64::from(a.abs_diff(*b)).powi(2), square.1 + 1.0);
+        } else if outside {
+            assert_eq!(a, b, "filled from the first frame");
+        }
+    }
+    assert!((square.0 / square.1).sqrt() < 1.0, "{square:?}");
+}
+
+#[test]
+fn frames_of_a_camera_at_rest_are_left_alone() {
+    let camera = camera();
+    let mut steadier = steadier(None);
+    for seed in 0..4 {
+        let moving = |at: DVec2| {
+            (at.x > 40.0 * f64::from(seed) && at.x < 40.0 * f64::from(seed) + 60.0).then_some(30.0)
+        };
+        let frame = Shot { noise: 4.0 + f64::from(seed), ..Shot::of(&camera, [0.0; 3]) };
+        let (steadied, motion) = pushed(&mut steadier, &frame.drawn(|grey| grey, moving));
+        assert_eq!(
+            (steadied, motion.state, motion.turn_rad),
+            (Steadied::AsGiven, CameraState::Still, DVec3::ZERO)
+        );
+    }
+    assert!(steadier.losses().is_empty());
+}
+
+#[test]
+fn without_texture_nothing_is_estimated_and_frames_are_left_alone() {
+    let grey = Image::filled(320, 240, 100u8);
+    let error = Template::new(&Pyramid::new(grey.as_frame(), 2), &camera()).unwrap_err();
+    assert_eq!(error, SteadyError::NoTexture { points: 0, needed: 60 });
+    for (width, height) in [(320, 240), (1, 1), (2, 9), (7, 300), (8, 8)] {
+        let mut steadier = steadier(None);
+        for level in [0u8, 100, 255] {
+            let (steadied, motion) = pushed(&mut steadier, &Image::filled(width, height, level));
+            assert_eq!((steadied, motion.state), (Steadied::AsGiven, CameraState::Unknown));
+            assert!(motion.shift_px == [0.0; 2] && motion.turn_rad == DVec3::ZERO && motion.support.is_nan());
+        }
+    }
+    let mut steadier = steadier(Some(&camera()));
+    pushed(&mut steadier, &Shot::of(&camera(), [0.0; 3]).plain());
+    let other = Image::filled(320, 200, 0u8);
+    assert!(matches!(steadier.push(&other.as_frame()), Err(FrameError::SizeChanged { height: 200, .. })));
+}
+
+/// A black frame and a flash are no cut: the camera is unknown in them, and known again after them.
+#[test]
+fn a_black_frame_is_no_cut() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    let wall = Shot::of(&camera, [0.0; 3]).plain();
+    pushed(&mut steadier, &wall);
+    for level in [0u8, 255] {
+        let (steadied, motion) = pushed(&mut steadier, &Image::filled(320, 240, level));
+        assert_eq!((steadied, motion.state), (Steadied::AsGiven, CameraState::Unknown));
+        assert_eq!(pushed(&mut steadier, &wall).1.state, CameraState::Still);
+    }
+    assert!(steadier.losses().is_empty() && steadier.take_loss().is_none());
+}
+
+#[test]
+fn a_tripod_that_is_kicked_is_found_again() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    pushed(&mut steadier, &Shot::of(&camera, [0.0; 3]).plain());
+    for turn in [[0.03, -0.055, 0.01], [0.0, 0.0, 0.0]] {
+        let motion = pushed(&mut steadier, &Shot::of(&camera, turn).plain()).1;
+        let off_px = apart_px(&camera, &motion.turned(), &matrix(turn.into()));
+        // Frames nearer to the first than the limit are left where they are.
+        assert!(off_px < 0.06, "{off_px} {motion:?}");
+    }
+}
+
+/// Pictures of one wall up to a frame, then of another one.
+fn cut_at(
+    steadier: &mut Steadier,
+    camera: &Camera,
+    at: usize,
+    count: usize,
+) -> Vec<(Steadied, CameraMotion)> {
+    let wall = |seed: u32, k: usize| Shot { seed, ..Shot::of(camera, [0.0, 0.001 * k as f64, 0.0]) }.plain();
+    (0..count).map(|k| pushed(steadier, &wall(if k < at { 1 } else { 2 }, k))).collect()
+}
+
+#[test]
+fn a_cut_ends_the_view_of_a_given_camera_until_it_comes_back() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    let frames = cut_at(&mut steadier, &camera, 5, 10);
+    assert_eq!(steadier.losses(), [Loss { frame: 5, reason: LossReason::Cut }]);
+    assert_eq!(steadier.take_loss(), Some(Loss { frame: 5, reason: LossReason::Cut }));
+    assert_eq!(steadier.take_loss(), None);
+    let lost = frames.iter().position(|(_, motion)| motion.state == CameraState::Lost).unwrap();
+    assert!(lost <= 8 && frames[lost..].iter().all(|(steadied, _)| *steadied == Steadied::Lost));
+    let back = pushed(&mut steadier, &Shot::of(&camera, [0.0, 0.01, 0.0]).plain()).1;
+    assert_eq!(back.state, CameraState::Turned);
+}
+
+#[test]
+fn without_a_camera_another_shot_is_a_view_of_its_own() {
+    let camera = camera();
+    let mut steadier = steadier(None);
+    let frames = cut_at(&mut steadier, &camera, 4, 12);
+    assert_eq!(steadier.losses(), [Loss { frame: 4, reason: LossReason::Cut }]);
+    let (_, last) = &frames[11];
+    assert!(last.state == CameraState::Turned && last.support > 0.8, "{last:?}");
+    // Against the first frame of the second shot.
+    let off_px = apart_px(&camera, &last.turned(), &matrix(DVec3::new(0.0, 0.007, 0.0)));
+    assert!(off_px < 0.1, "{off_px}");
+}
+
+#[test]
+fn a_zoom_is_noticed_and_shaking_is_none() {
+    let camera = camera();
+    let run = |zoom_per_frame: f64| {
+        let mut steadier = steadier(Some(&camera));
+        for k in 0..24 {
+            let shake = [0.006 * (0.9 * f64::from(k)).sin(), 0.008 * (1.3 * f64::from(k)).cos(), 0.0];
+            let zoom = zoom_per_frame * f64::from((k - 6).max(0));
+            pushed(&mut steadier, &Shot { zoom, ..Shot::of(&camera, shake) }.plain());
+        }
+        steadier.losses().to_vec()
+    };
+    assert!(run(0.0).is_empty());
+    let lost = run(0.006);
+    assert!(lost.len() == 1 && lost[0].reason == LossReason::Zoom, "{lost:?}");
+    // 3 px at the corner, 200 px from the centre, are reached 2.5 frames after the zoom begins.
+    assert!((7..=11).contains(&lost[0].frame), "{lost:?}");
+}
+
+/// A pan beyond the first view: key frames are chained, and the way back ends at the beginning.
+#[test]
+fn a_pan_is_chained_over_key_frames() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    let turns = (0..=40).map(|k| 0.03 * f64::from(if k <= 20 { k } else { 40 - k }));
+    let mut worst = 0.0f64;
+    for pan in turns {
+        let turn = [0.1 * pan, pan, 0.05 * pan];
+        let motion = pushed(&mut steadier, &Shot::of(&camera, turn).plain()).1;
+        worst = worst.max(apart_px(&camera, &motion.turned(), &matrix(turn.into())));
+    }
+    assert!(steadier.keys.len() > 1 && steadier.losses().is_empty());
+    assert!(worst < 0.5, "{worst} px");
+}
+
+#[test]
+fn one_thread_and_many_give_the_same() {
+    let camera = camera();
+    let frames: Vec<Image<u8>> =
+        (0..3).map(|k| Shot::of(&camera, [0.004 * f64::from(k), 0.007, 0.002]).plain()).collect();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut steadier = steadier(Some(&camera));
+            frames.iter().map(|frame| pushed(&mut steadier, frame)).collect::<Vec<_>>()
+        })
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn options_outside_their_ranges_are_refused() {
+    let options = SteadyOptions::default();
+    assert_eq!(options.check(), Ok(()));
+    for (wrong, name) in [
+        (SteadyOptions { still_px: f64::NAN, ..options }, "still_px"),
+        (SteadyOptions { least_support: 1.0, ..options }, "least_support"),
+        (SteadyOptions { most_zoom_px: 0.0, ..options }, "most_zoom_px"),
+    ] {
+        assert_eq!(wrong.check().unwrap_err().name, name);
+    }
+}

@@ -1,0 +1,111 @@
+"""The camera in every frame: whether it stood still, how far it turned, and where a view ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from memo.files import write_columns_csv
+from memo.wording import counted
+
+__all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "write_camera_motion_csv"]
+
+CAMERA_MOTION_COLUMNS = (
+    *("frame", "state", "rx_rad", "ry_rad", "rz_rad", "shift_px", "shift_rms_px", "support"),
+)
+"""Columns of `camera_motion.csv`, in order."""
+
+_STATES = ("still", "turned", "unknown", "lost")
+
+
+@dataclass(frozen=True)
+class CameraMotion:
+    """The camera in the frames of a video; empty if it was not looked for (`steady=False`)."""
+
+    rows: Sequence[tuple[int, str, Sequence[float], float, float, float]] = ()
+    """Per frame: number, state ("still", "turned", "unknown" or "lost"), rotation vector from the camera of the
+    first frame to that of the frame (radians, camera axes), largest and root mean square displacement of the
+    picture (pixels), and the share of its points that the rotation explains."""
+    lost: Sequence[tuple[int, str]] = field(default=())
+    """Where a view ended: the first frame of another one, and "cut", "zoom" or "other view"."""
+    first_frame: int = 0
+    """Number in the video of the first frame given."""
+    shrink: int = 1
+    """Pixels of the video per pixel of a frame, along each axis."""
+    camera_given: bool = False
+    """Whether a calibration was given."""
+
+    @property
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """One array per column of `camera_motion.csv`, in pixels and frames of the video."""
+        turns = np.array([row[2] for row in self.rows], np.float64).reshape(-1, 3)
+        numbers = np.array([row[3:6] for row in self.rows], np.float64).reshape(-1, 3)
+        return {
+            "frame": np.array([row[0] + self.first_frame for row in self.rows], np.int64),
+            "state": np.array([row[1] for row in self.rows], object),
+            "rx_rad": turns[:, 0],
+            "ry_rad": turns[:, 1],
+            "rz_rad": turns[:, 2],
+            "shift_px": numbers[:, 0] * self.shrink,
+            "shift_rms_px": numbers[:, 1] * self.shrink,
+            "support": numbers[:, 2],
+        }
+
+    @property
+    def moved(self) -> bool:
+        """True if frames were steadied or a view ended."""
+        return bool(self.lost) or any(row[1] == "turned" for row in self.rows)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Number of frames per state, displacement of the steadied frames (pixels), and lost views."""
+        columns = self.columns
+        counts = {f"frames_{state}": int((columns["state"] == state).sum()) for state in _STATES}
+        turned = columns["state"] == "turned"
+        largest, rms = columns["shift_px"][turned], columns["shift_rms_px"][turned]
+        return {
+            "moved": self.moved,
+            "largest_px": float(largest.max()) if turned.any() else 0.0,
+            "rms_px": float(np.sqrt(np.mean(rms**2))) if turned.any() else 0.0,
+            **counts,
+            "lost": [[frame + self.first_frame, reason] for frame, reason in self.lost],
+        }
+
+    @property
+    def sentences(self) -> list[str]:
+        """What to know of a camera that moved; none of one that stood still."""
+        if not self.moved:
+            return []
+        summary, said = self.summary, []
+        if steadied := summary["frames_turned"]:
+            said.append(
+                f"The camera moved: the picture shifts by up to {summary['largest_px']:.1f} px "
+                f"({summary['rms_px']:.1f} px root mean square) against the first frame. "
+                f"{counted(steadied, 'frame')} of {len(self.rows)} were turned back."
+            )
+        for frame, reason in summary["lost"][:5]:
+            said.append(f"{_WHAT[reason].format(frame=frame)} {_THEN[self.camera_given]}")
+        if len(summary["lost"]) > 5:
+            said.append(f"{counted(len(summary['lost']) - 5, 'more view')} ended like this.")
+        return said
+
+
+_WHAT = {
+    "cut": "The view changes at frame {frame} (a cut).",
+    "zoom": "The picture is zoomed from about frame {frame} on, or the camera moves forwards or backwards.",
+    "other view": "The view is another one from about frame {frame} on.",
+}
+_THEN = {
+    True: "The given camera is that of the first view, so frames of another one are not used.",
+    False: "A walk ends there; what follows is tracked as a scene of its own.",
+}
+
+
+def write_camera_motion_csv(path: str | PathLike[str], motion: CameraMotion) -> None:
+    """Writes the camera of every frame, one row per frame."""
+    write_columns_csv(path, motion.columns)
