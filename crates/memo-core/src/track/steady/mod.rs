@@ -45,6 +45,14 @@ pub enum SteadyError {
         /// Points needed.
         needed: usize,
     },
+    /// The gradients are in a small part of the picture.
+    #[error("gradients are in {:.0} % of the picture only: a rotation needs {:.0} %", 100.0 * share, 100.0 * needed)]
+    PlainPicture {
+        /// Share of the cells of the picture with a strong gradient.
+        share: f64,
+        /// Share needed.
+        needed: f64,
+    },
 }
 
 /// Options of the steadying.

@@ -24,10 +24,16 @@ const TILES: f64 = 1200.0;
 const LEAST_TILE_PX: usize = 8;
 /// Points taken from a tile of the finest level and of the others.
 const POINTS_PER_TILE: [usize; 2] = [6, 4];
-/// Gradients below this are noise, grey levels per pixel: four standard deviations at a noise of 3 grey levels.
+/// Gradients below this are noise, grey levels per pixel; or below this many standard deviations of the noise, of which
+/// a gradient has 0.43 along each axis.
 const LEAST_GRADIENT: f64 = 5.0;
+const LEAST_GRADIENT_SDS: f64 = 3.0;
 /// A template needs this many points at every level.
 const LEAST_POINTS: usize = 60;
+/// Points are wanted in this share of the cells of the picture, 16 by 12. Before a plain wall all gradients are the
+/// person's, whose motion would be taken for that of the camera.
+const LEAST_CELLS: f64 = 0.5;
+const CELLS: [usize; 2] = [16, 12];
 
 /// A pixel of the template.
 #[derive(Debug, Clone, Copy)]
@@ -59,8 +65,42 @@ impl Template {
         if fewest < LEAST_POINTS {
             return Err(SteadyError::NoTexture { points: fewest, needed: LEAST_POINTS });
         }
+        let share = cells_with_points(&levels[0], camera);
+        if share < LEAST_CELLS {
+            return Err(SteadyError::PlainPicture { share, needed: LEAST_CELLS });
+        }
         Ok(Self { levels })
     }
+}
+
+/// Share of the cells of the picture that contain a point.
+fn cells_with_points(points: &[Point], camera: &Camera) -> f64 {
+    let mut has_point = [false; CELLS[0] * CELLS[1]];
+    for pixel in points.iter().filter_map(|point| pixel_of(camera, &Turned::IDENTITY, point.ray)) {
+        let part = |at: f64, side: u32, count: usize| {
+            ((at.max(0.0) / f64::from(side) * count as f64) as usize).min(count - 1)
+        };
+        let [across, down] = CELLS;
+        let cell = part(pixel.y, camera.size[1], down) * across + part(pixel.x, camera.size[0], across);
+        has_point[cell] = true;
+    }
+    has_point.iter().filter(|has| **has).count() as f64 / has_point.len() as f64
+}
+
+/// Standard deviation of the noise, from the median of the filter that cancels planes and edges (Immerkaer 1996);
+/// texture in more than half of the picture enlarges it.
+fn noise_sd(frame: &Frame<'_>) -> f64 {
+    let step = ((frame.width() * frame.height()) as f64 / 4096.0).sqrt().max(1.0) as usize;
+    let mut found: Vec<i32> = Vec::with_capacity(8192);
+    for y in (1..frame.height() - 1).step_by(step) {
+        let [above, here, below] = [frame.row(y - 1), frame.row(y), frame.row(y + 1)];
+        for x in (1..frame.width() - 1).step_by(step) {
+            let second = |row: &[u8]| i32::from(row[x - 1]) - 2 * i32::from(row[x]) + i32::from(row[x + 1]);
+            found.push((second(above) - 2 * second(here) + second(below)).abs());
+        }
+    }
+    let middle = found.len() / 2;
+    f64::from(*found.select_nth_unstable(middle).1) / (0.6745 * 6.0)
 }
 
 /// The strongest gradients of every tile.
@@ -70,6 +110,7 @@ fn points(frame: &Frame<'_>, level: usize, camera: &Camera) -> Vec<Point> {
         return Vec::new();
     }
     let side = ((width * height) as f64 / TILES).sqrt().ceil().max(LEAST_TILE_PX as f64) as usize;
+    let least = (LEAST_GRADIENT_SDS * noise_sd(frame)).max(LEAST_GRADIENT);
     let taken = POINTS_PER_TILE[level.min(1)];
     let mut all = Vec::new();
     let mut tile = Vec::with_capacity(side * side);
@@ -79,7 +120,7 @@ fn points(frame: &Frame<'_>, level: usize, camera: &Camera) -> Vec<Point> {
             for y in top..(top + side).min(height - 2) {
                 for x in left..(left + side).min(width - 2) {
                     let length_sq = gradient(frame, x, y).length_squared();
-                    if length_sq >= LEAST_GRADIENT * LEAST_GRADIENT {
+                    if length_sq >= least * least {
                         tile.push((length_sq, x, y));
                     }
                 }

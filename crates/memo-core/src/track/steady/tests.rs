@@ -172,6 +172,28 @@ fn without_texture_nothing_is_estimated_and_frames_are_left_alone() {
     assert!(matches!(steadier.push(&other.as_frame()), Err(FrameError::SizeChanged { height: 200, .. })));
 }
 
+/// Before a plain wall all gradients are those of a person, whose motion is not that of the camera.
+#[test]
+fn before_a_plain_wall_a_person_is_no_camera_motion() {
+    let camera = camera();
+    let mut steadier = steadier(None);
+    for k in 0..6 {
+        let left = 60.0 + 6.0 * f64::from(k);
+        let person = |at: DVec2| {
+            let inside = (left..left + 90.0).contains(&at.x) && at.y > 20.0;
+            Some(if inside { texture(3, at - DVec2::X * left, 5.0) } else { 120.0 })
+        };
+        let frame =
+            Shot { noise: 5.0, seed: k as u32, ..Shot::of(&camera, [0.0; 3]) }.drawn(|grey| grey, person);
+        assert!(pushed(&mut steadier, &frame).0 == Steadied::AsGiven, "{k}");
+        if k == 0 {
+            let error = Template::new(&Pyramid::new(frame.as_frame(), 2), &camera).unwrap_err();
+            assert!(matches!(error, SteadyError::PlainPicture { share, .. } if share < 0.45), "{error}");
+        }
+    }
+    assert!(steadier.motions().iter().all(|motion| motion.state == CameraState::Unknown));
+}
+
 /// A black frame and a flash are no cut: the camera is unknown in them, and known again after them.
 #[test]
 fn a_black_frame_is_no_cut() {
