@@ -270,3 +270,17 @@ def test_a_tracker_loses_nothing_when_a_frame_is_interrupted(track, alarm):
     for name, column in track.columns.items():
         np.testing.assert_array_equal(again.columns[name], column, err_msg=name)
     assert taken_all_the_same > 0
+
+
+def test_a_point_of_the_picture_chooses_a_person(track):
+    columns = track.columns
+    row = len(track) // 2
+    frame = int(columns["frame"][row])
+    middle = [columns[f"right_hip_{axis}_px"][row] for axis in "uv"]
+    assert track.person_at(*middle, frame) == 0
+    assert track.person_at(middle[0] + 300, middle[1], frame) is None
+    assert track.person_at(*middle, 10_000) is None
+    alone = track.of_person(0)
+    assert len(alone) == len(track) and alone.summary == track.summary
+    with pytest.raises(ValueError, match=r"no person 1: the track has 1 person, counted from 0"):
+        track.of_person(1)

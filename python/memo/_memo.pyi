@@ -272,8 +272,8 @@ class Tracker:
 class Steadier:
     """Steadies frames of a camera held in the hand, as `Tracker` does.
 
-    A frame's `state` is "still", "turned", "unknown" or "lost"; a frame that was turned back has `picture`, as
-    the camera of the first frame would have seen it, and `unseen`, the pixels that it does not show.
+    A frame's `state` is "still", "turned", "unknown" or "lost"; a frame that was turned back has `picture`,
+    as the camera of the first frame would have seen it, and `unseen`, the pixels that it does not show.
     `turn_rad` is the rotation vector from the first frame's camera to the frame's, camera axes.
     """
 

@@ -24,9 +24,11 @@ __all__ = [
     "checked_fov",
     "checked_height",
     "frame_range",
+    "heights",
     "is_url",
     "load_camera",
     "nothing_at",
+    "point_in_frame",
     "tracker_options",
     "two_sides",
 ]
@@ -36,6 +38,7 @@ class InputError(ValueError):
     """A mistake in the user's input; the message is one line."""
 
 
+_POINT = re.compile(r"(\d+(?:\.\d+)?),(\d+(?:\.\d+)?)@(\d+)")
 # At least two letters: one letter is a Windows drive. `Path` removes one of the two slashes.
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
 
@@ -93,6 +96,14 @@ def heights(text: str | None) -> float | list[float] | None:
     except ValueError:
         raise InputError(f"--height {text} is not a height in metres, or several as in 1.80,1.65") from None
     return each[0] if len(each) == 1 else each
+
+
+def point_in_frame(text: str) -> tuple[float, float, int]:
+    """A point of the picture in a frame, as in 320,240@50: pixels, and the number of the frame in the video."""
+    point = _POINT.fullmatch(text.strip())
+    if point is None:
+        raise InputError(f"--follow {text} is not a point in a frame such as 320,240@50")
+    return float(point[1]), float(point[2]), int(point[3])
 
 
 def checked_height(height_m: float) -> float:

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,14 @@ def _never() -> Stop:
     return nullcontext(SimpleNamespace(requested=False))
 
 
+class Point(NamedTuple):
+    """A point of the picture, pixels of the video, in a frame of the video."""
+
+    u_px: float
+    v_px: float
+    frame: int
+
+
 @dataclass(frozen=True)
 class Recording:
     """A video, its known parameters, and what to write."""
@@ -76,6 +84,8 @@ class Recording:
     overlay: bool = True
     plots: bool = True
     page: bool = False
+    follow: Point | None = None
+    """Of several people, only the one who is there."""
 
 
 @dataclass
@@ -98,6 +108,8 @@ class Recorded:
     run: tuple[Mapping[str, Any], Source, int, bool]
     """Options, source, frames read and whether frames were left: the input of `write_run`."""
     written: list[Path] = field(default_factory=list)
+    followed: int | None = None
+    """The person chosen by a point, counted among everybody who was tracked."""
 
     @property
     def interrupted(self) -> bool:
@@ -175,7 +187,11 @@ def _track_recording(
             shrink=reader.shrink,
             size=reader.full_size,
         )
-        recorded = follow(reader, memo.Tracker(**options), source, out, reader.frame_count, progress, stop)
+        tracker, point = memo.Tracker(**options), recording.follow
+        recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, point)
+        if point is not None and recorded.followed is None:
+            at = f"{point.u_px:g},{point.v_px:g}@{point.frame}"
+            remark(f"{video}: nobody was tracked at {at}: the results are those of everybody")
         if reader.damage:
             remark(f"{video}: {reader.damage}")
     if recorded.interrupted:
@@ -206,6 +222,7 @@ def follow(
     count: int | None = None,
     progress: Progress = _unseen,
     stop: Stop | None = None,
+    point: Point | None = None,
 ) -> Recorded:
     """Passes all frames to the tracker; a stop ends it after the current frame.
 
@@ -220,12 +237,12 @@ def follow(
                 if asked.requested:
                     break
     except ValueError as error:
-        recorded = _recorded(tracker, source, frames_read, interrupted=True)
+        recorded = _recorded(tracker, source, frames_read, True, point)
         if not len(recorded.columns["frame"]):
             raise
         write_tables(recorded, out)
         raise InputError(f"{error}; the tables hold what was tracked until then") from error
-    return _recorded(tracker, source, frames_read, asked.requested)
+    return _recorded(tracker, source, frames_read, asked.requested, point)
 
 
 def write_results(
@@ -294,12 +311,19 @@ def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:
         yield f"pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera"
 
 
-def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool) -> Recorded:
+def _recorded(
+    tracker: Any, source: Source, frames_read: int, interrupted: bool, point: Point | None
+) -> Recorded:
     """The track in pixels of the video, frames numbered as in the video (the tracker counts from 0)."""
     track: Track = tracker.finish()
     if source.shrink > 1:
         track = track.of_video(source.shrink, source.size)
     first_frame = source.frames[0]
+    followed = None
+    if point is not None:
+        followed = track.person_at(point.u_px, point.v_px, point.frame - first_frame)
+    if followed is not None:
+        track = track.of_person(followed)
     track.camera_motion = replace(track.camera_motion, first_frame=first_frame)
 
     def renumbered(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -320,6 +344,7 @@ def _recorded(tracker: Any, source: Source, frames_read: int, interrupted: bool)
         records=track.records,
         camera_motion=track.camera_motion,
         run=(tracker.options, source, frames_read, interrupted),
+        followed=followed,
     )
 
 

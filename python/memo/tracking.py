@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass, replace
@@ -332,6 +333,29 @@ class Track:
         """The person of each walk, counted from 0 in order of appearance."""
         order = {person: k for k, person in enumerate(sorted({walk.person for walk in self.walks}))}
         return [order[walk.person] for walk in self.walks]
+
+    def person_at(self, u_px: float, v_px: float, frame: int) -> int | None:
+        """The person whose model covers a point of the picture in a frame; of several, the one whose middle is
+        nearest. None if there is nobody."""
+        columns, found = self.columns, []
+        for row in np.flatnonzero(columns["frame"] == frame).tolist():
+            points = self.contours(row).reshape(-1, 2)
+            points = points[np.isfinite(points).all(axis=1)]
+            low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.inf, -np.inf)
+            point = np.array([u_px, v_px])
+            if (low <= point).all() and (point <= high).all():
+                found.append((float(np.linalg.norm(point - (low + high) / 2)), int(columns["person"][row])))
+        return min(found)[1] if found else None
+
+    def of_person(self, person: int) -> Track:
+        """The walks of one person alone; people are counted from 0, as in the column `person`."""
+        walks = [walk for walk, own in zip(self.walks, self.people, strict=True) if own == person]
+        if not walks:
+            there = counted(len(set(self.people)), "person", "people")
+            raise ValueError(f"there is no person {person}: the track has {there}, counted from 0")
+        alone = copy.copy(self)
+        alone.walks = walks
+        return alone
 
     @property
     def events(self) -> list[dict[str, Any]]:

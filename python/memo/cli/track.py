@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Interrupt, complain, guarded, with_steps
 from memo.exits import Exit
-from memo.given import frame_range, heights, tracker_options
-from memo.recording import Recorded, Recording, track_recording
+from memo.given import frame_range, heights, point_in_frame, tracker_options
+from memo.recording import Point, Recorded, Recording, track_recording
 
 if TYPE_CHECKING:
     import typer
@@ -56,8 +56,8 @@ def add_track(app: "typer.Typer") -> None:
         steady: Annotated[
             bool,
             typer.Option(
-                help="Turn frames back to the view of the first one, for a camera held in the hand. Frames of "
-                "a camera at rest are not changed."
+                help="Turn frames back to the view of the first one, for a camera held in the hand. Frames "
+                "of a camera at rest are not changed."
             ),
         ] = True,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
@@ -71,6 +71,12 @@ def add_track(app: "typer.Typer") -> None:
                 "to 1280 pixels or less. Results are in pixels of the video.",
                 metavar="N",
                 min=1,
+            ),
+        ] = None,
+        follow: Annotated[
+            str | None,
+            typer.Option(
+                help="Of several people, keep only the one who is at pixel X,Y in frame F.", metavar="X,Y@F"
             ),
         ] = None,
         out: Annotated[
@@ -91,7 +97,9 @@ def add_track(app: "typer.Typer") -> None:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
             options = tracker_options(heights(height), camera, reading, fov_deg, steady)
             asked = frame_range(frames)
-            return _track(Recording(video, options, asked, fps, shrink, overlay, plots, page), delivery)
+            point = None if follow is None else Point(*point_in_frame(follow))
+            recording = Recording(video, options, asked, fps, shrink, overlay, plots, page, point)
+            return _track(recording, delivery)
 
         raise typer.Exit(guarded(work))
 
