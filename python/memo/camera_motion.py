@@ -29,8 +29,8 @@ class CameraMotion:
 
     rows: Sequence[tuple[int, str, Sequence[float], float, float, float]] = ()
     """Per frame: number, state ("still", "turned", "unknown" or "lost"), rotation vector from the camera of
-    the first frame to that of the frame (radians, camera axes), largest and root mean square displacement of the
-    picture (pixels), and the share of its points that the rotation explains."""
+    the first frame to that of the frame (radians, camera axes), largest and root mean square displacement of
+    the picture (pixels), and the share of its points that the rotation explains."""
     lost: Sequence[tuple[int, str]] = field(default=())
     """Where a view ended: the first frame of another one, and "cut", "zoom" or "other view"."""
     first_frame: int = 0

@@ -99,7 +99,7 @@ def heights(text: str | None) -> float | list[float] | None:
 
 
 def point_in_frame(text: str) -> tuple[float, float, int]:
-    """A point of the picture in a frame, as in 320,240@50: pixels, and the number of the frame in the video."""
+    """A point of the picture in a frame, as in 320,240@50: pixels, and the frame's number in the video."""
     point = _POINT.fullmatch(text.strip())
     if point is None:
         raise InputError(f"--follow {text} is not a point in a frame such as 320,240@50")

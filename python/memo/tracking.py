@@ -335,8 +335,8 @@ class Track:
         return [order[walk.person] for walk in self.walks]
 
     def person_at(self, u_px: float, v_px: float, frame: int) -> int | None:
-        """The person whose model covers a point of the picture in a frame; of several, the one whose middle is
-        nearest. None if there is nobody."""
+        """The person whose model covers a point of the picture in a frame; of several, the one whose middle
+        is nearest. None if there is nobody."""
         columns, found = self.columns, []
         for row in np.flatnonzero(columns["frame"] == frame).tolist():
             points = self.contours(row).reshape(-1, 2)
