@@ -598,7 +598,7 @@ def _(d, name):
         leftward=lambda: d.choice(None, True, False),
         late_left=lambda: d.number(-0.1, 0.1),
         slant_rad=lambda: d.number(-1, 1),
-        mover=lambda: d.choice("walker", "rider", "waver", "trolley"),
+        mover=lambda: d.choice("walker", "rider", "waver", "trolley", "treadmill"),
     )
     scene = _memo.ClothedScene(d.whole(0, 2**62), **options)
     member = name.split(".")[1]
@@ -617,6 +617,7 @@ def tracker_options(d):
         gait=lambda: d.choice("dense", "sampled_10", "boulic"),
         adapt=lambda: d.choice(True, False),
         start_frames=lambda: d.whole(5, 20),
+        treadmill=lambda: d.choice(None, True, False),
         compensate_gain=lambda: d.choice(True, False),
         background=lambda: d.choice(True, False),
         measure=lambda: d.choice("rohr", "lowe"),
@@ -1301,7 +1302,7 @@ def _(d):
         noise_sd=lambda: d.number(0, 300),
         leftward=lambda: d.choice(None, True, False),
         late_left=lambda: d.number(-0.1, 0.1),
-        mover=lambda: d.choice("walker", "rider", "waver", "trolley"),
+        mover=lambda: d.choice("walker", "rider", "waver", "trolley", "treadmill"),
         progress=d.called_back,
     )
     return repr(memo.demo_scene(d.whole(0, 2**62), frames=d.whole(0, 14), **options))

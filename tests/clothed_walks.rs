@@ -330,3 +330,68 @@ fn two_people_who_cross_are_followed_through_it_and_never_exchanged() {
         }
     }
 }
+
+/// Someone who walks on the spot is followed from the first frame to the last, with lengths and speed on the belt.
+#[test]
+fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
+    // Across the image, and obliquely.
+    for (seed, slant_rad) in [(1, None), (4, Some(0.35))] {
+        let options = ClothedOptions {
+            frames: 55,
+            slant_rad,
+            mover: Mover::Treadmill,
+            seed,
+            ..ClothedOptions::default()
+        };
+        let scene = scene(options);
+        let walks = tracked(&scene, 0..scene.len(), true);
+        assert_eq!(walks.iter().map(|w| w.steps().len()).collect::<Vec<_>>(), [55], "seed {seed}");
+        let treadmill = walks[0].treadmill().expect("on a treadmill");
+        let [belt, sd] = [treadmill.belt.speed_mps, treadmill.belt.sd_mps];
+        let turn = (walks[0].path().heading_rad - scene.heading_rad).to_degrees();
+        let heading_deg = turn - 360.0 * (turn / 360.0).round();
+        let followed = Followed { seed, scene, walks };
+        let phase = median(followed.errors().iter().map(|e| e[3].abs()).collect());
+        println!(
+            "seed {seed}: belt {belt:.3} of {:.3}, heading off {heading_deg:.1}, phase {phase:.3}",
+            followed.scene.speed_mps
+        );
+        assert!((belt / followed.scene.speed_mps - 1.0).abs() < 0.05 && (0.01..0.08).contains(&(sd / belt)));
+        assert!(heading_deg.abs() < 10.0 && phase < 0.03, "seed {seed}: {heading_deg}, {phase}");
+        assert!(
+            followed.walks[0].p_swapped() < OPEN && treadmill.mirrored.is_none_or(|m| m.probability < OPEN)
+        );
+        let table = followed.walks[0].gait_parameters();
+        let of = |wanted| table.iter().find(|p| p.quantity == wanted && p.side.is_none()).unwrap();
+        let [right_m, left_m] = [Side::Right, Side::Left].map(|side| followed.scene.step(side).0);
+        for (quantity, truth) in [
+            (GaitQuantity::Speed, followed.scene.speed_mps),
+            (GaitQuantity::StepLength, 0.5 * (right_m + left_m)),
+        ] {
+            let [low, high] = of(quantity).interval.unwrap();
+            assert!(
+                low < truth && truth < high && high - low < 0.3 * truth,
+                "{quantity:?}: {low}..{high}, {truth}"
+            );
+        }
+    }
+}
+
+/// The same clip with the treadmill excluded holds no walk.
+#[test]
+fn a_treadmill_can_be_excluded() {
+    let scene =
+        scene(ClothedOptions { seed: 1, frames: 45, mover: Mover::Treadmill, ..ClothedOptions::default() });
+    let options = TrackerOptions {
+        camera: Some(scene.camera.clone()),
+        treadmill: Some(false),
+        fit: None,
+        ..TrackerOptions::for_height(scene.height_m)
+    };
+    let mut tracker = Tracker::new(options).unwrap();
+    for k in 0..scene.len() {
+        tracker.update(&scene.frame(k).as_frame(), scene.time_s(k)).unwrap();
+    }
+    tracker.finish().unwrap();
+    assert!(tracker.take_finished().iter().all(|walk| walk.treadmill().is_none()));
+}

@@ -252,6 +252,7 @@ class Tracker:
         gait: str = "dense",
         adapt: bool = True,
         start_frames: int = 13,
+        treadmill: bool | None = None,
         compensate_gain: bool = False,
         background: bool = False,
         steady: bool = True,
@@ -347,6 +348,8 @@ class Walk:
     def height_is_contradicted(self) -> bool: ...
     @property
     def walk_ratio(self) -> tuple[float, float, float] | None: ...
+    @property
+    def treadmill(self) -> tuple[float, float, tuple[float, float] | None] | None: ...
     @property
     def camera(self) -> Camera: ...
     @property

@@ -34,12 +34,14 @@ DEFINITIONS: dict[str, str] = {
     "cadence": "Steps per minute. Measured: the rate of the gait phase over all frames of the walk. "
     "Interval: scatter of the frames about that rate, each step one independent observation, or "
     "that of steps that vary by 3 %, whichever is larger.",
-    "speed": "Speed of the trunk along its straight path, negative when walking backwards. Measured: the "
+    "speed": "Speed of the trunk along its straight path, negative when walking backwards; on a treadmill "
+    "relative to the belt, whose speed is measured from the feet in stance. Measured: the "
     "rate of its position over all frames. Interval: scatter as for cadence, and the scale (distance from "
     "the camera, estimated from the person's height in the picture; without a camera file also the assumed "
     "field of view, as far as the path runs along the line of sight).",
     "stride_time": "Duration of a cycle of two steps, 120 / cadence. Measured.",
-    "stride_length": "Distance covered by the trunk in a cycle, speed times stride time. Measured; interval "
+    "stride_length": "Distance covered by the trunk in a cycle (on a treadmill: on the belt), speed "
+    "times stride time. Measured; interval "
     "with the scale.",
     "step_time": "From the other foot's heel strike to this side's; without a side, half the stride "
     "time. Measured between the initial contacts of the fitted feet, as in events.csv. Interval: scatter "

@@ -121,6 +121,7 @@ def tracker_options(
     reading: Mapping[str, Any],
     fov_deg: float | None,
     steady: bool = True,
+    treadmill: bool | None = None,
 ) -> dict[str, Any]:
     """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
     options: dict[str, Any] = {}
@@ -139,6 +140,8 @@ def tracker_options(
         options["fov_deg"] = checked_fov(fov_deg)
     if not steady:
         options["steady"] = False
+    if treadmill is not None:
+        options["treadmill"] = treadmill
     return options
 
 

@@ -57,7 +57,7 @@ def demo_scene(
     noise_sd: float | None = None,
     leftward: bool | None = None,
     late_left: float | None = None,
-    mover: Literal["walker", "rider", "waver", "trolley"] = "walker",
+    mover: Literal["walker", "rider", "waver", "trolley", "treadmill"] = "walker",
     progress: Progress | None = None,
 ) -> DemoScene:
     """Draws a person in clothes who walks through a room, 25 frames per second.

@@ -24,6 +24,7 @@ from memo.plausible import (
     measured_height_sentences,
 )
 from memo.table import data_frame
+from memo.treadmill import treadmill_figures, treadmill_sentence
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Tracker:
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
     `adapt=False` does not fit the person: angles are those of the average gait, moved by the tracked phase.
     `start_frames`: number of frames in the starting phase.
+    `treadmill`: whether the person walks on a treadmill; None finds out.
     `compensate_gain`: follow exposure drift between frames.
     `background`: keep a slowly varying background, for people who stop.
     `steady`: estimate how the camera turns, and turn frames back to the view of the first one. Frames of a
@@ -71,6 +73,7 @@ class Tracker:
         gait: str = "dense",
         adapt: bool = True,
         start_frames: int = 13,
+        treadmill: bool | None = None,
         compensate_gain: bool = False,
         background: bool = False,
         steady: bool = True,
@@ -85,6 +88,7 @@ class Tracker:
             "gait": gait,
             "adapt": adapt,
             "start_frames": start_frames,
+            "treadmill": treadmill,
             "compensate_gain": compensate_gain,
             "background": background,
             "steady": steady,
@@ -146,6 +150,7 @@ def track(
     gait: str = "dense",
     adapt: bool = True,
     start_frames: int = 13,
+    treadmill: bool | None = None,
     compensate_gain: bool = False,
     background: bool = False,
     steady: bool = True,
@@ -173,6 +178,7 @@ def track(
         gait=gait,
         adapt=adapt,
         start_frames=start_frames,
+        treadmill=treadmill,
         compensate_gain=compensate_gain,
         background=background,
         steady=steady,
@@ -229,6 +235,7 @@ class StoredWalk:
     measured_height: tuple[float, float] | None
     height_is_contradicted: bool
     walk_ratio: tuple[float, float, float] | None
+    treadmill: tuple[float, float, tuple[float, float] | None] | None
 
     @classmethod
     def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
@@ -487,6 +494,7 @@ class Track:
             "p_other_gait": main.p_other_direction,
             "p_swapped": main.p_swapped,
             "speed_mps": speed,
+            **treadmill_figures(main),
             "cadence_steps_per_min": cadence,
             "height_m": main.height[0],
             "height_sd_m": main.height[1],
@@ -502,6 +510,8 @@ class Track:
     def _message(cls, walk: _memo.Walk | StoredWalk) -> str:
         times_s = walk.columns()["time_s"]
         speed, cadence = cls._pace(walk)
+        if walk.treadmill is not None:
+            return treadmill_sentence(walk, times_s[-1] - times_s[0], cadence)
         manner = "walks" if walk.direction == "forward" else "walks backwards"
         sure = walk.p_other_direction < 0.1
         return (
@@ -521,6 +531,8 @@ class Track:
 
     @staticmethod
     def _way(walk: _memo.Walk | StoredWalk) -> str:
+        if walk.treadmill is not None:
+            return "on a treadmill"
         columns = walk.columns()
         ends = np.column_stack([columns[f"right_hip_{axis}_m"][[0, -1]] for axis in "xyz"])
         first_px, last_px = walk.camera.project(ends)[:, 0]  # in one view, wherever the camera looked

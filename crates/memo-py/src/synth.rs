@@ -65,8 +65,10 @@ impl PyClothedScene {
             "rider" => Mover::Rider,
             "waver" => Mover::Waver,
             "trolley" => Mover::Trolley,
+            "treadmill" => Mover::Treadmill,
             _ => {
-                let message = format!("mover must be walker, rider, waver or trolley, got {mover:?}");
+                let message =
+                    format!("mover must be walker, rider, waver, trolley or treadmill, got {mover:?}");
                 return Err(PyValueError::new_err(message));
             }
         };

@@ -24,6 +24,7 @@ use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
 use memo_core::track::steady::SteadyOptions;
 use memo_core::track::tracker::{Now, Tracker};
+use memo_core::track::treadmill::Treadmill;
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -141,8 +142,9 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     #[pyo3(signature = (
-        height_m=None, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, compensate_gain=false,
-        background=false, steady=true, measure="rohr", full_gradient=None, full_velocity=None, part_weights=None
+        height_m=None, camera=None, *, fov_deg=None, gait="dense", adapt=true, start_frames=13, treadmill=None,
+        compensate_gain=false, background=false, steady=true, measure="rohr", full_gradient=None, full_velocity=None,
+        part_weights=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
@@ -152,6 +154,7 @@ impl PyTracker {
         gait: &str,
         adapt: bool,
         start_frames: i64,
+        treadmill: Option<bool>,
         compensate_gain: bool,
         background: bool,
         steady: bool,
@@ -193,6 +196,7 @@ impl PyTracker {
         similarity.full_gradient = full_gradient;
         similarity.full_velocity = full_velocity;
         similarity.part_weights = part_weights.unwrap_or(similarity.part_weights);
+        options.treadmill = treadmill;
         options.fit = adapt.then(FitOptions::default);
         options.start_frames = usize::try_from(start_frames).unwrap_or(0);
         let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
@@ -474,6 +478,15 @@ impl PyWalk {
     #[getter]
     fn walk_ratio(&self) -> Option<(f64, f64, f64)> {
         self.walk.walk_ratio().map(|ratio| (ratio.value, ratio.usual[0], ratio.usual[1]))
+    }
+
+    /// Speed of the treadmill's belt with its standard deviation, m/s, and the heading that looks alike from the camera
+    /// with its probability (radians; None if there is none); None for a walk over ground.
+    #[getter]
+    #[allow(clippy::type_complexity, reason = "a plain tuple crosses the border best")]
+    fn treadmill(&self) -> Option<(f64, f64, Option<(f64, f64)>)> {
+        let Treadmill { belt, mirrored } = self.walk.treadmill()?;
+        Some((belt.speed_mps, belt.sd_mps, mirrored.map(|m| (m.heading_rad, m.probability))))
     }
 
     /// The camera, given or assumed.

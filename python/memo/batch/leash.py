@@ -59,7 +59,9 @@ def _track(arguments: Sequence[str]) -> Exit:
         height_m, camera = options.pop("height_m", None), options.pop("camera", None)
         recording = Recording(
             video,
-            tracker_options(height_m, camera, reading, options.pop("fov_deg", None)),
+            tracker_options(
+                height_m, camera, reading, options.pop("fov_deg", None), options.pop("treadmill", None)
+            ),
             frame_range(options.pop("frames", ":")),
             page=options.pop("report", False),
             **options,

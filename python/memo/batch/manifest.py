@@ -48,6 +48,7 @@ OPTIONS = {
     "camera_v_up": Option("--camera-v-up", bool, "--camera-v-down"),
     "height_m": Option("--height", float),
     "fov_deg": Option("--fov-deg", float),
+    "treadmill": Option("--treadmill", bool),
     "frames": Option("--frames", str),
     "fps": Option("--fps", float),
     "shrink": Option("--shrink", int),

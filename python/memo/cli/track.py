@@ -60,6 +60,13 @@ def add_track(app: "typer.Typer") -> None:
                 "of a camera at rest are not changed."
             ),
         ] = True,
+        treadmill: Annotated[
+            bool | None,
+            typer.Option(
+                "--treadmill/--no-treadmill",
+                help="Whether the person walks on a treadmill; by default, memo finds out.",
+            ),
+        ] = None,
         frames: Annotated[str, typer.Option(help="Frames A up to, not including, B.", metavar="A:B")] = ":",
         fps: Annotated[
             float | None, typer.Option(help="True frame rate, in place of the time stamps, for slow motion.")
@@ -95,7 +102,7 @@ def add_track(app: "typer.Typer") -> None:
 
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
-            options = tracker_options(heights(height), camera, reading, fov_deg, steady)
+            options = tracker_options(heights(height), camera, reading, fov_deg, steady, treadmill)
             asked = frame_range(frames)
             point = None if follow is None else Point(*point_in_frame(follow))
             recording = Recording(video, options, asked, fps, shrink, overlay, plots, page, point)

@@ -3,7 +3,7 @@
 use super::crowd::{Expected, body_box, expected};
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
-use super::fit::{FitError, FitFrame, Problem, WalkFit};
+use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot};
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
@@ -12,6 +12,7 @@ use super::result::smoothed_hypotheses;
 use super::search::{Hypothesis, Scene};
 use super::start::{StartReport, start};
 use super::steady::CameraMotion;
+use super::treadmill;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
@@ -20,6 +21,8 @@ use std::collections::HashMap;
 
 /// Nobody walks slower than this, m/s.
 pub(super) const SLOWEST_MPS: f64 = 0.25;
+/// Somebody who moves faster over the last frames has left the treadmill, m/s.
+const LEAVING_MPS: f64 = 0.7;
 /// Minimum cadence of a walk, gait cycles per second.
 const SLOWEST_HZ: f64 = 0.3;
 /// Range of stride lengths (two steps) as shares of the body height. Some 90 walks (motion-captured, on video and
@@ -76,6 +79,10 @@ pub(super) struct Active {
     pub(super) settled: bool,
     /// What the fit needs of each frame.
     pub(super) pieces: Vec<Piece>,
+    /// Whether the person walks on the spot.
+    pub(super) is_on_treadmill: bool,
+    /// On the spot, the frames of the stream until the start: later ones do not show the empty scene.
+    pub(super) early: Option<Backdrop>,
 }
 
 impl Active {
@@ -160,7 +167,9 @@ impl Active {
         let covered_m = (last.state.along.position - first.state.along.position).abs();
         let cycles = (last.state.phase.position - first.state.phase.position).abs();
         let elapsed_s = last.time_s - first.time_s;
-        let stopped = covered_m < SLOWEST_MPS * elapsed_s || cycles < SLOWEST_HZ * elapsed_s;
+        let is_slow = covered_m < SLOWEST_MPS * elapsed_s;
+        let left = if self.is_on_treadmill { covered_m > LEAVING_MPS * elapsed_s } else { is_slow };
+        let stopped = left || cycles < SLOWEST_HZ * elapsed_s;
         stopped || matched(recent).is_some_and(|found| found < LOST_SHARE * mean_similarity(twin))
     }
 
@@ -170,6 +179,14 @@ impl Active {
         let Some(last) = steps.last() else { return false };
         let seen = steps.iter().rev().find(|step| step.visible >= DECIDING_SHARE);
         last.time_s - seen.unwrap_or(&steps[0]).time_s > LONGEST_HIDDEN_S
+    }
+
+    /// True if the person is somewhere else than at the start.
+    pub(super) fn moves_on(&self) -> bool {
+        let twin = &self.walk.twins[self.walk.best()];
+        let (Some(first), Some(last)) = (twin.steps.first(), twin.steps.last()) else { return false };
+        let covered_m = last.state.along.position - first.state.along.position;
+        covered_m.abs() >= SLOWEST_MPS * (last.time_s - first.time_s)
     }
 
     /// True if the moving thing walked: over all frames it moved on, and its displacement per cycle is possible
@@ -183,6 +200,9 @@ impl Active {
         let elapsed_s = last.time_s - first.time_s;
         let covered_m = last.state.along.position - first.state.along.position;
         let cycles = last.state.phase.position - first.state.phase.position;
+        if self.is_on_treadmill {
+            return cycles >= SLOWEST_HZ * elapsed_s;
+        }
         let stride = covered_m / cycles / self.walk.walker.body.height_m;
         covered_m.abs() >= SLOWEST_MPS * elapsed_s
             && cycles.abs() >= SLOWEST_HZ * elapsed_s
@@ -226,7 +246,9 @@ impl Active {
     pub(super) fn settle(&mut self, backdrop: &Backdrop, options: &TrackerOptions) {
         if !std::mem::replace(&mut self.settled, true) {
             let kept = std::mem::take(&mut self.kept);
-            self.turn_path(&kept, options);
+            if !self.is_on_treadmill {
+                self.turn_path(&kept, options);
+            }
             self.adopt_person(&kept, backdrop, options);
         }
     }
@@ -245,7 +267,10 @@ impl Active {
         let first = steps.first().map_or(usize::MAX, |step| step.frame);
         let last = steps.last().map_or(0, |step| step.frame);
         let pieces = self.pieces.iter().filter(|piece| (first..=last).contains(&piece.frame));
-        let views = backdrop.views(pieces);
+        let views = match self.is_on_treadmill {
+            true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
+            false => backdrop.views(pieces),
+        };
         let half_torso_m = 0.5 * walker.body.torso_length_m();
         let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
             let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
@@ -253,13 +278,29 @@ impl Active {
         };
         let places = smoothed_hypotheses(steps, &options.walk.filter);
         let frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
-        let problem = Problem::new(&self.camera, &self.average, path, &frames, fit);
-        let problem = match (&options.camera, self.height.source) {
-            (None, _) => problem.of_assumed_camera(),
-            (Some(_), HeightSource::Given) => problem,
-            (Some(_), _) => problem.of_height(&self.height),
+        let problem = |path| {
+            let problem = Problem::new(&self.camera, &self.average, path, &frames, fit);
+            match (&options.camera, self.height.source) {
+                (None, _) => problem.of_assumed_camera(),
+                (Some(_), HeightSource::Given) => problem,
+                (Some(_), _) => problem.of_height(&self.height),
+            }
         };
-        Some(problem.fit(p_swapped))
+        if !self.is_on_treadmill {
+            return Some(problem(path).fit(p_swapped));
+        }
+        let mirrored = treadmill::mirrored(path, &self.camera);
+        let [here, there] = [path, &mirrored].map(|path| problem(path).on_treadmill());
+        Some(fit_on_the_spot(&here, &there, p_swapped))
+    }
+
+    /// True unless the fitted feet of a person on the spot take steps that no legs of that height take.
+    pub(super) fn takes_steps(&self, fit: Option<&WalkFit>) -> bool {
+        let Some((fit, belt)) = fit.and_then(|fit| Some((fit, fit.belt?))) else { return true };
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let elapsed_s = steps[steps.len() - 1].time_s - steps[0].time_s;
+        let cycles = fit.frames[fit.frames.len() - 1].phase - fit.frames[0].phase;
+        STRIDE_HEIGHTS.contains(&(belt.speed_mps * elapsed_s / cycles / fit.body.height_m))
     }
 
     /// The given or assumed height, or the one that a fit measured.
@@ -361,6 +402,8 @@ mod tests {
             gait_speed_mps: 1.2,
             settled: false,
             pieces: Vec::new(),
+            is_on_treadmill: false,
+            early: None,
         }
     }
 

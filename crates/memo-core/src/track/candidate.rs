@@ -13,7 +13,7 @@ use crate::model::{Camera, GaitStyle, Walker};
 /// A candidate is dropped after this many consecutive frames without it.
 pub(super) const MISSED_FRAMES: usize = 3;
 /// Speed of a comfortable walk, used before the speed is known, m/s.
-const COMFORTABLE_MPS: f64 = 1.3;
+pub(super) const COMFORTABLE_MPS: f64 = 1.3;
 /// Nobody walks faster than this, m/s.
 const FASTEST_MPS: f64 = 3.0;
 /// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
@@ -81,7 +81,7 @@ impl Candidate {
     pub fn begin(&self, given: &Given<'_>) -> Option<Active> {
         let options = given.options;
         let sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
-        if feet_cut_off(&sightings, given.size[1] as usize) {
+        if feet_cut_off(&sightings, given.size[1] as usize) || options.treadmill == Some(true) {
             return None;
         }
         let height = start_height(options, given.height_m, given.camera, &sightings);
@@ -113,6 +113,8 @@ impl Candidate {
             kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
             gait_speed_mps: course.speed_mps,
             settled: false,
+            is_on_treadmill: false,
+            early: None,
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
         })
     }
@@ -149,7 +151,7 @@ struct Started {
     start: StartReport,
 }
 
-fn course(
+pub(super) fn course(
     sightings: &[Sighting],
     given: &Given<'_>,
     crown_m: f64,
@@ -171,7 +173,7 @@ fn course(
 }
 
 /// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
-fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
+pub(super) fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
     2 * sightings.iter().filter(|s| s.rectangle.bottom + 2 >= height).count() > sightings.len()
 }
 

@@ -18,6 +18,9 @@
 //!    cm), on the rows of sole and crown (`track::locate`), on `POSTURE_SD` and, for oblique paths seen by an
 //!    assumed camera, on `FOCAL_SD`.
 //!
+//! On a treadmill, lengths and speed are those on the belt: displacement of the trunk plus that of the belt, whose
+//! standard deviation is a fifth term.
+//!
 //! Sources of the numbers. Measured on four motion-captured walks (two of the Biomechanical-ToolKit data, CMU
 //! 02_01 and 12_01; contacts by the ankle's speed, 11 degrees of freedom): a step differs from its side's mean by
 //! 3.3 % in time and 3.6 % in length, part of which is error of the contacts; the feet differ in reach by 0.012 m
@@ -35,6 +38,7 @@
 //! together over the cycle), shadows and reflections at the feet, for which the scale leaves room, and a tilted
 //! camera if none is given.
 
+use super::fit::belt::Belt;
 use super::fit::contacts::Contact;
 use super::result::{EventKind, Row, Side, TrackedWalk};
 use super::start::Direction;
@@ -282,7 +286,7 @@ impl TrackedWalk {
             Some(fit) => fitted_strikes(&fit.contacts, whole.rate_hz.value),
             None => strikes(self.steps(), whole.rate_hz.value),
         };
-        let steps = steps_between(&strikes, &self.rows());
+        let steps = steps_between(&strikes, &self.rows(), whole.belt.speed_mps);
         let (rate_hz, speed_mps) = (whole.rate_hz.value, whole.speed_mps.value.abs());
         let strike_sd_s = match self.fitted() {
             Some(_) => CONTACT_SIDE_SD_S,
@@ -306,7 +310,7 @@ impl TrackedWalk {
                 prior_variance: noise_sq * speed_mps.powi(2) + (NATURAL_SHARE * step_m).powi(2),
                 side_sd: (strike_sd_s * speed_mps)
                     .hypot(REACH_COUNTS * REACH_SD_M / std::f64::consts::SQRT_2),
-                scale_sd: whole.scale_sd,
+                scale_sd: whole.scale_sd.hypot(whole.belt_share()),
             },
         );
         Some(Sides { time_s, length_m })
@@ -314,7 +318,7 @@ impl TrackedWalk {
 
     /// Relative standard deviation of lengths along the path, from distance and posture. For an assumed camera
     /// also from the focal length, which scales displacement along the line of sight.
-    fn scale_sd(&self) -> f64 {
+    pub(super) fn scale_sd(&self) -> f64 {
         let (eye, path) = (self.camera.position().truncate(), self.path());
         let depth_sd_m = match self.fitted() {
             Some(fit) if !self.camera_is_guessed => {
@@ -356,11 +360,14 @@ struct Whole {
     /// Half the interval of the stride length, relative.
     stride_share: f64,
     scale_sd: f64,
+    /// The belt of a treadmill.
+    belt: Belt,
 }
 
 impl Whole {
     fn of(walk: &TrackedWalk) -> Option<Self> {
-        let (phases, places) = measured(walk);
+        let belt = walk.belt();
+        let (phases, places) = measured(walk, &belt);
         if phases.len() < LEAST_FRAMES {
             return None;
         }
@@ -373,7 +380,7 @@ impl Whole {
         let n = (2.0 * cycles).floor() as usize;
         let (speed_mps, _) = line_through(&places);
         let half_rate = half_slope(&phases, 2.0 * cycles);
-        let speed_share = half_slope(&places, 2.0 * cycles) / speed_mps.abs();
+        let speed_share = half_slope(&places, 2.0 * cycles).hypot(Z * belt.sd_mps) / speed_mps.abs();
         let scale_sd = walk.scale_sd();
         // The slope of a random walk of n steps varies sqrt(6 / 5) times as much as the mean of its steps. The
         // scatter about the line contains their variation too, so the larger of both is used.
@@ -386,7 +393,13 @@ impl Whole {
             speed_mps: Estimate { value: speed_mps, half: speed_mps.abs() * of_place(speed_share), n },
             stride_share: of_place(rate_share.hypot(speed_share)),
             scale_sd,
+            belt,
         })
+    }
+
+    /// Relative standard deviation of the belt's speed.
+    fn belt_share(&self) -> f64 {
+        if self.belt.speed_mps == 0.0 { 0.0 } else { self.belt.sd_mps / self.belt.speed_mps.abs() }
     }
 
     fn stride_s(&self) -> Estimate {
@@ -413,17 +426,19 @@ fn half_slope(points: &[(f64, f64)], steps: f64) -> f64 {
 /// Times and values.
 type OverTime = Vec<(f64, f64)>;
 
-/// Time and phase, and time and place, of each frame of the fit, or else of each measured frame of the tracker.
-fn measured(walk: &TrackedWalk) -> (OverTime, OverTime) {
+/// Time and phase, and time and place on the ground or the belt, of each frame of the fit, or else of each measured
+/// frame of the tracker.
+fn measured(walk: &TrackedWalk, belt: &Belt) -> (OverTime, OverTime) {
     let steps = walk.steps();
+    let on_belt = |time_s: f64, along_m: f64| along_m + belt.speed_mps * time_s;
     match walk.fitted() {
         Some(fit) => {
             let timed = steps.iter().zip(&fit.frames);
-            timed.map(|(s, f)| ((s.time_s, f.phase), (s.time_s, f.along_m))).unzip()
+            timed.map(|(s, f)| ((s.time_s, f.phase), (s.time_s, on_belt(s.time_s, f.along_m)))).unzip()
         }
         None => {
             let seen = steps.iter().filter_map(|s| Some((s.time_s, unwrapped(s)?, s.measured?.along_m)));
-            seen.map(|(t, p, a)| ((t, p), (t, a))).unzip()
+            seen.map(|(t, p, a)| ((t, p), (t, on_belt(t, a)))).unzip()
         }
     }
 }
@@ -496,13 +511,14 @@ struct StepTaken {
     variance_s2: f64,
 }
 
-fn steps_between(strikes: &[Strike], rows: &[Row]) -> Vec<StepTaken> {
+fn steps_between(strikes: &[Strike], rows: &[Row], belt_mps: f64) -> Vec<StepTaken> {
     let neighbours = strikes.windows(2).filter(|pair| pair[1].index == pair[0].index + 1);
     neighbours
         .map(|pair| StepTaken {
             side: pair[1].side,
             time_s: pair[1].time_s - pair[0].time_s,
-            length_m: place_at(rows, pair[1].time_s) - place_at(rows, pair[0].time_s),
+            length_m: place_at(rows, pair[1].time_s) - place_at(rows, pair[0].time_s)
+                + belt_mps * (pair[1].time_s - pair[0].time_s),
             variance_s2: pair[0].variance_s2 + pair[1].variance_s2,
         })
         .collect()

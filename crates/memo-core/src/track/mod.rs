@@ -22,4 +22,5 @@ pub mod start;
 pub mod steady;
 pub mod swap;
 pub mod tracker;
+pub mod treadmill;
 pub mod walk;

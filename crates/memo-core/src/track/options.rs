@@ -58,6 +58,8 @@ pub struct TrackerOptions {
     /// Number of frames that must be followed before an oblique path is looked for. 40: one and a half strides at
     /// 25 frames per second.
     pub path_frames: usize,
+    /// Whether the person walks on a treadmill; `None` finds out.
+    pub treadmill: Option<bool>,
     /// Range of cadences to consider.
     pub cadence: CadenceRange,
     /// Options of the stages from pixels to regions and edges.
@@ -80,6 +82,7 @@ impl Default for TrackerOptions {
             start_frames: 13,
             fit: Some(FitOptions::default()),
             path_frames: 40,
+            treadmill: None,
             cadence: CadenceRange::default(),
             evidence: EvidenceOptions::default(),
             steady: Some(SteadyOptions::default()),

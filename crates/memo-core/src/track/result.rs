@@ -39,6 +39,8 @@ pub struct TrackedWalk {
     pub start: StartReport,
     /// The speed for which the average gait was made, m/s.
     pub gait_speed_mps: f64,
+    /// Whether the person walks on a treadmill ([`TrackedWalk::treadmill`]).
+    pub is_on_treadmill: bool,
     /// The fit of the person, or why there is none; `None` if none was asked for.
     pub fit: Option<Result<WalkFit, FitError>>,
     /// The options used.
@@ -60,7 +62,7 @@ pub struct Row {
     pub phase: f64,
     /// Probability that left and right are swapped.
     pub p_swapped: f64,
-    /// Speed along the path, m/s; negative for backward walking.
+    /// Speed along the path, m/s; negative for backward walking, relative to the belt on a treadmill.
     pub speed_mps: f64,
     /// Standard deviations of x, y, z (metres) and phase.
     pub sd: [f64; 4],
@@ -206,7 +208,7 @@ impl TrackedWalk {
             heading_rad: fit.path.heading_rad,
             phase: phase_at,
             p_swapped: fit.p_swapped,
-            speed_mps: speed(&fit.frames, self.steps(), k),
+            speed_mps: speed(&fit.frames, self.steps(), k) + self.belt().speed_mps,
             sd: [
                 (ahead.x * along).hypot(ahead.y * across),
                 (ahead.y * along).hypot(ahead.x * across),
@@ -265,7 +267,7 @@ impl TrackedWalk {
             heading_rad: self.walk.path.heading_rad,
             phase: hypothesis.phase,
             p_swapped,
-            speed_mps: along.0.velocity,
+            speed_mps: along.0.velocity + self.belt().speed_mps,
             sd: [
                 forward.x.hypot(across.x),
                 forward.y.hypot(across.y),

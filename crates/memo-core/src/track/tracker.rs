@@ -7,15 +7,20 @@
 //! 5. It ends the walk when the person leaves the image or stops walking, and fits the person to all its frames
 //!    ([`fit`](super::fit)). Whoever walks on where the person was expected has the same number (`people`).
 //!
+//! Something that stays in one place for `path_frames` frames may walk on a treadmill ([`treadmill`](super::treadmill)),
+//! while nobody else is followed.
+//!
 //! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the edges of at most
 //! [`TrackerOptions::path_frames`] or `start_frames` frames, whichever is more, the rows of the current walk and, for
-//! the fit, 32 frames of the stream and the part of each frame of the walk that shows the person. A walk longer than
+//! the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the person. A walk longer than
 //! [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`] without a fit, is returned in
 //! pieces of that length.
 //!
 //! Edges are matched within a few pixels, whatever the image size. Shrink images whose longer side exceeds about
 //! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as
 //! well, but enlarged to 1440p it was taken for backward walking.
+
+mod on_the_spot;
 
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
@@ -30,6 +35,7 @@ pub use super::people::Now;
 use super::result::TrackedWalk;
 use super::search::Scene;
 use super::steady::{CameraMotion, Loss};
+use super::treadmill::Standing;
 use super::walk::FrameEdges;
 use crate::image::{Frame, GroupOptions, Mask, Rectangle, Region, group_regions, regions};
 use crate::model::body::BodyError;
@@ -108,6 +114,8 @@ pub struct Tracker {
     /// Walks that are over, and since when. Somebody may start there again.
     fading: Vec<(usize, Active)>,
     identities: Identities,
+    /// Frames of something that may walk on the spot.
+    standing: Standing,
     finished: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
@@ -130,6 +138,7 @@ impl Tracker {
             people: Vec::new(),
             fading: Vec::new(),
             identities: Identities::default(),
+            standing: Standing::default(),
             finished: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
@@ -214,6 +223,7 @@ impl Tracker {
             }
         }
         self.candidates.clear();
+        self.standing = Standing::default();
         self.identities.forget_ended();
         self.backdrop = Backdrop::default();
     }
@@ -325,12 +335,24 @@ impl Tracker {
             }
             if !active.settled {
                 active.kept.push((sighting, edges));
-                if active.kept.len() >= self.options.path_frames {
-                    active.settle(&self.backdrop, &self.options);
-                }
             }
+            self.settle(k);
         }
         Ok(())
+    }
+
+    /// Settles path and person of somebody who was followed for long enough.
+    fn settle(&mut self, k: usize) {
+        let active = &self.people[k];
+        if active.settled || active.kept.len() < self.options.path_frames {
+            return;
+        }
+        if self.people.len() == 1 {
+            let active = self.people.remove(k);
+            let active = self.begun_on_the_spot(active);
+            self.people.insert(k, active);
+        }
+        self.people[k].settle(&self.backdrop, &self.options);
     }
 
     /// Ends walks that are over. On a wrong path a walk can seem to be over, so the path is looked for first.
@@ -366,6 +388,9 @@ impl Tracker {
         self.report.frames_with_candidate += usize::from(!regions.is_empty());
         let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
         self.report.frames_cut_off += usize::from(is_cut_off);
+        if self.people.is_empty() {
+            self.stand(evidence, regions.first().and_then(|region| whole(region, evidence)))?;
+        }
         let regions = if self.people.is_empty() { regions } else { self.unexplained(evidence) };
         self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
         let camera = if self.people.is_empty() { None } else { self.camera() };
@@ -383,6 +408,7 @@ impl Tracker {
         }
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
         self.start(evidence);
+        self.start_on_the_spot(evidence);
         Ok(())
     }
 
@@ -472,7 +498,8 @@ impl Tracker {
         !self.people.iter().any(near)
     }
 
-    fn end_walk(&mut self, mut active: Active) {
+    fn end_walk(&mut self, active: Active) {
+        let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         active.settle(&self.backdrop, &self.options);
         active.trim();
         if !active.is_walk() {
@@ -480,11 +507,16 @@ impl Tracker {
             self.identities.withdraw(active.person);
             return;
         }
+        let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
+        let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
+        if !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
+            self.report.refused_starts += 1;
+            self.identities.withdraw(active.person);
+            return;
+        }
         if let Some(sign) = active.sign() {
             self.identities.end(active.person, sign);
         }
-        let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
-        let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
         let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
         self.finished.push(TrackedWalk {
             person: active.person,
@@ -496,6 +528,7 @@ impl Tracker {
             start: active.start,
             camera_is_guessed: self.options.camera.is_none(),
             gait_speed_mps: active.gait_speed_mps,
+            is_on_treadmill: active.is_on_treadmill,
             fit,
             options: self.options.walk,
         });

@@ -47,6 +47,8 @@ pub enum Mover {
     Waver,
     /// A trolley as high as a person.
     Trolley,
+    /// A person who walks on a treadmill in the middle of the image; the belt is not drawn.
+    Treadmill,
 }
 
 /// Options of a clothed scene. `None` means that the seed decides.
@@ -130,7 +132,7 @@ pub struct ClothedScene {
     pub height_m: f64,
     /// Direction of the path, radians about world Z; the person faces in this direction.
     pub heading_rad: f64,
-    /// Mean speed, metres per second.
+    /// Mean speed, metres per second; on a treadmill, that of the belt.
     pub speed_mps: f64,
     /// Mean cadence, gait cycles per second.
     pub cycle_hz: f64,
@@ -223,7 +225,7 @@ impl ClothedScene {
 
     /// The ground truth of a frame; `None` unless the mover is a walker.
     pub fn truth(&self, frame: usize) -> Option<ClothedTruth> {
-        if self.options.mover != Mover::Walker {
+        if !self.walks() {
             return None;
         }
         let time_s = self.time_s(frame);
@@ -242,7 +244,7 @@ impl ClothedScene {
     /// Initial contacts and toe-offs from the first to the last frame, in order; empty unless the mover is a
     /// walker.
     pub fn contacts(&self) -> Vec<FootContact> {
-        if self.options.mover != Mover::Walker || self.is_empty() {
+        if !self.walks() || self.is_empty() {
             return Vec::new();
         }
         let end_s = self.time_s(self.len() - 1);
@@ -304,6 +306,11 @@ impl ClothedScene {
         (person::solids(&figure, &self.sizes, &self.clothes), feet.collect())
     }
 
+    /// Whether the mover is a person who walks.
+    fn walks(&self) -> bool {
+        matches!(self.options.mover, Mover::Walker | Mover::Treadmill)
+    }
+
     /// The posed person at a time.
     fn figure(&self, time_s: f64) -> Figure {
         let cycles = self.cycles(time_s);
@@ -314,6 +321,10 @@ impl ClothedScene {
             |way: f64| self.stride.figure(still).placed(0.0, DVec3::X * (way - self.stride.length_m * still));
         let figure = match self.options.mover {
             Mover::Walker | Mover::Trolley => self.stride.figure(cycles),
+            Mover::Treadmill => {
+                let belt_m = self.speed_mps * (time_s - self.middle_s());
+                self.stride.figure(cycles).placed(0.0, -DVec3::X * belt_m)
+            }
             Mover::Rider => carried(self.stride.length_m * cycles),
             Mover::Waver => waving(carried(middle), (TAU * self.cycle_hz * time_s).sin()),
         };

@@ -40,6 +40,26 @@ fn scenes_of_one_pixel_of_no_frames_and_beyond_the_last_frame_can_be_drawn() {
 }
 
 #[test]
+fn on_a_treadmill_the_body_stays_and_standing_feet_move_with_the_belt() {
+    for seed in 0..5 {
+        let options = ClothedOptions { seed, mover: Mover::Treadmill, ..ClothedOptions::default() };
+        let scene = scene(options);
+        let ahead = DVec2::from_angle(scene.heading_rad).extend(0.0);
+        let places: Vec<f64> =
+            (0..scene.len()).map(|k| scene.truth(k).unwrap().torso_centre.dot(ahead)).collect();
+        assert!(places.iter().all(|place| place.abs() < 0.15), "{seed}: {places:?}");
+        // The heel between 0.15 and 0.3 of a cycle after its contact.
+        for contact in scene.contacts().iter().filter(|c| c.kind == EventKind::HeelStrike) {
+            let own = usize::from(contact.side == Side::Left);
+            let heel =
+                |share: f64| scene.figure(contact.time_s + share / scene.cycle_hz).feet[own][0].dot(ahead);
+            let speed = (heel(0.15) - heel(0.3)) * scene.cycle_hz / 0.15;
+            assert!((speed / scene.speed_mps - 1.0).abs() < 0.02, "{seed}: {speed}");
+        }
+    }
+}
+
+#[test]
 fn a_seed_gives_the_same_pixels_in_any_order_and_seeds_differ() {
     let (a, b) = (small(0, Mover::Walker), small(0, Mover::Walker));
     let later = b.frame(20);

@@ -3,7 +3,8 @@
 //! An outer line separates the body from the background: there the difference from the background falls outwards
 //! and the picture itself has a step. Shadows, reflections and edges of the room that the body covers have only one
 //! of the two, so the geometric mean of both is searched. An inner line separates parts of the body: a step of grey
-//! of either sign. No threshold decides; the strongest step counts, the less the farther it is from the line.
+//! of either sign, and so is an outer line where the empty scene was never seen. No threshold decides;
+//! the strongest step counts, the less the farther it is from the line.
 
 use crate::image::Image;
 use crate::model::EllipticCylinder;
@@ -16,8 +17,8 @@ pub struct View {
     pub corner: [usize; 2],
     /// The frame's grey values.
     pub grey: Image<u8>,
-    /// Those of the empty scene, of the same size.
-    pub background: Image<u8>,
+    /// Those of the empty scene, of the same size; `None` if it was never seen.
+    pub background: Option<Image<u8>>,
     /// The bodies of other people near it.
     pub others: Vec<EllipticCylinder>,
 }
@@ -71,6 +72,7 @@ impl View {
     ) -> Option<FoundEdge> {
         let (near, reach) = (&reach.near, reach.near.len() as i64 - 1);
         let margin = SAMPLES as i64;
+        let is_empty_seen = self.background.is_some();
         let corner = DVec2::new(self.corner[0] as f64, self.corner[1] as f64);
         samples.clear();
         for offset in -reach - margin..=reach + margin {
@@ -84,8 +86,8 @@ impl View {
                 (inside - outside) / SAMPLES as f64
             };
             match border {
-                Border::Outer => (fall(1).max(0.0) * fall(0).abs()).sqrt(),
-                Border::Inner => fall(0).abs(),
+                Border::Outer if is_empty_seen => (fall(1).max(0.0) * fall(0).abs()).sqrt(),
+                _ => fall(0).abs(),
             }
         };
         let mut best = (0.0, 0);
@@ -126,7 +128,7 @@ impl View {
             upper + down * (lower - upper)
         };
         let grey = between(&self.grey);
-        Some([grey, (grey - between(&self.background)).abs()])
+        Some([grey, self.background.as_ref().map_or(0.0, |behind| (grey - between(behind)).abs())])
     }
 }
 
@@ -144,7 +146,7 @@ mod tests {
             grey.row_mut(y)[40..45].fill(20);
             background.row_mut(y)[40..45].fill(20);
         }
-        View { corner: [100, 50], grey, background, others: Vec::new() }
+        View { corner: [100, 50], grey, background: Some(background), others: Vec::new() }
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {
@@ -177,6 +179,16 @@ mod tests {
             &mut Vec::new(),
         );
         assert_eq!(inwards.unwrap().strength, 0.0);
+    }
+
+    #[test]
+    fn where_the_empty_scene_was_never_seen_every_step_may_be_an_outline() {
+        let alone = View { background: None, ..view(100) };
+        for x in [28.0, 33.2] {
+            let edge = found(&alone, x, Border::Outer);
+            assert!((x + edge.offset_px - 30.5).abs() < 0.3, "{edge:?} from {x}");
+        }
+        assert!(found(&alone, 44.0, Border::Outer).strength > 50.0, "an edge of the room, too");
     }
 
     #[test]

@@ -17,8 +17,10 @@
 //! The normal equations have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time is
 //! linear in the number of frames.
 
+pub mod belt;
 pub mod contacts;
 pub(crate) mod edge_search;
+mod headings;
 mod lines;
 mod problem;
 mod quality;
@@ -32,10 +34,12 @@ use super::search::Path;
 use crate::model::{Body, Gait, GaitStyle, PosedBody, Posture, Walker};
 use crate::option_error::OptionError;
 use crate::wording::counted;
+use belt::Belt;
 use contacts::Contact;
 use glam::DVec3;
 use thiserror::Error;
 
+pub(crate) use headings::fit_on_the_spot;
 pub(crate) use problem::{FitFrame, Problem};
 pub use quality::{FitQuality, FitVerdict};
 pub use unknowns::JOINTS;
@@ -146,8 +150,21 @@ pub struct WalkFit {
     pub contacts: Vec<Contact>,
     /// Probability that left and right are exchanged.
     pub p_swapped: f64,
+    /// On a treadmill, the heading that looks alike.
+    pub mirrored: Option<MirroredHeading>,
+    /// The belt of a treadmill; `None` over ground, or if no stance was seen as a whole.
+    pub belt: Option<Belt>,
     /// How well the model fits.
     pub quality: FitQuality,
+}
+
+/// A heading in which the outlines are almost the same, mirrored at the line of sight, with left and right exchanged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MirroredHeading {
+    /// Direction the body would face, radians about world Z.
+    pub heading_rad: f64,
+    /// Probability that it is the true one.
+    pub probability: f64,
 }
 
 impl WalkFit {

@@ -1,5 +1,6 @@
 //! The least-squares problem of the fit: steps, normal equations, and the result with its standard deviations.
 
+use super::belt;
 use super::contacts;
 use super::edge_search::{Border, Reach, View};
 use super::lines::{Figure, Sample, Workspace, gradient, row_of, samples};
@@ -44,6 +45,7 @@ pub(crate) struct Problem<'a> {
     is_scale_seen: bool,
     /// Standard deviation of the height of a standing foot, metres.
     ground_sd_m: f64,
+    is_on_treadmill: bool,
     /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
     origin: DVec2,
     origin_along_m: f64,
@@ -51,7 +53,7 @@ pub(crate) struct Problem<'a> {
 
 /// A gait from which the fit starts. People who walk unlike the average are not always reached from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum StartGait {
+pub(super) enum StartGait {
     Average,
     /// [`GaitStyle::CROUCHED`].
     Crouched,
@@ -62,7 +64,7 @@ enum StartGait {
 impl StartGait {
     const ALL: [Self; 4] = [Self::Average, Self::Crouched, Self::StiffKnee(0), Self::StiffKnee(1)];
 
-    fn mirrored(self) -> Self {
+    pub(super) fn mirrored(self) -> Self {
         match self {
             Self::StiffKnee(side) => Self::StiffKnee(1 - side),
             same => same,
@@ -113,6 +115,7 @@ impl<'a> Problem<'a> {
             excess: Prior { mean: 0.0, sd: options.height_sd },
             is_scale_seen: true,
             ground_sd_m: GROUND_SD_M,
+            is_on_treadmill: false,
             origin,
             origin_along_m,
         }
@@ -135,6 +138,13 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// The same of a person on a treadmill, whose heading no movement shows.
+    pub fn on_treadmill(mut self) -> Self {
+        self.priors[WHOLE_HEADING].sd = UNSEEN_HEADING_SD_RAD;
+        self.is_on_treadmill = true;
+        self
+    }
+
     /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
     /// sides are exchanged; without it, the sides stay as tracked.
     pub fn fit(&self, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
@@ -154,23 +164,36 @@ impl<'a> Problem<'a> {
             Some(other) if p_exchanged > 0.5 => (other, 1.0 - p_exchanged),
             _ => (as_tracked, p_exchanged),
         };
-        let quality = self.quality(&best);
+        self.checked(&best, p_swapped)
+    }
+
+    /// The result of a fit, unless it ended in a wrong place.
+    pub(super) fn checked(&self, fitted: &Fitted, p_swapped: f64) -> Result<WalkFit, FitError> {
+        let quality = self.quality(fitted);
         let residual = quality.residual_px / quality.height_px;
         if quality.missed > MOST_MISSED || residual > MOST_RESIDUAL {
             return Err(FitError::Misfit { missed: quality.missed, residual });
         }
-        Ok(self.result(&best, p_swapped, quality))
+        Ok(self.result(fitted, p_swapped, quality))
+    }
+
+    pub(super) fn frame_count(&self) -> usize {
+        self.frames.len()
+    }
+
+    pub(super) fn heading_rad(&self, fitted: &Fitted) -> f64 {
+        self.path.heading_rad + fitted.unknowns.whole[WHOLE_HEADING]
     }
 
     /// The start whose first steps come nearest to the edges, with the tracker's phase shifted by some cycles.
-    fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
+    pub(super) fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
         let starts = StartGait::ALL.into_iter().filter_map(|gait| Some((self.started(phase, gait)?, gait)));
         let ((_, unknowns), gait) = starts.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
         Some((unknowns, gait))
     }
 
     /// The first steps from one gait, and their cost.
-    fn started(&self, phase: f64, gait: StartGait) -> Option<(f64, Unknowns)> {
+    pub(super) fn started(&self, phase: f64, gait: StartGait) -> Option<(f64, Unknowns)> {
         let mut unknowns = self.start(phase);
         gait.apply(&self.walker.gait, &mut unknowns.whole);
         let height_px = self.height_px(&unknowns)?;
@@ -182,7 +205,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The other steps.
-    fn finished(&self, mut unknowns: Unknowns) -> Option<Fitted> {
+    pub(super) fn finished(&self, mut unknowns: Unknowns) -> Option<Fitted> {
         let height_px = self.height_px(&unknowns)?;
         let mut last = None;
         for n in STEPS[0]..STEPS.iter().sum() {
@@ -381,10 +404,15 @@ impl<'a> Problem<'a> {
             };
             (frame, [0, 1].map(|side| figure.sole(side)))
         };
-        let (mut all, feet): (Vec<FittedFrame>, Vec<_>) =
+        let (mut all, mut feet): (Vec<FittedFrame>, Vec<_>) =
             (0..frames.len()).into_par_iter().map(frame).unzip();
         let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
         let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
+        let belt =
+            self.is_on_treadmill.then(|| belt::belt(&times_s, &phases, &feet, path.direction())).flatten();
+        if let Some(belt) = belt {
+            belt::move_with(&mut feet, &times_s, path.direction() * belt.speed_mps);
+        }
         let contacts = contacts::contacts(&times_s, &phases, &feet, path.direction());
         // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
         let zero = contacts::mean_phase(&contacts, &times_s, &phases) * self.share_of_zero(&quality);
@@ -398,6 +426,8 @@ impl<'a> Problem<'a> {
             frames: all,
             contacts,
             p_swapped,
+            mirrored: None,
+            belt,
             quality,
         }
     }
@@ -502,9 +532,9 @@ struct Room {
 }
 
 /// A fit with one choice of sides.
-struct Fitted {
+pub(super) struct Fitted {
     unknowns: Unknowns,
-    seen: Seen,
+    pub(super) seen: Seen,
     solution: Solution,
     height_px: f64,
 }
@@ -532,6 +562,8 @@ const GROUND_FRAMES: f64 = 10.0;
 const ASSUMED_GROUND_SD_M: f64 = 0.06;
 const ASSUMED_HEADING_SD_RAD: f64 = 0.02;
 const ASSUMED_ACROSS_SD_M: f64 = 0.1;
+/// Standard deviation of the heading about the start's, where nothing but the outlines shows it.
+const UNSEEN_HEADING_SD_RAD: f64 = 0.5;
 /// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,
 /// cycles/s of the phase, rad/s of the angles. Of the size that prototypes on motion-captured walks used; the
 /// result hardly depends on them.
@@ -625,7 +657,12 @@ mod tests {
         let grey = Image::filled(640, 480, 90u8);
         let frame = |k: usize| FitFrame {
             time_s: 0.04 * k as f64,
-            view: View { corner: [0, 0], grey: grey.clone(), background: grey.clone(), others: Vec::new() },
+            view: View {
+                corner: [0, 0],
+                grey: grey.clone(),
+                background: Some(grey.clone()),
+                others: Vec::new(),
+            },
             start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
         };
         let fit = |count: usize| {

@@ -92,10 +92,31 @@ impl Backdrop {
 
     /// The pieces with the empty scene behind them.
     pub fn views<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
+        self.views_before(pieces, LEAST_EMPTY)
+    }
+
+    /// The same of somebody who never leaves a place: the empty scene is that of the frames without the person, and
+    /// unknown if there are none.
+    pub fn views_on_the_spot<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
+        let pieces: Vec<&Piece> = pieces.collect();
+        let is_walk = |frame: usize| pieces.iter().any(|piece| piece.frame == frame);
+        if self.frames.iter().any(|kept| !is_walk(kept.frame)) {
+            return self.views_before(pieces.into_iter(), 1);
+        }
+        let alone = |p: &Piece| View {
+            corner: [p.kept.left, p.kept.top],
+            grey: p.grey.clone(),
+            background: None,
+            others: p.others.clone(),
+        };
+        pieces.into_iter().map(alone).collect()
+    }
+
+    fn views_before<'a>(&self, pieces: impl Iterator<Item = &'a Piece>, least: usize) -> Vec<View> {
         let pieces: Vec<&Piece> = pieces.collect();
         let Some(whole) = pieces.iter().map(|p| p.kept).reduce(|a, b| a.union(&b)) else { return Vec::new() };
         let rows: Vec<Vec<u8>> =
-            (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole)).collect();
+            (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole, least)).collect();
         let behind = |piece: &Piece| {
             let kept = piece.kept;
             let mut background = Image::filled(kept.width(), kept.height(), 0);
@@ -106,7 +127,7 @@ impl Backdrop {
             View {
                 corner: [kept.left, kept.top],
                 grey: piece.grey.clone(),
-                background,
+                background: Some(background),
                 others: piece.others.clone(),
             }
         };
@@ -115,14 +136,14 @@ impl Backdrop {
 
     /// One row of the empty scene: the median of the frames in which people are elsewhere, or of all frames where
     /// these are too few.
-    fn empty_row(&self, y: usize, whole: &Rectangle) -> Vec<u8> {
+    fn empty_row(&self, y: usize, whole: &Rectangle, least: usize) -> Vec<u8> {
         let mut values = Vec::with_capacity(self.frames.len());
         let mut median = |x: usize| {
             let is_in = |w: &Rectangle| (w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y);
             values.clear();
             let free = self.frames.iter().filter(|kept| !kept.people.iter().any(is_in));
             values.extend(free.map(|kept| kept.image.row(y)[x]));
-            if values.len() < LEAST_EMPTY {
+            if values.len() < least {
                 values.clear();
                 values.extend(self.frames.iter().map(|kept| kept.image.row(y)[x]));
             }
@@ -168,15 +189,35 @@ mod tests {
             let mut wrong = 0;
             for (view, piece) in views.iter().zip(&pieces) {
                 assert_eq!((view.corner, &view.grey), ([piece.kept.left, piece.kept.top], &piece.grey));
-                for y in 0..view.background.height() {
+                let background = view.background.as_ref().unwrap();
+                for y in 0..background.height() {
                     let expected = |x: usize| (40 + 10 * ((x + piece.kept.left) / 8 % 3)) as u8;
-                    let row = view.background.row(y).iter().enumerate();
+                    let row = background.row(y).iter().enumerate();
                     wrong += row.filter(|(x, v)| **v != expected(*x)).count();
                 }
             }
             // In eight frames the box hardly leaves its place: columns that it always covers stay unknown.
             assert!(if frames == 50 { wrong == 0 } else { wrong > 0 }, "{frames}: {wrong}");
         }
+    }
+
+    #[test]
+    fn behind_somebody_who_stays_is_what_was_seen_before_or_nothing() {
+        let mut backdrop = Backdrop::default();
+        (0..8).for_each(|k| backdrop.push(k, &frame(k)));
+        let walk: Vec<Piece> =
+            (2..8).map(|k| Piece::new(k, &frame(k), window(2).union(&window(7)), Vec::new())).collect();
+        let views = backdrop.views_on_the_spot(walk.iter());
+        assert!(views.iter().all(|view| view.background.is_some()));
+        // The two frames before the walk show the box farther left; right of it the scene is empty.
+        let (background, corner) = (views[0].background.as_ref().unwrap(), views[0].corner);
+        let grey = |x: usize| (40 + 10 * (x / 8 % 3)) as u8;
+        assert!((40..50).all(|x| background.at(x - corner[0], 20 - corner[1]) == grey(x)));
+        let mut always = Backdrop::default();
+        (2..8).for_each(|k| always.push(k, &frame(k)));
+        let views = always.views_on_the_spot(walk.iter());
+        assert!(views.len() == 6 && views.iter().all(|view| view.background.is_none()));
+        assert_eq!(views[3].grey, walk[3].grey);
     }
 
     #[test]

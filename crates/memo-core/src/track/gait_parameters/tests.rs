@@ -111,6 +111,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         walk,
         camera: camera(),
         camera_is_guessed: false,
+        is_on_treadmill: false,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.1,
         start: report(path, beginning, direction),
@@ -476,6 +477,7 @@ fn a_step_leads_from_one_strike_to_the_next_and_is_named_after_it() {
             strike(5, Side::Left, 2.7, 5e-4),
         ],
         &walk.rows(),
+        0.0,
     );
     let found: Vec<_> = taken.iter().map(|s| (s.side, s.time_s, s.length_m, s.variance_s2)).collect();
     assert_eq!(found.len(), 2, "not over a strike that was not seen: {found:?}");
@@ -487,6 +489,27 @@ fn a_step_leads_from_one_strike_to_the_next_and_is_named_after_it() {
         );
         assert!((length_m - 1.2 * wanted_s).abs() < 1e-4, "{length_m}");
     }
+}
+
+/// Without a fit of the person the belt has the speed of the average gait, known to 15 %.
+#[test]
+fn on_a_treadmill_lengths_are_those_on_the_belt() {
+    let still: Vec<Measured> = exact(3.05, 0.0).into_iter().map(|(t, _, phase)| (t, 0.3, phase)).collect();
+    let walk = TrackedWalk { is_on_treadmill: true, ..tracked(&still, ACROSS, Direction::Forward) };
+    let belt = walk.treadmill().unwrap().belt;
+    // Strides of 0.6 to 1.05 heights, as people take.
+    assert!((0.6..1.05).contains(&(belt.speed_mps / 0.9 / 1.75)), "{belt:?}");
+    let table = walk.gait_parameters();
+    let of = |quantity, side| table.iter().find(|p| p.quantity == quantity && p.side == side).unwrap();
+    let speed = of(GaitQuantity::Speed, None);
+    assert!((speed.value.unwrap() - belt.speed_mps).abs() < 1e-9);
+    let [low, high] = speed.interval.unwrap();
+    assert!((high - low) / 2.0 > Z * 0.15 * belt.speed_mps && (high - low) / 2.0 < Z * 0.17 * belt.speed_mps);
+    let stride = of(GaitQuantity::StrideLength, None).value.unwrap();
+    assert!((stride - belt.speed_mps / 0.9).abs() < 1e-3, "{stride}");
+    assert!(walk.rows().iter().all(|row| (row.speed_mps - belt.speed_mps).abs() < 0.05));
+    let over_ground = TrackedWalk { is_on_treadmill: false, ..walk };
+    assert_eq!((over_ground.treadmill(), over_ground.belt().speed_mps), (None, 0.0));
 }
 
 /// For independent points the standard deviation of the slope is sd / sqrt(sum (t - mean)²).

@@ -255,6 +255,8 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         average: walker(),
         settled: true,
         pieces: Vec::new(),
+        is_on_treadmill: false,
+        early: None,
     });
     tracker
 }

@@ -1,0 +1,377 @@
+//! Walking on a treadmill: the legs walk and the body stays where it is.
+//!
+//! Rectangles show the direction of a walk by their drift. On a treadmill this is noise, so more frames are collected
+//! before a walk on the spot can begin (`Standing`), and the model is compared with them in a fan of headings, the
+//! whole cycle each. Arms are left out, because arms also swing in people who stand.
+//!
+//! The fan has a broad maximum and cannot tell a heading from its mirror image at the line of sight with left and right
+//! exchanged: their outlines are the same in parallel projection. The fit of the person compares both, because feet
+//! ahead stand higher or lower in the image than feet behind ([`fit`](super::fit)). Walking backwards on a treadmill is
+//! not looked for.
+
+use super::active::{Active, SLOWEST_MPS};
+use super::fit::MirroredHeading;
+use super::fit::belt::Belt;
+use super::fit::views::{Backdrop, Piece};
+use super::height::BodyHeight;
+use super::locate::{Course, Sighting};
+use super::options::TrackerOptions;
+use super::result::TrackedWalk;
+use super::search::{Grid, Path, Scene, search};
+use super::start::{CadenceRange, Direction, PhaseCurve, StartReport, phase_lines, start};
+use super::walk::{FrameEdges, Walk, WalkOptions};
+use crate::image::Rectangle;
+use crate::model::{Camera, GaitStyle, Walker};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// Headings of the fan: every 15 degrees.
+const HEADINGS: usize = 24;
+/// Half widths of the search at each heading, along the path and in height, metres.
+const REACH_M: [f64; 2] = [0.1, 0.04];
+/// Every third frame is compared.
+const EVERY: usize = 3;
+/// Similarity along the best line of phase, divided by the mean over all phases, that the legs of a walker exceed.
+pub(super) const LEAST_CONTRAST: f64 = 1.3;
+/// What stays is forgotten after this many consecutive frames without it.
+const MISSED_FRAMES: usize = 3;
+/// Arms in the order of the parts of the body.
+const ARMS: std::ops::Range<usize> = 2..8;
+
+/// What is known of the treadmill of a walk.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Treadmill {
+    /// Speed of the belt and its standard deviation with that of the distance from the camera.
+    pub belt: Belt,
+    /// The heading that looks alike, if it is another one.
+    pub mirrored: Option<MirroredHeading>,
+}
+
+impl TrackedWalk {
+    /// The treadmill; `None` over ground. Without a fit of the person, the belt has the speed of the average gait.
+    pub fn treadmill(&self) -> Option<Treadmill> {
+        let belt = self.belt();
+        let sd_mps = belt.sd_mps.hypot(self.scale_sd() * belt.speed_mps);
+        let mirrored = self.fitted().and_then(|fit| fit.mirrored);
+        self.is_on_treadmill.then_some(Treadmill { belt: Belt { sd_mps, ..belt }, mirrored })
+    }
+
+    /// Speed of the belt without the distance's standard deviation, m/s; 0 over ground.
+    pub(super) fn belt(&self) -> Belt {
+        if !self.is_on_treadmill {
+            return Belt { speed_mps: 0.0, sd_mps: 0.0 };
+        }
+        self.fitted().and_then(|fit| fit.belt).unwrap_or_else(|| self.belt_of_average_gait())
+    }
+
+    /// The speed at which the model's ankle moves backwards in the middle of its stance, at the walk's cadence.
+    fn belt_of_average_gait(&self) -> Belt {
+        let walker = &self.walk.walker;
+        let ankle = |phase: f64| walker.pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
+        let [begin, end] = MIDDLE_OF_STANCE;
+        let metres_per_cycle = (ankle(begin) - ankle(end)) / (end - begin);
+        let steps = self.steps();
+        let rate_hz = match (steps.first(), steps.last()) {
+            (Some(first), Some(last)) if last.time_s > first.time_s => {
+                (last.state.phase.position - first.state.phase.position) / (last.time_s - first.time_s)
+            }
+            _ => 0.0,
+        };
+        let speed_mps = metres_per_cycle * rate_hz;
+        Belt { speed_mps, sd_mps: AVERAGE_GAIT_SHARE * speed_mps.abs() }
+    }
+}
+
+/// Phases between which the foot of the average gait is flat.
+const MIDDLE_OF_STANCE: [f64; 2] = [0.1, 0.4];
+/// Standard deviation over people of the speed at the same cadence, as a share of it.
+const AVERAGE_GAIT_SHARE: f64 = 0.15;
+
+/// Frames in which something stays in one place.
+#[derive(Debug, Default)]
+pub(super) struct Standing {
+    pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
+    pub(super) pieces: Vec<Piece>,
+}
+
+impl Standing {
+    /// The part of the image that the thing covered so far, with this rectangle; `None` if there is none.
+    pub(super) fn window(&self, rectangle: Option<&Rectangle>) -> Option<Rectangle> {
+        let before = self.sightings().iter().map(|s| s.rectangle).reduce(|a, b| a.union(&b));
+        match (before, rectangle) {
+            (Some(before), Some(rectangle)) if before.gap(rectangle) == [0, 0] => {
+                Some(before.union(rectangle))
+            }
+            (_, Some(rectangle)) => Some(*rectangle),
+            (before, None) => before,
+        }
+    }
+
+    /// These frames and the next; frames of something elsewhere, or of something that was gone, are dropped.
+    pub(super) fn with(self, sighting: Option<Sighting>, edges: FrameEdges, piece: Option<Piece>) -> Self {
+        let is_there = |k: &(Option<Sighting>, FrameEdges)| k.0.is_some();
+        let is_gone = self.kept.iter().rev().take_while(|k| !is_there(k)).count() >= MISSED_FRAMES;
+        let is_elsewhere = self.kept.last().is_some_and(|(_, last)| last.window.gap(&edges.window) != [0, 0]);
+        let mut standing = if is_gone || is_elsewhere { Self::default() } else { self };
+        standing.kept.push((sighting, edges));
+        standing.pieces.extend(piece);
+        standing
+    }
+
+    /// Without the first frames.
+    pub(super) fn later(mut self, count: usize) -> Self {
+        self.kept.drain(..count.min(self.kept.len()));
+        self.pieces.drain(..count.min(self.pieces.len()));
+        self
+    }
+
+    /// The frames before a walk, then those of the walk.
+    pub(super) fn followed_by(mut self, kept: &[(Option<Sighting>, FrameEdges)], pieces: &[Piece]) -> Self {
+        let first = kept.first().map_or(usize::MAX, |(_, edges)| edges.frame);
+        self.kept.retain(|(_, edges)| edges.frame < first);
+        self.pieces.retain(|piece| piece.frame < first);
+        self.kept.extend_from_slice(kept);
+        self.pieces.extend_from_slice(pieces);
+        self
+    }
+
+    /// The rectangles.
+    pub(super) fn sightings(&self) -> Vec<Sighting> {
+        self.kept.iter().filter_map(|(sighting, _)| *sighting).collect()
+    }
+}
+
+/// What a start on the spot needs besides the frames.
+pub(super) struct Spot<'a> {
+    pub(super) camera: Camera,
+    /// The course of the rectangles as of somebody who walks along the image plane.
+    pub(super) course: Course,
+    pub(super) height: BodyHeight,
+    pub(super) walker: Walker,
+    pub(super) backdrop: &'a Backdrop,
+    pub(super) options: &'a TrackerOptions,
+}
+
+impl Spot<'_> {
+    /// Starts a walk on the spot; `None` if the thing moves on, or if its legs do not walk.
+    pub(super) fn begin(&self, standing: Standing) -> Result<Active, Standing> {
+        let is_forced = self.options.treadmill == Some(true);
+        if self.course.speed_mps >= SLOWEST_MPS && !is_forced {
+            return Err(standing);
+        }
+        let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
+        let Some(start) = self.start(&frames) else { return Err(standing) };
+        let Self { camera, course, height, walker, options, .. } = self;
+        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
+        for (_, edges) in &standing.kept {
+            walk.follow(edges, camera, &options.walk);
+        }
+        Ok(Active {
+            person: 0,
+            camera: camera.clone(),
+            height: *height,
+            depth_sd_m: course.depth_sd_m,
+            start,
+            walk,
+            average: Walker { style: GaitStyle::default(), ..walker.clone() },
+            kept: standing.kept,
+            gait_speed_mps: course.speed_mps,
+            settled: false,
+            pieces: standing.pieces,
+            is_on_treadmill: true,
+            early: Some(self.backdrop.clone()),
+        })
+    }
+
+    /// The heading of the fan that is most similar, and the start of a walk in it.
+    fn start(&self, frames: &[&FrameEdges]) -> Option<StartReport> {
+        let mut options = self.options.walk;
+        options.similarity.part_weights[ARMS].fill(0.0);
+        let place = self.place();
+        let heading_rad =
+            best_heading(frames, place, &self.walker, &self.camera, &self.options.cadence, &options)?;
+        let path = Path { origin: place, heading_rad };
+        let course = Course { path, along_m: vec![0.0; frames.len()], ..self.course.clone() };
+        let start = start(frames, &course, &self.walker, &self.camera, &self.options.cadence, &options)?;
+        let walks =
+            start.contrast() >= LEAST_CONTRAST && start.frozen.similarity < start.lines.best.similarity;
+        (walks && start.direction == Direction::Forward).then_some(start)
+    }
+
+    /// Where the thing stays, on the ground.
+    fn place(&self) -> DVec2 {
+        let Course { path, along_m, .. } = &self.course;
+        path.point(along_m.iter().sum::<f64>() / along_m.len() as f64, 0.0).truncate()
+    }
+}
+
+/// The heading at which the similarity along the best line of phase is the highest.
+fn best_heading(
+    frames: &[&FrameEdges],
+    place: DVec2,
+    walker: &Walker,
+    camera: &Camera,
+    rates: &CadenceRange,
+    options: &WalkOptions,
+) -> Option<f64> {
+    let height_m = walker.level_torso_height_m();
+    let similarity = |heading_rad: f64| {
+        let path = Path { origin: place, heading_rad };
+        let scene = Scene::new(walker, camera, &path);
+        let grid = Grid::whole_cycle_within(0.0, height_m, REACH_M);
+        let curve = |frame: &&FrameEdges| {
+            let found = search(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
+            let scores = found.curve().iter().map(|(_, score)| *score).collect();
+            PhaseCurve { time_s: frame.time_s, scores }
+        };
+        let curves: Vec<PhaseCurve> = frames.iter().map(curve).collect();
+        phase_lines(&curves, rates).map(|lines| (heading_rad, lines.best.similarity))
+    };
+    let fan: Vec<_> =
+        (0..HEADINGS).into_par_iter().filter_map(|k| similarity(TAU * k as f64 / HEADINGS as f64)).collect();
+    let best = fan.into_iter().reduce(|best, next| if next.1 > best.1 { next } else { best })?;
+    Some(best.0)
+}
+
+/// The path whose outlines look the same from the camera: mirrored at the line of sight.
+pub(super) fn mirrored(path: &Path, camera: &Camera) -> Path {
+    let sight = path.origin - camera.position().truncate();
+    let view = (camera.rotation.transpose() * DVec3::Z).truncate();
+    let sight = sight.try_normalize().or(view.try_normalize()).unwrap_or(DVec2::Y);
+    Path { heading_rad: 2.0 * sight.to_angle() + PI - path.heading_rad, ..*path }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::locate::Crown;
+    use super::super::locate::locate;
+    use super::super::search::Hypothesis;
+    use super::super::search::tests::{camera, edges_of, walker};
+    use super::*;
+
+    const PLACE: DVec2 = DVec2::new(0.2, 0.3);
+
+    fn path(heading_rad: f64) -> Path {
+        Path { origin: PLACE, heading_rad }
+    }
+
+    /// Twelve frames of the contours and rectangles of a person who stays, with legs and arms at these rates and
+    /// drifting at this speed.
+    fn standing(heading_rad: f64, rate_hz: f64, drift_mps: f64) -> Standing {
+        let (walker, camera) = (walker(), camera());
+        let path = path(heading_rad);
+        let scene = Scene::new(&walker, &camera, &path);
+        let height_m = walker.level_torso_height_m();
+        let crown_m = walker.level_crown_height_m();
+        let window = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
+        let frame = |k: usize| {
+            let time_s = 0.1 * k as f64;
+            let along_m = drift_mps * time_s;
+            let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.3 + rate_hz * time_s });
+            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(path.point(along_m, z)).unwrap());
+            let rectangle = Rectangle {
+                left: (sole.x - 40.0).round() as usize,
+                right: (sole.x + 40.0).round() as usize,
+                top: (crown.y - 2.0).round() as usize,
+                bottom: sole.y.round() as usize,
+            };
+            (
+                Some(Sighting { time_s, rectangle }),
+                FrameEdges { frame: k, time_s, window, edges, others: Vec::new(), shared: false },
+            )
+        };
+        Standing { kept: (0..12).map(frame).collect(), pieces: Vec::new() }
+    }
+
+    fn begun(standing: Standing, treadmill: Option<bool>) -> Option<Active> {
+        let options = TrackerOptions { treadmill, fit: None, ..TrackerOptions::for_height(1.75) };
+        let (walker, backdrop) = (walker(), Backdrop::default());
+        let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: 0.02 };
+        let course = locate(&standing.sightings(), &camera(), &crown).unwrap();
+        let height = BodyHeight::given(1.75);
+        let spot = Spot { camera: camera(), course, height, walker, backdrop: &backdrop, options: &options };
+        spot.begin(standing).ok()
+    }
+
+    #[test]
+    fn legs_that_walk_on_the_spot_begin_a_walk_in_their_heading() {
+        let heading_rad = PI - 0.5;
+        let active = begun(standing(heading_rad, 0.9, 0.0), None).unwrap();
+        assert!(active.is_on_treadmill && active.start.direction == Direction::Forward);
+        let found = active.walk.path;
+        let off = |path: &Path| (path.heading_rad - heading_rad).sin().abs();
+        // The mirrored heading has the same outlines, but not the one that faces the other way.
+        assert!(off(&found).min(off(&mirrored(&found, &camera()))) < 0.3, "{heading_rad}: {found:?}");
+        assert!((found.heading_rad - heading_rad).cos() > 0.3);
+        assert!((active.start.lines.best.rate_hz - 0.9).abs() < 0.05);
+        assert!(found.origin.distance(PLACE) < 0.1, "{found:?}");
+        assert_eq!(active.walk.twins[0].steps.len(), 12);
+    }
+
+    #[test]
+    fn what_moves_on_or_stands_begins_no_walk_on_the_spot() {
+        assert!(begun(standing(0.0, 0.9, 1.2), None).is_none(), "a walk over ground");
+        assert!(begun(standing(0.0, 0.0, 0.0), Some(true)).is_none(), "somebody stands");
+    }
+
+    #[test]
+    fn a_mirrored_heading_is_that_at_the_line_of_sight() {
+        let camera = camera();
+        for heading_rad in [0.4, 2.0, -1.2] {
+            let there = mirrored(&path(heading_rad), &camera);
+            let sight = (PLACE - camera.position().truncate()).normalize();
+            let [ahead, other] = [DVec2::from_angle(heading_rad), there.direction()];
+            assert!((ahead.dot(sight) + other.dot(sight)).abs() < 1e-12);
+            assert!((ahead.dot(sight.perp()) - other.dot(sight.perp())).abs() < 1e-12);
+            assert_eq!(there.origin, PLACE);
+        }
+    }
+
+    fn edges(frame: usize) -> FrameEdges {
+        let window = Rectangle { left: 10, top: 10, right: 60, bottom: 90 };
+        FrameEdges {
+            frame,
+            time_s: 0.04 * frame as f64,
+            window,
+            edges: Vec::new(),
+            others: Vec::new(),
+            shared: false,
+        }
+    }
+
+    #[test]
+    fn frames_of_what_was_gone_or_is_elsewhere_are_forgotten() {
+        let rectangle = Rectangle { left: 20, top: 20, right: 50, bottom: 80 };
+        let seen = Some(Sighting { time_s: 0.0, rectangle });
+        let three = Standing::default().with(seen, edges(0), None).with(None, edges(1), None);
+        let three = three.with(seen, edges(2), None);
+        assert_eq!((three.kept.len(), three.sightings().len()), (3, 2));
+        let wider = Rectangle { right: 70, ..rectangle };
+        assert_eq!(three.window(Some(&wider)), Some(rectangle.union(&wider)));
+        assert_eq!(three.window(None), Some(rectangle));
+        let far = Rectangle { left: 200, right: 230, ..rectangle };
+        assert_eq!(three.window(Some(&far)), Some(far));
+        let elsewhere = FrameEdges { window: far, ..edges(3) };
+        assert_eq!(Standing::default().with(seen, edges(2), None).with(seen, elsewhere, None).kept.len(), 1);
+        let gone = (3..6).fold(three, |standing, k| standing.with(None, edges(k), None));
+        assert_eq!(gone.kept.len(), 6);
+        assert_eq!(gone.with(seen, edges(6), None).kept.len(), 1);
+        assert_eq!(Standing::default().window(None), None);
+    }
+
+    #[test]
+    fn frames_before_a_walk_come_first_and_once() {
+        let with = |standing: Standing, k: usize| standing.with(None, edges(k), None);
+        let before = (0..4).fold(Standing::default(), |standing, k| {
+            let seen = Sighting { time_s: 0.0, rectangle: edges(0).window };
+            standing.with(Some(seen), edges(k), None)
+        });
+        let walk: Vec<_> = (2..6).map(|k| (None, edges(k))).collect();
+        let all = before.followed_by(&walk, &[]);
+        let frames = |standing: &Standing| standing.kept.iter().map(|(_, e)| e.frame).collect::<Vec<_>>();
+        assert_eq!(frames(&all), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(frames(&all.later(4)), [4, 5]);
+        assert!(with(Standing::default(), 0).later(9).kept.is_empty());
+    }
+}
