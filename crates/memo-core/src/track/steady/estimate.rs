@@ -29,8 +29,10 @@ const TUKEY: f64 = 4.685;
 const LEAST_SD: f64 = 1.0;
 /// A point supports the rotation if its residual is below that of a shift by this many pixels, ...
 const SUPPORT_PX: f64 = 0.5;
-/// ... or below this many grey levels.
+/// ... or below this many grey levels, and if the picture has at least this share of the point's gradient there. The
+/// noise of a codec on a plain wall passes the first test, but its gradients are others in the next frame.
 const SUPPORT_GREY: f64 = 6.0;
+const SUPPORT_GRADIENT: f64 = 0.4;
 /// Fewest points seen in the picture, as a share of the template's.
 const LEAST_SEEN: f64 = 0.25;
 /// The gain between template and picture is within this factor.
@@ -128,9 +130,8 @@ impl Comparison<'_> {
     /// Support, uncertainty and zoom at the end, on the finest level.
     fn judge(&self, points: &[Point], at: &mut Estimate) -> Option<()> {
         let residuals = self.residuals(points, 0, at)?;
-        let tolerance = |p: &Point| (SUPPORT_PX * at.gain * p.gradient).max(SUPPORT_GREY);
-        let near = residuals.iter().filter(|r| r.off.abs() <= tolerance(&points[r.point])).count();
-        at.support = near as f64 / residuals.len() as f64;
+        let supports = |r: &&Residual| self.is_supporting(&points[r.point], r.off, at);
+        at.support = residuals.iter().filter(supports).count() as f64 / residuals.len() as f64;
         let sd = robust_sd(&residuals);
         let equations = Equations::<6>::new(points, &residuals, TUKEY * sd, |p| {
             let [x, y, z, grey, one] = row(p);
@@ -142,6 +143,21 @@ impl Comparison<'_> {
         let turn = covariance.fixed_view::<3, 3>(0, 0).into_owned();
         at.sd_px = self.corners().map(|plane| displacement_sd(self.camera, &turn, plane)).fold(0.0, f64::max);
         Some(())
+    }
+
+    /// True if the picture has the grey value and the gradient of a point where the rotation shows it.
+    fn is_supporting(&self, p: &Point, off: f64, at: &Estimate) -> bool {
+        let steep = at.gain * p.gradient;
+        if off.abs() > (SUPPORT_PX * steep).max(SUPPORT_GREY) {
+            return false;
+        }
+        let frame = self.pyramid.level(0);
+        let along = |step: DVec2| {
+            let pixel = pixel_of(self.camera, &at.rotation, p.ray)? + step;
+            bilinear(&frame, pixel.x, pixel.y)
+        };
+        let rise = along(p.uphill).zip(along(-p.uphill)).map(|(above, below)| (above - below) / 2.0);
+        rise.is_some_and(|rise| rise >= SUPPORT_GRADIENT * steep)
     }
 
     /// The corners of the picture on the normalised plane, without the lens.

@@ -22,6 +22,7 @@ mod warp;
 use crate::image::{Frame, FrameError, Image, Mask};
 use crate::model::Camera;
 use crate::option_error::OptionError;
+use crate::wording::counted;
 use estimate::{Comparison, Estimate};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use pyramid::Pyramid;
@@ -38,7 +39,7 @@ pub type Turned = DMat3;
 #[non_exhaustive]
 pub enum SteadyError {
     /// The picture has too few gradients.
-    #[error("a picture with {points} points of strong gradient at one scale: a rotation needs {needed}")]
+    #[error("a picture with {} of strong gradient at one scale: a rotation needs {needed}", counted(*points, "point"))]
     NoTexture {
         /// Points found on the scale with the fewest.
         points: usize,
@@ -48,7 +49,7 @@ pub enum SteadyError {
     /// The gradients are in a small part of the picture.
     #[error("gradients are in {:.0} % of the picture only: a rotation needs {:.0} %", 100.0 * share, 100.0 * needed)]
     PlainPicture {
-        /// Share of the cells of the picture with a strong gradient.
+        /// Share of the cells of the picture with strong gradients.
         share: f64,
         /// Share needed.
         needed: f64,
@@ -187,11 +188,21 @@ pub enum Steadied {
 const NEW_SHOT_FRAMES: [usize; 2] = [3, 25];
 /// Support falls at a cut from one frame to the next by this much.
 const CUT_FALL: f64 = 0.25;
+/// Support that falls below this share of the last frame's is not trusted, unless it stays there for so many frames.
+const SUDDEN_FALL: f64 = 0.6;
+const FALLEN_FRAMES: usize = 3;
+/// A jump, found by trying many shifts, needs this much support.
+const JUMP_SUPPORT: f64 = 0.5;
+/// At a cut at least this share of the picture, at its coarsest scale, changes by more than this many grey levels against
+/// the last frame of the view, after the median change is taken off. What a codec leaves on a plain wall does not.
+const CUT_SHARE: f64 = 0.25;
+const CUT_GREY: i32 = 12;
 /// Frames in which a zoom must be seen.
 const ZOOM_FRAMES: usize = 4;
-/// A frame that shares less than this with the key frame, or supports it less, becomes a key frame.
+/// A frame that shares less than this with the key frame becomes a key frame, and one of several that support it less.
 const KEY_OVERLAP: f64 = 0.6;
-const KEY_SUPPORT: f64 = 0.55;
+const KEY_SUPPORT: f64 = 0.5;
+const FADING_FRAMES: usize = 5;
 /// The first key frame and the latest of this number in all are kept.
 const MOST_KEYS: usize = 12;
 /// Motions kept: of the longest walk and more.
@@ -241,7 +252,12 @@ pub struct Steadier {
     keys: Vec<Key>,
     last: Turned,
     last_support: f64,
+    /// The coarsest scale of the last frame that a key frame explained.
+    last_coarse: Option<Image<u8>>,
     other: Option<Other>,
+    /// Frames since the last one that a key frame explained, and frames of little support.
+    unexplained: usize,
+    fading: usize,
     zooming: usize,
     is_lost: bool,
     frames: usize,
@@ -261,7 +277,10 @@ impl Steadier {
             keys: Vec::new(),
             last: DMat3::IDENTITY,
             last_support: 0.0,
+            last_coarse: None,
             other: None,
+            unexplained: 0,
+            fading: 0,
             zooming: 0,
             is_lost: false,
             frames: 0,
@@ -291,7 +310,10 @@ impl Steadier {
         let found = self.compared(&pyramid);
         match found {
             Some((key, estimate)) => self.follow(number, key, &estimate, &pyramid),
-            None => self.look_for_another_shot(number, frame, &pyramid),
+            None => {
+                self.unexplained += 1;
+                self.look_for_another_shot(number, frame, &pyramid);
+            }
         }
         Ok(self.noted(number, found.map(|(_, estimate)| estimate.support), frame))
     }
@@ -325,15 +347,16 @@ impl Steadier {
         let key = Key { template, turned: DMat3::IDENTITY, zoom: 0.0 };
         let warp = Warp::new(&camera);
         self.begin(key, View { camera, warp, picture: frame.to_image() });
+        self.last_coarse = Some(pyramid.coarsest().to_image());
     }
 
     fn begin(&mut self, key: Key, view: View) {
         self.view = Some(view);
         self.keys = vec![key];
         self.last = DMat3::IDENTITY;
-        self.last_support = 1.0;
+        self.last_support = 0.0;
         self.other = None;
-        self.zooming = 0;
+        (self.unexplained, self.fading, self.zooming) = (0, 0, 0);
         self.is_lost = false;
     }
 
@@ -343,9 +366,14 @@ impl Steadier {
         let comparison = Comparison { pyramid, camera: &view.camera };
         let nearest = self.nearest_key();
         let to = |key: usize| self.last * self.keys[key].turned.transpose();
-        let good = |estimate: &Estimate| estimate.is_supported(self.options.least_support);
+        let is_trusted = self.unexplained >= FALLEN_FRAMES;
+        let expected = if is_trusted { 0.0 } else { SUDDEN_FALL * self.last_support };
+        let good = |estimate: &Estimate| estimate.is_supported(expected.max(self.options.least_support));
         let of = |key: usize, from: &Turned| comparison.estimate(&self.keys[key].template, from).filter(good);
-        let jumped = |key: usize, from: &Turned| of(key, &comparison.jump(&self.keys[key].template, from));
+        let jumped = |key: usize, from: &Turned| {
+            let found = of(key, &comparison.jump(&self.keys[key].template, from));
+            found.filter(|estimate| estimate.support >= JUMP_SUPPORT)
+        };
         let first = || (nearest != 0 || self.is_lost).then(|| jumped(0, &DMat3::IDENTITY)).flatten();
         let near = of(nearest, &to(nearest)).or_else(|| jumped(nearest, &to(nearest)));
         near.map(|estimate| (nearest, estimate)).or_else(|| first().map(|estimate| (0, estimate)))
@@ -364,6 +392,9 @@ impl Steadier {
         let Some(view) = &self.view else { return };
         self.last = estimate.rotation * self.keys[key].turned;
         self.last_support = estimate.support;
+        self.unexplained = 0;
+        self.fading = if estimate.support < KEY_SUPPORT { self.fading + 1 } else { 0 };
+        self.last_coarse = Some(pyramid.coarsest().to_image());
         self.other = None;
         let zoom = self.keys[key].zoom + estimate.zoom[0];
         let corner_px =
@@ -381,7 +412,8 @@ impl Steadier {
             return;
         }
         let shared = shared_with(&view.camera, &estimate.rotation);
-        if shared < KEY_OVERLAP || estimate.support < KEY_SUPPORT {
+        if shared < KEY_OVERLAP || self.fading >= FADING_FRAMES {
+            self.fading = 0;
             let Ok(template) = Template::new(pyramid, &view.camera) else { return };
             if self.keys.len() >= MOST_KEYS {
                 self.keys.remove(1);
@@ -401,7 +433,12 @@ impl Steadier {
         if let Some(other) = self.other.as_mut().filter(|_| agrees) {
             other.agreeing += 1;
             let needed = NEW_SHOT_FRAMES[usize::from(other.reason == LossReason::OtherView)];
-            if other.agreeing >= needed && !self.is_lost {
+            let is_another = other.reason == LossReason::Zoom
+                || self
+                    .last_coarse
+                    .as_ref()
+                    .is_some_and(|last| changed_share(last, &pyramid.coarsest()) >= CUT_SHARE);
+            if other.agreeing >= needed && is_another && !self.is_lost {
                 let loss = Loss { frame: other.frame, reason: other.reason };
                 self.lose(loss);
                 let other = self.other.take();
@@ -476,6 +513,16 @@ impl Steadier {
             _ => Steadied::AsGiven,
         }
     }
+}
+
+/// Share of the pixels of two pictures whose difference is far from the median difference.
+fn changed_share(a: &Image<u8>, b: &Frame<'_>) -> f64 {
+    let row = |y: usize| a.row(y).iter().zip(b.row(y)).map(|(a, b)| i32::from(*b) - i32::from(*a));
+    let mut differences: Vec<i32> = (0..a.height()).flat_map(row).collect();
+    let middle = differences.len() / 2;
+    let median = *differences.select_nth_unstable(middle).1;
+    let far = differences.iter().filter(|d| (*d - median).abs() > CUT_GREY).count();
+    far as f64 / differences.len() as f64
 }
 
 /// Number of levels of a picture.

@@ -28,6 +28,11 @@ impl<'a> Pyramid<'a> {
         if level == 0 { self.finest } else { self.reduced[level - 1].as_frame() }
     }
 
+    /// The picture of the last level.
+    pub fn coarsest(&self) -> Frame<'_> {
+        self.level(self.levels() - 1)
+    }
+
     /// Number of levels.
     pub fn levels(&self) -> usize {
         self.reduced.len() + 1

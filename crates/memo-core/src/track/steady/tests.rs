@@ -188,10 +188,23 @@ fn before_a_plain_wall_a_person_is_no_camera_motion() {
         assert!(pushed(&mut steadier, &frame).0 == Steadied::AsGiven, "{k}");
         if k == 0 {
             let error = Template::new(&Pyramid::new(frame.as_frame(), 2), &camera).unwrap_err();
-            assert!(matches!(error, SteadyError::PlainPicture { share, .. } if share < 0.45), "{error}");
+            assert!(matches!(error, SteadyError::PlainPicture { share, .. } if share < 0.4), "{error}");
         }
     }
     assert!(steadier.motions().iter().all(|motion| motion.state == CameraState::Unknown));
+}
+
+/// What a codec leaves on a plain wall differs from frame to frame; that is no texture and no cut.
+#[test]
+fn texture_that_is_another_in_every_frame_is_no_view() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    for k in 0..40u32 {
+        let faint = |at: DVec2| Some(120.0 + 0.2 * (texture(k / 5, at, 6.0) - 120.0));
+        let frame = Shot { noise: 0.5, seed: k, ..Shot::of(&camera, [0.0; 3]) }.drawn(|grey| grey, faint);
+        assert!(pushed(&mut steadier, &frame).0 == Steadied::AsGiven, "{k}");
+    }
+    assert!(steadier.losses().is_empty(), "{:?}", steadier.losses());
 }
 
 /// A black frame and a flash are no cut: the camera is unknown in them, and known again after them.
