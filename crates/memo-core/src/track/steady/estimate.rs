@@ -82,9 +82,9 @@ struct Residual {
 }
 
 impl Comparison<'_> {
-    /// The rotation, from coarse to fine, starting at `from`; `None` if too little of the template is in the picture or
+    /// The rotation, from the coarsest of the `levels` finest ones on, starting at `from`; `None` if too little of the template is in the picture or
     /// the equations are singular.
-    pub fn estimate(&self, template: &Template, from: &Turned) -> Option<Estimate> {
+    pub fn estimate(&self, template: &Template, from: &Turned, levels: usize) -> Option<Estimate> {
         let mut at = Estimate {
             rotation: *from,
             gain: 1.0,
@@ -93,9 +93,9 @@ impl Comparison<'_> {
             sd_px: f64::INFINITY,
             zoom: [0.0, f64::INFINITY],
         };
-        for level in (0..self.pyramid.levels()).rev() {
+        for level in (0..levels).rev() {
             for round in 0..MOST_ROUNDS {
-                let is_first = round == 0 && level + 1 == self.pyramid.levels();
+                let is_first = round == 0 && level + 1 == levels;
                 let step_px = self.round(&template.levels[level], level, is_first, &mut at)?;
                 if step_px < SMALL_STEPS_PX[usize::from(level == 0)] {
                     break;
@@ -104,6 +104,20 @@ impl Comparison<'_> {
         }
         self.judge(&template.levels[0], &mut at)?;
         (1.0 / MOST_GAIN..MOST_GAIN).contains(&at.gain).then_some(at)
+    }
+
+    /// The rotation by the finest level alone if it is supported by `expected`; otherwise by all levels, if that is
+    /// supported more. Where a wall has fine texture only, the coarse levels show people rather than the wall.
+    pub fn near(&self, template: &Template, from: &Turned, expected: f64) -> Option<Estimate> {
+        let fine = self.estimate(template, from, 1);
+        if fine.is_some_and(|found| found.support >= expected) {
+            return fine;
+        }
+        let coarse = self.estimate(template, from, self.pyramid.levels());
+        match (fine, coarse) {
+            (Some(fine), Some(coarse)) if coarse.support <= fine.support => Some(fine),
+            (fine, coarse) => coarse.or(fine),
+        }
     }
 
     /// One round; returns the step in pixels of the level.

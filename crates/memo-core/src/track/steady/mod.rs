@@ -188,6 +188,8 @@ pub enum Steadied {
 const NEW_SHOT_FRAMES: [usize; 2] = [3, 25];
 /// Support falls at a cut from one frame to the next by this much.
 const CUT_FALL: f64 = 0.25;
+/// With this share of the last frame's support, a rotation that the finest scale finds is the right one.
+const USUAL_SHARE: f64 = 0.85;
 /// Support that falls below this share of the last frame's is not trusted, unless it stays there for so many frames.
 const SUDDEN_FALL: f64 = 0.6;
 const FALLEN_FRAMES: usize = 3;
@@ -366,10 +368,12 @@ impl Steadier {
         let comparison = Comparison { pyramid, camera: &view.camera };
         let nearest = self.nearest_key();
         let to = |key: usize| self.last * self.keys[key].turned.transpose();
+        let usual = if self.last_support > 0.0 { USUAL_SHARE * self.last_support } else { 1.0 };
         let is_trusted = self.unexplained >= FALLEN_FRAMES;
         let expected = if is_trusted { 0.0 } else { SUDDEN_FALL * self.last_support };
         let good = |estimate: &Estimate| estimate.is_supported(expected.max(self.options.least_support));
-        let of = |key: usize, from: &Turned| comparison.estimate(&self.keys[key].template, from).filter(good);
+        let of =
+            |key: usize, from: &Turned| comparison.near(&self.keys[key].template, from, usual).filter(good);
         let jumped = |key: usize, from: &Turned| {
             let found = of(key, &comparison.jump(&self.keys[key].template, from));
             found.filter(|estimate| estimate.support >= JUMP_SUPPORT)
@@ -427,7 +431,7 @@ impl Steadier {
         let Some(view) = &self.view else { return };
         let comparison = Comparison { pyramid, camera: &view.camera };
         let agrees = self.other.as_ref().is_some_and(|other| {
-            let found = comparison.estimate(&other.key.template, &other.key.turned);
+            let found = comparison.near(&other.key.template, &other.key.turned, 1.0);
             found.is_some_and(|e| e.is_supported(self.options.least_support))
         });
         if let Some(other) = self.other.as_mut().filter(|_| agrees) {
@@ -446,7 +450,7 @@ impl Steadier {
             }
             return;
         }
-        let support = comparison.estimate(&self.keys[self.nearest_key()].template, &self.last);
+        let support = comparison.near(&self.keys[self.nearest_key()].template, &self.last, 1.0);
         let fallen = self.last_support - support.map_or(0.0, |e| e.support);
         let reason = match self.other {
             _ if self.zooming > 0 => LossReason::Zoom,
