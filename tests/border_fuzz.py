@@ -665,13 +665,15 @@ def tracks(d, tracker):
     "Tracker.take_finished",
     "Tracker.current",
     "Tracker.seek_report",
+    "Tracker.camera_motion",
+    "Tracker.lost_views",
 )
 def _(d, name):
     tracker = new_tracker(d, _memo.Tracker)
     if name == "Tracker.__new__":
         return
     all(True for _ in tracks(d, tracker))
-    tracker.current(), tracker.seek_report()
+    tracker.current(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
     tracker.finish()
     for walk in tracker.take_finished():
         (
@@ -686,6 +688,15 @@ def _(d, name):
             walk.contours(0),
         )
     tracker.finish() if d.is_wrong() else None
+
+
+@case("Steadier.__new__", "Steadier.update", "Steadier.losses")
+def _(d, name):
+    options = d.options(fov_deg=lambda: d.number(5, 170), still_px=lambda: d.number(0, 3))
+    steadier = _memo.Steadier(d.maybe(d.camera), **options)
+    for frame in d.frames(d.size(7)):
+        steadier.update(frame)
+    steadier.losses()
 
 
 WALK_PARTS = [name for name in dir(_memo.Walk) if not name.startswith("_")]

@@ -217,7 +217,7 @@ def _found(
 def _whole(
     compared: npt.NDArray[np.uint8], whole: npt.NDArray[np.uint8], shrink: int
 ) -> npt.NDArray[np.uint8]:
-    """The picture of the video that was compared; of a steadied and averaged one, the average enlarged."""
+    """The picture that was compared, as large as the video; a steadied one is the average, enlarged."""
     if shrink == 1:
         return compared
     if np.array_equal(compared, averaged(whole, shrink)):

@@ -56,7 +56,7 @@ def add_track(app: "typer.Typer") -> None:
         steady: Annotated[
             bool,
             typer.Option(
-                help="Turn frames back to the view of the first one, for a camera held in the hand. Frames "
+                help="Turn frames back to the view of the first one, for a camera in the hand. Frames "
                 "of a camera at rest are not changed."
             ),
         ] = True,

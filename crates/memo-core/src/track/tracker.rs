@@ -12,9 +12,9 @@
 //!
 //! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the edges of at most
 //! [`TrackerOptions::path_frames`] or `start_frames` frames, whichever is more, the rows of the current walk and, for
-//! the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the person. A walk longer than
-//! [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`] without a fit, is returned in
-//! pieces of that length.
+//! the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the
+//! person. A walk longer than [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`]
+//! without a fit, is returned in pieces of that length.
 //!
 //! Edges are matched within a few pixels, whatever the image size. Shrink images whose longer side exceeds about
 //! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as

@@ -1,0 +1,83 @@
+"""A camera in the hand: its rotation against OpenCV's, and walks shaken and still."""
+
+import csv
+
+import cv2
+import memo
+import memo.video
+import numpy as np
+import pytest
+from conftest import SHARED_DATA
+from memo import _memo
+
+SIZE = (320, 240)
+
+
+def textured(seed):
+    """A smooth random wall, larger than the picture."""
+    wall = np.random.default_rng(seed).uniform(0, 255, (500, 600)).astype(np.float32)
+    return cv2.GaussianBlur(wall, None, 2.0) * 4 - 380
+
+
+def shot(wall, camera, turn_rad):
+    """The wall through OpenCV: the picture of a camera turned by a rotation vector."""
+    matrix = np.array(camera.parameters()["matrix"])
+    turn = cv2.Rodrigues(np.array(turn_rad, float))[0]
+    from_wall = matrix @ turn @ np.linalg.inv(matrix) @ np.array([[1, 0, -140], [0, 1, -130], [0, 0, 1.0]])
+    seen = cv2.warpPerspective(wall, from_wall, SIZE, flags=cv2.INTER_CUBIC)
+    noise = np.random.default_rng(5).normal(0, 1, seen.shape)
+    return np.clip(seen + noise, 0, 255).astype(np.uint8)
+
+
+def test_a_picture_turned_by_opencv_is_turned_back():
+    camera = _memo.Camera.level(SIZE, 50.0, 1.0, 5.0)
+    matrix, wall = np.array(camera.parameters()["matrix"]), textured(1)
+    steadier = _memo.Steadier(camera)
+    first = shot(wall, camera, [0, 0, 0])
+    assert steadier.update(first)["state"] == "still"
+    places = np.array([[[0, 0]], [[319, 0]], [[0, 239]], [[319, 239]], [[160, 120]]], float)
+    for turn_rad in ([0.01, -0.015, 0.01], [-0.004, 0.02, -0.02]):
+        found = steadier.update(shot(wall, camera, turn_rad))
+
+        def moved(turn):
+            rotation = cv2.Rodrigues(np.array(turn, float))[0]
+            return cv2.perspectiveTransform(places, matrix @ rotation @ np.linalg.inv(matrix))
+
+        off_px = np.linalg.norm(moved(found["turn_rad"]) - moved(turn_rad), axis=2).max()
+        assert found["state"] == "turned" and off_px < 0.1, (off_px, found["turn_rad"])
+        seen = ~found["unseen"]
+        differs = np.abs(found["picture"].astype(int) - first)[seen]
+        assert seen.mean() > 0.85 and differs.mean() < 3, differs.mean()
+
+
+def test_a_cut_ends_in_a_sentence():
+    camera = _memo.Camera.level(SIZE, 50.0, 1.0, 5.0)
+    frames = [shot(textured(1 + (k >= 6)), camera, [0, 0, 0]) for k in range(14)]
+    track = memo.track(frames, height_m=1.75, fps=25, camera=camera)
+    assert track.summary["camera_motion"]["lost"] == [[6, "cut"]]
+    assert any("frame 6 (a cut)" in sentence for sentence in track.sentences)
+    given = memo.track(frames, height_m=1.75, fps=25, camera=camera, steady=False)
+    assert given.camera_motion.rows == [] and given.camera_motion.sentences == []
+
+
+def test_a_hand_held_recording_is_steadied():
+    scene = SHARED_DATA / "people" / "shake3"
+    if not scene.is_dir():
+        pytest.skip("the recordings are not here")
+    camera = memo.Camera.from_file(scene / "camera.toml")
+    focal = camera.parameters()["matrix"][0][0]
+    steadier = _memo.Steadier(camera)
+    with open(scene / "camera_motion.csv") as file, memo.video.VideoReader(scene / "video.mp4") as video:
+        off_px = []
+        for frame, row in zip(video, csv.DictReader(file), strict=True):
+            found = steadier.update(frame.luma)
+            yaw, pitch, roll = (float(row[name]) for name in ("u_px", "v_px", "roll_rad"))
+            about = [
+                cv2.Rodrigues(np.array(turn, float))[0]
+                for turn in ([0, 0, roll], [pitch / focal, 0, 0], [0, yaw / focal, 0])
+            ]
+            rest = cv2.Rodrigues(
+                cv2.Rodrigues(np.array(found["turn_rad"]))[0].T @ about[0] @ about[1] @ about[2]
+            )
+            off_px.append(focal * np.linalg.norm(rest[0]))
+    assert np.sqrt(np.mean(np.square(off_px))) < 0.15 and steadier.losses() == []
