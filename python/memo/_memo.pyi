@@ -30,6 +30,7 @@ __all__ = [
     "RodTrials",
     "Scene",
     "SecondMotion",
+    "Steadier",
     "TableInputs",
     "Tracker",
     "Walk",
