@@ -13,6 +13,8 @@
 //! Limits: the camera only rotates. A camera that is carried along changes the perspective: near a wall it cannot be told
 //! from a rotation, and forwards it looks like a zoom. Without a calibration the rotation is that of the assumed field of
 //! view; a wrong one leaves part of a pan uncorrected towards the sides. A rolling shutter is not modelled.
+//! A fast zoom may be reported as a cut; before fine texture, a slow one may pass unnoticed. Before a wall of faint texture
+//! motions of several pixels per frame may be missed, because its coarse scales show nothing.
 
 mod estimate;
 mod pyramid;
