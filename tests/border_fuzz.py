@@ -663,7 +663,7 @@ def tracks(d, tracker):
     "Tracker.update",
     "Tracker.finish",
     "Tracker.take_finished",
-    "Tracker.current",
+    "Tracker.people",
     "Tracker.seek_report",
     "Tracker.camera_motion",
     "Tracker.lost_views",
@@ -673,7 +673,7 @@ def _(d, name):
     if name == "Tracker.__new__":
         return
     all(True for _ in tracks(d, tracker))
-    tracker.current(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
+    tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
     tracker.finish()
     for walk in tracker.take_finished():
         (

@@ -21,7 +21,8 @@ def track_columns(count=20):
     rng = np.random.default_rng(3)
     columns = {name: np.round(rng.normal(size=count), 2) for name in TRACK_COLUMNS}
     columns["x_m"][4] = np.nan
-    return columns | {"frame": np.arange(count), "walk": np.zeros(count, np.int64)}
+    whole = {name: np.zeros(count, np.int64) for name in ("walk", "person")}
+    return columns | {"frame": np.arange(count)} | whole
 
 
 GAIT = {
@@ -36,7 +37,9 @@ GAIT = {
 
 
 def test_units_are_in_the_metadata_of_columns(tmp_path):
-    write_parquet(tmp_path / "a.parquet", track_columns(), units={"walk": "1"}, about={"table": "track"})
+    write_parquet(
+        tmp_path / "a.parquet", track_columns(), units={"walk": "1", "person": "1"}, about={"table": "track"}
+    )
     schema = pq.read_schema(tmp_path / "a.parquet")
     units = {field.name: (field.metadata or {}).get(b"unit") for field in schema}
     assert units["x_m"] == b"m" and units["time_s"] == b"s" and units["right_knee_deg"] == b"deg"

@@ -141,9 +141,15 @@ def test_start_line_passes_through_the_tracked_phases(track):
 
 
 def test_two_frames_have_a_line_and_one_has_none():
-    two = {"frame": np.array([4, 6]), "phase": np.array([0.9, 0.1])}
-    assert _phase_line(two)(5) == pytest.approx(1.0)
-    assert _phase_line({name: values[:1] for name, values in two.items()}) is None
+    two = {"frame": np.array([4, 6]), "phase": np.array([0.9, 0.1]), "walk": np.array([0, 0])}
+    assert _phase_line(two, np.array([4]))(5) == pytest.approx(1.0)
+    assert _phase_line({name: values[:1] for name, values in two.items()}, np.array([4])) is None
+
+
+def test_the_line_of_phase_is_that_of_the_longest_walk_that_starts_there():
+    frames, phases = np.array([4, 5, 4, 5, 6]), np.array([0.1, 0.2, 0.5, 0.52, 0.54])
+    both = {"frame": frames, "phase": phases, "walk": np.array([0, 0, 1, 1, 1])}
+    assert _phase_line(both, np.array([4, 5]))(6) == pytest.approx(0.54)
 
 
 def test_a_line_is_cut_where_the_phase_starts_anew_forwards_and_backwards():

@@ -22,7 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from memo.given import frame_range, is_url, load_camera, nothing_at, tracker_options
+from memo.given import frame_range, is_url, load_camera, nothing_at, point_in_frame, tracker_options
 from memo.spreadsheet import CsvRows, Error
 from memo.wording import counted
 
@@ -48,10 +48,12 @@ OPTIONS = {
     "camera_v_up": Option("--camera-v-up", bool, "--camera-v-down"),
     "height_m": Option("--height", float),
     "fov_deg": Option("--fov-deg", float),
+    "steady": Option("--steady", bool),
     "treadmill": Option("--treadmill", bool),
     "frames": Option("--frames", str),
     "fps": Option("--fps", float),
     "shrink": Option("--shrink", int),
+    "follow": Option("--follow", str),
     "overlay": Option("--overlay", bool),
     "plots": Option("--plots", bool),
     "report": Option("--report", bool),
@@ -414,6 +416,8 @@ def _check_options(row: Row) -> None:
     if fps is not None and not (math.isfinite(fps) and fps > 0):
         raise ValueError(f"fps {fps:g} is not a frame rate")
     frame_range(options.get("frames", ":"))
+    if "follow" in options:
+        point_in_frame(options["follow"])
     camera = options.get("camera")
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
     height = options.get("height_m")

@@ -64,6 +64,8 @@ type Kept = [(Option<Sighting>, FrameEdges)];
 pub(super) struct Active {
     /// Number of the person, in order of appearance.
     pub(super) person: usize,
+    /// Whether somebody was followed when the walk started.
+    pub(super) started_near: bool,
     pub(super) camera: Camera,
     /// The body height with which the walk started.
     pub(super) height: BodyHeight,
@@ -398,6 +400,7 @@ mod tests {
             walk,
             average: walker(),
             person: 0,
+            started_near: false,
             kept: Vec::new(),
             gait_speed_mps: 1.2,
             settled: false,

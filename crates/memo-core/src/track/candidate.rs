@@ -104,6 +104,7 @@ impl Candidate {
         }
         Some(Active {
             person: 0,
+            started_near: false,
             camera,
             height,
             depth_sd_m: course.depth_sd_m,

@@ -20,8 +20,6 @@ const OWNED: f32 = 0.04;
 const NEARER: f32 = 0.015;
 /// What an angle of 90 degrees between edge and contour counts, share of the height.
 const TURNED: f32 = 0.075;
-/// Where somebody unknown is near, edges belong to a person only within this share of the height.
-const CONTESTED: f32 = 0.06;
 /// Changes within this share of the height of a body are explained by it.
 const EXPLAINED: f64 = 0.05;
 
@@ -76,11 +74,6 @@ pub(super) fn keep_own(edges: &mut Vec<EdgeLine>, own: &Expected, others: &[&Exp
             of_other < OWNED && of_other + NEARER <= cost
         })
     });
-}
-
-/// Removes the edges that are far from the contours of the person, because somebody unknown is near.
-pub(super) fn keep_near(edges: &mut Vec<EdgeLine>, own: &Expected) {
-    edges.retain(|edge| own.cost(edge) < CONTESTED);
 }
 
 /// Removes the edges of people who are followed.
@@ -217,9 +210,6 @@ mod tests {
             vec![across, edge([310.0, 110.0], [310.0, 190.0]), edge([302.0, 110.0], [302.0, 190.0])];
         keep_unowned(&mut edges, &[&person(300.0)]);
         assert_eq!(edges.len(), 2, "90 degrees count 15 pixels, and 10 pixels are more than 8");
-        let mut near = vec![edge([311.0, 110.0], [311.0, 190.0]), edge([313.0, 110.0], [313.0, 190.0])];
-        keep_near(&mut near, &person(300.0));
-        assert_eq!(near.len(), 1, "12 pixels");
     }
 
     #[test]

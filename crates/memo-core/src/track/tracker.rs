@@ -24,8 +24,9 @@ mod on_the_spot;
 
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
-use super::crowd::{Expected, body_box, clear_explained, expected, keep_near, keep_own, keep_unowned};
+use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
+use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
 use super::height::is_of_a_person;
 use super::locate::Sighting;
@@ -317,11 +318,7 @@ impl Tracker {
                 own,
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
-            let is_contested = self.candidates.iter().any(|candidate| candidate.is_in(&own.window));
-            if is_contested {
-                keep_near(&mut edges.edges, own);
-            }
-            edges.shared = is_contested || !meeting.is_empty();
+            edges.shared = !meeting.is_empty();
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Region| region.rectangle.gap(&own.window) == [0, 0];
@@ -464,7 +461,7 @@ impl Tracker {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         for n in (0..self.candidates.len()).rev() {
             let candidate = &self.candidates[n];
-            if candidate.seen.len() < self.frames_to_start() || candidate.missed > 0 {
+            if candidate.seen.len() < self.frames_to_start(candidate) || candidate.missed > 0 {
                 continue;
             }
             let height_m = self.options.height_of(self.identities.count());
@@ -473,6 +470,7 @@ impl Tracker {
                 Some(mut active) => {
                     self.candidates.remove(n);
                     active.person = self.identified(&active);
+                    active.started_near = !self.people.is_empty();
                     self.people.push(active);
                 }
                 None => {
@@ -483,11 +481,12 @@ impl Tracker {
         }
     }
 
-    /// Somebody who comes near a followed person is soon hidden or mistaken for that person, so half as many frames
-    /// must do.
-    fn frames_to_start(&self) -> usize {
+    /// Somebody beside a followed person is soon hidden or mistaken for that person, so half as many frames must do.
+    fn frames_to_start(&self, candidate: &Candidate) -> usize {
         let all = self.options.start_frames;
-        if self.people.is_empty() { all } else { all.div_ceil(2) }
+        let is_beside =
+            |active: &Active| active.as_followed().is_some_and(|followed| candidate.is_in(&followed.window));
+        if self.people.iter().any(is_beside) { all.div_ceil(2) } else { all }
     }
 
     /// False if somebody is followed where a walk would start.
@@ -509,7 +508,9 @@ impl Tracker {
         }
         let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
-        if !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
+        // What was left over from somebody else can look like a walker, but then the contours do not fit.
+        let is_left_over = active.started_near && matches!(fit, Some(Err(FitError::Misfit { .. })));
+        if is_left_over || !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
             self.report.refused_starts += 1;
             self.identities.withdraw(active.person);
             return;

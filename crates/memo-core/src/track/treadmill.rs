@@ -169,6 +169,7 @@ impl Spot<'_> {
         }
         Ok(Active {
             person: 0,
+            started_near: false,
             camera: camera.clone(),
             height: *height,
             depth_sd_m: course.depth_sd_m,

@@ -497,7 +497,7 @@ impl Steadier {
     /// Records the camera in a frame and steadies the frame.
     fn noted(&mut self, number: usize, support: Option<f64>, frame: &Frame<'_>) -> Steadied {
         let shift_px = self.view.as_ref().map_or([0.0; 2], |view| displacement_px(&view.camera, &self.last));
-        let is_moved = !(shift_px[0] < self.options.still_px);
+        let is_moved = shift_px[0].is_nan() || shift_px[0] >= self.options.still_px;
         let state = match support {
             _ if self.is_lost => CameraState::Lost,
             None => CameraState::Unknown,

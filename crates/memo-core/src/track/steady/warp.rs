@@ -104,17 +104,17 @@ impl Warp {
             for (k, &weight) in of_y.iter().enumerate() {
                 let row = &frame.row(top as usize - 1 + k)[left as usize - 1..left as usize + 3];
                 let line: i32 = row.iter().zip(of_x).map(|(&grey, &w)| i32::from(grey) * i32::from(w)).sum();
-                sum += (line + 64 >> 7) * i32::from(weight);
+                sum += ((line + 64) >> 7) * i32::from(weight);
             }
         } else {
             for (k, &weight) in of_y.iter().enumerate() {
                 let row = frame.row((top - 1 + k as i64).clamp(0, height - 1) as usize);
                 let grey = |i: usize| i32::from(row[(left - 1 + i as i64).clamp(0, width - 1) as usize]);
                 let line: i32 = (0..4).map(|i| grey(i) * i32::from(of_x[i])).sum();
-                sum += (line + 64 >> 7) * i32::from(weight);
+                sum += ((line + 64) >> 7) * i32::from(weight);
             }
         }
-        Some((sum + (1 << 20) >> 21).clamp(0, 255) as u8)
+        Some(((sum + (1 << 20)) >> 21).clamp(0, 255) as u8)
     }
 }
 

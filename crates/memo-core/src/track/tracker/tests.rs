@@ -245,6 +245,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     walk.twins[0].visible_sum = count as f64;
     tracker.people.push(Active {
         person: 0,
+        started_near: false,
         height: super::super::height::BodyHeight::given(1.75),
         camera: camera(),
         depth_sd_m: 0.1,
