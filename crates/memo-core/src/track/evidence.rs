@@ -252,8 +252,13 @@ impl EvidenceStream {
         {
             return Err(EvidenceError::TimeOrder { previous_s, time_s });
         }
-        let number = self.frames;
+        let evidence = self.push_next(frame, time_s)?;
         self.frames += 1;
+        Ok(evidence)
+    }
+
+    fn push_next(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
+        let number = self.frames;
         let Some(steadier) = &mut self.steadier else {
             return self.push_steady(number, frame, time_s);
         };

@@ -205,8 +205,9 @@ mod tests {
     fn behind_somebody_who_stays_is_what_was_seen_before_or_nothing() {
         let mut backdrop = Backdrop::default();
         (0..8).for_each(|k| backdrop.push(k, &frame(k)));
-        let walk: Vec<Piece> =
-            (2..8).map(|k| Piece::new(k, &frame(k), window(2).union(&window(7)), Vec::new())).collect();
+        let place = window(2).union(&window(7));
+        (2..8).for_each(|k| backdrop.occupy(k, place));
+        let walk: Vec<Piece> = (2..8).map(|k| Piece::new(k, &frame(k), place, Vec::new())).collect();
         let views = backdrop.views_on_the_spot(walk.iter());
         assert!(views.iter().all(|view| view.background.is_some()));
         // The two frames before the walk show the box farther left; right of it the scene is empty.
