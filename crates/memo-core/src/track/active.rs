@@ -39,6 +39,8 @@ const RECENT_FRAMES: usize = 12;
 /// A walk ends if the mean similarity of those frames is below this share of the walk's mean.
 const LOST_SHARE: f64 = 0.45;
 
+/// So many last frames without the person are removed; a single one may only be matched badly.
+const LEAST_GONE: usize = 3;
 /// Frames in which less of the person is visible decide nothing.
 const DECIDING_SHARE: f32 = 0.3;
 /// A person who is hidden for longer is given up, seconds.
@@ -220,9 +222,10 @@ impl Active {
         let low = LOST_SHARE * mean_similarity(twin);
         let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
         let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE;
-        let gone = twin.steps.iter().rev().take_while(is_gone).count();
+        let gone =
+            Some(twin.steps.iter().rev().take_while(is_gone).count()).filter(|gone| *gone >= LEAST_GONE);
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
-        let end = twin.steps.len() - over.max(gone);
+        let end = twin.steps.len() - over.max(gone.unwrap_or(0));
         self.walk.keep(absent.min(end)..end);
     }
 
