@@ -225,7 +225,7 @@ def test_a_tracker_at_work_while_its_process_is_forked_is_refused_in_the_child(t
         while thread.is_alive():
             if not (child := os.fork()):
                 refused = 0
-                for ask in [tracker.current, tracker.seek_report, tracker.take_finished, tracker.finish]:
+                for ask in [tracker.people, tracker.seek_report, tracker.take_finished, tracker.finish]:
                     try:
                         ask()
                     except RuntimeError as error:
