@@ -30,7 +30,16 @@ if TYPE_CHECKING:
     from memo.tracking import Track
     from memo.video import Frame, VideoReader
 
-__all__ = ["Recorded", "Recording", "Stop", "follow", "track_recording", "write_results", "write_tables"]
+__all__ = [
+    "Point",
+    "Recorded",
+    "Recording",
+    "Stop",
+    "follow",
+    "track_recording",
+    "write_results",
+    "write_tables",
+]
 
 _DRAWN = (
     "camera_motion.csv",
