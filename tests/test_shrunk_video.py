@@ -184,6 +184,21 @@ def test_contours_and_boxes_are_those_of_the_video(runs, n, tmp_path):
         np.testing.assert_allclose(boxes[n][side], wanted, atol=0.2 * n, err_msg=side)
 
 
+def test_contours_of_a_part_of_a_video_are_those_of_its_frames(runs, tmp_path):
+    first, n = 6, 1
+    memo_command(
+        *("track", runs[n].video, "--camera", runs[n].video.with_suffix(".toml"), "--height", 1.75),
+        *("--frames", f"{first}:", "--no-plots", "--no-overlay", "--quiet", "--out", tmp_path),
+    )
+    part, whole = (read_track_csv(folder / "track.csv") for folder in (tmp_path, runs[n].given))
+    in_whole = contours_of_run(runs[n].given, whole)
+    for row, found in list(enumerate(contours_of_run(tmp_path, part)))[5:-5:5]:
+        assert len(found) > 20
+        at = np.flatnonzero(whole["frame"] == part["frame"][row])[0]
+        # The same person is fitted to somewhat other frames.
+        np.testing.assert_allclose(found.mean((0, 1)), in_whole[at].mean((0, 1)), atol=3)
+
+
 @SIZES
 def test_keypoint_files_are_of_the_video(runs, n, tmp_path):
     for name in ("walk.json", "walk"):

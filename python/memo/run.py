@@ -193,6 +193,7 @@ def contours_of_run(
     run = read_run(folder)
     contours: list[npt.NDArray[np.float64]] = [np.empty((0, 2, 2))] * len(columns["walk"])
     known = np.isfinite(np.asarray(columns["x_m"], np.float64) + np.asarray(columns["phase"], np.float64))
+    first = run["frames"][0]  # the record counts from the first frame read
     frames = np.where(known, np.asarray(columns["frame"], np.int64), -1)
     for walk in np.unique(columns["walk"]).tolist():
         if not 0 <= walk < len(run["walks"]):
@@ -201,7 +202,7 @@ def contours_of_run(
             )
         rows = np.flatnonzero(columns["walk"] == walk)
         try:
-            found = _memo.recorded_contours(run["walks"][walk], frames[rows].tolist())
+            found = _memo.recorded_contours(run["walks"][walk], (frames[rows] - first).tolist())
         except (TypeError, ValueError, OverflowError) as error:
             raise RunError(f"{folder / NAME}: {error}") from None
         for row, (segments, _) in zip(rows.tolist(), found, strict=True):

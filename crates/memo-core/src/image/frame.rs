@@ -5,6 +5,7 @@
 //! `f32`, and `f64` would double the memory traffic.
 
 use crate::wording::counted;
+use glam::DVec2;
 use thiserror::Error;
 
 /// Why a frame was refused.
@@ -210,6 +211,24 @@ impl<'a> Frame<'a> {
     /// larger `x` reads padding or a later row.
     pub fn at(&self, x: usize, y: usize) -> u8 {
         self.data[y * self.stride + x]
+    }
+
+    /// The grey value between four pixels, linear along both axes; `None` outside the centres of the outermost pixels.
+    #[inline]
+    pub(crate) fn between(&self, p: DVec2) -> Option<f64> {
+        let is_inside =
+            p.x >= 0.0 && p.y >= 0.0 && p.x < self.width as f64 - 1.0 && p.y < self.height as f64 - 1.0;
+        if !is_inside {
+            return None;
+        }
+        let (x, y) = (p.x as usize, p.y as usize);
+        let (right, down) = (p.x - x as f64, p.y - y as f64);
+        let row = |y: usize| {
+            let [a, b] = [self.row(y)[x], self.row(y)[x + 1]].map(f64::from);
+            a + right * (b - a)
+        };
+        let (upper, lower) = (row(y), row(y + 1));
+        Some(upper + down * (lower - upper))
     }
 
     /// An owned copy without padding.

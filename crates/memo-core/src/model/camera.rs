@@ -8,7 +8,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::Matrix3x4;
 use thiserror::Error;
 
@@ -306,6 +306,19 @@ impl Camera {
     pub fn distort(&self, ideal_px: DVec2) -> Option<DVec2> {
         let distorted = self.distortion.distort(self.plane_from_pixel(ideal_px))?;
         Some(self.pixel_from_plane(distorted))
+    }
+
+    /// The derivative of [`Camera::distort`] at an ideal pixel, by central differences over one pixel, within which a
+    /// lens is linear to 1e-6; `None` beyond the fold of the lens model.
+    pub(crate) fn distortion_slope(&self, ideal_px: DVec2) -> Option<DMat2> {
+        if self.distortion == Distortion::None {
+            return Some(DMat2::IDENTITY);
+        }
+        let slope = |axis: DVec2| {
+            let [low, high] = [-0.5, 0.5].map(|by| self.distort(ideal_px + by * axis));
+            Some(high? - low?)
+        };
+        Some(DMat2::from_cols(slope(DVec2::X)?, slope(DVec2::Y)?))
     }
 
     /// The ideal pixel that the lens maps to `pixel`, accurate to 1e-10 px.

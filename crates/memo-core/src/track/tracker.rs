@@ -81,8 +81,8 @@ pub enum TrackError {
 pub const LONGEST_WALK: usize = 20_000;
 /// At most this many candidates are kept at a time, the largest regions.
 const MOST_CANDIDATES: usize = 3;
-/// A walk that is over is returned after this many frames, in which somebody may start where it ended.
-const FADING_FRAMES: usize = 25;
+/// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
+const FADING_S: f64 = 1.0;
 /// A start this near to somebody who is followed is the same person, metres.
 const SAME_PLACE_M: f64 = 0.3;
 /// A walk ends when this share of the body's height or width is outside the image.
@@ -113,7 +113,7 @@ pub struct Tracker {
     /// Everybody who is followed.
     people: Vec<Active>,
     /// Walks that are over, and since when. Somebody may start there again.
-    fading: Vec<(usize, Active)>,
+    fading: Vec<(f64, Active)>,
     identities: Identities,
     /// Frames of something that may walk on the spot.
     standing: Standing,
@@ -127,7 +127,8 @@ pub struct Tracker {
 impl Tracker {
     /// A tracker for a new stream; an error if the body height or an option is out of range.
     pub fn new(options: TrackerOptions) -> Result<Self, TrackError> {
-        options.height_m.map(Body::from_height).transpose()?;
+        let heights_m = options.height_m.iter().chain(&options.further_heights_m);
+        heights_m.copied().try_for_each(|height_m| Body::from_height(height_m).map(|_| ()))?;
         options.check()?;
         let stream = options.evidence_stream();
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
@@ -167,16 +168,22 @@ impl Tracker {
         if let Some(evidence) = self.stream.finish()? {
             self.advance(&evidence)?;
         }
-        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
-        let all: Vec<Active> = fading.chain(std::mem::take(&mut self.people)).collect();
-        all.into_iter().for_each(|active| self.end_walk(active));
+        self.take_everybody().into_iter().for_each(|active| self.end_walk(active));
         Ok(())
     }
 
-    /// The walks that have ended since the last call.
+    /// Everybody who is followed or was until lately.
+    fn take_everybody(&mut self) -> Vec<Active> {
+        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
+        fading.chain(std::mem::take(&mut self.people)).collect()
+    }
+
+    /// The walks that have ended since the last call, in order of their first frames.
     #[must_use]
     pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
-        std::mem::take(&mut self.finished)
+        let mut walks = std::mem::take(&mut self.finished);
+        walks.sort_by_key(|walk| (walk.steps().first().map(|step| step.frame), walk.person));
+        walks
     }
 
     /// The state of the person who appeared first of those who are followed at the last processed frame; `None` while
@@ -215,9 +222,7 @@ impl Tracker {
 
     /// Ends all walks before the view ended; what follows is another scene.
     fn end_view(&mut self, loss: &Loss) {
-        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
-        let all: Vec<Active> = fading.chain(std::mem::take(&mut self.people)).collect();
-        for mut active in all {
+        for mut active in self.take_everybody() {
             active.drop_from(loss.frame.saturating_sub(1));
             if active.walk.twins[0].steps.len() >= self.options.start_frames {
                 self.end_walk(active);
@@ -354,12 +359,12 @@ impl Tracker {
 
     /// Ends walks that are over. On a wrong path a walk can seem to be over, so the path is looked for first.
     fn end_walks(&mut self, evidence: &Evidence) {
-        let (frame, longest) = (evidence.frame, self.longest_walk);
+        let (time_s, longest) = (evidence.time_s, self.longest_walk);
         let is_long = |active: &mut Active| active.settled && active.walk.twins[0].steps.len() >= longest;
         let mut ended: Vec<Active> = self.people.extract_if(.., is_long).collect();
         let is_over = |active: &mut Active| active.settled && (active.is_over() || active.is_hidden());
-        self.fading.extend(self.people.extract_if(.., is_over).map(|active| (frame, active)));
-        let is_gone = |(end, _): &mut (usize, Active)| *end + FADING_FRAMES < frame;
+        self.fading.extend(self.people.extract_if(.., is_over).map(|active| (time_s, active)));
+        let is_gone = |(end_s, _): &mut (f64, Active)| time_s - *end_s > FADING_S;
         ended.extend(self.fading.extract_if(.., is_gone).map(|(_, active)| active));
         ended.into_iter().for_each(|active| self.end_walk(active));
     }
@@ -368,7 +373,7 @@ impl Tracker {
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
         let Some(start) = new.sign_at(0) else { return self.identities.count() };
-        let leads = |(_, old): &(usize, Active)| {
+        let leads = |(_, old): &(f64, Active)| {
             old.sign_before(start.time_s).is_some_and(|end| end.leads_to(&start))
         };
         let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };

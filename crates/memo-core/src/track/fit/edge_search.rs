@@ -112,23 +112,9 @@ impl View {
 
     /// Grey value, and absolute difference from the background, between pixels; `None` outside the piece.
     fn sample(&self, p: DVec2) -> Option<[f64; 2]> {
-        let (width, height) = (self.grey.width(), self.grey.height());
-        let is_inside = p.x >= 0.0 && p.y >= 0.0 && p.x < width as f64 - 1.0 && p.y < height as f64 - 1.0;
-        if !is_inside {
-            return None;
-        }
-        let (x, y) = (p.x as usize, p.y as usize);
-        let (right, down) = (p.x - x as f64, p.y - y as f64);
-        let between = |image: &Image<u8>| {
-            let row = |y: usize| {
-                let [a, b] = [image.row(y)[x], image.row(y)[x + 1]].map(f64::from);
-                a + right * (b - a)
-            };
-            let (upper, lower) = (row(y), row(y + 1));
-            upper + down * (lower - upper)
-        };
-        let grey = between(&self.grey);
-        Some([grey, self.background.as_ref().map_or(0.0, |behind| (grey - between(behind)).abs())])
+        let grey = self.grey.as_frame().between(p)?;
+        let behind = self.background.as_ref().and_then(|behind| behind.as_frame().between(p));
+        Some([grey, behind.map_or(0.0, |behind| (grey - behind).abs())])
     }
 }
 

@@ -15,7 +15,7 @@ use super::unknowns::{
 };
 use crate::model::body::Part;
 use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
-use crate::model::{Body, Camera, ContourKind, Distortion, EllipticCylinder, Others, PosedBody, side_lines};
+use crate::model::{Body, Camera, ContourKind, EllipticCylinder, Others, PosedBody, side_lines};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 /// The figure of one frame in the world.
@@ -353,24 +353,9 @@ const BALL: f64 = 0.6;
 pub fn gradient(camera: &Camera, world: DVec3, normal: DVec2) -> DVec3 {
     let p = camera.camera_from_world(world);
     let ideal_px = p.truncate() / p.z * camera.focal_px + camera.centre_px;
-    let n = lens(camera, ideal_px).transpose() * normal * camera.focal_px / p.z;
+    let lens = camera.distortion_slope(ideal_px).unwrap_or(DMat2::IDENTITY);
+    let n = lens.transpose() * normal * camera.focal_px / p.z;
     camera.rotation.transpose() * DVec3::new(n.x, n.y, -n.dot(p.truncate()) / p.z)
-}
-
-/// The derivative of the lens distortion at an ideal pixel, by central differences over one pixel, within which a
-/// lens is linear to 1e-6.
-fn lens(camera: &Camera, ideal_px: DVec2) -> DMat2 {
-    if camera.distortion == Distortion::None {
-        return DMat2::IDENTITY;
-    }
-    let slope = |axis: DVec2| {
-        let [low, high] = [-0.5, 0.5].map(|by| camera.distort(ideal_px + by * axis));
-        Some(high? - low?)
-    };
-    match (slope(DVec2::X), slope(DVec2::Y)) {
-        (Some(x), Some(y)) => DMat2::from_cols(x, y),
-        _ => DMat2::IDENTITY,
-    }
 }
 
 #[cfg(test)]
@@ -378,7 +363,7 @@ mod tests {
     use super::super::super::search::tests::camera;
     use super::super::unknowns::{FIGURE, WHOLE, side_angles};
     use super::*;
-    use crate::model::Posture;
+    use crate::model::{Distortion, Posture};
 
     /// A figure by its coordinates, away from symmetry.
     fn figure(q: &[f64]) -> Figure {

@@ -14,6 +14,7 @@
 use super::Turned;
 use super::pyramid::{Pyramid, at_level};
 use super::template::{Point, Template, flow_per_turn, pixel_of};
+use crate::estimate::median::median;
 use crate::image::Frame;
 use crate::model::Camera;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -82,8 +83,8 @@ struct Residual {
 }
 
 impl Comparison<'_> {
-    /// The rotation, from the coarsest of the `levels` finest ones on, starting at `from`; `None` if too little of the template is in the picture or
-    /// the equations are singular.
+    /// The rotation, from the coarsest of the `levels` finest ones on, starting at `from`; `None` if too little of the
+    /// template is in the picture or the equations are singular.
     pub fn estimate(&self, template: &Template, from: &Turned, levels: usize) -> Option<Estimate> {
         let mut at = Estimate {
             rotation: *from,
@@ -125,7 +126,7 @@ impl Comparison<'_> {
         let mut residuals = self.residuals(points, level, at)?;
         if is_first {
             // A change of brightness is no motion.
-            let middle = median(residuals.iter().map(|r| r.off));
+            let middle = median(&mut residuals.iter().map(|r| r.off).collect::<Vec<_>>()).unwrap_or(0.0);
             residuals.iter_mut().for_each(|r| r.off -= middle);
             at.offset += middle;
         }
@@ -168,7 +169,7 @@ impl Comparison<'_> {
         let frame = self.pyramid.level(0);
         let along = |step: DVec2| {
             let pixel = pixel_of(self.camera, &at.rotation, p.ray)? + step;
-            bilinear(&frame, pixel.x, pixel.y)
+            frame.between(pixel)
         };
         let rise = along(p.uphill).zip(along(-p.uphill)).map(|(above, below)| (above - below) / 2.0);
         rise.is_some_and(|rise| rise >= SUPPORT_GRADIENT * steep)
@@ -186,7 +187,7 @@ impl Comparison<'_> {
         let frame = self.pyramid.level(level);
         let of = |(point, p): (usize, &Point)| {
             let pixel = pixel_of(self.camera, &at.rotation, p.ray)?;
-            let grey = bilinear(&frame, at_level(pixel.x, level), at_level(pixel.y, level))?;
+            let grey = frame.between(DVec2::new(at_level(pixel.x, level), at_level(pixel.y, level)))?;
             Some(Residual { point, off: grey - at.gain * p.grey - at.offset })
         };
         let residuals: Vec<Residual> = points.iter().enumerate().filter_map(of).collect();
@@ -278,28 +279,6 @@ fn displacement_sd(camera: &Camera, turn: &SMatrix<f64, 3, 3>, plane: DVec2) -> 
 
 /// 1.4826 times the median of the absolute residuals, at least [`LEAST_SD`].
 fn robust_sd(residuals: &[Residual]) -> f64 {
-    (1.4826 * median(residuals.iter().map(|r| r.off.abs()))).max(LEAST_SD)
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
-}
-
-/// The grey value between four pixels; `None` outside the picture.
-fn bilinear(frame: &Frame<'_>, x: f64, y: f64) -> Option<f64> {
-    let is_inside = x >= 0.0 && y >= 0.0 && x < (frame.width() - 1) as f64 && y < (frame.height() - 1) as f64;
-    if !is_inside {
-        return None;
-    }
-    let (left, top) = (x as usize, y as usize);
-    let (s, t) = (x - left as f64, y - top as f64);
-    let [above, below] = [frame.row(top), frame.row(top + 1)];
-    let between = |row: &[u8]| {
-        let [a, b] = [row[left], row[left + 1]].map(f64::from);
-        a + s * (b - a)
-    };
-    let (upper, lower) = (between(above), between(below));
-    Some(upper + t * (lower - upper))
+    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.off.abs()).collect();
+    (1.4826 * median(&mut sizes).unwrap_or(0.0)).max(LEAST_SD)
 }

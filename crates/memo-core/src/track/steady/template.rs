@@ -15,7 +15,7 @@ use super::pyramid::{Pyramid, at_finest};
 use super::{SteadyError, Turned};
 use crate::image::Frame;
 use crate::model::Camera;
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 /// About this many tiles cover a picture; points come from every tile with texture, so no part of the scene decides
 /// alone.
@@ -92,7 +92,7 @@ fn cells_with_points(points: &[Point], camera: &Camera) -> f64 {
 
 /// Standard deviation of the noise, from the median of the filter that cancels planes and edges (Immerkaer 1996);
 /// texture in more than half of the picture enlarges it.
-fn noise_sd(frame: &Frame<'_>) -> f64 {
+fn noise_sd_of_one(frame: &Frame<'_>) -> f64 {
     let step = ((frame.width() * frame.height()) as f64 / 4096.0).sqrt().max(1.0) as usize;
     let mut found: Vec<i32> = Vec::with_capacity(8192);
     for y in (1..frame.height() - 1).step_by(step) {
@@ -113,7 +113,7 @@ fn points(frame: &Frame<'_>, level: usize, camera: &Camera) -> Vec<Point> {
         return Vec::new();
     }
     let side = ((width * height) as f64 / TILES).sqrt().ceil().max(LEAST_TILE_PX as f64) as usize;
-    let least = (LEAST_GRADIENT_SDS * noise_sd(frame)).max(LEAST_GRADIENT);
+    let least = (LEAST_GRADIENT_SDS * noise_sd_of_one(frame)).max(LEAST_GRADIENT);
     let taken = POINTS_PER_TILE[level.min(1)];
     let mut all = Vec::new();
     let mut tile = Vec::with_capacity(side * side);
@@ -149,7 +149,7 @@ fn point(frame: &Frame<'_>, [x, y]: [usize; 2], level: usize, camera: &Camera) -
     let pixel = DVec2::new(at_finest(x as f64, level), at_finest(y as f64, level));
     let ideal = camera.undistort(pixel).ok()?;
     let gradient_px = gradient(frame, x, y);
-    let per_ideal = lens_derivative(camera, ideal)?.transpose() * gradient_px / f64::from(1u32 << level);
+    let per_ideal = camera.distortion_slope(ideal)?.transpose() * gradient_px / f64::from(1u32 << level);
     let plane = (ideal - camera.centre_px) / camera.focal_px;
     let [of_x, of_y] = flow_per_turn(plane);
     let per_turn = of_x * per_ideal.x * camera.focal_px.x + of_y * per_ideal.y * camera.focal_px.y;
@@ -167,12 +167,6 @@ fn point(frame: &Frame<'_>, [x, y]: [usize; 2], level: usize, camera: &Camera) -
 pub fn flow_per_turn(plane: DVec2) -> [DVec3; 2] {
     let DVec2 { x, y } = plane;
     [DVec3::new(-x * y, 1.0 + x * x, -y), DVec3::new(-1.0 - y * y, x * y, x)]
-}
-
-/// Change of the distorted pixel per change of the ideal one, by central differences.
-fn lens_derivative(camera: &Camera, ideal: DVec2) -> Option<DMat2> {
-    let along = |step: DVec2| Some((camera.distort(ideal + step)? - camera.distort(ideal - step)?) / 2.0);
-    Some(DMat2::from_cols(along(DVec2::X)?, along(DVec2::Y)?))
 }
 
 /// The pixel of the finest level at which a turned camera sees a ray; `None` behind the camera or beyond its lens.

@@ -496,4 +496,7 @@ fn heights_are_those_of_people_in_order_of_appearance() {
     assert_eq!([0, 1, 2].map(|person| options.height_of(person)), [Some(1.8); 3]);
     options.further_heights_m = vec![1.6];
     assert_eq!([0, 1, 2].map(|person| options.height_of(person)), [Some(1.8), Some(1.6), None]);
+    options.further_heights_m.push(18.0);
+    let refused = Tracker::new(options).unwrap_err();
+    assert!(matches!(refused, TrackError::Body(_)) && refused.to_string().contains("18"), "{refused}");
 }
