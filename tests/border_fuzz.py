@@ -589,6 +589,7 @@ def _(d, name):
     "ClothedScene.height_m",
     "ClothedScene.speed_mps",
     "ClothedScene.heading_rad",
+    "ClothedScene.heading_at",
     "ClothedScene.__len__",
 )
 def _(d, name):
@@ -598,11 +599,12 @@ def _(d, name):
         leftward=lambda: d.choice(None, True, False),
         late_left=lambda: d.number(-0.1, 0.1),
         slant_rad=lambda: d.number(-1, 1),
+        turn_rad=lambda: d.number(-5, 5),
         mover=lambda: d.choice("walker", "rider", "waver", "trolley", "treadmill"),
     )
     scene = _memo.ClothedScene(d.whole(0, 2**62), **options)
     member = name.split(".")[1]
-    if member in ("frame", "time_s", "truth"):
+    if member in ("frame", "time_s", "truth", "heading_at"):
         return getattr(scene, member)(d.whole(0, len(scene)))
     if member == "contacts":
         return scene.contacts()
@@ -1313,6 +1315,7 @@ def _(d):
         noise_sd=lambda: d.number(0, 300),
         leftward=lambda: d.choice(None, True, False),
         late_left=lambda: d.number(-0.1, 0.1),
+        turn_deg=lambda: d.number(-250, 250),
         mover=lambda: d.choice("walker", "rider", "waver", "trolley", "treadmill"),
         progress=d.called_back,
     )

@@ -80,9 +80,9 @@ impl Followed {
 
     /// Errors of every row: along the path, across it, in height (metres) and in phase.
     fn errors(&self) -> Vec<[f64; 4]> {
-        let ahead = glam::DVec2::from_angle(self.scene.heading_rad);
         let of = |row: &Row| {
             let truth = self.scene.truth(row.frame).unwrap();
+            let ahead = glam::DVec2::from_angle(truth.heading_rad);
             let off = row.torso_centre - truth.torso_centre;
             let level = off.truncate();
             [level.dot(ahead), level.dot(ahead.perp()), off.z, phase_off(row.phase, truth.phase)]
@@ -331,6 +331,44 @@ fn two_people_who_cross_are_followed_through_it_and_never_exchanged() {
     }
 }
 
+/// Someone who turns is followed along a curve, with the heading of every frame.
+#[test]
+fn a_walk_that_turns_is_followed_round_its_curve() {
+    for (seed, turn_rad) in [(3, 1.1), (8, -1.4)] {
+        let options = ClothedOptions {
+            frames: 90,
+            slant_rad: Some(-0.3 * turn_rad),
+            leftward: Some(false),
+            turn_rad,
+            seed,
+            ..ClothedOptions::default()
+        };
+        let scene = scene(options);
+        let walks = tracked(&scene, 0..scene.len(), true);
+        let frames: Vec<usize> = walks.iter().map(|walk| walk.steps().len()).collect();
+        let followed = Followed { seed, scene, walks };
+        let off = |row: &Row| {
+            let off = row.heading_rad - followed.scene.truth(row.frame).unwrap().heading_rad;
+            off.sin().atan2(off.cos()).to_degrees().abs()
+        };
+        let mut heading_deg: Vec<f64> = followed.rows().iter().map(off).collect();
+        heading_deg.sort_by(f64::total_cmp);
+        let of = |share: f64| heading_deg[(share * (heading_deg.len() - 1) as f64) as usize];
+        let errors = followed.errors();
+        let along = rms(errors.iter().map(|e| e[0]));
+        let phase = median(errors.iter().map(|e| e[3].abs()).collect());
+        println!(
+            "seed {seed}: {frames:?} frames, heading {:.1} {:.1}, along {along:.3}, {phase:.3}",
+            of(0.5),
+            of(0.95)
+        );
+        assert!(frames.len() == 1 && frames[0] >= 72, "seed {seed}: {frames:?}");
+        assert!(!followed.walks[0].route().is_straight());
+        assert!(of(0.5) < 8.0 && of(0.95) < 15.0, "seed {seed}: {}, {}", of(0.5), of(0.95));
+        assert!(along < 0.1 && phase < 0.03, "seed {seed}: {along}, {phase}");
+    }
+}
+
 /// Someone who walks on the spot is followed from the first frame to the last, with lengths and speed on the belt.
 #[test]
 fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
@@ -348,7 +386,7 @@ fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
         assert_eq!(walks.iter().map(|w| w.steps().len()).collect::<Vec<_>>(), [55], "seed {seed}");
         let treadmill = walks[0].treadmill().expect("on a treadmill");
         let [belt, sd] = [treadmill.belt.speed_mps, treadmill.belt.sd_mps];
-        let turn = (walks[0].path().heading_rad - scene.heading_rad).to_degrees();
+        let turn = (walks[0].rows()[0].heading_rad - scene.heading_rad).to_degrees();
         let heading_deg = turn - 360.0 * (turn / 360.0).round();
         let followed = Followed { seed, scene, walks };
         let phase = median(followed.errors().iter().map(|e| e[3].abs()).collect());

@@ -195,8 +195,9 @@ def test_contours_of_a_part_of_a_video_are_those_of_its_frames(runs, tmp_path):
     for row, found in list(enumerate(contours_of_run(tmp_path, part)))[5:-5:5]:
         assert len(found) > 20
         at = np.flatnonzero(whole["frame"] == part["frame"][row])[0]
-        # The same person is fitted to somewhat other frames.
-        np.testing.assert_allclose(found.mean((0, 1)), in_whole[at].mean((0, 1)), atol=3)
+        # The same person is fitted to somewhat other frames, and moves by 3 pixels a frame.
+        middle = [np.mean([np.min(lines[..., 0]), np.max(lines[..., 0])]) for lines in (found, in_whole[at])]
+        assert middle[0] == pytest.approx(middle[1], abs=4)
 
 
 @SIZES

@@ -57,6 +57,7 @@ def demo_scene(
     noise_sd: float | None = None,
     leftward: bool | None = None,
     late_left: float | None = None,
+    turn_deg: float = 0.0,
     mover: Literal["walker", "rider", "waver", "trolley", "treadmill"] = "walker",
     progress: Progress | None = None,
 ) -> DemoScene:
@@ -67,15 +68,23 @@ def demo_scene(
     Proportions, clothes, gait, heading, camera, room and all options that are None follow from the seed.
 
     `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
-    by which the left foot strikes late (-0.1 to 0.1). Movers other than a walker must be refused by the
+    by which the left foot strikes late (-0.1 to 0.1), `turn_deg` how far a walker turns to the left in all
+    (-229 to 229): the path is an arc. Movers other than a walker must be refused by the
     tracker: a `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`;
     they have no truth. `progress` is called with the number of frames drawn and the total.
     """
     scene = _memo.ClothedScene(
-        seed, frames=frames, noise_sd=noise_sd, leftward=leftward, late_left=late_left, mover=mover
+        seed,
+        frames=frames,
+        noise_sd=noise_sd,
+        leftward=leftward,
+        late_left=late_left,
+        turn_rad=float(np.radians(turn_deg)),
+        mover=mover,
     )
     rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]
     truth = _truth(scene, [(index, centre, phase, *pose) for index, centre, phase, pose in rows])
+    truth["heading_rad"] = np.array([scene.heading_at(index) for index, *_ in rows], float)
     contacts = scene.contacts()
     events: Columns = {
         "time_s": np.array([time_s for time_s, _, _ in contacts], float),

@@ -25,6 +25,7 @@ from memo.plausible import (
 )
 from memo.table import data_frame
 from memo.treadmill import treadmill_figures, treadmill_sentence
+from memo.turning import turned_deg, turning_words
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -490,6 +491,7 @@ class Track:
             "walks": len(self.walks),
             "people": max(self.people) + 1,
             "direction": self._way(main),
+            "turned_deg": turned_deg(main),
             "gait": main.direction,
             "p_other_gait": main.p_other_direction,
             "p_swapped": main.p_swapped,
@@ -515,7 +517,8 @@ class Track:
         manner = "walks" if walk.direction == "forward" else "walks backwards"
         sure = walk.p_other_direction < 0.1
         return (
-            f"Somebody {manner} {cls._way(walk)} for {times_s[-1] - times_s[0]:.1f} s at {speed:.2f} m/s"
+            f"Somebody {manner} {cls._way(walk)}{turning_words(walk)} for {times_s[-1] - times_s[0]:.1f} s"
+            f" at {speed:.2f} m/s"
             + (f", {cadence:.0f} steps per minute" if np.isfinite(cadence) else "")
             + ("." if sure else f"; the direction is not certain (p = {1 - walk.p_other_direction:.2f}).")
         )

@@ -35,8 +35,14 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyRe
     let window = |r: &Rectangle| [r.left, r.top, r.right, r.bottom];
     let dict = PyDict::new(py);
     dict.set_item("camera", PyCamera(walk.camera.clone()).parameters(py)?)?;
-    dict.set_item("origin_m", walk.walk.path.origin.to_array())?;
-    dict.set_item("heading_rad", walk.walk.path.heading_rad)?;
+    let start = walk.walk.route.at(f64::NEG_INFINITY);
+    dict.set_item("origin_m", start.origin.to_array())?;
+    dict.set_item("heading_rad", start.heading_rad)?;
+    if !walk.walk.route.is_straight() {
+        let paths = || steps.iter().map(|step| step.look.path);
+        dict.set_item("searched_origin_m", paths().map(|p| p.origin.to_array()).collect::<Vec<_>>())?;
+        dict.set_item("searched_heading_rad", paths().map(|p| p.heading_rad).collect::<Vec<_>>())?;
+    }
     dict.set_item("height_m", body.height_m)?;
     dict.set_item("proportions", body.proportions.to_array())?;
     dict.set_item("curves_rad", gait.sampled(style))?;
@@ -66,7 +72,6 @@ pub fn record_of<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyRe
 struct Recorded {
     camera: Camera,
     walker: Walker,
-    path: Path,
     looks: HashMap<usize, Look>,
     drawn: HashMap<usize, PosedBody>,
     /// Rotation vectors of the camera by frame; empty if it stood still.
@@ -89,11 +94,9 @@ impl Recorded {
         let gait = Gait::from_samples(curves.each_ref().map(Vec::as_slice));
         let drawn = drawn(record)?;
         body.proportions = Proportions::from_array(&finite("proportions", value(record, "proportions")?)?);
-        let origin = DVec2::from_array(finite("origin_m", value(record, "origin_m")?)?);
         Ok(Self {
             camera: PyCamera::from_parameters(&camera)?.0,
             walker: Walker { body, gait, style: GaitStyle::default() },
-            path: Path { origin, heading_rad: number(record, "heading_rad")? },
             looks: looks(record)?,
             drawn,
             turns: turns(record)?,
@@ -108,8 +111,8 @@ impl Recorded {
         }
     }
 
-    fn scene(&self) -> Scene<'_> {
-        Scene::new(&self.walker, &self.camera, &self.path)
+    fn scene(&self, look: &Look) -> Scene<'_> {
+        Scene::new(&self.walker, &self.camera, &look.path)
     }
 }
 
@@ -183,6 +186,7 @@ fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
         numbers(record, "height_of_torso_m", frames.len())?,
         numbers(record, "phase", frames.len())?,
     ];
+    let paths = paths(record, frames.len())?;
     let look = |k: usize| {
         let [left, top, right, bottom] = windows[k];
         if left > right || top > bottom {
@@ -193,9 +197,23 @@ fn looks(record: &Bound<'_, PyDict>) -> PyResult<HashMap<usize, Look>> {
         }
         let heights_of = Axis { centre: middles[k], step: POSITION_STEP_M, count: counts[k] };
         let best = Hypothesis { along_m: alongs[k], height_m: heights[k], phase: phases[k].rem_euclid(1.0) };
-        Ok((frames[k], Look { window: Rectangle { left, top, right, bottom }, heights: heights_of, best }))
+        let window = Rectangle { left, top, right, bottom };
+        Ok((frames[k], Look { window, heights: heights_of, best, path: paths[k] }))
     };
     (0..frames.len()).map(look).collect()
+}
+
+/// The path on which each frame was searched: those of a curved route are recorded for each frame.
+fn paths(record: &Bound<'_, PyDict>, frames: usize) -> PyResult<Vec<Path>> {
+    let path = |(origin, heading_rad): ([f64; 2], f64)| {
+        Ok(Path { origin: DVec2::from_array(finite("origin_m", origin)?), heading_rad })
+    };
+    if !record.contains("searched_heading_rad")? {
+        let path = path((value(record, "origin_m")?, number(record, "heading_rad")?))?;
+        return Ok(vec![path; frames]);
+    }
+    let origins: Vec<[f64; 2]> = column(record, "searched_origin_m", frames)?;
+    origins.into_iter().zip(numbers(record, "searched_heading_rad", frames)?).map(path).collect()
 }
 
 fn value<'py, T: FromPyObjectOwned<'py>>(record: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
@@ -314,7 +332,7 @@ impl PyExplainer {
         let bodies = around.filter_map(|(_, walk)| walk.drawn.get(&evidence.frame));
         let cylinders: Vec<EllipticCylinder> = bodies.flat_map(|body| body.cylinders).collect();
         let others = Others::new(&cylinders, self.walks[index].camera.position());
-        let scene = self.walks[index].scene().among(&others);
+        let scene = self.walks[index].scene(&look).among(&others);
         let why =
             pooled(py, || explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))?
                 .map_err(value_error)?;

@@ -50,7 +50,7 @@ pub struct PyClothedScene(ClothedScene);
 #[pymethods]
 impl PyClothedScene {
     #[new]
-    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, mover="walker"))]
+    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, mover="walker"))]
     fn new(
         seed: u64,
         frames: usize,
@@ -58,6 +58,7 @@ impl PyClothedScene {
         leftward: Option<bool>,
         late_left: Option<f64>,
         slant_rad: Option<f64>,
+        turn_rad: f64,
         mover: &str,
     ) -> PyResult<Self> {
         let mover = match mover {
@@ -84,6 +85,7 @@ impl PyClothedScene {
             leftward,
             late_left,
             slant_rad,
+            turn_rad,
             mover,
             ..ClothedOptions::default()
         };
@@ -111,6 +113,11 @@ impl PyClothedScene {
         let Some(truth) = self.0.truth(index) else { return Ok(None) };
         let joints = joints_array(py, [truth.right, truth.left])?;
         Ok(Some((truth.torso_centre.into(), truth.phase, (joints, angles_deg(truth.angles)))))
+    }
+
+    /// Direction of the path where the person is in a frame, radians; None if nobody walks.
+    fn heading_at(&self, index: usize) -> Option<f64> {
+        self.0.truth(index).map(|truth| truth.heading_rad)
     }
 
     /// Initial contacts and toe-offs: time in seconds, kind and side.

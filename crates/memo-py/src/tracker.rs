@@ -20,11 +20,11 @@ use memo_core::track::height::{BodyHeight, POPULATION_HEIGHT_M, POPULATION_SD_M}
 use memo_core::track::options::{GaitChoice, TrackerOptions};
 use memo_core::track::result::{Row, TrackedWalk};
 use memo_core::track::score::Measure;
-use memo_core::track::search::Hypothesis;
 use memo_core::track::start::Direction;
 use memo_core::track::steady::SteadyOptions;
 use memo_core::track::tracker::{Now, Tracker};
 use memo_core::track::treadmill::Treadmill;
+use memo_core::track::walk::Step;
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -401,15 +401,14 @@ impl PyWalk {
     /// Best measured hypotheses per frame, (rows, 3): world x of the position along the path and z in metres,
     /// phase; NaN for frames without a measurement.
     fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let path = &self.walk.walk.path;
-        let row = |measured: &Option<Hypothesis>| match measured {
+        let row = |step: &Step| match &step.measured {
             Some(h) => {
                 let vertical = self.walk.walk.walker.gait.vertical_m(h.phase);
-                [path.point(h.along_m, 0.0).x, h.height_m + vertical, h.phase]
+                [step.look.path.point(h.along_m, 0.0).x, h.height_m + vertical, h.phase]
             }
             None => [f64::NAN; 3],
         };
-        numpy_from_rows(py, self.walk.steps().iter().map(|step| row(&step.measured)).collect())
+        numpy_from_rows(py, self.walk.steps().iter().map(row).collect())
     }
 
     /// Visible contours of the model in a row, in pixels of its frame: (segments, 2, 2), and the body part of each

@@ -59,7 +59,7 @@ fn mean_similarity(twin: &Twin) -> f64 {
 }
 
 /// Frames kept for fitting.
-type Kept = [(Option<Sighting>, FrameEdges)];
+pub(super) type Kept = [(Option<Sighting>, FrameEdges)];
 
 /// The current walk.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ pub(super) struct Active {
     pub(super) walk: Walk,
     /// The average walker of the person's height.
     pub(super) average: Walker,
-    /// Evidence kept until an oblique path was looked for.
+    /// The frames so far, to follow them again on another route; without a fit, the latest.
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
     pub(super) gait_speed_mps: f64,
     /// Whether path and person were settled.
@@ -98,21 +98,23 @@ impl Active {
             person: self.person,
             frame: step.frame,
             time_s: step.time_s,
-            torso_centre: self.scene().pose(&hypothesis).torso_centre,
-            heading_rad: self.walk.path.heading_rad,
+            torso_centre: self.scene(hypothesis.along_m).pose(&hypothesis).torso_centre,
+            heading_rad: self.walk.route.at(hypothesis.along_m).heading_rad,
             phase: hypothesis.phase,
             p_swapped: self.walk.swap_probability(&options.walk.swap),
             speed_mps: step.state.along.velocity,
         })
     }
 
-    fn scene(&self) -> Scene<'_> {
-        Scene::new(&self.walk.walker, &self.camera, &self.walk.path)
+    /// The scene near a place along the route.
+    pub(super) fn scene(&self, along_m: f64) -> Scene<'_> {
+        Scene::new(&self.walk.walker, &self.camera, &self.walk.route.at(along_m))
     }
 
     /// The body in the last frame.
     pub(super) fn body(&self) -> Option<[EllipticCylinder; PART_COUNT]> {
-        Some(self.scene().pose(&self.walk.last()?.state.hypothesis()).cylinders)
+        let hypothesis = self.walk.last()?.state.hypothesis();
+        Some(self.scene(hypothesis.along_m).pose(&hypothesis).cylinders)
     }
 
     /// Where the person is and goes on the ground.
@@ -121,12 +123,12 @@ impl Active {
     }
 
     /// The frames of the better twin.
-    fn steps(&self) -> &[Step] {
+    pub(super) fn steps(&self) -> &[Step] {
         &self.walk.twins[self.walk.best()].steps
     }
 
     /// Number of frames before a time.
-    fn frames_before(&self, time_s: f64) -> usize {
+    pub(super) fn frames_before(&self, time_s: f64) -> usize {
         self.steps().partition_point(|step| step.time_s < time_s)
     }
 
@@ -143,7 +145,7 @@ impl Active {
     /// Where the person was and went in a frame.
     pub(super) fn sign_at(&self, index: usize) -> Option<Sign> {
         let step = self.steps().get(index)?;
-        let path = &self.walk.path;
+        let path = self.walk.route.at(step.state.along.position);
         Some(Sign {
             time_s: step.time_s,
             place_m: path.point(step.state.along.position, 0.0).truncate(),
@@ -156,7 +158,8 @@ impl Active {
         let twins = [self.walk.best(), 1 - self.walk.best()].map(|twin| self.walk.twins[twin].steps.last());
         let [Some(best), Some(other)] = twins else { return None };
         let [low, high] = body_box(&self.camera, &self.body()?)?;
-        Some(expected(&self.scene(), [&best.state, &other.state], best.look.window, high.y - low.y))
+        let scene = self.scene(best.state.along.position);
+        Some(expected(&scene, [&best.state, &other.state], best.look.window, high.y - low.y))
     }
 
     /// True if in the last frames the person stood still or the model matched little.
@@ -255,6 +258,7 @@ impl Active {
                 self.turn_path(&kept, options);
             }
             self.adopt_person(&kept, backdrop, options);
+            self.kept = kept;
         }
     }
 
@@ -267,7 +271,7 @@ impl Active {
         p_swapped: Option<f64>,
     ) -> Option<Result<WalkFit, FitError>> {
         let fit = options.fit.as_ref()?;
-        let Walk { walker, path, .. } = &self.walk;
+        let walker = &self.walk.walker;
         let steps = &self.walk.twins[self.walk.best()].steps;
         let first = steps.first().map_or(usize::MAX, |step| step.frame);
         let last = steps.last().map_or(0, |step| step.frame);
@@ -282,9 +286,10 @@ impl Active {
             FitFrame { time_s: step.time_s, view, start: Hypothesis { height_m, ..place } }
         };
         let places = smoothed_hypotheses(steps, &options.walk.filter);
-        let frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
-        let problem = |path| {
-            let problem = Problem::new(&self.camera, &self.average, path, &frames, fit);
+        let mut frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
+        let route = &self.route_by_contours(&mut frames, fit);
+        let problem = |route| {
+            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit);
             match (&options.camera, self.height.source) {
                 (None, _) => problem.of_assumed_camera(),
                 (Some(_), HeightSource::Given) => problem,
@@ -292,10 +297,10 @@ impl Active {
             }
         };
         if !self.is_on_treadmill {
-            return Some(problem(path).fit(p_swapped));
+            return Some(problem(route).fit(p_swapped));
         }
-        let mirrored = treadmill::mirrored(path, &self.camera);
-        let [here, there] = [path, &mirrored].map(|path| problem(path).on_treadmill());
+        let mirrored = treadmill::mirrored(&route.at(0.0), &self.camera).into();
+        let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
         Some(fit_on_the_spot(&here, &there, p_swapped))
     }
 
@@ -336,7 +341,7 @@ impl Active {
             rate_hz: (last.phase - first.phase) / elapsed_s,
         };
         let average = self.walk.clone();
-        self.follow_again(Walk::new(fit.walker(), fit.path, beginning), kept, options);
+        self.follow_again(Walk::new(fit.walker(), fit.route.clone(), beginning), kept, options);
         let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
         if summed(&self.walk) <= summed(&average) {
             self.walk = average;
@@ -371,7 +376,8 @@ impl Active {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use super::super::route::Route;
     use super::super::search::tests::{camera, edges_of, walker};
     use super::super::search::{Axis, Path, Scene};
     use super::super::start::Direction;
@@ -382,14 +388,14 @@ mod tests {
     use crate::image::Rectangle;
     use glam::DVec2;
 
-    const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
-    const BEGINNING: Beginning =
+    pub const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    pub const BEGINNING: Beginning =
         Beginning { time_s: 0.0, along_m: -0.6, phase: 0.2, speed_mps: 1.2, rate_hz: 0.9 };
     const WINDOW: Rectangle = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
     const FRAME_S: f64 = 0.05;
 
     /// A walk of the given steps; the second twin is worse.
-    fn active(steps: Vec<Step>) -> Active {
+    pub fn active(steps: Vec<Step>) -> Active {
         let mut walk = Walk::new(walker(), PATH, BEGINNING);
         walk.twins[0].similarity_sum = steps.iter().map(|s| f64::from(s.similarity)).sum();
         walk.twins[0].visible_sum = steps.len() as f64;
@@ -421,7 +427,7 @@ mod tests {
             phase: ConstantVelocity::new(cycles, 0.9, 1e-4, 1e-3),
         };
         let heights = Axis::around(1.15, 0.1, 0.02);
-        let look = Look { window: WINDOW, heights, best: state.hypothesis() };
+        let look = Look { window: WINDOW, heights, best: state.hypothesis(), path: PATH };
         let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
         Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, look }
     }
@@ -536,15 +542,26 @@ mod tests {
     /// Twelve frames with the contours of a person who walks along `path` and the rectangles of a person who
     /// walks along `seen`.
     fn kept(path: &Path, seen: &Path) -> Vec<(Option<Sighting>, FrameEdges)> {
+        frames_on(12, 0.1, &(*path).into(), &(*seen).into())
+    }
+
+    /// The same of any number of frames, at this distance in seconds.
+    pub fn frames_on(
+        count: usize,
+        frame_s: f64,
+        route: &Route,
+        seen: &Route,
+    ) -> Vec<(Option<Sighting>, FrameEdges)> {
         let (walker, camera) = (walker(), camera());
-        let scene = Scene::new(&walker, &camera, path);
         let crown_m = walker.level_crown_height_m();
         let frame = |k: usize| {
-            let time_s = 0.1 * k as f64;
+            let time_s = frame_s * k as f64;
             let along_m = -0.6 + 1.2 * time_s;
             let height_m = walker.level_torso_height_m();
+            let scene = Scene::new(&walker, &camera, &route.at(along_m));
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s });
-            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(seen.point(along_m, z)).unwrap());
+            let [sole, crown] =
+                [0.0, crown_m].map(|z| camera.project(seen.at(along_m).point(along_m, z)).unwrap());
             let rectangle = Rectangle {
                 left: (sole.x - 40.0).round() as usize,
                 right: (sole.x + 40.0).round() as usize,
@@ -556,10 +573,10 @@ mod tests {
                 FrameEdges { frame: k, time_s, window: WINDOW, edges, others: Vec::new(), shared: false },
             )
         };
-        (0..12).map(frame).collect()
+        (0..count).map(frame).collect()
     }
 
-    fn options() -> TrackerOptions {
+    pub fn options() -> TrackerOptions {
         TrackerOptions { start_frames: 5, fit: None, ..TrackerOptions::for_height(1.75) }
     }
 
@@ -571,7 +588,7 @@ mod tests {
         }
         active.kept = kept;
         active.settle(&Backdrop::default(), &options());
-        assert!(active.settled && active.kept.is_empty());
+        assert!(active.settled);
         active
     }
 
@@ -579,8 +596,9 @@ mod tests {
     fn a_slanting_path_is_taken_where_rectangles_and_contours_show_it() {
         let slanting = Path { heading_rad: 0.4, ..PATH };
         let turned = refitted(kept(&slanting, &slanting));
-        assert!((turned.walk.path.heading_rad - 0.4).abs() < 0.1, "{:?}", turned.walk.path);
-        assert_eq!((turned.start.path, turned.walk.beginning), (turned.walk.path, turned.start.beginning));
+        let path = turned.walk.route.at(0.0);
+        assert!((path.heading_rad - 0.4).abs() < 0.1, "{path:?}");
+        assert_eq!((turned.start.path, turned.walk.beginning), (path, turned.start.beginning));
         assert_eq!(turned.walk.twins[0].steps.len(), 12);
         assert!(turned.walk.twins[0].similarity_sum > 8.0);
     }
@@ -588,7 +606,7 @@ mod tests {
     #[test]
     fn a_path_that_only_the_rectangles_show_is_not_taken() {
         let straight = refitted(kept(&PATH, &Path { heading_rad: 0.4, ..PATH }));
-        assert_eq!((straight.walk.path, straight.start.path), (PATH, PATH));
+        assert_eq!((straight.walk.route, straight.start.path), (PATH.into(), PATH));
         assert!(straight.walk.twins[0].similarity_sum > 10.0);
     }
 

@@ -44,8 +44,8 @@ pub struct PhaseScore {
 
 /// Compares a frame with the model again, as the tracker did.
 ///
-/// `scene` is the scene of the walk with the fitted person
-/// ([`TrackedWalk::scene`](super::result::TrackedWalk::scene)), `look` is that of the frame's step.
+/// `scene` is the scene of the walk with the followed person
+/// ([`TrackedWalk::scene`](super::result::TrackedWalk::scene)), `look` is that of the frame's step, whose path is taken.
 pub fn explain(
     evidence: &Evidence,
     look: &Look,
@@ -53,6 +53,7 @@ pub fn explain(
     evidence_options: &EvidenceOptions,
     options: &WalkOptions,
 ) -> Result<Explanation, EvidenceError> {
+    let scene = &Scene { path: look.path, ..*scene };
     // 1. The edges of the window.
     let edges = evidence.edges(&look.window, Some(scene.camera), evidence_options)?;
     // 2. The model's contours, each with the edge it matches.
@@ -115,8 +116,8 @@ mod tests {
         let mut all = Vec::new();
         let mut add = |evidence: Evidence| {
             if let Some(step) = walk.steps().iter().find(|s| s.frame == evidence.frame) {
-                let why =
-                    explain(&evidence, &step.look, &walk.scene(), &options.evidence, &walk.options).unwrap();
+                let why = explain(&evidence, &step.look, &walk.scene(0.0), &options.evidence, &walk.options)
+                    .unwrap();
                 all.push((step.similarity, why));
             }
         };

@@ -319,7 +319,9 @@ impl TrackedWalk {
     /// Relative standard deviation of lengths along the path, from distance and posture. For an assumed camera
     /// also from the focal length, which scales displacement along the line of sight.
     pub(super) fn scale_sd(&self) -> f64 {
-        let (eye, path) = (self.camera.position().truncate(), self.path());
+        let rows = self.rows();
+        let middle_m = rows.get(rows.len() / 2).map_or(0.0, |row| row.hypothesis.along_m);
+        let (eye, path) = (self.camera.position().truncate(), self.route().at(middle_m));
         let depth_sd_m = match self.fitted() {
             Some(fit) if !self.camera_is_guessed => {
                 fit.frames.iter().map(|f| f.sd[1]).sum::<f64>() / fit.frames.len() as f64

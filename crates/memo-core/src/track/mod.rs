@@ -1,6 +1,7 @@
 //! Model-based tracking: similarity of model and edges, search, starting phase, filter, tracker.
 
 mod active;
+mod bend;
 mod candidate;
 mod column;
 mod crowd;
@@ -16,6 +17,7 @@ pub mod options;
 mod people;
 pub mod plausible;
 pub mod result;
+pub mod route;
 pub mod score;
 pub mod search;
 pub mod start;

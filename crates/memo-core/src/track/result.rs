@@ -8,12 +8,13 @@
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
 use super::height::{BodyHeight, HeightSource};
-use super::search::{Hypothesis, Path, Scene};
+use super::route::Route;
+use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
 use crate::model::{Camera, PosedBody, Posture, SideJoints};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 
 pub use crate::model::skeleton::Side;
@@ -139,9 +140,9 @@ impl TrackedWalk {
             && measured.is_some_and(|seen| self.height.contradicts(&seen))
     }
 
-    /// The path walked: that of the fit, or the tracker's.
-    pub fn path(&self) -> &Path {
-        self.fitted().map_or(&self.walk.path, |fit| &fit.path)
+    /// The way walked: that of the fit, or the tracker's.
+    pub fn route(&self) -> &Route {
+        self.fitted().map_or(&self.walk.route, |fit| &fit.route)
     }
 
     /// The body in a row of [`TrackedWalk::rows`], placed in the world.
@@ -152,7 +153,7 @@ impl TrackedWalk {
     pub fn pose_of(&self, index: usize, row: &Row) -> PosedBody {
         match self.fitted() {
             Some(fit) => fit.pose(index),
-            None => self.scene().pose(&row.hypothesis),
+            None => self.scene(row.hypothesis.along_m).pose(&row.hypothesis),
         }
     }
 
@@ -169,9 +170,9 @@ impl TrackedWalk {
         self.start.direction
     }
 
-    /// The walker, camera and path of the walk.
-    pub fn scene(&self) -> Scene<'_> {
-        Scene::new(&self.walk.walker, &self.camera, &self.walk.path)
+    /// The tracker's walker and camera, and the tangent of its route at a place along it, metres.
+    pub fn scene(&self, along_m: f64) -> Scene<'_> {
+        Scene::new(&self.walk.walker, &self.camera, &self.walk.route.at(along_m))
     }
 
     /// Steps of the better twin: measurements and filtered states.
@@ -198,14 +199,14 @@ impl TrackedWalk {
     fn fitted_row(&self, step: &Step, fit: &WalkFit, k: usize) -> Row {
         let frame = &fit.frames[k];
         let posed = fit.pose(k);
-        let ahead = fit.path.direction();
+        let ahead = DVec2::from_angle(frame.heading_rad);
         let [along, across, height, phase] = self.with_scale(frame);
         let phase_at = frame.phase.rem_euclid(1.0);
         Row {
             frame: step.frame,
             time_s: step.time_s,
             torso_centre: posed.torso_centre,
-            heading_rad: fit.path.heading_rad,
+            heading_rad: frame.heading_rad,
             phase: phase_at,
             p_swapped: fit.p_swapped,
             speed_mps: speed(&fit.frames, self.steps(), k) + self.belt().speed_mps,
@@ -232,7 +233,7 @@ impl TrackedWalk {
     fn with_scale(&self, frame: &FittedFrame) -> [f64; 4] {
         let [along, across, height, phase] = frame.sd;
         let scale_sd = self.height.assumed_scale_sd();
-        let (eye, path) = (self.camera.position().truncate(), self.path());
+        let (eye, path) = (self.camera.position().truncate(), self.route().at(frame.along_m));
         let off_axis_m = frame.along_m - path.along(eye);
         [
             along.hypot(scale_sd * off_axis_m),
@@ -248,23 +249,24 @@ impl TrackedWalk {
             height_m: height.0.position,
             phase: phase.0.position.rem_euclid(1.0),
         };
-        let posed = self.scene().pose(&hypothesis);
+        let scene = self.scene(hypothesis.along_m);
+        let posed = scene.pose(&hypothesis);
         let sd = |(state, scale): (ConstantVelocity, f64), common: f64| {
             (state.position_sd() * scale).hypot(common)
         };
         // An error of depth also shifts the position along the path, in proportion to its distance from the
         // camera's foot point.
         let eye = self.camera.position().truncate();
-        let off_axis = (hypothesis.along_m - self.walk.path.along(eye)).abs();
-        let distance = self.walk.path.distance(eye);
+        let off_axis = (hypothesis.along_m - scene.path.along(eye)).abs();
+        let distance = scene.path.distance(eye);
         let along_sd = sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance);
-        let heading = self.walk.path.direction();
+        let heading = scene.path.direction();
         let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * self.depth_sd_m);
         Row {
             frame: step.frame,
             time_s: step.time_s,
             torso_centre: posed.torso_centre,
-            heading_rad: self.walk.path.heading_rad,
+            heading_rad: scene.path.heading_rad,
             phase: hypothesis.phase,
             p_swapped,
             speed_mps: along.0.velocity + self.belt().speed_mps,

@@ -62,15 +62,15 @@ pub struct Scene<'a> {
     /// The camera.
     pub camera: &'a Camera,
     /// The line walked and the direction the body faces.
-    pub path: &'a Path,
+    pub path: Path,
     /// Other people, who may stand in front.
     pub others: &'a Others,
 }
 
 impl<'a> Scene<'a> {
     /// A person alone.
-    pub fn new(walker: &'a Walker, camera: &'a Camera, path: &'a Path) -> Self {
-        Self { walker, camera, path, others: Others::NONE }
+    pub fn new(walker: &'a Walker, camera: &'a Camera, path: &Path) -> Self {
+        Self { walker, camera, path: *path, others: Others::NONE }
     }
 
     /// The same person among others.

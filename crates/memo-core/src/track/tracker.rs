@@ -3,16 +3,16 @@
 //! 1. It looks for moving regions that could be people and that nobody explains who is followed already.
 //! 2. It starts on 13 frames of such a region ([`TrackerOptions::start_frames`]).
 //! 3. It follows both half-cycle twins with filters. Nearer people hide farther ones (`crowd`).
-//! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed.
+//! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed, and for turns from then on
+//!    (`bend`).
 //! 5. It ends the walk when the person leaves the image or stops walking, and fits the person to all its frames
 //!    ([`fit`](super::fit)). Whoever walks on where the person was expected has the same number (`people`).
 //!
 //! Something that stays in one place for `path_frames` frames may walk on a treadmill ([`treadmill`](super::treadmill)),
 //! while nobody else is followed.
 //!
-//! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the edges of at most
-//! [`TrackerOptions::path_frames`] or `start_frames` frames, whichever is more, the rows of the current walk and, for
-//! the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the
+//! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the rows of the current
+//! walk and its edges (without a fit, those of the latest frames, some more than `path_frames`) and, for the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the
 //! person. A walk longer than [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`]
 //! without a fit, is returned in pieces of that length.
 //!
@@ -34,7 +34,6 @@ use super::options::TrackerOptions;
 use super::people::Identities;
 pub use super::people::Now;
 use super::result::TrackedWalk;
-use super::search::Scene;
 use super::steady::{CameraMotion, Loss};
 use super::treadmill::Standing;
 use super::walk::FrameEdges;
@@ -279,7 +278,7 @@ impl Tracker {
         let best = active.walk.best();
         let predict = |twin| active.walk.predict(twin, evidence.time_s, &self.options.walk.filter);
         let (predicted, other) = (predict(best), predict(1 - best));
-        let scene = Scene::new(&active.walk.walker, &active.camera, &active.walk.path);
+        let scene = active.scene(predicted.along.position);
         let body = scene.pose(&predicted.hypothesis()).cylinders;
         let [low, high] = body_box(&active.camera, &body)?;
         let size = DVec2::new(evidence.grey.width() as f64, evidence.grey.height() as f64);
@@ -335,10 +334,9 @@ impl Tracker {
                 active.pieces.push(Piece::new(evidence.frame, &evidence.grey, own.window, others));
                 self.backdrop.occupy(evidence.frame, own.window);
             }
-            if !active.settled {
-                active.kept.push((sighting, edges));
-            }
+            active.kept.push((sighting, edges));
             self.settle(k);
+            self.people[k].turn(&self.options);
         }
         Ok(())
     }
@@ -357,12 +355,15 @@ impl Tracker {
         self.people[k].settle(&self.backdrop, &self.options);
     }
 
-    /// Ends walks that are over. On a wrong path a walk can seem to be over, so the path is looked for first.
+    /// Ends walks that are over. On a wrong path a walk can seem to be over, so a turn is looked for first.
     fn end_walks(&mut self, evidence: &Evidence) {
         let (time_s, longest) = (evidence.time_s, self.longest_walk);
         let is_long = |active: &mut Active| active.settled && active.walk.twins[0].steps.len() >= longest;
         let mut ended: Vec<Active> = self.people.extract_if(.., is_long).collect();
-        let is_over = |active: &mut Active| active.settled && (active.is_over() || active.is_hidden());
+        let options = &self.options;
+        let is_over = |active: &mut Active| {
+            active.settled && (active.is_hidden() || active.is_over() && !active.goes_on(options))
+        };
         self.fading.extend(self.people.extract_if(.., is_over).map(|active| (time_s, active)));
         let is_gone = |(end_s, _): &mut (f64, Active)| time_s - *end_s > FADING_S;
         ended.extend(self.fading.extract_if(.., is_gone).map(|(_, active)| active));
@@ -373,9 +374,8 @@ impl Tracker {
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
         let Some(start) = new.sign_at(0) else { return self.identities.count() };
-        let leads = |(_, old): &(f64, Active)| {
-            old.sign_before(start.time_s).is_some_and(|end| end.leads_to(&start))
-        };
+        let leads =
+            |(_, old): &(f64, Active)| old.sign_before(start.time_s).is_some_and(|end| end.leads_to(&start));
         let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };
         let (_, mut old) = self.fading.remove(n);
         old.end_before(start.time_s);
@@ -471,7 +471,8 @@ impl Tracker {
             }
             let height_m = self.options.height_of(self.identities.count());
             let given = Given { options: &self.options, camera: self.camera(), height_m, size };
-            match candidate.begin(&given).filter(|active| self.is_somebody_else(active)) {
+            let begun = candidate.begin(&given).filter(|active| self.is_somebody_else(active));
+            match begun.filter(|active| !self.is_left_over(active)) {
                 Some(mut active) => {
                     self.candidates.remove(n);
                     active.person = self.identified(&active);
@@ -502,9 +503,18 @@ impl Tracker {
         !self.people.iter().any(near)
     }
 
+    /// True if the changes were left over from somebody who turned: that person's contours are more similar on a curve.
+    fn is_left_over(&mut self, new: &Active) -> bool {
+        let Some(found) = new.as_followed() else { return false };
+        let beside = |person: &&mut Active| person.as_followed().is_some_and(|other| other.meets(&found));
+        let options = &self.options;
+        self.people.iter_mut().filter(beside).any(|person| person.has_turned(options))
+    }
+
     fn end_walk(&mut self, active: Active) {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         active.settle(&self.backdrop, &self.options);
+        active.turned(&self.options);
         active.trim();
         if !active.is_walk() {
             self.report.refused_starts += 1;

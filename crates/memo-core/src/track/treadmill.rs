@@ -303,7 +303,7 @@ mod tests {
         let heading_rad = PI - 0.5;
         let active = begun(standing(heading_rad, 0.9, 0.0), None).unwrap();
         assert!(active.is_on_treadmill && active.start.direction == Direction::Forward);
-        let found = active.walk.path;
+        let found = active.walk.route.at(0.0);
         let off = |path: &Path| (path.heading_rad - heading_rad).sin().abs();
         // The mirrored heading has the same outlines, but not the one that faces the other way.
         assert!(off(&found).min(off(&mirrored(&found, &camera()))) < 0.3, "{heading_rad}: {found:?}");

@@ -4,6 +4,7 @@
 //! A track that starts half a cycle off does not correct itself, because its legs fit almost as well. So both
 //! twins are followed, each with its own filters, and the sums of their similarities decide between them.
 
+use super::route::Route;
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
 use super::swap::{SwapModel, swap_probability};
@@ -109,6 +110,8 @@ pub struct Look {
     pub heights: Axis,
     /// The grid point of the highest similarity; the prediction if nothing matched.
     pub best: Hypothesis,
+    /// The path on which it was searched: the tangent of the route at the prediction.
+    pub path: Path,
 }
 
 /// One frame of one twin.
@@ -180,8 +183,8 @@ pub struct FrameEdges {
 pub struct Walk {
     /// Body, gait and style.
     pub walker: Walker,
-    /// The line walked and the direction the body faces.
-    pub path: Path,
+    /// The way walked and the direction the body faces.
+    pub route: Route,
     /// State at the beginning; that of the second twin is half a cycle later.
     pub beginning: Beginning,
     /// The two half-cycle hypotheses.
@@ -191,17 +194,18 @@ pub struct Walk {
 
 impl Walk {
     /// A walk at its beginning, with no frame followed.
-    pub fn new(walker: Walker, path: Path, beginning: Beginning) -> Self {
+    pub fn new(walker: Walker, route: impl Into<Route>, beginning: Beginning) -> Self {
         let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0 };
-        Self { walker, path, beginning, twins: [twin.clone(), twin], first_time_s: None }
+        Self { walker, route: route.into(), beginning, twins: [twin.clone(), twin], first_time_s: None }
     }
 
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
         let others = Others::new(&edges.others, camera.position());
-        let scene = Scene::new(&self.walker, camera, &self.path).among(&others);
         let step = |twin: usize| {
             let predicted = self.predict(twin, edges.time_s, &options.filter);
+            let path = self.route.at(predicted.along.position);
+            let scene = Scene::new(&self.walker, camera, &path).among(&others);
             match_frame(edges, &scene, &predicted, options)
         };
         let (first, second) = rayon::join(|| step(0), || step(1));
@@ -266,6 +270,16 @@ impl Walk {
         }
     }
 
+    /// Forgets the steps from an index on, to follow their frames again.
+    pub(crate) fn go_back_to(&mut self, end: usize) {
+        for twin in &mut self.twins {
+            for step in twin.steps.split_off(end.min(twin.steps.len())) {
+                twin.similarity_sum -= f64::from(step.similarity * step.visible);
+                twin.visible_sum -= f64::from(step.visible);
+            }
+        }
+    }
+
     /// The last step of the best twin.
     pub fn last(&self) -> Option<&Step> {
         self.twins[self.best()].steps.last()
@@ -283,7 +297,7 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
     let filter = options.filter.of_visible_share(visible.into());
     let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &filter));
     let best = measured.map_or(predicted.hypothesis(), |_| found.best());
-    let look = Look { window: edges.window, heights: grid.height, best };
+    let look = Look { window: edges.window, heights: grid.height, best, path: scene.path };
     Step {
         frame: edges.frame,
         time_s: edges.time_s,
@@ -355,7 +369,7 @@ mod tests {
             height: ConstantVelocity::new(measured.height_m, 0.0, 1e-4, 0.0),
             phase: ConstantVelocity::new(measured.phase, 0.9, 0.01, 0.01),
         };
-        let look = Look { window: WINDOW, heights: Axis::around(1.0, 0.1, 0.02), best: measured };
+        let look = Look { window: WINDOW, heights: Axis::around(1.0, 0.1, 0.02), best: measured, path: PATH };
         Step {
             frame: 0,
             time_s,

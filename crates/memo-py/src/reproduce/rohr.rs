@@ -210,9 +210,8 @@ pub fn search_windows<'py>(
 #[pyfunction]
 pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let tracked = &walk.walk;
-    let path = &tracked.walk.path;
     let row = |step: &memo_core::track::walk::Step| {
-        let s = &step.state;
+        let (s, path) = (&step.state, step.look.path);
         let phase = s.phase.position.rem_euclid(1.0);
         let z = s.height.position + tracked.walk.walker.gait.vertical_m(phase);
         let sd_x = s.along.position_sd() * path.heading_rad.cos().abs();
@@ -234,7 +233,7 @@ pub fn walk_lines<'py>(
 ) -> PyResult<SegmentsWithParts<'py>> {
     let at = hypothesis(&walk, row)?;
     let at = Hypothesis { phase: phase.unwrap_or(at.phase), ..at };
-    let visible = walk.walk.scene().visible(&at, &VisibilityOptions::default());
+    let visible = walk.walk.scene(at.along_m).visible(&at, &VisibilityOptions::default());
     segments_with_parts(py, &visible, &walk.walk.camera)
 }
 
@@ -274,7 +273,7 @@ pub fn walk_similarity(
     let grid = Grid::whole_cycle_within(at.along_m, at.height_m, [along_m, height_m]);
     let found = pooled(py, || {
         let options = &tracked.options;
-        search(&edges, &tracked.scene(), &grid, &options.similarity, options.hidden_lines)
+        search(&edges, &tracked.scene(at.along_m), &grid, &options.similarity, options.hidden_lines)
     })?;
     WalkSimilarity::of(py, found, &grid, &at)
 }

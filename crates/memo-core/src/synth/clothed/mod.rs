@@ -70,6 +70,8 @@ pub struct ClothedOptions {
     pub slant_rad: Option<f64>,
     /// Delay of the left side, as a fraction of the cycle, -0.1 to 0.1; by the seed a few thousandths.
     pub late_left: Option<f64>,
+    /// How far a walker turns to the left in all, radians, -4 to 4: the path is an arc about its middle.
+    pub turn_rad: f64,
     /// What moves.
     pub mover: Mover,
 }
@@ -85,6 +87,7 @@ impl Default for ClothedOptions {
             leftward: None,
             slant_rad: None,
             late_left: None,
+            turn_rad: 0.0,
             mover: Mover::Walker,
         }
     }
@@ -97,6 +100,8 @@ pub struct ClothedTruth {
     pub frame: usize,
     /// Time, seconds.
     pub time_s: f64,
+    /// Direction of the path where the hips are, radians about world Z.
+    pub heading_rad: f64,
     /// Mean of both shoulders and both hips, world axes, metres.
     pub torso_centre: DVec3,
     /// Joints of the right side, world axes, metres.
@@ -130,7 +135,7 @@ pub struct ClothedScene {
     pub camera: Camera,
     /// Body height of the person from crown to sole, metres.
     pub height_m: f64,
-    /// Direction of the path, radians about world Z; the person faces in this direction.
+    /// Direction of the path, of an arc in its middle, radians about world Z; the person faces in this direction.
     pub heading_rad: f64,
     /// Mean speed, metres per second; on a treadmill, that of the belt.
     pub speed_mps: f64,
@@ -233,6 +238,7 @@ impl ClothedScene {
         Some(ClothedTruth {
             frame,
             time_s,
+            heading_rad: self.heading_of(right.hip.midpoint(left.hip)),
             torso_centre: 0.25 * (right.shoulder + left.shoulder + right.hip + left.hip),
             right,
             left,
@@ -328,8 +334,24 @@ impl ClothedScene {
             Mover::Rider => carried(self.stride.length_m * cycles),
             Mover::Waver => waving(carried(middle), (TAU * self.cycle_hz * time_s).sin()),
         };
-        let heading = DVec2::from_angle(self.heading_rad);
-        figure.placed(self.heading_rad, (-middle * heading).extend(0.0))
+        figure.placed(0.0, -middle * DVec3::X).rolled(self.curvature()).placed(self.heading_rad, DVec3::ZERO)
+    }
+
+    /// Curvature of the path, 1/m, positive to the left.
+    fn curvature(&self) -> f64 {
+        self.options.turn_rad / (2.0 * self.middle_s() * self.speed_mps)
+    }
+
+    /// Direction of the path where a person with these hips is.
+    fn heading_of(&self, hips: DVec3) -> f64 {
+        if self.curvature() == 0.0 {
+            return self.heading_rad;
+        }
+        // From the centre of the arc, which lies beside its middle.
+        let radius = self.curvature().recip();
+        let left = DVec2::from_angle(self.heading_rad).perp();
+        let from_centre = hips.truncate() - radius * left;
+        self.heading_rad + (-radius * left).angle_to(from_centre)
     }
 
     /// Four posts on a board with wheels.
@@ -393,7 +415,8 @@ impl ClothedScene {
     }
 
     fn angles(&self, joints: [SideJoints; 2]) -> [SideAngles; 2] {
-        let forward = DVec2::from_angle(self.heading_rad).extend(0.0);
+        let hips = joints[0].hip.midpoint(joints[1].hip);
+        let forward = DVec2::from_angle(self.heading_of(hips)).extend(0.0);
         let elevation = |from: DVec3, to: DVec3| (to - from).dot(forward).atan2(from.z - to.z);
         let [right, left] = joints;
         let trunk = elevation(right.shoulder.midpoint(left.shoulder), right.hip.midpoint(left.hip));
@@ -418,6 +441,7 @@ fn check(options: &ClothedOptions) -> Result<(), SceneError> {
         ("rate_hz", options.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
         ("noise_sd", options.noise_sd.map_or(0.0, f64::from), 0.0..=255.0, "0 to 255 grey levels"),
         ("slant_rad", options.slant_rad.unwrap_or(0.0), -1.0..=1.0, "-1 to 1 rad"),
+        ("turn_rad", options.turn_rad, -4.0..=4.0, "-4 to 4 rad"),
         ("late_left", options.late_left.unwrap_or(0.0), -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
     ])
 }

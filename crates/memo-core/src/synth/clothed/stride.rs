@@ -250,10 +250,28 @@ pub(super) struct Figure {
 }
 
 impl Figure {
+    /// The figure with the x axis rolled onto a circle of this curvature, 1/m, that bends to the left. Standing feet
+    /// stay where they are.
+    pub(super) fn rolled(&self, curvature: f64) -> Self {
+        if curvature == 0.0 {
+            return *self;
+        }
+        let point = |p: DVec3| {
+            let (sin, cos) = (curvature * p.x).sin_cos();
+            DVec3::new(sin / curvature - p.y * sin, (1.0 - cos) / curvature + p.y * cos, p.z)
+        };
+        let turn = DMat3::from_rotation_z(curvature * self.neck.x);
+        Self { forward: turn * self.forward, ..self.moved(point) }
+    }
+
     /// The figure turned about world Z and moved.
     pub(super) fn placed(&self, heading_rad: f64, to: DVec3) -> Self {
         let turn = DMat3::from_rotation_z(heading_rad);
-        let point = |p: DVec3| turn * p + to;
+        Self { forward: turn * self.forward, ..self.moved(|p| turn * p + to) }
+    }
+
+    /// The figure with all points moved.
+    fn moved(&self, point: impl Fn(DVec3) -> DVec3) -> Self {
         let side = |j: SideJoints| SideJoints {
             shoulder: point(j.shoulder),
             elbow: point(j.elbow),
@@ -264,11 +282,11 @@ impl Figure {
         };
         Self {
             joints: self.joints.map(side),
-            feet: self.feet.map(|foot| foot.map(point)),
-            hands: self.hands.map(point),
+            feet: self.feet.map(|foot| foot.map(&point)),
+            hands: self.hands.map(&point),
             neck: point(self.neck),
             head: point(self.head),
-            forward: turn * self.forward,
+            forward: self.forward,
         }
     }
 }

@@ -24,6 +24,7 @@ fn what_cannot_be_drawn_is_refused() {
     );
     assert!(refused(ClothedOptions { noise_sd: Some(-1.0), ..base() }).ends_with("got -1"));
     assert!(refused(ClothedOptions { slant_rad: Some(2.0), ..base() }).ends_with("got 2"));
+    assert!(refused(ClothedOptions { turn_rad: 5.0, ..base() }).ends_with("got 5"));
     assert!(refused(ClothedOptions { late_left: Some(0.2), ..base() }).ends_with("got 0.2"));
 }
 
@@ -36,6 +37,36 @@ fn scenes_of_one_pixel_of_no_frames_and_beyond_the_last_frame_can_be_drawn() {
             let drawn = scene.frame(frame);
             assert_eq!([drawn.width() as u32, drawn.height() as u32], size);
         }
+    }
+}
+
+#[test]
+fn on_an_arc_the_body_turns_and_standing_feet_stay() {
+    for (seed, turn_rad) in [(1, 1.0), (2, -2.0)] {
+        let scene = scene(ClothedOptions { seed, turn_rad, ..ClothedOptions::default() });
+        let truths: Vec<_> = (0..scene.len()).filter_map(|k| scene.truth(k)).collect();
+        // The heading turns by the whole angle, and the body moves in it.
+        let turned = truths[truths.len() - 1].heading_rad - truths[0].heading_rad;
+        assert!((turned / turn_rad - 1.0).abs() < 0.1, "{turned} of {turn_rad}");
+        let mut shares = Vec::new();
+        for pair in truths.windows(2) {
+            let moved = (pair[1].torso_centre - pair[0].torso_centre).truncate();
+            let ahead = DVec2::from_angle(0.5 * (pair[0].heading_rad + pair[1].heading_rad));
+            assert!(moved.dot(ahead) > 0.95 * moved.length(), "{moved} {ahead}");
+            let stands =
+                |side: fn(&ClothedTruth) -> DVec3| (side(&pair[1]) - side(&pair[0])).truncate().length();
+            shares.push(stands(|t| t.right.ankle).min(stands(|t| t.left.ankle)) / moved.length());
+        }
+        // Of two feet, one hardly moves most of the time.
+        shares.sort_by(f64::total_cmp);
+        assert!(shares[shares.len() / 2] < 0.2, "{shares:?}");
+        // Thighs are as long as on a straight path, to a share of the curvature.
+        let straight = self::scene(ClothedOptions { seed, ..ClothedOptions::default() });
+        let thigh = |scene: &ClothedScene| {
+            let truth = scene.truth(20).unwrap();
+            truth.right.hip.distance(truth.right.knee)
+        };
+        assert!((thigh(&scene) / thigh(&straight) - 1.0).abs() < 0.08);
     }
 }
 

@@ -29,16 +29,20 @@ const NEAR: f64 = 0.2;
 const TOE_OFF_PHASE: f64 = 0.61;
 
 /// The contacts of a walk, none of a backward one. `feet` has heel and ball of the right and the left foot in each
-/// frame, metres.
-pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead: DVec2) -> Vec<Contact> {
+/// frame, metres; `ahead` is the direction of walking in each frame.
+pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead: &[DVec2]) -> Vec<Contact> {
     let count = times_s.len();
     if count < 3 || phases[count - 1] <= phases[0] {
         return Vec::new();
     }
-    let place = |k: usize, side: usize, point: usize| feet[k][side][point].truncate().dot(ahead);
+    // How far a point moves along the way from frame k to the next.
+    let moved = |k: usize, side: usize, point: usize| {
+        let [from, to] = [k, k + 1].map(|k| feet[k][side][point].truncate());
+        (to - from).dot((ahead[k] + ahead[k + 1]).normalize_or(ahead[k]))
+    };
     let elapsed_s = times_s[count - 1] - times_s[0];
-    let middle = |k: usize| 0.5 * (place(k, 0, 0) + place(k, 1, 0));
-    let walking_mps = (middle(count - 1) - middle(0)) / elapsed_s;
+    let walking_m: f64 = (0..count - 1).map(|k| 0.5 * (moved(k, 0, 0) + moved(k, 1, 0))).sum();
+    let walking_mps = walking_m / elapsed_s;
     let mut contacts = Vec::new();
     for (side, name) in [Side::Right, Side::Left].into_iter().enumerate() {
         let later = 0.5 * side as f64;
@@ -47,10 +51,7 @@ pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead
             (EventKind::ToeOff, 1, TOE_OFF_PHASE, BALL_SHARE, true),
         ] {
             // Speed over the walking speed, between frames.
-            let speed = |k: usize| {
-                let by_m = place(k + 1, side, point) - place(k, side, point);
-                by_m / (times_s[k + 1] - times_s[k]) / walking_mps
-            };
+            let speed = |k: usize| moved(k, side, point) / (times_s[k + 1] - times_s[k]) / walking_mps;
             let half =
                 |k: usize| [0.5 * (times_s[k] + times_s[k + 1]), 0.5 * (phases[k] + phases[k + 1]) + later];
             let mut found: Vec<(i64, f64, f64)> = Vec::new();
@@ -123,7 +124,8 @@ mod tests {
         let times_s: Vec<f64> = (0..150).map(|k| 0.02 * f64::from(k) + 0.003).collect();
         let phases: Vec<f64> = times_s.iter().map(|t| t + 0.03).collect();
         let all: Vec<_> = times_s.iter().map(|&t| feet(t)).collect();
-        let found = contacts(&times_s, &phases, &all, DVec2::X);
+        let ahead = vec![DVec2::X; times_s.len()];
+        let found = contacts(&times_s, &phases, &all, &ahead);
         for (kind, side, expected) in [
             (EventKind::HeelStrike, Side::Right, vec![1.0, 2.0]),
             (EventKind::HeelStrike, Side::Left, vec![0.5, 1.5, 2.5]),
@@ -141,8 +143,8 @@ mod tests {
         // The phases are ahead by 0.03; heels stop at 0 and 0.5.
         assert!((mean_phase(&found, &times_s, &phases) - 0.03).abs() < 0.01);
         assert_eq!(mean_phase(&[], &times_s, &phases), 0.0);
-        assert!(contacts(&times_s[..2], &phases[..2], &all[..2], DVec2::X).is_empty());
+        assert!(contacts(&times_s[..2], &phases[..2], &all[..2], &ahead).is_empty());
         let backwards: Vec<f64> = phases.iter().map(|p| -p).collect();
-        assert!(contacts(&times_s, &backwards, &all, DVec2::X).is_empty());
+        assert!(contacts(&times_s, &backwards, &all, &ahead).is_empty());
     }
 }

@@ -24,13 +24,14 @@ mod headings;
 mod lines;
 mod problem;
 mod quality;
+mod route;
 mod seen;
 mod sides;
 mod unknowns;
 pub(crate) mod views;
 
 use super::height::BodyHeight;
-use super::search::Path;
+use super::route::Route;
 use crate::model::{Body, Gait, GaitStyle, PosedBody, Posture, Walker};
 use crate::option_error::OptionError;
 use crate::wording::counted;
@@ -119,7 +120,9 @@ pub struct Measured {
 pub struct FittedFrame {
     /// Centre of the torso, metres.
     pub torso_centre: DVec3,
-    /// Place along the path, metres.
+    /// Direction the body faces, radians about world Z.
+    pub heading_rad: f64,
+    /// Length along the route, metres.
     pub along_m: f64,
     /// Gait phase, cycles, not wrapped; 0 = right initial contact.
     pub phase: f64,
@@ -139,8 +142,8 @@ pub struct WalkFit {
     /// The body height that the outlines show above the ground of a calibrated camera, whatever height was given;
     /// `None` in an assumed camera.
     pub height: Option<BodyHeight>,
-    /// The fitted path.
-    pub path: Path,
+    /// The fitted way; lengths along it begin below the middle of the walk.
+    pub route: Route,
     /// The person's curves at fifty equally spaced phases from the side's own initial contact: hip, knee, ankle,
     /// shoulder and elbow of the right side, then of the left, radians.
     pub curves: [Vec<f64>; 2 * JOINTS],
@@ -181,8 +184,8 @@ impl WalkFit {
 
     /// The body in a frame, placed in the world.
     pub fn pose(&self, frame: usize) -> PosedBody {
-        let FittedFrame { torso_centre, posture, .. } = &self.frames[frame];
-        self.body.pose(*torso_centre, self.path.heading_rad, posture)
+        let FittedFrame { torso_centre, heading_rad, posture, .. } = &self.frames[frame];
+        self.body.pose(*torso_centre, *heading_rad, posture)
     }
 }
 

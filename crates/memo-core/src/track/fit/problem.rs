@@ -15,6 +15,7 @@ use super::{FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measure
 use crate::estimate::arrow::{Arrow, Solution, velocity_change};
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::{BodyHeight, HeightSource};
+use crate::track::route::Route;
 use crate::track::search::{Hypothesis, Path};
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
@@ -34,8 +35,8 @@ pub(crate) struct Problem<'a> {
     camera: &'a Camera,
     /// The average walker of the given or supposed height.
     walker: &'a Walker,
-    /// The tracker's path.
-    path: &'a Path,
+    /// The tracker's route.
+    route: &'a Route,
     frames: &'a [FitFrame],
     options: &'a FitOptions,
     priors: Vec<Prior>,
@@ -99,16 +100,16 @@ impl<'a> Problem<'a> {
     pub fn new(
         camera: &'a Camera,
         walker: &'a Walker,
-        path: &'a Path,
+        route: &'a Route,
         frames: &'a [FitFrame],
         options: &'a FitOptions,
     ) -> Self {
         let origin_along_m = frames.get(frames.len() / 2).map_or(0.0, |frame| frame.start.along_m);
-        let origin = path.point(origin_along_m, 0.0).truncate();
+        let origin = route.place(origin_along_m);
         Self {
             camera,
             walker,
-            path,
+            route,
             frames,
             options,
             priors: priors(),
@@ -182,7 +183,7 @@ impl<'a> Problem<'a> {
     }
 
     pub(super) fn heading_rad(&self, fitted: &Fitted) -> f64 {
-        self.path.heading_rad + fitted.unknowns.whole[WHOLE_HEADING]
+        self.route.at(self.origin_along_m).heading_rad + fitted.unknowns.whole[WHOLE_HEADING]
     }
 
     /// The start whose first steps come nearest to the edges, with the tracker's phase shifted by some cycles.
@@ -230,13 +231,35 @@ impl<'a> Problem<'a> {
         }
     }
 
+    pub(super) fn route(&self) -> &Route {
+        self.route
+    }
+
+    /// Length along the route up to a frame's pelvis.
+    pub(super) fn along(&self, frame: &[f64; FRAME]) -> f64 {
+        self.origin_along_m + frame[FRAME_ALONG]
+    }
+
+    /// The tangent of the tracker's route where a frame's pelvis is.
+    fn tangent(&self, frame: &[f64; FRAME]) -> Path {
+        self.route.at(self.along(frame))
+    }
+
+    /// Search width and weights of the last step from a starting gait.
+    pub(super) fn last_start_width(&self, unknowns: &Unknowns) -> Option<Width> {
+        Some(Width::of_step(STEPS[0] - 1, self.height_px(unknowns)?))
+    }
+
     /// The figure of a frame.
     fn figure(&self, unknowns: &Unknowns, frame: usize) -> Figure {
         let (whole, frame) = (&unknowns.whole, &unknowns.frames[frame]);
         let body = body(&self.walker.body, whole);
-        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
+        let tangent = self.tangent(frame);
+        let heading_rad = tangent.heading_rad + whole[WHOLE_HEADING];
         let ahead = DVec2::from_angle(heading_rad);
-        let ground = self.origin + frame[FRAME_ALONG] * ahead + whole[WHOLE_ACROSS] * ahead.perp();
+        let place = tangent.point(self.along(frame), 0.0).truncate();
+        let turned = DVec2::from_angle(whole[WHOLE_HEADING]).rotate(place - self.origin);
+        let ground = self.origin + turned + whole[WHOLE_ACROSS] * ahead.perp();
         let pelvis = ground.extend(frame[FRAME_HEIGHT]);
         let (sin, cos) = whole[WHOLE_LEAN].sin_cos();
         let torso_centre = pelvis + 0.5 * body.torso_length_m() * (sin * ahead).extend(cos);
@@ -284,8 +307,22 @@ impl<'a> Problem<'a> {
         width: &Width,
         room: &mut Room,
     ) -> (DMatrix<f64>, DVector<f64>, Seen) {
+        let (_, normal, right, seen) = self.figure_terms(unknowns, frame, width, room);
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut room.slopes);
+        let (normal, right) = of_unknowns(&normal, &right, &room.slopes, WHOLE + block);
+        (normal, right, seen)
+    }
+
+    /// The figure of a frame, the normal equations over its coordinates, and what was seen.
+    pub(super) fn figure_terms(
+        &self,
+        unknowns: &Unknowns,
+        frame: usize,
+        width: &Width,
+        room: &mut Room,
+    ) -> (Figure, DMatrix<f64>, DVector<f64>, Seen) {
         let figure = self.figure(unknowns, frame);
-        let Room { work, slopes: room_slopes } = room;
+        let work = &mut room.work;
         let view = &self.frames[frame].view;
         samples(&figure, &view.others, self.camera, &unknowns.whole, width.spacing_px(), work);
         let mut normal = DMatrix::<f64>::zeros(FIGURE, FIGURE);
@@ -319,9 +356,7 @@ impl<'a> Problem<'a> {
         let (side, lowest) = figure.lowest_point();
         let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
         add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
-        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], room_slopes);
-        let (normal, right) = of_unknowns(&normal, &right, room_slopes, WHOLE + block);
-        (normal, right, seen)
+        (figure, normal, right, seen)
     }
 
     /// Priors of people, of the stated height and of smooth motion.
@@ -389,14 +424,14 @@ impl<'a> Problem<'a> {
     /// Step 7.
     fn result(&self, fitted: &Fitted, p_swapped: f64, quality: FitQuality) -> WalkFit {
         let Unknowns { whole, frames } = &fitted.unknowns;
-        let heading_rad = self.path.heading_rad + whole[WHOLE_HEADING];
-        let across = whole[WHOLE_ACROSS] * DVec2::from_angle(heading_rad).perp();
-        let path = Path { origin: self.origin + across, heading_rad };
+        let (turn, left_m) = (whole[WHOLE_HEADING], whole[WHOLE_ACROSS]);
+        let route = self.route.moved(self.origin, self.origin_along_m, turn, left_m);
         let frame = |k: usize| {
             let figure = self.figure(&fitted.unknowns, k);
             let frame = FittedFrame {
                 torso_centre: figure.posed.torso_centre,
-                along_m: path.along(figure.posed.torso_centre.truncate()),
+                heading_rad: self.tangent(&frames[k]).heading_rad + turn,
+                along_m: route.along(figure.posed.torso_centre.truncate(), frames[k][FRAME_ALONG]),
                 phase: frames[k][FRAME_PHASE],
                 posture: posture(&self.walker.gait, whole, &frames[k]),
                 measured: self.measured(fitted, k),
@@ -408,12 +443,12 @@ impl<'a> Problem<'a> {
             (0..frames.len()).into_par_iter().map(frame).unzip();
         let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
         let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
-        let belt =
-            self.is_on_treadmill.then(|| belt::belt(&times_s, &phases, &feet, path.direction())).flatten();
+        let ahead: Vec<DVec2> = all.iter().map(|f| DVec2::from_angle(f.heading_rad)).collect();
+        let belt = self.is_on_treadmill.then(|| belt::belt(&times_s, &phases, &feet, ahead[0])).flatten();
         if let Some(belt) = belt {
-            belt::move_with(&mut feet, &times_s, path.direction() * belt.speed_mps);
+            belt::move_with(&mut feet, &times_s, ahead[0] * belt.speed_mps);
         }
-        let contacts = contacts::contacts(&times_s, &phases, &feet, path.direction());
+        let contacts = contacts::contacts(&times_s, &phases, &feet, &ahead);
         // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
         let zero = contacts::mean_phase(&contacts, &times_s, &phases) * self.share_of_zero(&quality);
         all.iter_mut().for_each(|frame| frame.phase -= zero);
@@ -421,7 +456,7 @@ impl<'a> Problem<'a> {
         WalkFit {
             body: body(&self.walker.body, whole),
             height: self.height(fitted, &quality),
-            path,
+            route,
             curves,
             frames: all,
             contacts,
@@ -500,7 +535,7 @@ impl<'a> Problem<'a> {
 
 /// Search width and weights of one step.
 #[derive(Debug, Clone)]
-struct Width {
+pub(super) struct Width {
     reach: Reach,
     scale_px: f64,
     height_px: f64,
@@ -526,7 +561,7 @@ impl Width {
 
 /// Working memory of a thread.
 #[derive(Debug, Default)]
-struct Room {
+pub(super) struct Room {
     work: Workspace,
     slopes: Vec<Slope>,
 }
@@ -667,7 +702,7 @@ mod tests {
         };
         let fit = |count: usize| {
             let frames: Vec<FitFrame> = (0..count).map(frame).collect();
-            Problem::new(&camera, &walker, &path, &frames, &options).fit(Some(0.1))
+            Problem::new(&camera, &walker, &path.into(), &frames, &options).fit(Some(0.1))
         };
         assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
         assert_eq!(fit(15), Err(FitError::Undetermined));

@@ -41,6 +41,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
             window: Rectangle { left: 0, top: 0, right: 9, bottom: 9 },
             heights: Axis::around(1.0, 0.1, 0.02),
             best: state.hypothesis(),
+            path,
         };
         let similarity = if seen.is_some() { 0.5 } else { 0.0 };
         Step {
@@ -134,7 +135,7 @@ fn rows_are_the_smoothed_states_of_every_frame() {
         assert_eq!((row.frame, row.time_s, row.heading_rad), (5 + 2 * k, frames[k].0, 0.0));
         assert_eq!(row.similarity, if frames[k].1.is_some() { 0.5 } else { 0.0 });
         assert!(row.hypothesis.phase == row.phase && row.p_swapped == walk.p_swapped());
-        let posed = walk.scene().pose(&row.hypothesis);
+        let posed = walk.scene(row.hypothesis.along_m).pose(&row.hypothesis);
         assert_eq!((row.torso_centre, row.right, row.left), (posed.torso_centre, posed.right, posed.left));
     }
 }

@@ -1,7 +1,7 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
 use super::super::search::tests::{camera, walker};
-use super::super::search::{Axis, Hypothesis, Path};
+use super::super::search::{Axis, Hypothesis, Path, Scene};
 use super::super::start::Direction;
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Step, Walk};
@@ -230,7 +230,12 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
         phase: ConstantVelocity::new(0.2 + 0.9 * time_s, 0.9, 1e-4, 1e-3),
     };
     let best = state.hypothesis();
-    let look = Look { window: boxed(100, 399, 80, 200), heights: Axis::around(height_m, 0.1, 0.02), best };
+    let look = Look {
+        window: boxed(100, 399, 80, 200),
+        heights: Axis::around(height_m, 0.1, 0.02),
+        best,
+        path: PATH,
+    };
     Step { frame, time_s, state, measured: Some(best), similarity: 0.5, visible: 1.0, shared: false, look }
 }
 
@@ -325,7 +330,7 @@ fn frames_are_kept_until_there_are_enough_for_the_path() {
     let mut tracker = following(20, -0.5, 1.2);
     tracker.options.path_frames = 3;
     tracker.people.first_mut().unwrap().settled = false;
-    for (k, (kept, turned)) in [(1, false), (2, false), (0, true), (0, true)].into_iter().enumerate() {
+    for (k, (kept, turned)) in [(1, false), (2, false), (3, true), (4, true)].into_iter().enumerate() {
         tracker.advance(&evidence(20 + k, &[])).unwrap();
         let active = tracker.people.first().unwrap();
         assert_eq!((active.kept.len(), active.settled), (kept, turned), "frame {k}");
@@ -450,7 +455,7 @@ fn following_two(gap_m: f64) -> Tracker {
     let mut tracker = following(40, 0.0, 1.2);
     let behind = Path { origin: DVec2::new(0.0, gap_m), ..PATH };
     let mut second = following(40, 0.0, 1.2).people.remove(0);
-    second.walk.path = behind;
+    second.walk.route = behind.into();
     second.person = 1;
     tracker.people.push(second);
     tracker

@@ -1,0 +1,33 @@
+"""What a summary says of a person who turns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from memo import _memo
+    from memo.tracking import StoredWalk
+
+    Walk: TypeAlias = _memo.Walk | StoredWalk
+
+__all__ = ["turned_deg", "turning_words"]
+
+TOLD_DEG = 20.0
+"""A turn from this angle on is told. Of 30 drawn people in clothes who turned by 40 or 69 degrees, the turn
+of 29 was found within 15 degrees; 18 who went straight were not told to turn."""
+
+
+def turned_deg(walk: Walk) -> float:
+    """How far the path turns from the first to the last frame, degrees; positive to the left."""
+    heading_rad = np.unwrap(walk.columns()["heading_rad"])
+    return float(np.degrees(heading_rad[-1] - heading_rad[0]))
+
+
+def turning_words(walk: Walk) -> str:
+    """The turn within a sentence; empty if there is none worth telling."""
+    turned = turned_deg(walk)
+    if walk.treadmill is not None or abs(turned) < TOLD_DEG:
+        return ""
+    return f", turning {'left' if turned > 0 else 'right'} by about {abs(turned):.0f} degrees,"

@@ -1,0 +1,97 @@
+"""Walks on a curve: the whole chain on a drawn person, and what the summary says."""
+
+import sys
+import types
+
+import av
+import memo
+import numpy as np
+import pytest
+from memo import cli
+from memo.explain import explain
+from memo.files import read_track_csv
+from memo.report import write_report
+from memo.turning import turned_deg, turning_words
+
+
+def walk(*headings_deg, treadmill=None):
+    return types.SimpleNamespace(
+        treadmill=treadmill, columns=lambda: {"heading_rad": np.radians(headings_deg)}
+    )
+
+
+def test_a_turn_is_told_from_20_degrees_on_and_not_on_a_treadmill():
+    assert turned_deg(walk(10, 10, 10)) == 0
+    assert turned_deg(walk(170, -170, -150)) == pytest.approx(40)
+    assert turning_words(walk(0, 10, 19)) == ""
+    assert turning_words(walk(0, 10, 21)) == ", turning left by about 21 degrees,"
+    assert turning_words(walk(0, -40, -72.4)) == ", turning right by about 72 degrees,"
+    assert turning_words(walk(0, 30, treadmill=(1.2, 0.03, None))) == ""
+
+
+TURN_DEG = 69
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return memo.demo_scene(4, frames=84, turn_deg=TURN_DEG)
+
+
+@pytest.fixture(scope="module")
+def run(scene, tmp_path_factory):
+    """The folder of a run over the drawn video."""
+    folder = tmp_path_factory.mktemp("turning")
+    with av.open(str(folder / "video.mkv"), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"qp": "0", "preset": "ultrafast"})
+        stream.height, stream.width = scene.frames[0].shape
+        stream.pix_fmt = "gray"
+        for frame in scene.frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+        container.mux(stream.encode(None))
+    scene.camera.to_toml(folder / "camera.toml")
+    arguments = [
+        "track",
+        folder / "video.mkv",
+        "--camera",
+        folder / "camera.toml",
+        "--height",
+        scene.height_m,
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            sys, "argv", ["memo", *map(str, arguments), "--no-plots", "--quiet", "--out", str(folder)]
+        )
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+    assert not exited.value.code
+    return folder
+
+
+def test_the_scene_turns_by_the_angle_asked_for(scene):
+    heading = np.degrees(np.unwrap(scene.truth["heading_rad"]))
+    assert heading[-1] - heading[0] == pytest.approx(TURN_DEG, rel=0.05)
+    steps = np.diff([scene.truth["x_m"], scene.truth["y_m"]])
+    ahead = np.array([np.cos(scene.truth["heading_rad"]), np.sin(scene.truth["heading_rad"])])
+    assert np.all((steps * ahead[:, 1:]).sum(0) > 0.9 * np.hypot(*steps))
+    assert np.ptp(memo.demo_scene(4, frames=9).truth["heading_rad"]) == 0
+
+
+def test_who_turns_is_followed_with_the_heading_of_each_frame(scene, run):
+    columns = read_track_csv(run / "track.csv")
+    assert set(columns["person"]) == {0} and len(columns["frame"]) > 65
+    truth = {name: scene.truth[name][columns["frame"]] for name in ("heading_rad", "x_m", "y_m")}
+    off = np.degrees(np.angle(np.exp(1j * (columns["heading_rad"] - truth["heading_rad"]))))
+    assert np.median(np.abs(off)) < 6 and np.quantile(np.abs(off), 0.95) < 15
+    assert np.median(np.hypot(columns["x_m"] - truth["x_m"], columns["y_m"] - truth["y_m"])) < 0.1
+
+
+def test_a_frame_on_the_curve_is_explained_as_it_was_searched(run):
+    columns = read_track_csv(run / "track.csv")
+    whys = list(explain(run))
+    assert [why.frame for why in whys] == columns["frame"].tolist()
+    np.testing.assert_allclose([why.chosen_similarity for why in whys], columns["similarity"], atol=8e-6)
+
+
+def test_the_report_tells_the_turn(run):
+    text = write_report(run).path.read_text(encoding="utf-8")
+    assert "turning left by about" in text
