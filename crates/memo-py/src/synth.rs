@@ -51,6 +51,7 @@ pub struct PyClothedScene(ClothedScene);
 impl PyClothedScene {
     #[new]
     #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, mover="walker"))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         seed: u64,
         frames: usize,
