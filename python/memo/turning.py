@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 __all__ = ["turned_deg", "turning_words"]
 
-TOLD_DEG = 20.0
-"""A turn from this angle on is told. Of 30 drawn people in clothes who turned by 40 or 69 degrees, the turn
-of 29 was found within 16 degrees; 18 who went straight were not told to turn."""
+STATED_DEG = 20.0
+"""The summary states turns of at least this angle. Of 30 drawn people in clothes who turned by 40 or
+69 degrees, the turn of 29 was found within 16 degrees; the path of 18 who went straight stayed straight."""
 
 
 def turned_deg(walk: Walk) -> float:
@@ -26,8 +26,8 @@ def turned_deg(walk: Walk) -> float:
 
 
 def turning_words(walk: Walk) -> str:
-    """The turn within a sentence; empty if there is none worth telling."""
+    """The turn as a part of a sentence; empty below `STATED_DEG` and on a treadmill."""
     turned = turned_deg(walk)
-    if walk.treadmill is not None or abs(turned) < TOLD_DEG:
+    if walk.treadmill is not None or abs(turned) < STATED_DEG:
         return ""
     return f", turning {'left' if turned > 0 else 'right'} by about {abs(turned):.0f} degrees,"

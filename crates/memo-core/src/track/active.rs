@@ -3,7 +3,7 @@
 use super::crowd::{Expected, body_box, expected};
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
-use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot};
+use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot, fitted_route};
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
@@ -287,7 +287,7 @@ impl Active {
         };
         let places = smoothed_hypotheses(steps, &options.walk.filter);
         let mut frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
-        let route = &self.route_by_contours(&mut frames, fit);
+        let route = &fitted_route(&self.camera, &self.average, &self.walk.route, &mut frames, fit);
         let problem = |route| {
             let problem = Problem::new(&self.camera, &self.average, route, &frames, fit);
             match (&options.camera, self.height.source) {

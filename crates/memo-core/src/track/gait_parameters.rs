@@ -319,8 +319,11 @@ impl TrackedWalk {
     /// Relative standard deviation of lengths along the path, from distance and posture. For an assumed camera
     /// also from the focal length, which scales displacement along the line of sight.
     pub(super) fn scale_sd(&self) -> f64 {
-        let rows = self.rows();
-        let middle_m = rows.get(rows.len() / 2).map_or(0.0, |row| row.hypothesis.along_m);
+        let middle = self.steps().len() / 2;
+        let middle_m = match self.fitted() {
+            Some(fit) => fit.frames[middle].along_m,
+            None => self.steps().get(middle).map_or(0.0, |step| step.state.along.position),
+        };
         let (eye, path) = (self.camera.position().truncate(), self.route().at(middle_m));
         let depth_sd_m = match self.fitted() {
             Some(fit) if !self.camera_is_guessed => {

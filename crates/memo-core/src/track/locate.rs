@@ -52,7 +52,7 @@ pub struct Sighting {
 }
 
 /// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
-pub(super) const MASK_MARGIN_PX: f64 = 2.0;
+const MASK_MARGIN_PX: f64 = 2.0;
 /// Shadows and reflections move the bottom row down and nothing moves it up, so a low quantile is the row of the
 /// soles. It needs no margin: shoes change less than hair does, and the far foot is higher in the image than the
 /// near one.
@@ -191,6 +191,13 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, crown: &Crown) -
         speed_mps,
         depth_sd_m,
     })
+}
+
+/// Where the person of one rectangle stands.
+pub(super) fn foot(sighting: &Sighting, camera: &Camera, crown: &Crown) -> Result<FootPosition, LocateError> {
+    let midpoints = person_midpoints(std::slice::from_ref(sighting), camera)?;
+    let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
+    Ok(stand(camera, &midpoints, crown.height_m, &options)?)
 }
 
 /// The position from both rows, weighted. If the depth from the soles is much smaller than that from the crown,

@@ -134,11 +134,6 @@ impl Route {
         route.start = tangent(&route.knots[0]);
         route
     }
-
-    /// Difference of the headings at two lengths along the route, radians: how far it turns between them.
-    pub fn turn_between(&self, from_m: f64, to_m: f64) -> f64 {
-        self.at(to_m).heading_rad - self.at(from_m).heading_rad
-    }
 }
 
 /// Points nearer to each other are one, metres.
@@ -157,6 +152,11 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, TAU};
 
     const RADIUS_M: f64 = 3.0;
+
+    /// How far a route turns between two lengths.
+    fn turn(route: &Route, from_m: f64, to_m: f64) -> f64 {
+        route.at(to_m).heading_rad - route.at(from_m).heading_rad
+    }
 
     /// Points of a circle about the origin from (3, 0) on, counter-clockwise, by the length of the arc.
     fn on_circle(along_m: f64) -> DVec2 {
@@ -180,7 +180,7 @@ mod tests {
         }
         let point = DVec2::new(5.0, 1.0);
         assert_eq!(route.along(point, 77.0), path.along(point));
-        assert_eq!(route.turn_between(-3.0, 8.0), 0.0);
+        assert_eq!(turn(&route, -3.0, 8.0), 0.0);
     }
 
     #[test]
@@ -197,7 +197,7 @@ mod tests {
             // On the tangent, the point has the same length.
             assert!((path.along(route.place(2.0 + along_m)) - 2.0 - along_m).abs() < 1e-9);
         }
-        assert!((route.turn_between(3.0, 15.0) - 12.0 / RADIUS_M).abs() < 2e-3);
+        assert!((turn(&route, 3.0, 15.0) - 12.0 / RADIUS_M).abs() < 2e-3);
     }
 
     #[test]
@@ -234,7 +234,7 @@ mod tests {
         }
         let outwards = DVec2::from_angle(0.2).rotate(about.normalize());
         assert!(moved.place(0.0).distance(about + 0.5 * outwards) < 2e-3);
-        assert!((moved.turn_between(0.0, 3.5) - 1.0).abs() < 2e-3);
+        assert!((turn(&moved, 0.0, 3.5) - 1.0).abs() < 2e-3);
         // Of a straight route likewise.
         let path = Path { origin: DVec2::new(1.0, 2.0), heading_rad: 0.3 };
         let moved = Route::from(path).moved(path.point(4.0, 0.0).truncate(), 4.0, 0.1, 0.2).at(0.0);
@@ -250,13 +250,13 @@ mod tests {
         let new = old.continued(&north, 2.0).unwrap();
         assert!(new.place(1.5).distance(DVec2::new(1.5, 0.0)) < 1e-6);
         assert!(new.place(4.0).distance(DVec2::new(2.0, 2.0)) < 1e-6);
-        assert!((new.turn_between(0.5, 4.0) - FRAC_PI_2).abs() < 1e-6);
+        assert!((turn(&new, 0.5, 4.0) - FRAC_PI_2).abs() < 1e-6);
     }
 
     #[test]
     fn headings_are_not_wrapped_and_repeated_points_count_once() {
         let route = circle();
-        assert!((route.turn_between(2.5, 16.5) - 14.0 / RADIUS_M).abs() < 2e-3 && 14.0 / RADIUS_M < TAU);
+        assert!((turn(&route, 2.5, 16.5) - 14.0 / RADIUS_M).abs() < 2e-3 && 14.0 / RADIUS_M < TAU);
         let twice: Vec<DVec2> = (0..40).map(|k| DVec2::new(0.1 * f64::from(k / 2), 0.0)).collect();
         let line = Route::through(&twice, 0.0).unwrap();
         assert!((line.along(DVec2::new(1.9, 0.3), 0.0) - 1.9).abs() < 1e-9);

@@ -9,9 +9,11 @@
 //! at the length s of L, with the Legendre polynomials P_j, and turned there by a'(s). With body, gait and places held,
 //! each step solves for the c_j that bring the contours to the edges.
 
+use super::FitOptions;
 use super::lines::Figure;
-use super::problem::{Problem, Room, Width};
+use super::problem::{FitFrame, Problem, Room, Width};
 use super::unknowns::{ACROSS, ALONG, FIGURE, HEADING, Unknowns};
+use crate::model::{Camera, Walker};
 use crate::track::route::Route;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -26,9 +28,33 @@ const CURVATURE_SD: f64 = 0.15;
 /// Distance of the points of a moved route, metres.
 const POINTS_M: f64 = 0.1;
 
+/// Number of steps.
+const STEPS: usize = 2;
+
+/// The route of somebody who turned, moved until the contours lie on the edges, and the frames on it; a straight route
+/// as it is.
+pub(crate) fn fitted_route(
+    camera: &Camera,
+    walker: &Walker,
+    route: &Route,
+    frames: &mut [FitFrame],
+    options: &FitOptions,
+) -> Route {
+    let mut route = route.clone();
+    for _ in 0..if route.is_straight() { 0 } else { STEPS } {
+        let Some(next) = Problem::new(camera, walker, &route, frames, options).moved_route() else { break };
+        for frame in frames.iter_mut() {
+            let along_m = frame.start.along_m;
+            frame.start.along_m = next.along(route.place(along_m), along_m);
+        }
+        route = next;
+    }
+    route
+}
+
 impl Problem<'_> {
     /// The route after one step; `None` if the contours do not determine one.
-    pub(crate) fn moved_route(&self) -> Option<Route> {
+    fn moved_route(&self) -> Option<Route> {
         let (unknowns, _) = self.best_start(0.0)?;
         let ends = [0, unknowns.frames.len() - 1].map(|k| self.along(&unknowns.frames[k]));
         let length_m = ends[1] - ends[0];
