@@ -6,6 +6,7 @@
 
 use glam::DVec2;
 use memo_core::synth::{ClothedOptions, ClothedScene, FootContact, Mover};
+use memo_core::track::fit::FitError;
 use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
 use memo_core::track::options::TrackerOptions;
 use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
@@ -433,4 +434,35 @@ fn a_treadmill_can_be_excluded() {
     }
     tracker.finish().unwrap();
     assert!(tracker.take_finished().iter().all(|walk| walk.treadmill().is_none()));
+}
+
+/// Someone who walks away from the camera is followed by the feet, and left and right stay open.
+#[test]
+fn a_walk_along_the_line_of_sight_is_followed_by_its_feet() {
+    let seed = 3;
+    let options = ClothedOptions {
+        frames: 90,
+        slant_rad: Some(1.48),
+        leftward: Some(false),
+        seed,
+        ..ClothedOptions::default()
+    };
+    let scene = scene(options);
+    let walks = tracked(&scene, 0..scene.len(), true);
+    let frames: Vec<usize> = walks.iter().map(|walk| walk.steps().len()).collect();
+    let followed = Followed { seed, scene, walks };
+    let errors = followed.errors();
+    let along = rms(errors.iter().map(|e| e[0]));
+    let wrapped = |e: f64| (2.0 * e - (2.0 * e).round()).abs() / 2.0;
+    let phase = median(errors.iter().map(|e| wrapped(e[3])).collect());
+    println!("seed {seed}: {frames:?} frames, along {along:.3}, phase {phase:.3}");
+    assert!(frames.len() == 1 && frames[0] >= 72, "seed {seed}: {frames:?}");
+    let walk = &followed.walks[0];
+    assert!(walk.is_frontal && walk.p_swapped() == 0.5);
+    assert!(matches!(walk.fit, Some(Err(FitError::Frontal))));
+    // Shadows and shoes move all places: the stated deviation says so.
+    let row = &followed.rows()[frames[0] / 2];
+    let stated = row.sd[0].hypot(row.sd[1]);
+    assert!(along < 0.3 && along < 2.0 * stated, "seed {seed}: {along}, stated {stated}");
+    assert!(phase < 0.1 && row.sd[3] > 0.03, "seed {seed}: {phase}");
 }

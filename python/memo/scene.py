@@ -58,6 +58,7 @@ def demo_scene(
     leftward: bool | None = None,
     late_left: float | None = None,
     turn_deg: float = 0.0,
+    slant_deg: float | None = None,
     mover: Literal["walker", "rider", "waver", "trolley", "treadmill"] = "walker",
     progress: Progress | None = None,
 ) -> DemoScene:
@@ -69,7 +70,8 @@ def demo_scene(
 
     `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
     by which the left foot strikes late (-0.1 to 0.1), `turn_deg` how far a walker turns to the left in all
-    (-229 to 229): the path is an arc. Movers other than a walker must be refused by the
+    (-229 to 229): the path is an arc. `slant_deg` turns the path out of the image plane, to the left (-91 to
+    91): a person who walks to the right goes away at 90. Movers other than a walker must be refused by the
     tracker: a `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`;
     they have no truth. `progress` is called with the number of frames drawn and the total.
     """
@@ -80,6 +82,7 @@ def demo_scene(
         leftward=leftward,
         late_left=late_left,
         turn_rad=float(np.radians(turn_deg)),
+        slant_rad=None if slant_deg is None else float(np.radians(slant_deg)),
         mover=mover,
     )
     rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]

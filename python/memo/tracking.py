@@ -237,6 +237,7 @@ class StoredWalk:
     height_is_contradicted: bool
     walk_ratio: tuple[float, float, float] | None
     treadmill: tuple[float, float, tuple[float, float] | None] | None
+    is_frontal: bool
 
     @classmethod
     def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
@@ -279,6 +280,9 @@ class StoredWalk:
     def __repr__(self) -> str:
         return f"StoredWalk({counted(len(self), 'row')}, {self.direction})"
 
+
+ALONG_SIGHT = float(np.cos(np.radians(35)))
+"""Paths that are within this angle of the line of sight, as its cosine, lead towards the camera or away."""
 
 _TABLES = ("columns", "events", "measured", "start", "gait_parameters", "cycles", "departures", "record")
 
@@ -538,6 +542,10 @@ class Track:
             return "on a treadmill"
         columns = walk.columns()
         ends = np.column_stack([columns[f"right_hip_{axis}_m"][[0, -1]] for axis in "xyz"])
+        ahead, sight = (ends[1] - ends[0])[:2], (ends.mean(0) - walk.camera.position)[:2]
+        along = float(ahead @ sight) / float(np.linalg.norm(ahead) * np.linalg.norm(sight))
+        if abs(along) > ALONG_SIGHT:
+            return "away from the camera" if along > 0 else "towards the camera"
         first_px, last_px = walk.camera.project(ends)[:, 0]  # in one view, wherever the camera looked
         return "left to right" if last_px > first_px else "right to left"
 

@@ -488,6 +488,13 @@ impl PyWalk {
         Some((belt.speed_mps, belt.sd_mps, mirrored.map(|m| (m.heading_rad, m.probability))))
     }
 
+    /// True for a walk towards the camera or away from it, whose place and phase the feet show: left and right stay open,
+    /// and the angles are those of average walking.
+    #[getter]
+    fn is_frontal(&self) -> bool {
+        self.walk.is_frontal
+    }
+
     /// The camera, given or assumed.
     #[getter]
     fn camera(&self) -> PyCamera {

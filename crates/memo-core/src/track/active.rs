@@ -4,6 +4,7 @@ use super::crowd::{Expected, body_box, expected};
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot, fitted_route};
+use super::frontal::Frontal;
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
@@ -87,6 +88,8 @@ pub(super) struct Active {
     pub(super) is_on_treadmill: bool,
     /// On the spot, the frames of the stream until the start: later ones do not show the empty scene.
     pub(super) early: Option<Backdrop>,
+    /// What the feet show of somebody who walks towards the camera or away from it.
+    pub(super) frontal: Option<Frontal>,
 }
 
 impl Active {
@@ -101,9 +104,14 @@ impl Active {
             torso_centre: self.scene(hypothesis.along_m).pose(&hypothesis).torso_centre,
             heading_rad: self.walk.route.at(hypothesis.along_m).heading_rad,
             phase: hypothesis.phase,
-            p_swapped: self.walk.swap_probability(&options.walk.swap),
+            p_swapped: self.p_swapped(options),
             speed_mps: step.state.along.velocity,
         })
+    }
+
+    /// Probability that left and right are swapped; the feet of somebody who walks towards the camera do not show it.
+    pub(super) fn p_swapped(&self, options: &TrackerOptions) -> f64 {
+        if self.frontal.is_some() { 0.5 } else { self.walk.swap_probability(&options.walk.swap) }
     }
 
     /// The scene near a place along the route.
@@ -177,6 +185,8 @@ impl Active {
         let is_slow = covered_m < SLOWEST_MPS * elapsed_s;
         let left = if self.is_on_treadmill { covered_m > LEAVING_MPS * elapsed_s } else { is_slow };
         let stopped = left || cycles < SLOWEST_HZ * elapsed_s;
+        let unseen = |frontal: &Frontal| count - frontal.seen().min(count) >= RECENT_FRAMES;
+        let stopped = stopped || self.frontal.as_ref().is_some_and(unseen);
         stopped || matched(recent).is_some_and(|found| found < LOST_SHARE * mean_similarity(twin))
     }
 
@@ -229,6 +239,7 @@ impl Active {
             Some(twin.steps.iter().rev().take_while(is_gone).count()).filter(|gone| *gone >= LEAST_GONE);
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
         let end = twin.steps.len() - over.max(gone.unwrap_or(0));
+        let end = self.frontal.as_ref().map_or(end, |frontal| frontal.seen().min(end));
         self.walk.keep(absent.min(end)..end);
     }
 
@@ -271,6 +282,9 @@ impl Active {
         p_swapped: Option<f64>,
     ) -> Option<Result<WalkFit, FitError>> {
         let fit = options.fit.as_ref()?;
+        if self.frontal.is_some() {
+            return Some(Err(FitError::Frontal));
+        }
         let walker = &self.walk.walker;
         let steps = &self.walk.twins[self.walk.best()].steps;
         let first = steps.first().map_or(usize::MAX, |step| step.frame);
@@ -416,6 +430,7 @@ pub(super) mod tests {
             pieces: Vec::new(),
             is_on_treadmill: false,
             early: None,
+            frontal: None,
         }
     }
 

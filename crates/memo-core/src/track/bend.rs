@@ -91,7 +91,7 @@ impl Active {
     /// Follows the kept frames from an index on again, on the curve through their sightings, if that gains so much
     /// similarity; true if it does. Unless a `quick` comparison denies it.
     fn bend(&mut self, from: usize, least_gain: f64, is_quick: bool, options: &TrackerOptions) -> bool {
-        if self.is_on_treadmill {
+        if self.is_on_treadmill || self.frontal.is_some() {
             return false;
         }
         let end = self.steps().last().map_or(0, |step| step.frame);

@@ -15,7 +15,7 @@ pub(super) const MISSED_FRAMES: usize = 3;
 /// Speed of a comfortable walk, used before the speed is known, m/s.
 pub(super) const COMFORTABLE_MPS: f64 = 1.3;
 /// Nobody walks faster than this, m/s.
-const FASTEST_MPS: f64 = 3.0;
+pub(super) const FASTEST_MPS: f64 = 3.0;
 /// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
 /// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
 const LEAST_CONTRAST: f64 = 1.22;
@@ -115,6 +115,7 @@ impl Candidate {
             gait_speed_mps: course.speed_mps,
             settled: false,
             is_on_treadmill: false,
+            frontal: None,
             early: None,
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
         })

@@ -150,6 +150,12 @@ impl Evidence {
         group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
     }
 
+    /// The rectangle of all changes at one of the firm ones. It reaches down to feet that hardly move.
+    pub(crate) fn all_changes(&self, firm: &Rectangle, options: &EvidenceOptions) -> Option<Rectangle> {
+        let regions = group_regions(&regions(&self.mask, options.group.min_part_area), &options.group);
+        regions.into_iter().map(|region| region.rectangle).find(|all| all.gap(firm) == [0, 0])
+    }
+
     /// Straight edges in and near the changed pixels of a rectangle, with their edge points. If nothing changed
     /// in the rectangle, those of the whole rectangle.
     pub fn edges(

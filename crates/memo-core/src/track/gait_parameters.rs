@@ -331,7 +331,12 @@ impl TrackedWalk {
             }
             _ => self.depth_sd_m,
         };
-        let distance = (depth_sd_m / path.distance(eye)).hypot(POSTURE_SD);
+        // Along the line of sight, the length of a row on the ground grows with the square of the distance.
+        let relative = match self.is_frontal {
+            true => 2.0 * depth_sd_m / path.point(middle_m, 0.0).truncate().distance(eye),
+            false => depth_sd_m / path.distance(eye),
+        };
+        let distance = relative.hypot(POSTURE_SD);
         let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
         let along_view_sq = path.direction().dot(view).powi(2);
         if self.camera_is_guessed { distance.hypot(FOCAL_SD * along_view_sq) } else { distance }

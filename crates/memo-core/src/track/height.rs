@@ -110,6 +110,23 @@ pub(super) fn start_height(
     }
 }
 
+/// The same of somebody who comes nearer or goes away: each rectangle has its own rows.
+pub(super) fn approaching_height(
+    options: &TrackerOptions,
+    height_m: Option<f64>,
+    camera: &Camera,
+    sightings: &[Sighting],
+) -> BodyHeight {
+    let of = |sighting: &Sighting| {
+        let one = std::slice::from_ref(sighting);
+        start_height(options, height_m, Some(camera), one)
+    };
+    let is_known = |height: &BodyHeight| height.source != HeightSource::Assumed;
+    let mut all: Vec<BodyHeight> = sightings.iter().map(of).filter(is_known).collect();
+    all.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    all.get(all.len() / 2).copied().unwrap_or(BodyHeight::POPULATION)
+}
+
 /// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m.
 pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
     let weight = PositionOptions::default().bottom_weight;

@@ -52,7 +52,7 @@ pub struct Sighting {
 }
 
 /// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
-const MASK_MARGIN_PX: f64 = 2.0;
+pub(super) const MASK_MARGIN_PX: f64 = 2.0;
 /// Shadows and reflections move the bottom row down and nothing moves it up, so a low quantile is the row of the
 /// soles. It needs no margin: shoes change less than hair does, and the far foot is higher in the image than the
 /// near one.

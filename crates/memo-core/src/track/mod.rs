@@ -9,6 +9,7 @@ pub mod cycles;
 pub mod evidence;
 pub mod explain;
 pub mod fit;
+mod frontal;
 pub mod gait_parameters;
 pub mod height;
 pub mod locate;

@@ -7,11 +7,12 @@
 
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
+use super::frontal::{ACROSS_SD_M, COMMON_PHASE_SD};
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
-use super::walk::{Step, Walk, WalkOptions};
+use super::walk::{State, Step, Walk, WalkOptions};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
 use crate::model::{Camera, PosedBody, Posture, SideJoints};
 use glam::{DVec2, DVec3};
@@ -42,6 +43,9 @@ pub struct TrackedWalk {
     pub gait_speed_mps: f64,
     /// Whether the person walks on a treadmill ([`TrackedWalk::treadmill`]).
     pub is_on_treadmill: bool,
+    /// Whether the person walks towards the camera or away from it: then the feet show place and phase, left and right
+    /// stay open, and the angles are those of the average gait.
+    pub is_frontal: bool,
     /// The fit of the person, or why there is none; `None` if none was asked for.
     pub fit: Option<Result<WalkFit, FitError>>,
     /// The options used.
@@ -130,7 +134,11 @@ impl TrackedWalk {
 
     /// Probability that left and right are swapped in the whole walk: of the fit, or of the twins' similarities.
     pub fn p_swapped(&self) -> f64 {
-        self.fitted().map_or_else(|| self.walk.swap_probability(&self.options.swap), |fit| fit.p_swapped)
+        match self.fitted() {
+            Some(fit) => fit.p_swapped,
+            None if self.is_frontal => 0.5,
+            None => self.walk.swap_probability(&self.options.swap),
+        }
     }
 
     /// True if a height was given and the fit contradicts it by more than three standard deviations.
@@ -190,8 +198,12 @@ impl TrackedWalk {
     }
 
     fn tracked_rows(&self, steps: &[Step]) -> Vec<Row> {
-        let coordinates = coordinates(steps, &self.options.filter);
         let p_swapped = self.p_swapped();
+        if self.is_frontal {
+            let of = |s: &State| [s.along, s.height, s.phase].map(|state| (state, 1.0));
+            return steps.iter().map(|step| self.row(step, p_swapped, of(&step.state))).collect();
+        }
+        let coordinates = coordinates(steps, &self.options.filter);
         let at = |k: usize| coordinates.each_ref().map(|c| (c.smoothed[k], c.sd_scale));
         steps.iter().enumerate().map(|(k, step)| self.row(step, p_swapped, at(k))).collect()
     }
@@ -259,9 +271,12 @@ impl TrackedWalk {
         let eye = self.camera.position().truncate();
         let off_axis = (hypothesis.along_m - scene.path.along(eye)).abs();
         let distance = scene.path.distance(eye);
-        let along_sd = sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance);
+        let [along_sd, across_sd] = match self.is_frontal {
+            true => [sd(along, self.depth_sd_m), ACROSS_SD_M],
+            false => [sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance), self.depth_sd_m],
+        };
         let heading = scene.path.direction();
-        let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * self.depth_sd_m);
+        let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * across_sd);
         Row {
             frame: step.frame,
             time_s: step.time_s,
@@ -274,7 +289,7 @@ impl TrackedWalk {
                 forward.x.hypot(across.x),
                 forward.y.hypot(across.y),
                 sd(height, COMMON_SD[1]).hypot(self.height.assumed_scale_sd() * posed.torso_centre.z),
-                sd(phase, COMMON_SD[2]),
+                sd(phase, if self.is_frontal { COMMON_PHASE_SD } else { COMMON_SD[2] }),
             ],
             posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),
             measured: None,

@@ -334,6 +334,11 @@ impl Tracker {
                 active.pieces.push(Piece::new(evidence.frame, &evidence.grey, own.window, others));
                 self.backdrop.occupy(evidence.frame, own.window);
             }
+            if let Some(frontal) = &active.frontal {
+                let all = || sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
+                let seen = if frontal.by_all { all() } else { sighting };
+                active.pace(edges.time_s, seen.as_ref());
+            }
             active.kept.push((sighting, edges));
             self.settle(k);
             self.people[k].turn(&self.options);
@@ -515,13 +520,14 @@ impl Tracker {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         active.settle(&self.backdrop, &self.options);
         active.turned(&self.options);
+        active.pace_all();
         active.trim();
         if !active.is_walk() {
             self.report.refused_starts += 1;
             self.identities.withdraw(active.person);
             return;
         }
-        let p_swapped = active.walk.swap_probability(&self.options.walk.swap);
+        let p_swapped = active.p_swapped(&self.options);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
         // What was left over from somebody else can look like a walker, but then the contours do not fit.
         let is_left_over = active.started_near && matches!(fit, Some(Err(FitError::Misfit { .. })));
@@ -545,10 +551,18 @@ impl Tracker {
             camera_is_guessed: self.options.camera.is_none(),
             gait_speed_mps: active.gait_speed_mps,
             is_on_treadmill: active.is_on_treadmill,
+            is_frontal: active.frontal.is_some(),
             fit,
             options: self.options.walk,
         });
     }
+}
+
+/// The sighting of all changes at a sighting; `None` if the image border cuts them.
+fn feet(sighting: &Sighting, evidence: &Evidence, options: &TrackerOptions) -> Option<Sighting> {
+    let rectangle = evidence.all_changes(&sighting.rectangle, &options.evidence)?;
+    let is_cut = rectangle.bottom + 2 >= evidence.grey.height();
+    (!is_cut).then_some(Sighting { rectangle, ..*sighting })
 }
 
 /// The sighting of a region that the image border does not cut.

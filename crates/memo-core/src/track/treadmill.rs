@@ -24,6 +24,7 @@ use crate::image::Rectangle;
 use crate::model::{Camera, GaitStyle, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// Headings of the fan: every 15 degrees.
@@ -93,6 +94,8 @@ const AVERAGE_GAIT_SHARE: f64 = 0.15;
 pub(super) struct Standing {
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
     pub(super) pieces: Vec<Piece>,
+    /// By frame, the rectangles of all changes, which reach down to feet that hardly move.
+    pub(super) feet: BTreeMap<usize, Sighting>,
 }
 
 impl Standing {
@@ -109,20 +112,35 @@ impl Standing {
     }
 
     /// These frames and the next; frames of something elsewhere, or of something that was gone, are dropped.
-    pub(super) fn with(self, sighting: Option<Sighting>, edges: FrameEdges, piece: Option<Piece>) -> Self {
+    pub(super) fn with(
+        self,
+        sighting: Option<Sighting>,
+        feet: Option<Sighting>,
+        edges: FrameEdges,
+        piece: Option<Piece>,
+    ) -> Self {
         let is_there = |k: &(Option<Sighting>, FrameEdges)| k.0.is_some();
         let is_gone = self.kept.iter().rev().take_while(|k| !is_there(k)).count() >= MISSED_FRAMES;
         let is_elsewhere = self.kept.last().is_some_and(|(_, last)| last.window.gap(&edges.window) != [0, 0]);
         let mut standing = if is_gone || is_elsewhere { Self::default() } else { self };
+        standing.feet.extend(feet.map(|feet| (edges.frame, feet)));
         standing.kept.push((sighting, edges));
         standing.pieces.extend(piece);
         standing
+    }
+
+    /// Time from the first frame to the last, seconds.
+    pub(super) fn lasts_s(&self) -> f64 {
+        let ends = self.kept.first().zip(self.kept.last());
+        ends.map_or(0.0, |((_, first), (_, last))| last.time_s - first.time_s)
     }
 
     /// Without the first frames.
     pub(super) fn later(mut self, count: usize) -> Self {
         self.kept.drain(..count.min(self.kept.len()));
         self.pieces.drain(..count.min(self.pieces.len()));
+        let first = self.kept.first().map_or(usize::MAX, |(_, edges)| edges.frame);
+        self.feet.retain(|frame, _| *frame >= first);
         self
     }
 
@@ -184,6 +202,7 @@ impl Spot<'_> {
             settled: false,
             pieces: standing.pieces,
             is_on_treadmill: true,
+            frontal: None,
             early: Some(self.backdrop.clone()),
         })
     }
@@ -285,7 +304,7 @@ mod tests {
                 FrameEdges { frame: k, time_s, window, edges, others: Vec::new(), shared: false },
             )
         };
-        Standing { kept: (0..12).map(frame).collect(), pieces: Vec::new() }
+        Standing { kept: (0..12).map(frame).collect(), ..Standing::default() }
     }
 
     fn begun(standing: Standing, treadmill: Option<bool>) -> Option<Active> {
@@ -348,8 +367,8 @@ mod tests {
     fn frames_of_what_was_gone_or_is_elsewhere_are_forgotten() {
         let rectangle = Rectangle { left: 20, top: 20, right: 50, bottom: 80 };
         let seen = Some(Sighting { time_s: 0.0, rectangle });
-        let three = Standing::default().with(seen, edges(0), None).with(None, edges(1), None);
-        let three = three.with(seen, edges(2), None);
+        let three = Standing::default().with(seen, None, edges(0), None).with(None, None, edges(1), None);
+        let three = three.with(seen, None, edges(2), None);
         assert_eq!((three.kept.len(), three.sightings().len()), (3, 2));
         let wider = Rectangle { right: 70, ..rectangle };
         assert_eq!(three.window(Some(&wider)), Some(rectangle.union(&wider)));
@@ -357,19 +376,22 @@ mod tests {
         let far = Rectangle { left: 200, right: 230, ..rectangle };
         assert_eq!(three.window(Some(&far)), Some(far));
         let elsewhere = FrameEdges { window: far, ..edges(3) };
-        assert_eq!(Standing::default().with(seen, edges(2), None).with(seen, elsewhere, None).kept.len(), 1);
-        let gone = (3..6).fold(three, |standing, k| standing.with(None, edges(k), None));
+        assert_eq!(
+            Standing::default().with(seen, None, edges(2), None).with(seen, None, elsewhere, None).kept.len(),
+            1
+        );
+        let gone = (3..6).fold(three, |standing, k| standing.with(None, None, edges(k), None));
         assert_eq!(gone.kept.len(), 6);
-        assert_eq!(gone.with(seen, edges(6), None).kept.len(), 1);
+        assert_eq!(gone.with(seen, None, edges(6), None).kept.len(), 1);
         assert_eq!(Standing::default().window(None), None);
     }
 
     #[test]
     fn frames_before_a_walk_come_first_and_once() {
-        let with = |standing: Standing, k: usize| standing.with(None, edges(k), None);
+        let with = |standing: Standing, k: usize| standing.with(None, None, edges(k), None);
         let before = (0..4).fold(Standing::default(), |standing, k| {
             let seen = Sighting { time_s: 0.0, rectangle: edges(0).window };
-            standing.with(Some(seen), edges(k), None)
+            standing.with(Some(seen), None, edges(k), None)
         });
         let walk: Vec<_> = (2..6).map(|k| (None, edges(k))).collect();
         let all = before.followed_by(&walk, &[]);

@@ -66,7 +66,7 @@ pub struct ClothedOptions {
     pub noise_sd: Option<f32>,
     /// Whether the walk goes to the left.
     pub leftward: Option<bool>,
-    /// Angle of the path out of the image plane, radians, -1 to 1; by the seed within 0.12.
+    /// Angle of the path out of the image plane, radians, -1.6 to 1.6; by the seed within 0.12.
     pub slant_rad: Option<f64>,
     /// Delay of the left side, as a fraction of the cycle, -0.1 to 0.1; by the seed a few thousandths.
     pub late_left: Option<f64>,
@@ -440,7 +440,7 @@ fn check(options: &ClothedOptions) -> Result<(), SceneError> {
     check_ranges(&[
         ("rate_hz", options.rate_hz, 1.0..=1e4, "1 to 10000 frames a second"),
         ("noise_sd", options.noise_sd.map_or(0.0, f64::from), 0.0..=255.0, "0 to 255 grey levels"),
-        ("slant_rad", options.slant_rad.unwrap_or(0.0), -1.0..=1.0, "-1 to 1 rad"),
+        ("slant_rad", options.slant_rad.unwrap_or(0.0), -1.6..=1.6, "-1.6 to 1.6 rad"),
         ("turn_rad", options.turn_rad, -4.0..=4.0, "-4 to 4 rad"),
         ("late_left", options.late_left.unwrap_or(0.0), -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
     ])

@@ -95,6 +95,9 @@ pub enum FitError {
     /// The frames do not determine the unknowns.
     #[error("the frames do not show enough of the person")]
     Undetermined,
+    /// The person walks towards the camera or away from it.
+    #[error("seen from the front or from behind, the outline does not show the joint angles")]
+    Frontal,
     /// The fit ended in a place where the contours are not those of the frames.
     #[error(
         "the model does not fit the person: {:.0} % of its outline found no edge, the rest is {:.1} % of the height off",

@@ -112,6 +112,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         camera: camera(),
         camera_is_guessed: false,
         is_on_treadmill: false,
+        is_frontal: false,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.1,
         start: report(path, beginning, direction),

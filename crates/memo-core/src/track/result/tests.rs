@@ -66,6 +66,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
         camera: camera(),
         camera_is_guessed: false,
         is_on_treadmill: false,
+        is_frontal: false,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
         start: report(path, beginning, Direction::Forward),

@@ -1,9 +1,15 @@
 //! The tracker on somebody who walks on the spot, while nobody else is followed.
 
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
-use super::super::height::start_height;
+use super::super::frontal::Approach;
+use super::super::height::{approaching_height, start_height};
 use super::super::treadmill::Spot;
 use super::*;
+
+/// A start looks at so many seconds at most.
+const LONGEST_S: f64 = 4.0;
+/// Feet show a walk towards the camera after three steps.
+const SHORTEST_S: f64 = 1.5;
 
 impl Tracker {
     /// Collects frames of what may walk on the spot.
@@ -12,33 +18,62 @@ impl Tracker {
         evidence: &Evidence,
         sighting: Option<Sighting>,
     ) -> Result<(), TrackError> {
-        if self.options.treadmill == Some(false) {
-            return Ok(());
-        }
         let standing = std::mem::take(&mut self.standing);
         let Some(window) = standing.window(sighting.as_ref().map(|s| &s.rectangle)) else { return Ok(()) };
         let window = grown(&window, evidence, WINDOW_MARGIN_PX);
         let edges = self.edges(evidence, &window, self.options.camera.as_ref())?;
         let piece = |_| Piece::new(evidence.frame, &evidence.grey, window, Vec::new());
-        self.standing = standing.with(sighting, edges, self.options.fit.map(piece));
+        let feet = sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
+        self.standing = standing.with(sighting, feet, edges, self.options.fit.map(piece));
         Ok(())
     }
 
-    /// Starts a walk on the spot when there are enough frames, or drops the oldest ones.
+    /// Starts a walk on the spot, or one towards the camera or away from it, from time to time when there are enough
+    /// frames.
     pub(super) fn start_on_the_spot(&mut self, evidence: &Evidence) {
-        if !self.people.is_empty() || self.standing.kept.len() < self.options.path_frames {
+        let (least, every) = (self.options.path_frames, self.options.start_frames);
+        let further = self.standing.kept.len().checked_sub(least);
+        if !self.people.is_empty() || further.is_none_or(|further| !further.is_multiple_of(every)) {
             return;
         }
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         let standing = std::mem::take(&mut self.standing);
-        match self.spot(&standing.sightings(), size).map(|spot| spot.begin(standing)) {
-            Some(Ok(mut active)) => {
+        let begun = self.begun_where_it_stays(standing, size);
+        match begun.or_else(|standing| self.begun_along_the_sight(standing, size)) {
+            Ok(mut active) => {
                 self.candidates.clear();
                 active.person = self.identified(&active);
                 self.people.push(active);
             }
-            Some(Err(standing)) => self.standing = standing.later(self.options.start_frames),
-            None => {}
+            Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,
+            Err(standing) => self.standing = standing.later(every),
+        }
+    }
+
+    fn begun_where_it_stays(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
+        if self.options.treadmill == Some(false) {
+            return Err(standing);
+        }
+        match self.spot(&standing.sightings(), size) {
+            Some(spot) => spot.begin(standing),
+            None => Err(standing),
+        }
+    }
+
+    /// Only a calibrated camera shows how far away feet are.
+    fn begun_along_the_sight(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
+        let (options, sightings) = (&self.options, standing.sightings());
+        let Some(camera) = options.camera.as_ref().filter(|_| options.treadmill != Some(true)) else {
+            return Err(standing);
+        };
+        if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
+            return Err(standing);
+        }
+        let height =
+            approaching_height(options, options.height_of(self.identities.count()), camera, &sightings);
+        match options.walker(height.height_m, COMFORTABLE_MPS) {
+            Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
+            Err(_) => Err(standing),
         }
     }
 

@@ -263,6 +263,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         pieces: Vec::new(),
         is_on_treadmill: false,
         early: None,
+        frontal: None,
     });
     tracker
 }

@@ -1,0 +1,85 @@
+"""Walks towards the camera and away from it: the whole chain on a drawn person, and what the summary says."""
+
+import pickle
+import sys
+
+import av
+import memo
+import numpy as np
+import pytest
+from memo import cli
+from memo.explain import explain
+from memo.files import read_track_csv
+from memo.report import write_report
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A person who comes straight towards the camera, but for five degrees."""
+    return memo.demo_scene(4, frames=90, slant_deg=-85, leftward=False)
+
+
+@pytest.fixture(scope="module")
+def track(scene):
+    return memo.track(list(scene.frames), fps=25, camera=scene.camera, height_m=scene.height_m)
+
+
+def test_the_scene_comes_nearer(scene):
+    distance = np.hypot(
+        scene.truth["x_m"] - scene.camera.position[0], scene.truth["y_m"] - scene.camera.position[1]
+    )
+    assert np.all(np.diff(distance) < 0) and np.ptp(distance) > 3
+
+
+def test_place_and_phase_are_found_and_the_sides_stay_open(scene, track):
+    (walk,) = track.walks
+    assert walk.is_frontal and len(walk) > 72
+    columns = walk.columns()
+    truth = {name: scene.truth[name][columns["frame"]] for name in ("heading_rad", "x_m", "y_m", "phase")}
+    off_m = np.hypot(columns["x_m"] - truth["x_m"], columns["y_m"] - truth["y_m"])
+    assert np.median(off_m) < 0.3
+    assert np.median(off_m) < 2 * np.median(np.hypot(columns["sd_x_m"], columns["sd_y_m"]))
+    off = np.degrees(np.angle(np.exp(1j * (columns["heading_rad"] - truth["heading_rad"]))))
+    assert np.abs(off).max() < 6
+    half_cycles = 2 * (columns["phase"] - truth["phase"])
+    assert np.median(np.abs(half_cycles - np.round(half_cycles))) / 2 < 0.05
+    assert np.all(columns["p_swapped"] == 0.5)
+
+
+def test_the_summary_says_what_was_measured_and_what_not(track):
+    summary = track.summary
+    assert "walks towards the camera" in summary["message"] and "not certain" not in summary["message"]
+    assert summary["direction"] == "towards the camera" and summary["p_swapped"] == 0.5
+    assert not summary["fit"]["measured"] and "from the front" in summary["fit"]["problem"]
+
+
+def test_a_stored_walk_keeps_it(track):
+    (walk,) = pickle.loads(pickle.dumps(track)).walks
+    assert walk.is_frontal
+
+
+def test_without_a_calibrated_camera_nobody_is_followed_by_the_feet(scene):
+    track = memo.track(list(scene.frames), fps=25, height_m=scene.height_m)
+    assert not any(walk.is_frontal for walk in track.walks)
+
+
+def test_frames_are_explained_and_reported(scene, tmp_path, monkeypatch):
+    with av.open(str(tmp_path / "video.mkv"), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"qp": "0", "preset": "ultrafast"})
+        stream.height, stream.width = scene.frames[0].shape
+        stream.pix_fmt = "gray"
+        for frame in scene.frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+        container.mux(stream.encode(None))
+    scene.camera.to_toml(tmp_path / "camera.toml")
+    arguments = ["track", tmp_path / "video.mkv", "--camera", tmp_path / "camera.toml"]
+    arguments += ["--no-plots", "--quiet", "--out", tmp_path]
+    monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+    with pytest.raises(SystemExit) as exited:
+        cli.main()
+    assert not exited.value.code
+    columns = read_track_csv(tmp_path / "track.csv")
+    whys = list(explain(tmp_path))
+    assert [why.frame for why in whys] == columns["frame"].tolist()
+    np.testing.assert_allclose([why.chosen_similarity for why in whys], columns["similarity"], atol=8e-6)
+    assert "towards the camera" in write_report(tmp_path).path.read_text(encoding="utf-8")
