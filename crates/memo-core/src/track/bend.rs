@@ -25,6 +25,9 @@ const EVERY: usize = 10;
 /// Of the windows of drawn people who turned, the best gained 0.01 to 0.1. Of 60 windows of 40 frames and more of drawn
 /// people who went straight, three gained 0.002 to 0.006 and none more; 18 further people stayed on a straight path.
 const LEAST_GAIN: f64 = 0.01;
+/// The same before the path is settled, when a straight line may be off too. Of 24 drawn people who went straight, 16 to 35
+/// frames gained up to 0.04; of 16 who turned by 40 to 69 degrees, most gained 0.05 to 0.36.
+const LEAST_EARLY_GAIN: f64 = 0.05;
 /// The same of the quick comparison, after which the frames are followed again.
 const LEAST_QUICK_GAIN: f64 = 0.008;
 /// The quick comparison looks at one frame of so many.
@@ -70,9 +73,10 @@ impl Active {
         goes_on
     }
 
-    /// Looks for a turn in the latest frames; true if there is one. Fewer frames than settle a path show no turn.
+    /// Looks for a turn in the latest frames; true if there is one.
     pub(super) fn has_turned(&mut self, options: &TrackerOptions) -> bool {
-        self.settled && self.bend(self.latest(options), LEAST_GAIN, false, options)
+        let least_gain = if self.settled { LEAST_GAIN } else { LEAST_EARLY_GAIN };
+        self.bend(self.latest(options), least_gain, false, options)
     }
 
     /// Smooths the whole route of somebody who turned, from before and after each frame.

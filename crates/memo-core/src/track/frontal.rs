@@ -40,8 +40,8 @@ const RATES: usize = 40;
 const OFFSETS: usize = 25;
 /// How much earlier in the cycle the nearer foot is seen than it stands there, of people who come nearer and who go away.
 /// Changes show feet while they move: in front, a foot goes out of sight soon after it has landed, and behind, it comes
-/// into sight only when it is lifted. Measured on people drawn by two programs: 0.11 to 0.15, and -0.01 to -0.14.
-const LEAD: [f64; 2] = [0.12, -0.08];
+/// into sight only when it is lifted. Measured on people drawn by two programs: 0.11 to 0.15, and -0.10 to -0.21.
+const LEAD: [f64; 2] = [0.12, -0.15];
 /// All changes reach so much farther down than the firm ones, pixels.
 const ALL_MARGIN_PX: f64 = 2.0;
 /// How far the feet of walkers are off their line of phase, the scale of Cauchy's distribution, metres. Things that are no
