@@ -20,6 +20,7 @@ def explain(run_folder, frames=None, progress=None, *, video=None):
         yield SimpleNamespace(
             frame=int(frame),
             time_s=frame / 25,
+            walk=0,
             luma=np.tile(np.arange(0, 4 * width, 4, dtype=np.uint8), (height, 1)),
             change_mask=mask,
             edge_points=np.array([[left, v] for v in range(12, 38)] + [[-3.0, 5.0], [1000.0, 5.0]]),

@@ -462,12 +462,12 @@ def test_each_walk_of_a_video_has_its_own_direction(lab):
     lab.videos("twice")
     lab.run()
     seen = [
-        [row[name] for name in ("walk", "direction", "gait", "p_swapped")]
+        [row[name] for name in ("walk", "person", "direction", "gait", "p_swapped")]
         for row in table(lab.out, "gait_parameters.csv")
     ]
     assert seen == [
-        ["0", "left to right", "forward", "0.010000"],
-        ["1", "right to left", "backward", "0.200000"],
+        ["0", "0", "left to right", "forward", "0.010000"],
+        ["1", "1", "right to left", "backward", "0.200000"],
     ]
 
 
@@ -481,7 +481,7 @@ def test_every_walk_is_counted_and_told(lab):
     assert [row["walks"] for row in others] == ["1", "0", ""] and not any(row["remarks"] for row in others)
     assert result.walks == 3
     sentences = list(described(result))
-    several = "gait_parameters.csv has one row per walk, possibly of different people."
+    several = "gait_parameters.csv has one row per walk; its column person tells people of a video apart."
     assert f"3 walks; several in 1 video (v00): {several}" in sentences
     assert "Remarks on 1 video (v00): see status.csv." in sentences
     line = next(_line(now.record) for now in told if now.record is not None and now.record.name == "v00")

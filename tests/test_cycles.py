@@ -92,6 +92,17 @@ def test_the_table_is_a_data_frame_and_survives_a_file(track, tmp_path):
         track.to_pandas("toes")
 
 
+def test_cycles_have_the_number_of_the_person(tmp_path):
+    curve = ("right", "mean", np.nan, np.nan, np.zeros((5, 101, 6)))
+    table = cycle_table([[curve], [curve], [curve]], [0, 1, 0])
+    assert table["person"].tolist() == [0] * 505 + [1] * 505 + [0] * 505
+    assert cycle_table([[curve], [curve]])["person"].tolist() == [0] * 505 + [1] * 505
+    # A table of an older run, without the column.
+    header, row = ",".join(n for n in CYCLE_COLUMNS if n != "person"), "2,left,hip,mean,,,,0,1.0,,,,,1"
+    (tmp_path / "old.csv").write_text(f"{header}\n{row}\n")
+    assert read_cycles_csv(tmp_path / "old.csv")["person"].tolist() == [2]
+
+
 def test_a_table_without_its_columns_is_refused(tmp_path):
     empty = cycle_table([])
     assert tuple(empty) == CYCLE_COLUMNS and all(len(values) == 0 for values in empty.values())

@@ -163,8 +163,11 @@ def test_the_table_is_read_as_it_was_written(tmp_path):
     table = gait_table([LINES, LINES])
     write_gait_parameters_csv(tmp_path / "gait.csv", table)
     text = (tmp_path / "gait.csv").read_text().splitlines()
-    assert text[0] == "walk,parameter,side,value,unit,ci_low,ci_high,n"
-    assert text[1] == "0,step_length,right,0.7000,m,0.6500,0.7500,3" and text[7] == "0,stance,,61.0000,%,,,0"
+    assert text[0] == "walk,person,parameter,side,value,unit,ci_low,ci_high,n"
+    assert (
+        text[1] == "0,0,step_length,right,0.7000,m,0.6500,0.7500,3" and text[7] == "0,0,stance,,61.0000,%,,,0"
+    )
+    assert text[-1].startswith("1,1,")
     again = read_gait_parameters_csv(tmp_path / "gait.csv")
     for name in GAIT_COLUMNS:
         if table[name].dtype == float:
@@ -173,9 +176,20 @@ def test_the_table_is_read_as_it_was_written(tmp_path):
             np.testing.assert_array_equal(again[name], table[name])
     with pytest.raises(ValueError, match="missing \\['n'\\]"):
         write_gait_parameters_csv(tmp_path / "x.csv", {k: v for k, v in table.items() if k != "n"})
-    (tmp_path / "bad.csv").write_text("\n".join([text[0], "0,speed,,fast,m/s,,,1"]))
+    (tmp_path / "bad.csv").write_text("\n".join([text[0], "0,0,speed,,fast,m/s,,,1"]))
     with pytest.raises(ValueError, match=r"bad\.csv: column value: .*fast"):
         read_gait_parameters_csv(tmp_path / "bad.csv")
+
+
+def test_walks_of_one_person_have_the_same_number(tmp_path):
+    table = gait_table([LINES, LINES, LINES], [0, 1, 0])
+    assert table["person"].tolist() == [0] * len(LINES) + [1] * len(LINES) + [0] * len(LINES)
+    # A table of an older run, without the column.
+    (tmp_path / "old.csv").write_text(
+        "walk,parameter,side,value,unit,ci_low,ci_high,n\n3,speed,,1.2,m/s,,,1\n"
+    )
+    old = read_gait_parameters_csv(tmp_path / "old.csv")
+    assert tuple(old) == GAIT_COLUMNS and old["person"].tolist() == old["walk"].tolist() == [3]
 
 
 def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):

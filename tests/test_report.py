@@ -919,6 +919,71 @@ def test_cycles_are_drawn_and_tell_their_values(run_folder, opened):
     assert shown_text(page, f"{knee} h3 span") == told.replace("-", "\N{MINUS SIGN}")
 
 
+@pytest.fixture
+def two_people(run_folder, monkeypatch):
+    """A folder in which two people walk in the same frames, the second of them 1 m farther along."""
+
+    def explain(folder, frames=None, **_):
+        for why in fake_explain.explain(folder, sorted(set(frames))):
+            for walk in (0, 1):
+                why.walk = walk
+                yield why
+
+    monkeypatch.setattr("memo.report.track.explain", explain)
+    folder = run_folder()
+    table = read_track_csv(folder / "track.csv")
+    both = {name: np.concatenate([values, values]) for name, values in table.items()}
+    both["walk"] = both["person"] = np.repeat([0, 1], 20)
+    both["x_m"][20:] += 1.0
+    for joint in JOINTS:
+        both[f"{joint}_u_px"][20:] += 12.0
+    write_track_csv(folder / "track.csv", both)
+    strike = {"time_s": 0.3, "frame": 7.5, "event": "heel_strike", "side": "left", "walk": 1, "person": 1}
+    write_events_csv(folder / "events.csv", [*memo.files.read_events_csv(folder / "events.csv"), strike])
+    (folder / "gait_parameters.csv").write_text(
+        "walk,person,parameter,side,value,unit,ci_low,ci_high,n\n"
+        "0,0,cadence,,108.25,1/min,101.5,115.0,7\n1,1,cadence,,95.5,1/min,90,101,7\n"
+    )
+    return folder
+
+
+def test_every_person_has_a_tab(two_people, opened):
+    page = opened(write_report(two_people).path)
+    table = read_track_csv(two_people / "track.csv")
+    tabs = page.find_elements("css selector", "#people button")
+    assert [tab.text for tab in tabs] == ["person 1", "person 2"]
+    pictures = []
+    for person, cadence in ((0, "108.2"), (1, "95.5"), (0, "108.2")):
+        tabs[person].click()
+        assert [tab.get_attribute("aria-selected") for tab in tabs] == [
+            "true" if k == person else "false" for k in (0, 1)
+        ]
+        x_m = table["x_m"][table["person"] == person]
+        drawn = page.execute_script("return document.querySelectorAll('#motion path.curve').length")
+        assert drawn == 7 and shown_text(page, "#why-frame") == "frame 0"
+        told = shown_text(page, "#motion .chart h3 span").replace("\N{MINUS SIGN}", "-")
+        assert told.startswith(f"{x_m[0]:.2f} ± ")
+        visible = """const parts = [...document.querySelectorAll("[data-person]")];
+            return parts.filter((part) => part.clientHeight).map((part) => part.textContent).join()"""
+        assert cadence in page.execute_script(visible)
+        assert ("Heel strikes and toe-offs of person 2" in page.execute_script(visible)) == (person == 1)
+        # The first person alone has cycles.
+        assert bool(shown_text(page, "#cycles-none")) == (person == 1)
+        pictures.append({name: pixels(page, name) for name in ("stage", "view")})
+    assert pictures[0]["stage"] != pictures[1]["stage"] and pictures[0] == pictures[2]
+
+
+def test_a_person_is_chosen_by_keys_and_a_single_one_needs_no_tab(two_people, run_folder, opened):
+    from selenium.webdriver.common.keys import Keys
+
+    page = opened(write_report(two_people).path)
+    first, second = page.find_elements("css selector", "#people button")
+    first.send_keys(Keys.ARROW_RIGHT)
+    assert second.get_attribute("aria-selected") == "true" and second == page.switch_to.active_element
+    page = opened(write_report(run_folder()).path)
+    assert not page.find_element("id", "people").is_displayed()
+
+
 def test_both_walks_are_drawn_in_one_plot(two_folders, opened):
     page = opened(write_comparison(*two_folders).path, PHONE_PX)
     count = "return document.querySelectorAll(arguments[0]).length"

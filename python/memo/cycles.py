@@ -6,6 +6,7 @@ The core computes the numbers (`memo_core::track::cycles` and `memo_core::track:
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import count
 from os import PathLike
 from typing import Any
 
@@ -25,11 +26,11 @@ __all__ = [
 
 _VALUES = ("angle_deg", "sd_deg", "cycle_sd_deg", "ci_low_deg", "ci_high_deg", "n")
 
-CYCLE_COLUMNS = ("walk", "side", "joint", "curve", "cycle", "start_s", "end_s", "percent", *_VALUES)
+CYCLE_COLUMNS = ("walk", "person", "side", "joint", "curve", "cycle", "start_s", "end_s", "percent", *_VALUES)
 """Columns of `cycles.csv`, in order; an empty cell means unknown."""
 
 _POINTS = 101
-_WHOLE = ("walk", "percent", "n")
+_WHOLE = ("walk", "person", "percent", "n")
 _TEXTS = ("side", "joint", "curve")
 
 Curve = tuple[str, str, float, float, npt.NDArray[np.float64]]
@@ -37,16 +38,21 @@ Curve = tuple[str, str, float, float, npt.NDArray[np.float64]]
 Departure = tuple[str, str, float, float, int, float]
 
 
-def cycle_table(walks: Iterable[Sequence[Curve]]) -> dict[str, npt.NDArray[Any]]:
-    """The columns of `cycles.csv` from the curves of each walk, as `_memo.Walk.cycles` gives them."""
+def cycle_table(
+    walks: Iterable[Sequence[Curve]], people: Iterable[int] | None = None
+) -> dict[str, npt.NDArray[Any]]:
+    """The columns of `cycles.csv` from the curves of each walk, as `_memo.Walk.cycles` gives them.
+
+    `people` are the numbers of the persons of the walks, by default another one each.
+    """
     blocks: list[dict[str, npt.NDArray[Any]]] = []
-    for walk, curves in enumerate(walks):
+    for (walk, curves), person in zip(enumerate(walks), people or count(), strict=False):
         counts: dict[str, int] = {}
         for side, curve, start_s, end_s, values in curves:
             cycle = float("nan") if curve == "mean" else counts.setdefault(side, 0)
             counts[side] = counts.get(side, 0) + 1
             joints, points, _ = values.shape
-            alike = {"walk": walk, "side": side, "curve": curve, "cycle": cycle}
+            alike = {"walk": walk, "person": person, "side": side, "curve": curve, "cycle": cycle}
             block = {name: np.full(joints * points, value) for name, value in alike.items()}
             block |= {"start_s": np.full(joints * points, start_s), "end_s": np.full(joints * points, end_s)}
             block["joint"] = np.repeat(ANGLES, points)
@@ -74,8 +80,11 @@ def write_cycles_csv(path: str | PathLike[str], table: Mapping[str, npt.ArrayLik
 
 
 def read_cycles_csv(path: str | PathLike[str]) -> dict[str, npt.NDArray[Any]]:
-    """Reads what `write_cycles_csv` wrote; NaN for empty numbers, whole numbers as int64."""
-    return read_typed_columns(path, CYCLE_COLUMNS, whole=_WHOLE, texts=_TEXTS)
+    """Reads what `write_cycles_csv` wrote; NaN for empty numbers, whole numbers as int64.
+
+    Tables of older runs have no column `person`: every walk is another person's.
+    """
+    return read_typed_columns(path, CYCLE_COLUMNS, whole=_WHOLE, texts=_TEXTS, instead={"person": "walk"})
 
 
 def mean_cycle(

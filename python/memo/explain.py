@@ -38,7 +38,7 @@ _SAME_SIMILARITY = 0.01
 
 @dataclass(frozen=True)
 class Why:
-    """The evidence of one frame and the fit of the model to it, in pixels of the video."""
+    """The evidence of a walk in one frame and the fit of the model to it, in pixels of the video."""
 
     frame: int
     """Number of the frame in the video."""
@@ -107,6 +107,8 @@ def explain(
     video: str | PathLike[str] | None = None,
 ) -> Iterator[Why]:
     """Explains frames of a run of `memo track`, one after another in their order in the video.
+
+    A frame with several people is explained for each of their walks.
 
     `frames`: numbers in the video, by default all tracked ones. `progress` is called with the number of
     frames read and the total. `video`: the path of the video, if it was moved. Memory does not
@@ -206,12 +208,11 @@ def _found(
         found = explainer.update(whole if shrink == 1 else averaged(whole, shrink), frame.time_s)
         if progress is not None:
             progress(done, total)
-        if found is not None:  # from the previous frame
-            yield found, _whole(found["luma"], before, shrink)
+        for each in found:  # from the previous frame
+            yield each, _whole(each["luma"], before, shrink)
         before = whole
-    found = explainer.finish()
-    if found is not None:
-        yield found, _whole(found["luma"], before, shrink)
+    for each in explainer.finish():
+        yield each, _whole(each["luma"], before, shrink)
 
 
 def _whole(

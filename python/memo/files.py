@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -230,11 +231,19 @@ def read_events_csv(path: str | PathLike[str]) -> list[dict[str, Any]]:
 
 
 def read_typed_columns(
-    path: str | PathLike[str], names: Sequence[str], *, whole: Sequence[str] = (), texts: Sequence[str] = ()
+    path: str | PathLike[str],
+    names: Sequence[str],
+    *,
+    whole: Sequence[str] = (),
+    texts: Sequence[str] = (),
+    instead: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Column]:
-    """These columns of a table: int64 for `whole`, objects for `texts`, else float64 with NaN if empty."""
+    """These columns of a table: int64 for `whole`, objects for `texts`, else float64 with NaN if empty.
+
+    `instead` names the column whose values stand for an absent one.
+    """
     columns: dict[str, Column] = {}
-    for name, cells in read_text_columns(path, names).items():
+    for name, cells in read_text_columns(path, names, instead).items():
         kind = np.int64 if name in whole else np.float64
         try:
             filled = cells if name in texts else [cell or "nan" for cell in cells]
@@ -246,8 +255,12 @@ def read_typed_columns(
     return columns
 
 
-def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> dict[str, list[str]]:
+def read_text_columns(
+    path: str | PathLike[str], names: Sequence[str] = (), instead: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, list[str]]:
     """The columns of a table that has at least these (default: all), cell by cell as written.
+
+    `instead` names the column whose cells stand for an absent one.
 
     It reads every table of memo; ValueError names the file and the row.
     """
@@ -256,7 +269,8 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
             header, *rows = list(CsvRows(file)) or [[]]
     except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table: {error}") from None
-    absent = set(names) - set(header)
+    sources = {name: name if name in header else instead.get(name, name) for name in names or header}
+    absent = set(sources.values()) - set(header)
     if absent:
         raise ValueError(f"{path}: columns missing: {sorted(absent)}")
     if not header or len(set(header)) < len(header):
@@ -265,7 +279,7 @@ def read_text_columns(path: str | PathLike[str], names: Sequence[str] = ()) -> d
         if row and len(row) != len(header):
             raise ValueError(f"{path}: row {line} has {counted(len(row), 'cell')}, the header {len(header)}")
     place = {name: index for index, name in enumerate(header)}
-    return {name: [row[place[name]] for row in rows if row] for name in names or header}
+    return {name: [row[place[source]] for row in rows if row] for name, source in sources.items()}
 
 
 def read_text(

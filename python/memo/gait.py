@@ -9,6 +9,7 @@ coverage is measured on drawn people who vary as real people do (`tests/gait_par
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import count
 from os import PathLike
 from typing import Any
 
@@ -27,7 +28,7 @@ __all__ = [
     "write_gait_parameters_csv",
 ]
 
-GAIT_COLUMNS = ("walk", "parameter", "side", "value", "unit", "ci_low", "ci_high", "n")
+GAIT_COLUMNS = ("walk", "person", "parameter", "side", "value", "unit", "ci_low", "ci_high", "n")
 """Columns of `gait_parameters.csv`, in order; an empty cell means unknown."""
 
 DEFINITIONS: dict[str, str] = {
@@ -73,14 +74,20 @@ SYMMETRY = "step_time_symmetry", "step_length_symmetry"
 Table = dict[str, npt.NDArray[Any]]
 
 
-def gait_table(walks: Iterable[Iterable[tuple[str, str, float, str, float, float, int]]]) -> Table:
-    """The columns of `gait_parameters.csv` from the core's rows, one walk after another."""
+def gait_table(
+    walks: Iterable[Iterable[tuple[str, str, float, str, float, float, int]]],
+    people: Iterable[int] | None = None,
+) -> Table:
+    """The columns of `gait_parameters.csv` from the core's rows, one walk after another.
+
+    `people` are the numbers of the persons of the walks, by default another one each.
+    """
     lines = [
-        (walk, parameter, side, value, unit, low, high, n)
-        for walk, table in enumerate(walks)
-        for parameter, side, value, unit, low, high, n in table
+        (walk, person, *line)
+        for (walk, table), person in zip(enumerate(walks), people or count(), strict=False)
+        for line in table
     ]
-    kinds: tuple[Any, ...] = (np.int64, object, object, float, object, float, float, np.int64)
+    kinds: tuple[Any, ...] = (np.int64, np.int64, object, object, float, object, float, float, np.int64)
     columns = list(zip(*lines, strict=True)) or [()] * len(GAIT_COLUMNS)
     return {
         name: np.array(column, dtype=kind)
@@ -139,5 +146,11 @@ def write_gait_parameters_csv(path: str | PathLike[str], table: Mapping[str, npt
 
 
 def read_gait_parameters_csv(path: str | PathLike[str]) -> Table:
-    """Reads what `write_gait_parameters_csv` wrote; NaN for empty numbers, whole numbers as int64."""
-    return read_typed_columns(path, GAIT_COLUMNS, whole=("walk", "n"), texts=("parameter", "side", "unit"))
+    """Reads what `write_gait_parameters_csv` wrote; NaN for empty numbers, whole numbers as int64.
+
+    Tables of older runs have no column `person`: every walk is another person's.
+    """
+    texts = ("parameter", "side", "unit")
+    return read_typed_columns(
+        path, GAIT_COLUMNS, whole=("walk", "person", "n"), texts=texts, instead={"person": "walk"}
+    )

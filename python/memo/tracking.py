@@ -382,12 +382,12 @@ class Track:
     @property
     def gait_parameters(self) -> dict[str, npt.NDArray[Any]]:
         """The columns of `gait_parameters.csv`, see `memo.gait.DEFINITIONS`; one walk after another."""
-        return gait_table(walk.gait_parameters() for walk in self.walks)
+        return gait_table((walk.gait_parameters() for walk in self.walks), self.people)
 
     @property
     def cycles(self) -> dict[str, npt.NDArray[Any]]:
         """The columns of `cycles.csv`: every gait cycle of each side at 0 to 100 %, and their mean."""
-        return cycle_table(walk.cycles() for walk in self.walks)
+        return cycle_table((walk.cycles() for walk in self.walks), self.people)
 
     @property
     def sentences(self) -> list[str]:

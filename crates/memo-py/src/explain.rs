@@ -289,40 +289,48 @@ impl PyExplainer {
         Ok(Self { options, walks, wanted, stream })
     }
 
-    /// Adds the next frame, (H, W) uint8, and its time in seconds. Returns the explanation of the frame before,
-    /// if it was requested and is part of a walk.
+    /// Adds the next frame, (H, W) uint8, and its time in seconds. Returns the explanations of the frame before, one
+    /// of each walk that it is part of, if it was requested.
     fn update<'py>(
         &mut self,
         py: Python<'py>,
         frame: &Bound<'py, PyAny>,
         time_s: f64,
-    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let array = frame_from_numpy(frame)?;
         let frame = array.as_frame()?;
         let Some(stream) = &mut self.stream else {
             return Err(PyValueError::new_err("the frames have ended"));
         };
         let evidence = py.detach(|| stream.push(&frame, time_s)).map_err(value_error)?;
-        evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
+        evidence.map_or(Ok(Vec::new()), |evidence| self.explained(py, &evidence))
     }
 
-    /// Returns the explanation of the last frame.
-    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(mut stream) = self.stream.take() else { return Ok(None) };
+    /// Returns the explanations of the last frame.
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let Some(mut stream) = self.stream.take() else { return Ok(Vec::new()) };
         let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
-        evidence.map_or(Ok(None), |evidence| self.explained(py, evidence))
+        evidence.map_or(Ok(Vec::new()), |evidence| self.explained(py, &evidence))
     }
 }
 
 impl PyExplainer {
-    fn explained<'py>(&self, py: Python<'py>, evidence: Evidence) -> PyResult<Option<Bound<'py, PyDict>>> {
+    fn explained<'py>(&self, py: Python<'py>, evidence: &Evidence) -> PyResult<Vec<Bound<'py, PyDict>>> {
         if !self.wanted.contains(&evidence.frame) {
-            return Ok(None);
+            return Ok(Vec::new());
         }
-        let of = |walk: &Recorded| walk.looks.get(&evidence.frame).copied();
-        let Some((index, look)) = self.walks.iter().enumerate().find_map(|(k, w)| Some((k, of(w)?))) else {
-            return Ok(None);
-        };
+        let look = |walk: &Recorded| walk.looks.get(&evidence.frame).copied();
+        let seen = self.walks.iter().enumerate().filter_map(|(index, walk)| Some((index, look(walk)?)));
+        seen.map(|(index, look)| self.explained_walk(py, evidence, index, &look)).collect()
+    }
+
+    fn explained_walk<'py>(
+        &self,
+        py: Python<'py>,
+        evidence: &Evidence,
+        index: usize,
+        look: &Look,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let (width, height) = (evidence.grey.width(), evidence.grey.height());
         if look.window.right >= width || look.window.bottom >= height {
             let message = format!("{:?} lies outside frames of {width}x{height} pixels", look.window);
@@ -332,17 +340,16 @@ impl PyExplainer {
         let bodies = around.filter_map(|(_, walk)| walk.drawn.get(&evidence.frame));
         let cylinders: Vec<EllipticCylinder> = bodies.flat_map(|body| body.cylinders).collect();
         let others = Others::new(&cylinders, self.walks[index].camera.position());
-        let scene = self.walks[index].scene(&look).among(&others);
-        let why =
-            pooled(py, || explain(&evidence, &look, &scene, &self.options.evidence, &self.options.walk))?
-                .map_err(value_error)?;
-        dict_of(py, evidence, index, &look, &why, scene.camera).map(Some)
+        let scene = self.walks[index].scene(look).among(&others);
+        let why = pooled(py, || explain(evidence, look, &scene, &self.options.evidence, &self.options.walk))?
+            .map_err(value_error)?;
+        dict_of(py, evidence, index, look, &why, scene.camera)
     }
 }
 
 fn dict_of<'py>(
     py: Python<'py>,
-    evidence: Evidence,
+    evidence: &Evidence,
     walk: usize,
     look: &Look,
     why: &Explanation,
@@ -354,8 +361,8 @@ fn dict_of<'py>(
     dict.set_item("walk", walk)?;
     let Rectangle { left, top, right, bottom } = look.window;
     dict.set_item("window_px", (left, top, right, bottom))?;
-    dict.set_item("luma", numpy_from_image(py, evidence.grey)?)?;
-    dict.set_item("change_mask", numpy_from_image(py, evidence.mask)?)?;
+    dict.set_item("luma", numpy_from_image(py, evidence.grey.clone())?)?;
+    dict.set_item("change_mask", numpy_from_image(py, evidence.mask.clone())?)?;
     let points = why.edges.chains.edgels().iter().map(|e| e.position_px.as_dvec2().to_array()).collect();
     dict.set_item("edge_points", numpy_from_rows(py, points)?)?;
     let segments = why.edges.segments.iter().map(|s| [s.start_px.to_array(), s.end_px.to_array()]).collect();

@@ -473,7 +473,7 @@ def _of_walks(records: Sequence[Record]) -> Iterator[str]:
         walks = sum(record.walks or 0 for record in records)
         yield (
             f"{counted(walks, 'walk')}; several in {counted(len(several), 'video')} ({_named(several)}): "
-            "gait_parameters.csv has one row per walk, possibly of different people."
+            "gait_parameters.csv has one row per walk; its column person tells people of a video apart."
         )
     remarked = [record for record in records if record.remarks]
     if remarked:

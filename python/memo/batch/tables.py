@@ -21,7 +21,7 @@ STATUS_COLUMNS = ("name", "state", "walks", "attempt", "seconds", "message", "re
 
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
 _LEADING = (
-    *("name", "state", "walk", "height_m", "camera_given"),
+    *("name", "state", "walk", "person", "height_m", "camera_given"),
     *("start_s", "end_s", "direction", "gait", "p_swapped"),
 )
 
@@ -61,11 +61,11 @@ def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
     given, seen = _run(results / "run.json")
     common = {"name": row.name, "state": state, **given}
     walks: dict[str, dict[str, Any]] = {}
-    lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS)
-    for walk, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
+    lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS, {"person": "walk"})
+    for walk, person, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
         column = f"{parameter}{'_' if side else ''}{side}{_UNITS.get(unit, '')}"
         cells = {column: value, f"{column}_ci_low": low, f"{column}_ci_high": high, f"{column}_n": n}
-        walks.setdefault(walk, {**common, "walk": walk, **seen.get(walk, {})}).update(cells)
+        walks.setdefault(walk, {**common, "walk": walk, "person": person, **seen.get(walk, {})}).update(cells)
     return list(walks.values()) or [common]
 
 

@@ -41,6 +41,7 @@ def evidence(why: Why) -> dict[str, Any]:
 
     return {
         "frame": int(why.frame),
+        "walk": int(why.walk),
         "corner": [left, top],
         "size": [right - left, bottom - top],
         "step_px": n / 16,

@@ -6,10 +6,12 @@ The tables must be valid if they exist: an error names the file. Additional file
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from memo.cycles import read_cycles_csv
 from memo.files import read_events_csv, read_track_csv
@@ -48,8 +50,22 @@ class RunFolder:
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the tracked frames in the video."""
+        """Number in the video of the frame of each row."""
         return [int(frame) for frame in self.columns["frame"]]
+
+    @property
+    def people(self) -> dict[int, list[int]]:
+        """The numbers of each person's walks, by the number of the person."""
+        walks = zip(self.columns["person"], self.columns["walk"], strict=True)
+        people: dict[int, list[int]] = {}
+        for person, walk in sorted({(int(person), int(walk)) for person, walk in walks}):
+            people.setdefault(person, []).append(walk)
+        return people
+
+    def walk_of(self, event: Mapping[str, Any]) -> int:
+        """Number of the walk of an event; in tables without it, that of the nearest tracked frame."""
+        nearest = np.argmin(np.abs(self.columns["frame"] - event["frame"]))
+        return int(event.get("walk", self.columns["walk"][nearest]))
 
     @property
     def first_frame(self) -> int:

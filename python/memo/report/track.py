@@ -16,7 +16,7 @@ import memo
 from memo.explain import explain
 from memo.files import JOINTS
 from memo.report.choice import Choice, ordinal
-from memo.report.cycles import drawn_cycles
+from memo.report.cycles import drawn_cycles, none_sentence
 from memo.report.evidence import CHANGED, evidence
 from memo.report.page import Page, columns
 from memo.report.pictures import LONGEST_PX, Picture, Thinned, colour_frames, jpeg_uri, mask_uri
@@ -64,7 +64,7 @@ def track_page(
     counts = {
         "pictures": len(pictures),
         "every": every if pictures else None,
-        "explained": len(explained),
+        "explained": len({item["frame"] for item in explained}),
         "explained_every": why_every if explained else None,
     }
     notes += choice.told(every if pictures else 1)
@@ -87,9 +87,10 @@ def track_page(
                 "drawn": drawn,
             },
             "track": _track(run),
-            "events": run.events,
+            "events": [event | {"walk": run.walk_of(event)} for event in run.events],
             "camera": _camera(run),
             "cycles": drawn_cycles(run.cycles),
+            "no_cycles": none_sentence(run.cycles),
             "why": explained,
         },
     )
@@ -198,22 +199,28 @@ def _explained(
 ) -> tuple[list[dict[str, Any]], int]:
     """Frames with their evidence, and their spacing among the tracked frames in the page."""
     shown = {picture.frame for picture in pictures}
-    frames = [frame for frame in run.frames if frame in shown]
+    frames = sorted(shown & set(run.frames))
     if not (choice.why and run.run and frames):
         return [], 1
     every = -(-len(frames) // _MOST_EXPLAINED) if choice.every is None else 1
     chosen = frames[::every]
-    thinned: Thinned[dict[str, Any]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
+    rows = sum(map(set(chosen).__contains__, run.frames))
+    # A frame is kept with all its people or not at all.
+    thinned: Thinned[list[dict[str, Any]]] = Thinned(_WHY_BYTES, 1 if choice.every else None)
+    items: list[dict[str, Any]] = []
+    frame, is_wanted = None, False
     try:
         for why in _counted(
-            progress, "explaining frames", explain(run.path, chosen, video=run.video), len(chosen)
+            progress, "explaining frames", explain(run.path, chosen, video=run.video), rows
         ):
-            if thinned.wants_next():
-                item = evidence(why)
-                thinned.keep(item, len(json.dumps(item)))
+            if why.frame != frame:
+                frame, is_wanted, items = why.frame, thinned.wants_next(), []
+            if is_wanted:
+                items.append(evidence(why))
+                thinned.keep(items, sum(len(json.dumps(item)) for item in items))
     except (ValueError, OSError) as error:
         notes.append(f"Frames cannot be explained ({_one_line(error)}).")
-    return thinned.items, every * thinned.every
+    return [item for items in thinned.items for item in items], every * thinned.every
 
 
 def _track(run: RunFolder) -> dict[str, Any]:
@@ -224,6 +231,7 @@ def _track(run: RunFolder) -> dict[str, Any]:
     return {
         "frame": [int(frame) for frame in table["frame"]],
         "walk": [int(walk) for walk in table["walk"]],
+        "person": [int(person) for person in table["person"]],
         **{name: columns(table[name], digits) for name, digits in _SHOWN.items()},
         "joints": list(JOINTS),
         "points_m": columns(np.stack(points, axis=1), 3),

@@ -90,7 +90,8 @@ def _sentences(run: RunFolder) -> list[str]:
     if not frames:
         return ["Nobody was tracked in this video."]
     walks = len(set(run.columns["walk"].tolist()))
-    return [f"{counted(walks, 'walk')} in {counted(len(frames), 'frame')}, {frames[0]} to {frames[-1]}."]
+    tracked = counted(len(set(frames)), "frame")
+    return [f"{counted(walks, 'walk')} in {tracked}, {min(frames)} to {max(frames)}."]
 
 
 def _warnings(run: RunFolder, notes: list[str]) -> str:
@@ -192,23 +193,38 @@ def _parameters(run: RunFolder) -> str:
         return "<p>There are none: gait_parameters.csv is missing or has no rows.</p>"
     columns = [run.parameters[name] for name in GAIT_COLUMNS]
     lines = [dict(zip(GAIT_COLUMNS, line, strict=True)) for line in zip(*columns, strict=True)]
-    tables = []
-    for walk in dict.fromkeys(line["walk"] for line in lines):
-        known = [line for line in lines if line["walk"] == walk and np.isfinite(line["value"])]
-        if not known:
-            tables.append(f"<p>Walk {walk + 1}: too short or too uncertain for any.</p>")
-            continue
-        rows = []
-        for name, unit in dict.fromkeys((line["parameter"], line["unit"]) for line in known):
-            cells = {line["side"]: measured(line) for line in known if line["parameter"] == name}
-            in_words = text(name.replace("_", " ")) + (f", {text(unit)}" if unit else "")
-            rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
-        header = ("parameter", "both", "right", "left")
-        tables.append(rows_table(f"Walk {walk + 1}: value, 95 % interval, number of steps", header, rows))
+    of_walk: dict[int, list[dict[str, Any]]] = {}
+    for line in lines:
+        of_walk.setdefault(line["walk"], []).append(line)
+    tables = ""
+    for person in dict.fromkeys(line["person"] for line in lines):
+        own = [_of_walk(run, walk, of) for walk, of in of_walk.items() if of[0]["person"] == person]
+        tables += _of_person(person, _folded(own, _MOST_TABLES, "walks"))
     named = dict.fromkeys(line["parameter"] for line in lines)
     meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
     told = f"<details open><summary>Definitions</summary>{_listed(meanings)}</details>"
-    return _folded(tables, _MOST_TABLES, "walks") + told
+    return tables + told
+
+
+def _of_person(person: int, inside: str) -> str:
+    """A part of the page that belongs to one person."""
+    return f'<div data-person="{person}">{inside}</div>'
+
+
+def _of_walk(run: RunFolder, walk: int, lines: list[dict[str, Any]]) -> str:
+    """The table of gait parameters of a walk."""
+    several = len(run.people) > 1
+    name = f"Walk {walk + 1}" + f" (person {lines[0]['person'] + 1})" * several
+    known = [line for line in lines if np.isfinite(line["value"])]
+    if not known:
+        return f"<p>{name}: too short or too uncertain for any.</p>"
+    rows = []
+    for parameter, unit in dict.fromkeys((line["parameter"], line["unit"]) for line in known):
+        cells = {line["side"]: measured(line) for line in known if line["parameter"] == parameter}
+        in_words = text(parameter.replace("_", " ")) + (f", {text(unit)}" if unit else "")
+        rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
+    header = ("parameter", "both", "right", "left")
+    return rows_table(f"{name}: value, 95 % interval, number of steps", header, rows)
 
 
 def measured(line: Mapping[str, Any]) -> str:
@@ -229,27 +245,27 @@ def _listed(values: dict[str, Any]) -> str:
 
 
 def _events(run: RunFolder) -> str:
-    if not run.events:
-        return ""
+    """A table of heel strikes and toe-offs for each person."""
+    people = run.people
     several = len(_swapped(run)) > 1
-    rows = [
-        (
-            *((_walk_of(run, event),) if several else ()),
-            text(str(event["event"]).replace("_", " ")),
-            text(event["side"]),
-            number(event["time_s"], 3),
-            number(event["frame"], 1),
-        )
-        for event in run.events
-    ]
     header = (*(("walk",) if several else ()), "event", "side", "time, s", "frame")
-    return rows_table("Heel strikes and toe-offs", header, rows)
-
-
-def _walk_of(run: RunFolder, event: Mapping[str, Any]) -> str:
-    """Number of the walk of an event, from 1; in tables without it, that of the nearest tracked frame."""
-    nearest = np.argmin(np.abs(run.columns["frame"] - event["frame"]))
-    return str(int(event.get("walk", run.columns["walk"][nearest])) + 1)
+    tables = ""
+    for person, walks in people.items():
+        rows = [
+            (
+                *((str(run.walk_of(event) + 1),) if several else ()),
+                text(str(event["event"]).replace("_", " ")),
+                text(event["side"]),
+                number(event["time_s"], 3),
+                number(event["frame"], 1),
+            )
+            for event in run.events
+            if run.walk_of(event) in walks
+        ]
+        if rows:
+            caption = "Heel strikes and toe-offs" + f" of person {person + 1}" * (len(people) > 1)
+            tables += _of_person(person, rows_table(caption, header, rows))
+    return tables
 
 
 def _how(run: RunFolder) -> str:

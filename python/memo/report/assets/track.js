@@ -1,16 +1,36 @@
 // The page of a tracked walk.
 
-const { pictures, track, events, why } = data;
-const frames = pictures.frame.length ? pictures.frame : track.frame;
-const times = pictures.frame.length ? pictures.time_s : track.time_s ?? [];
-const rowOf = new Map(track.frame.map((frame, row) => [frame, row]));
-const jointAt = new Map((track.joints ?? []).map((name, index) => [name, index]));
-const whyOf = new Map(why.map((item, index) => [item.frame, index]));
-const shownTimes = [...(track.time_s ?? [])];
+const { pictures, track: everybody } = data;
+const timeOf = new Map(everybody.frame.map((frame, row) => [frame, everybody.time_s[row]]));
+const frames = pictures.frame.length ? pictures.frame : [...timeOf.keys()].sort((a, b) => a - b);
+const times = pictures.frame.length ? pictures.time_s : frames.map((frame) => timeOf.get(frame));
+const jointAt = new Map((everybody.joints ?? []).map((name, index) => [name, index]));
+
+// The person shown: rows of the tables, events, and explained frames.
+
+const people = [...new Set(everybody.person)].sort((a, b) => a - b);
+let person = people[0];
+let track = everybody;
+let [events, why] = [data.events, data.why];
+let [rowOf, whyOf, walks] = [new Map(), new Map(), new Set()];
+
+function choose(chosen) {
+  person = chosen;
+  const rows = everybody.frame.flatMap((_, row) => (everybody.person[row] === person ? [row] : []));
+  const columns = Object.entries(everybody).filter(([name]) => name !== "joints");
+  track = { joints: everybody.joints, ...Object.fromEntries(columns.map(([name, values]) => [name, rows.map((row) => values[row])])) };
+  walks = new Set(track.walk);
+  events = data.events.filter((event) => people.length < 2 || walks.has(event.walk));
+  why = data.why.filter((item) => people.length < 2 || walks.has(item.walk));
+  rowOf = new Map(track.frame.map((frame, row) => [frame, row]));
+  whyOf = new Map(why.map((item, index) => [item.frame, index]));
+}
+choose(person);
+
 const player = new Player(times, (index) => {
   const row = rowOf.get(frames[index]);
   const where = `frame ${frames[index]}, ${told(times[index], 2)} s`;
-  return row === undefined ? `${where}, nobody tracked` : `${where}, phase ${told(track.phase[row], 2)}`;
+  return row === undefined ? `${where}, ${people.length > 1 ? "not this person" : "nobody tracked"}` : `${where}, phase ${told(track.phase[row], 2)}`;
 });
 const rowNow = () => rowOf.get(frames[player.at]);
 
@@ -50,6 +70,13 @@ function strokes(context, segments, colour, width, place) {
   context.stroke();
 }
 
+/** The joints of the other people in the frame shown, pixels. */
+function othersNow() {
+  if (people.length < 2) return [];
+  const frame = frames[player.at];
+  return everybody.points_px.filter((_, row) => everybody.frame[row] === frame && everybody.person[row] !== person);
+}
+
 function stageSize() {
   if (pictures.size) return pictures.size;
   const image = stagePictures.at(player.at, drawStage);
@@ -75,10 +102,17 @@ const drawStage = drawnCanvas($("stage"), () => stageSize()[0] / stageSize()[1],
       context.strokeRect(left * factorU, top * factorV, (right + 1 - left) * factorU, (bottom + 1 - top) * factorV);
     }
   }
-  if (row === undefined || pictures.drawn) return;
+  if (pictures.drawn) return;
   const place = ([u, v]) => [(u + 0.5) * factorU, (v + 0.5) * factorV];
-  const at = (other, name) => track.points_px[other][jointAt.get(name)];
   const thick = Math.max(1.5, width / 300);
+  if ($("show-limbs").checked) {
+    for (const points of othersNow()) {
+      const limbs = CHAINS.flatMap(([, chain]) => [0, 1].map((k) => [k, k + 1].map((n) => points[jointAt.get(chain[n])])));
+      strokes(context, limbs.filter((ends) => known(...ends)), "rgba(255,255,255,.6)", thick * 0.7, place);
+    }
+  }
+  if (row === undefined) return;
+  const at = (other, name) => track.points_px[other][jointAt.get(name)];
   const explained = whyOf.get(frames[player.at]);
   if ($("show-contours").checked && explained !== undefined) {
     const { model, corner, step_px } = why[explained];
@@ -103,7 +137,7 @@ const drawStage = drawnCanvas($("stage"), () => stageSize()[0] / stageSize()[1],
     }
   }
 });
-$("layers").hidden = pictures.drawn || !track.frame.length;
+$("layers").hidden = pictures.drawn || !everybody.frame.length;
 for (const id of ["show-limbs", "show-contours", "show-trail"]) $(id).addEventListener("change", drawStage);
 
 // The walker in 3D.
@@ -163,7 +197,7 @@ $("views").addEventListener("click", (event) => {
 // Explanation.
 
 const PARTS = [["head", 0, 0], ["torso", 1, 1], ["right arm", 2, 4], ["left arm", 5, 7], ["right leg", 8, 10], ["left leg", 11, 13]];
-const whyPictures = Object.fromEntries(["luma", "change", "edges"].map((name) => [name, new Pictures(why.map((item) => item[name]))]));
+let whyPictures = {};
 let whyNow = 0;
 
 /** Red without support, yellow to green with support; the same green from a half on. */
@@ -253,8 +287,12 @@ function showWhy() {
   });
   $("parts").tBodies[0].replaceChildren(...rows);
 }
-$("why-none").hidden = why.length > 0;
-$("why-some").hidden = why.length === 0;
+function startWhy() {
+  whyNow = 0;
+  whyPictures = Object.fromEntries(["luma", "change", "edges"].map((name) => [name, new Pictures(why.map((item) => item[name]))]));
+  $("why-none").hidden = why.length > 0;
+  $("why-some").hidden = why.length === 0;
+}
 
 // Curves over time.
 
@@ -268,10 +306,13 @@ const MOTION = [
   { title: "Similarity of model and picture", key: "similarity", unit: "", digits: 2 },
   { title: "P(left and right swapped), of the whole walk", key: "p_swapped", unit: "", digits: 3, yRange: [0, 1] },
 ];
-const strikes = events.filter(({ event }) => event === "heel_strike").map(({ time_s: x, side }) => ({ x, look: side, name: `heel strike, ${side}` }));
-const curves = [];
-if (track.frame.length) {
-  const xRange = [shownTimes[0], shownTimes[shownTimes.length - 1]];
+let curves = [];
+function drawMotion() {
+  curves = [];
+  $("motion").replaceChildren();
+  if (!track.frame.length) return;
+  const strikes = events.filter(({ event }) => event === "heel_strike").map(({ time_s: x, side }) => ({ x, look: side, name: `heel strike, ${side}` }));
+  const xRange = [track.time_s[0], track.time_s[track.time_s.length - 1]];
   for (const { key, wraps, ...spec } of MOTION) {
     const host = element("div");
     $("motion").append(host);
@@ -291,15 +332,47 @@ if (track.frame.length) {
 // Gait cycles.
 
 const choice = $("cycle-walk");
-for (const walk of data.cycles.walks) choice.append(element("option", { value: walk }, `walk ${walk + 1}`));
 const drawCycles = () => {
   const walk = Number(choice.value);
   const looks = ["right", "left"].map((side) => ({ name: side, look: side, of: (curve) => curve.walk === walk && curve.side === side }));
   cycleCharts($("cycles"), data.cycles, looks);
 };
+function startCycles() {
+  const shown = data.cycles.walks.filter((walk) => walks.has(walk));
+  choice.replaceChildren(...shown.map((walk) => element("option", { value: walk }, `walk ${walk + 1}`)));
+  $("cycle-choice").hidden = shown.length < 2;
+  $("cycles-none").textContent = shown.length || !data.cycles.walks.length ? data.no_cycles : "This person has no measured cycles.";
+  if (shown.length) drawCycles();
+  else $("cycles").replaceChildren();
+}
 choice.addEventListener("change", drawCycles);
-$("cycle-choice").hidden = data.cycles.walks.length < 2;
-if (data.cycles.walks.length) drawCycles();
+
+// One tab for each person.
+
+function showPerson() {
+  startWhy();
+  drawMotion();
+  startCycles();
+  for (const part of document.querySelectorAll("[data-person]")) part.hidden = people.length > 1 && Number(part.dataset.person) !== person;
+  for (const tab of $("people").children) {
+    const isChosen = Number(tab.value) === person;
+    tab.setAttribute("aria-selected", isChosen);
+    tab.tabIndex = isChosen ? 0 : -1;
+  }
+  const first = frames.findIndex((frame) => rowOf.has(frame));
+  if (frames.length) player.show(rowOf.has(frames[player.at]) ? player.at : Math.max(0, first));
+}
+for (const one of people.length > 1 ? people : []) {
+  const tab = element("button", { type: "button", role: "tab", value: one }, `person ${one + 1}`);
+  tab.addEventListener("click", () => { choose(one); showPerson(); });
+  tab.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const next = step && $("people").children[people.indexOf(one) + step];
+    if (next) { next.focus(); next.click(); }
+  });
+  $("people").append(tab);
+}
+$("people").hidden = people.length < 2;
 
 player.listeners.push(drawStage, () => {
   aim();
@@ -308,5 +381,4 @@ player.listeners.push(drawStage, () => {
   curves.forEach((show) => show(row));
   showWhy();
 });
-const firstTracked = frames.findIndex((frame) => rowOf.has(frame));
-if (frames.length) player.show(Math.max(0, firstTracked));
+showPerson();
