@@ -91,6 +91,14 @@ def test_what_is_as_usual_is_not_mentioned():
     assert implausible_sentences(walk(walk_ratio=None, fit=None)) == []
 
 
+@pytest.mark.parametrize(
+    ("camera_given", "why"), [(False, "no camera were given"), (True, "does not show it")]
+)
+def test_an_assumed_height_is_said_with_its_reason(camera_given, why):
+    (said,) = assumed_height_sentences(walk(height=(1.7, 0.1, "assumed")), camera_given=camera_given)
+    assert why in said and "1.70 m tall" in said and "by 12%" in said
+
+
 def test_feet_off_the_ground_are_mentioned():
     (above,) = implausible_sentences(walk(fit=types.SimpleNamespace(sole_m=0.12, is_off_ground=True)))
     (below,) = implausible_sentences(walk(fit=types.SimpleNamespace(sole_m=-0.22, is_off_ground=True)))

@@ -21,13 +21,16 @@ __all__ = [
 ]
 
 
-def assumed_height_sentences(walk: Walk) -> list[str]:
-    """Says that the scale is that of an average person, if it is."""
+def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[str]:
+    """Says that the height is that of an average person, if it is, and why."""
     height_m, sd_m, source = walk.height
     if source != "assumed":
         return []
+    why = "No height and no camera were given"
+    if camera_given:
+        why = "No height was given, and the picture does not show it"
     return [
-        f"No height and no camera were given, so the person is taken to be {height_m:.2f} m tall: all sizes, "
+        f"{why}, so the person is taken to be {height_m:.2f} m tall: all sizes, "
         f"distances and speeds may be too large or too small by {2 * sd_m / height_m:.0%} (two standard "
         "deviations)."
     ]

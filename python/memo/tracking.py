@@ -396,7 +396,8 @@ class Track:
         if not self.walks:
             return [self.summary["message"], *said]
         for index, walk in enumerate(self.walks):
-            told = [*assumed_height_sentences(walk), self._message(walk)]
+            camera_given = self.camera_motion.camera_given
+            told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += measured_height_sentences(walk)
             told += cadence_sentences(self.gait_parameters, index)

@@ -210,9 +210,7 @@ def _explained(
     items: list[dict[str, Any]] = []
     frame, is_wanted = None, False
     try:
-        for why in _counted(
-            progress, "explaining frames", explain(run.path, chosen, video=run.video), rows
-        ):
+        for why in _counted(progress, "explaining frames", explain(run.path, chosen, video=run.video), rows):
             if why.frame != frame:
                 frame, is_wanted, items = why.frame, thinned.wants_next(), []
             if is_wanted:

@@ -11,6 +11,7 @@
 //!    does that it is not one of many lines by chance.
 //! 3. Place and phase of every frame, with slowly changing speed and cadence, are solved for by Gauss and Newton's
 //!    method.
+//! 4. When the walk is over, the path is the line through the feet of all its frames, on which they are followed again.
 //!
 //! Both feet reach alike, so the phase is known up to half a cycle: left and right stay open. Only walking forwards is
 //! looked for.
@@ -23,7 +24,7 @@ use super::options::TrackerOptions;
 use super::search::{Hypothesis, Path};
 use super::start::{CadenceRange, Direction, StartReport, start};
 use super::treadmill::Standing;
-use super::walk::{Beginning, FrameEdges, State, Walk};
+use super::walk::{Beginning, FrameEdges, State, Walk, WalkOptions};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::kalman::ConstantVelocity;
 use crate::estimate::line::line_through;
@@ -78,7 +79,8 @@ pub(super) const ACROSS_SD_M: f64 = 0.03;
 /// What the feet of one frame show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Feet {
-    /// Where the ray of the lowest row meets the ground, metres along the path.
+    /// Where the ray of the lowest row meets the ground, and its place along the path, metres.
+    place: DVec2,
     along_m: f64,
     /// Metres on the ground per pixel of that row.
     row_m: f64,
@@ -242,15 +244,10 @@ impl Frontal {
             .iter()
             .filter_map(|s| Some((s.time_s, feet(s, margin_px(by_all), camera)?[0])))
             .collect();
-        let first_s = seen.first()?.0;
-        let [(vx, x), (vy, y)] = [DVec2::X, DVec2::Y].map(|axis| {
-            line_through(&seen.iter().map(|(t, place)| (t - first_s, axis.dot(*place))).collect::<Vec<_>>())
-        });
-        let velocity = DVec2::new(vx, vy);
-        if !(SLOWEST_MPS..FASTEST_MPS).contains(&velocity.length()) {
+        let (path, speed_mps) = path_through(&seen)?;
+        if !(SLOWEST_MPS..FASTEST_MPS).contains(&speed_mps) {
             return None;
         }
-        let path = Path { origin: DVec2::new(x, y), heading_rad: velocity.to_angle() };
         let reach = Reach::new(walker, camera, path);
         let mut frontal = Self { path, reach, paces: Vec::new(), by_all };
         // 2. The best line of phase against even motion.
@@ -265,7 +262,22 @@ impl Frontal {
     fn feet_of(&self, sighting: Option<&Sighting>) -> Option<Feet> {
         let [place, above] = feet(sighting?, margin_px(self.by_all), &self.reach.camera)?;
         let along_m = self.path.along(place);
-        Some(Feet { along_m, row_m: (self.path.along(above) - along_m).abs() })
+        Some(Feet { place, along_m, row_m: (self.path.along(above) - along_m).abs() })
+    }
+
+    /// The same walk on the line through the feet of all frames, with the variances of place and phase.
+    fn on_path_of_all(&self) -> Option<(Self, Vec<[f64; 2]>)> {
+        let seen: Vec<(f64, DVec2)> =
+            self.paces.iter().filter_map(|pace| Some((pace.time_s, pace.feet?.place))).collect();
+        let (path, _) = path_through(&seen)?;
+        let reach = Reach::new(&self.reach.walker, &self.reach.camera, path);
+        let mut renewed = Self { path, reach, ..self.clone() };
+        for pace in &mut renewed.paces {
+            pace.along_m = path.along(self.path.point(pace.along_m, 0.0).truncate());
+            pace.feet = pace.feet.map(|feet| Feet { along_m: path.along(feet.place), ..feet });
+        }
+        let variances = renewed.solve(0)?;
+        Some((renewed, variances))
     }
 
     /// The line of phase from which feet at (time, place) are the least off.
@@ -347,6 +359,15 @@ impl Frontal {
         }
     }
 
+    /// Gives both twins the place and phase of a frame.
+    fn lay(&mut self, k: usize, variances: [f64; 2], walk: &mut Walk) {
+        for (n, twin) in walk.twins.iter_mut().enumerate() {
+            let Some(step) = twin.steps.get_mut(k) else { continue };
+            step.state = self.state(k, n, variances, &step.state);
+            step.measured = self.measured(k, &step.state);
+        }
+    }
+
     /// What the feet of a frame measure at its phase.
     fn measured(&mut self, k: usize, state: &State) -> Option<Hypothesis> {
         let Pace { feet, along_m, phase, .. } = self.paces[k];
@@ -405,6 +426,16 @@ impl Frontal {
         }
         variances
     }
+}
+
+/// The path on which somebody was seen at (time, place) on the ground, and the speed.
+fn path_through(seen: &[(f64, DVec2)]) -> Option<(Path, f64)> {
+    let first_s = seen.first()?.0;
+    let [(vx, x), (vy, y)] = [DVec2::X, DVec2::Y].map(|axis| {
+        line_through(&seen.iter().map(|(t, place)| (t - first_s, axis.dot(*place))).collect::<Vec<_>>())
+    });
+    let velocity = DVec2::new(vx, vy);
+    Some((Path { origin: DVec2::new(x, y), heading_rad: velocity.to_angle() }, velocity.length()))
 }
 
 /// Place at the first time and speed of the line through (time, place), by Cauchy weights; and how far the points are off,
@@ -504,24 +535,33 @@ impl Active {
         frontal.push(time_s, feet);
         let last = frontal.paces.len() - 1;
         let Some(variances) = frontal.solve(last.saturating_sub(WINDOW)) else { return };
-        let variances = variances[variances.len() - 1];
-        for (n, twin) in self.walk.twins.iter_mut().enumerate() {
-            let Some(step) = twin.steps.last_mut() else { continue };
-            step.state = frontal.state(last, n, variances, &step.state);
-            step.measured = frontal.measured(last, &step.state);
-        }
+        frontal.lay(last, variances[variances.len() - 1], &mut self.walk);
     }
 
     /// The same of all frames, each from those before and after it.
     pub(super) fn pace_all(&mut self) {
         let Some(frontal) = &mut self.frontal else { return };
         let Some(variances) = frontal.solve(0) else { return };
-        for (n, twin) in self.walk.twins.iter_mut().enumerate() {
-            for ((k, step), of) in twin.steps.iter_mut().enumerate().zip(&variances) {
-                step.state = frontal.state(k, n, *of, &step.state);
-                step.measured = frontal.measured(k, &step.state);
-            }
+        for (k, of) in variances.into_iter().enumerate() {
+            frontal.lay(k, of, &mut self.walk);
         }
+    }
+
+    /// Follows all frames again, on the line through all feet. Without a fit, the first frames of a long walk are gone, and
+    /// it stays on its path.
+    pub(super) fn straighten(&mut self, options: &WalkOptions) {
+        let Some(frontal) = &self.frontal else { return };
+        if self.kept.len() != self.steps().len() {
+            return;
+        }
+        let Some((mut renewed, variances)) = frontal.on_path_of_all() else { return };
+        let mut walk = Walk::new(self.walk.walker.clone(), renewed.path, renewed.beginning());
+        for (k, ((_, edges), of)) in self.kept.iter().zip(variances).enumerate() {
+            walk.follow(edges, &self.camera, options);
+            renewed.lay(k, of, &mut walk);
+        }
+        self.walk = walk;
+        self.frontal = Some(renewed);
     }
 }
 
@@ -628,6 +668,29 @@ mod tests {
         let before = frontal.paces[40];
         frontal.solve(40);
         assert!((frontal.paces[40].along_m - before.along_m).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_path_is_that_of_all_feet_in_the_end() {
+        // At first somebody drifts sideways.
+        let across = |t: f64| 0.16 * (2.0 - t).max(0.0) * towards().perp();
+        let place = |t: f64| feet_of_steps(t) + across(t);
+        let mut frontal = begun(&standing(50, place)).unwrap();
+        for k in 50..130 {
+            frontal.push(FRAME_S * k as f64, frame(k, place(FRAME_S * k as f64)).0.as_ref());
+        }
+        let off_deg = |frontal: &Frontal| towards().angle_to(frontal.path.direction()).to_degrees().abs();
+        assert!(off_deg(&frontal) > 7.0, "{}", off_deg(&frontal));
+        let (renewed, variances) = frontal.on_path_of_all().unwrap();
+        assert!(off_deg(&renewed) < 3.0, "{}", off_deg(&renewed));
+        assert_eq!((renewed.paces.len(), variances.len()), (130, 130));
+        for pace in &renewed.paces {
+            let body = MIDDLE + towards() * (SPEED_MPS * pace.time_s - 1.2);
+            let off = renewed.path.point(pace.along_m, 0.0).truncate() - body;
+            let most_m = 0.1 + across(pace.time_s).length();
+            assert!(off.length() < most_m, "{}: {off} m", pace.time_s);
+        }
+        assert!(variances.iter().flatten().all(|variance| *variance > 0.0 && *variance < 0.01));
     }
 
     #[test]

@@ -521,6 +521,7 @@ impl Tracker {
         active.settle(&self.backdrop, &self.options);
         active.turned(&self.options);
         active.pace_all();
+        active.straighten(&self.options.walk);
         active.trim();
         if !active.is_walk() {
             self.report.refused_starts += 1;
