@@ -30,7 +30,7 @@ nitpick_ignore_regex = [
     (r"py:.*", r"(Any|Path|PathLike|Callable|Iterable|Iterator|Mapping|Sequence|ContextManager)"),
     (  # of the inside
         r"py:.*",
-        r"memo\.(.*\._\w+|batch\.manifest\.Manifest|tracking\.StoredWalk|keypoints\.points\.Source)",
+        r"memo\.(.*\._\w+|batch\.manifest\.Manifest|keypoints\.points\.Source)",
     ),
     (
         r"py:.*",

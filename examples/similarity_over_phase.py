@@ -19,15 +19,15 @@ track = memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m,
 # `Track.start` keeps the curves of the starting frames: `similarity` is (frames, phases).
 
 start = track.start
-phases = np.arange(start["similarity"].shape[1]) / start["similarity"].shape[1]
+phases = np.arange(start.similarity.shape[1]) / start.similarity.shape[1]
 frame = 6
-true_phase = scene.truth["phase"][np.searchsorted(scene.truth["frame"], start["frame"][frame])]
+true_phase = scene.truth["phase"][np.searchsorted(scene.truth["frame"], start.frame[frame])]
 
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
-ax.plot(phases, start["similarity"][frame])
+ax.plot(phases, start.similarity[frame])
 ax.axvline(true_phase, color="tab:green", label="true phase")
 ax.axvline((true_phase + 0.5) % 1, color="tab:green", ls=":", label="half a cycle away")
-ax.set(xlabel="gait phase", ylabel="similarity, eq. (11)", title=f"frame {start['frame'][frame]}")
+ax.set(xlabel="gait phase", ylabel="similarity, eq. (11)", title=f"frame {start.frame[frame]}")
 ax.legend()
 
 # %%

@@ -678,17 +678,7 @@ def _(d, name):
     tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
     tracker.finish()
     for walk in tracker.take_finished():
-        (
-            walk.columns(),
-            walk.start(),
-            walk.record(),
-            walk.events(),
-            walk.gait_parameters(),
-            walk.cycles(),
-            walk.departures(),
-            walk.measured(),
-            walk.contours(0),
-        )
+        (repr(walk), walk._repr_html_(), walk.contours(0))
     tracker.finish() if d.is_wrong() else None
 
 
@@ -701,19 +691,13 @@ def _(d, name):
     steadier.losses()
 
 
-WALK_PARTS = [name for name in dir(_memo.Walk) if not name.startswith("_")]
-
-
-@case(*[f"Walk.{name}" for name in [*WALK_PARTS, "__len__"]])
-def _(d, name):
-    if name == "Walk.contours":
-        return WALK.contours(d.whole(0, len(WALK)))
-    found = getattr(WALK, name.split(".")[1])
-    return found() if callable(found) else found
+@case("Walk.contours")
+def _(d):
+    return WALK.contours(d.whole(0, len(WALK)))
 
 
 def record(d):
-    record = WALK.record()
+    record = dict(WALK.record)
     for key in list(record):
         if d.random.random() < 0.3 * d.wrong:
             value = record[key]
@@ -754,6 +738,11 @@ def _(d):
     return _memo.recorded_contours(record(d), [d.whole(0, 20) for _ in range(d.size(5))])
 
 
+@case("population_height_m")
+def _(d):
+    return _memo.population_height_m()
+
+
 @case("defaults")
 def _(d):
     return _memo.defaults(
@@ -791,6 +780,12 @@ def _(d):
     return memo.similarity(
         d.numbers(-50, 700, d.size(), 2, 2), d.numbers(-50, 700, d.size(), 2, 2), **options
     )
+
+
+@case("shrunk")
+def _(d):
+    (frame,) = d.frames(1)
+    return _memo.shrunk(frame, d.whole(1, 4))
 
 
 @case("edge_segments")
@@ -950,6 +945,15 @@ def _(d):
     return _memo.planar(*arguments, **options)
 
 
+def explanation(scene):
+    """The evidence of the walk in a frame."""
+    explainer = _memo.Explainer(TRACKER, [WALK.record], {int(WALK.columns["frame"][4])})
+    for index in range(14):
+        frame = np.ascontiguousarray(scene.frame(index)[::2, ::2])
+        for found in explainer.update(frame, scene.time_s(index)):
+            return found
+
+
 def results():
     """One object of each class of results, by its name."""
     scene = _memo.Scene(5, frames=14)
@@ -963,7 +967,16 @@ def results():
     pixels = 800.0 * joints[..., :2] / joints[..., 2:] + (320.0, 240.0)
     postures = _memo.posture(np.arange(4) / 25, pixels, np.ones((4, 14)), camera, height_m=1.75)
     window = next(window for window in limbs.windows if window.chains)
+    motion, cycle = _memo.FrameMotion(0, "still", [0.0, 0.0, 0.0], 0.1, 0.1, 1.0), np.zeros((5, 101, 6))
     made = [
+        *(WALK, WALK.start, WALK.start.line, WALK.height, WALK.gait_parameters[0], explanation(scene)),
+        _memo.WalkerState(0, 3, 0.1, 0.2, 0.0, 1.0, 0.0, 0.25, 0.1, 1.3),
+        *(_memo.SeekReport(9, 3, 1, 0), motion, _memo.LostView(4, "cut")),
+        _memo.SteadiedFrame(motion, np.zeros((3, 4), np.uint8), np.zeros((3, 4), bool)),
+        _memo.GaitEvent(0.1, 2.5, "toe_off", "left"),
+        _memo.GaitCycle("left", "mean", float("nan"), float("nan"), cycle),
+        *(_memo.Departure("left", "knee", 6.0, 2.0, 30, 0.2), _memo.WalkRatio(0.006, 0.004, 0.011)),
+        _memo.Treadmill(1.2, 0.03, -0.4, 0.3),
         *(walk, shown, limbs, window, window.chains[0], window.chains[0].links[0], postures),
         _memo.SecondMotion(["neck"], 0, joints, 1.0, 0.3),
         _memo.WalkFit(0.6, 200.0, 0.01, 0.02, 1.5, 0.01, False, "well", {"thigh": 0.4}, np.zeros((2, 5, 50))),
@@ -987,7 +1000,7 @@ RESULTS = results()
         f"{kind}.{part}"
         for kind, result in RESULTS.items()
         for part in vars(type(result))
-        if part not in NO_CALLS and f"{kind}.{part}" != "PointLightDisplay.frames"
+        if part not in NO_CALLS and f"{kind}.{part}" not in ("PointLightDisplay.frames", "Walk.contours")
     )
 )
 def _(d, name):
@@ -996,7 +1009,7 @@ def _(d, name):
     given = [d.one(WRONG_OBJECTS) if d.is_wrong() else field for field in fields]
     made = type(RESULTS[kind])(*d.one([given, given, given[1:], [*given, 1]] if d.is_wrong() else [given]))
     found = getattr(made, part)
-    return repr(made), made.__getnewargs__(), found
+    return repr(made), made.__getnewargs__(), made._repr_html_(), found
 
 
 @case("planar_rods", "planar_hinges")

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from memo import _memo
 from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table
 from memo.files import JOINTS, TRACK_COLUMNS
@@ -80,17 +81,18 @@ class Track:
         if status == "tracked":
             self.sentences.append("Left and right may be swapped (probability 40%): check them before use.")
         self.gait_parameters = gait_table(
-            [[("speed", "", SPEED_MPS, "m/s", 1.2, 1.4, 3)]] if len(times_s) else []
+            [[_memo.GaitParameter("speed", "", SPEED_MPS, "m/s", 1.2, 1.4, 3)]] if len(times_s) else []
         )
         self.cycles = cycle_table([])
         self.records = []
         phases = np.arange(N_PHASE) / N_PHASE
         best = self.columns["phase"][:12]
-        self.start = {
-            "frame": np.arange(len(best)),
-            "phase": best,
-            "similarity": 0.5 + 0.4 * np.cos(2 * np.pi * (phases[None, :] - best[:, None])),
-        }
+        similarity = 0.5 + 0.4 * np.cos(2 * np.pi * (phases[None, :] - best[:, None])).astype(np.float32)
+        lines = [_memo.PhaseLine(0.0, 1.0, 0.9)] * 4
+        frames = np.arange(len(best))
+        self.start = (
+            _memo.WalkStart(frames, times_s[:12], best, similarity, *lines, 0.1) if len(best) else None
+        )
         noise = np.random.default_rng(0).normal(0, 0.02, (3, len(times_s)))
         self.measured = {
             key: self.columns[name] + extra

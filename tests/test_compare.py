@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from memo import _memo
 from memo.compare import curve_differences, difference_sentences, parameter_differences
 from memo.cycles import cycle_table
 from memo.gait import gait_table
@@ -18,12 +19,13 @@ def cycles(knee_deg, half_deg, *, sides=("right",), joints=(1,)):
         values[joint] = np.column_stack(
             [angle, np.ones(101), np.full(101, np.nan), angle - half_deg, angle + half_deg, np.ones(101)]
         )
-    return cycle_table([[(side, "mean", np.nan, np.nan, values) for side in sides]])
+    return cycle_table([[_memo.GaitCycle(side, "mean", np.nan, np.nan, values) for side in sides]])
 
 
 def parameters(**values):
     """A table of gait parameters: name to (value, half width)."""
-    return gait_table([[(name, "", v, "m", v - half, v + half, 3) for name, (v, half) in values.items()]])
+    rows = [(name, "", v, "m", v - half, v + half, 3) for name, (v, half) in values.items()]
+    return gait_table([[_memo.GaitParameter(*row) for row in rows]])
 
 
 def test_intervals_are_combined_and_decide():

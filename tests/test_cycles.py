@@ -93,7 +93,7 @@ def test_the_table_is_a_data_frame_and_survives_a_file(track, tmp_path):
 
 
 def test_cycles_have_the_number_of_the_person(tmp_path):
-    curve = ("right", "mean", np.nan, np.nan, np.zeros((5, 101, 6)))
+    curve = _memo.GaitCycle("right", "mean", np.nan, np.nan, np.zeros((5, 101, 6)))
     table = cycle_table([[curve], [curve], [curve]], [0, 1, 0])
     assert table["person"].tolist() == [0] * 505 + [1] * 505 + [0] * 505
     assert cycle_table([[curve], [curve]])["person"].tolist() == [0] * 505 + [1] * 505
@@ -114,12 +114,12 @@ def test_a_table_without_its_columns_is_refused(tmp_path):
 
 
 def test_departures_are_said_with_their_interval():
-    [said] = departure_sentences([("left", "knee", -14.6, 5.2, 71, 0.312)])
+    [said] = departure_sentences([_memo.Departure("left", "knee", -14.6, 5.2, 71, 0.312)])
     assert said == (
         "The left knee is less flexed than in average walking: 15° (9 to 20) outside the band of "
         "healthy adults at 71 % of the cycle, and surely outside for 31% of it."
     )
-    assert "more flexed" in departure_sentences([("right", "hip", 6.0, 2.0, 3, 0.1)])[0]
+    assert "more flexed" in departure_sentences([_memo.Departure("right", "hip", 6.0, 2.0, 3, 0.1)])[0]
 
 
 def test_average_walking_is_the_clinical_average_lowered_to_joint_centres():

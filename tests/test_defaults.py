@@ -13,7 +13,7 @@ PICTURE = {"dot_px": "dot_px", "shape": "shape"}
 
 FUNCTIONS = {
     name: getattr(memo, name)
-    for name in ("edge_segments", "planar", "pointlight", "posture", "silhouettes", "walker_motion")
+    for name in ("edge_segments", "planar", "pointlight", "posture", "silhouettes", "track", "walker_motion")
 }
 OPTIONS = {
     ("planar", "noise_px"): "noise_px",
@@ -39,7 +39,8 @@ OPTIONS = {
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_call_leaves_defaults_to_the_core(name):
-    signatures = [inspect.signature(FUNCTIONS[name]), inspect.signature(getattr(_memo, name))]
+    calls = [FUNCTIONS[name], getattr(_memo, name, _memo.Tracker)]
+    signatures = [inspect.signature(call) for call in calls]
     for option, value in _memo.defaults(name).items():
         for parameters in (signature.parameters for signature in signatures):
             if option in parameters:
@@ -50,7 +51,8 @@ def test_a_call_leaves_defaults_to_the_core(name):
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_docstring_states_the_defaults(name):
-    (stated,) = re.findall(r"Defaults: (.*?)\.(?:\s|$)", FUNCTIONS[name].__doc__, re.DOTALL)
+    documented = memo.Tracker if name == "track" else FUNCTIONS[name]
+    (stated,) = re.findall(r"Defaults: (.*?)\.(?:\s|$)", documented.__doc__, re.DOTALL)
     found = dict(re.findall(r"`(\w+)` ([^,\s]+)", stated))
     expected = {key: value for key, value in _memo.defaults(name).items() if not isinstance(value, bool)}
     assert {key: ast.literal_eval(value) for key, value in found.items()} == expected

@@ -34,7 +34,7 @@ def test_the_scene_comes_nearer(scene):
 def test_place_and_phase_are_found_and_the_sides_stay_open(scene, track):
     (walk,) = track.walks
     assert walk.is_frontal and len(walk) > 72
-    columns = walk.columns()
+    columns = walk.columns
     truth = {name: scene.truth[name][columns["frame"]] for name in ("heading_rad", "x_m", "y_m", "phase")}
     off_m = np.hypot(columns["x_m"] - truth["x_m"], columns["y_m"] - truth["y_m"])
     assert np.median(off_m) < 0.3

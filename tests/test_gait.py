@@ -127,7 +127,7 @@ def test_without_a_walk_the_table_is_empty():
     assert track.sentences == ["Nobody was seen walking."] and track.records == []
 
 
-LINES = [
+ROWS = [
     ("step_length", "right", 0.70, "m", 0.65, 0.75, 3),
     ("step_length", "left", 0.60, "m", 0.55, 0.65, 3),
     ("step_length_symmetry", "", 15.3846, "%", 4.0, 26.0, 6),
@@ -138,19 +138,26 @@ LINES = [
 ]
 
 
+def lines(rows):
+    return [_memo.GaitParameter(*row) for row in rows]
+
+
+LINES = lines(ROWS)
+
+
 def test_only_what_excludes_zero_is_said():
     assert symmetry_sentences(gait_table([LINES]), 0) == [
         "The left step is 10 cm shorter than the right (3 to 17)."
     ]
-    wide = [(*line[:2], 0.1 if line[1] == "left" else line[2], *line[3:]) for line in LINES]
+    wide = lines((*row[:2], 0.1 if row[1] == "left" else row[2], *row[3:]) for row in ROWS)
     assert symmetry_sentences(gait_table([wide]), 0)[0].startswith("The left step is 60 cm shorter")
-    unknown = [(*line[:2], np.nan, line[3], np.nan, np.nan, 0) for line in LINES]
+    unknown = lines((*row[:2], np.nan, row[3], np.nan, np.nan, 0) for row in ROWS)
     assert symmetry_sentences(gait_table([LINES, unknown]), 1) == []
 
 
 def test_steps_hardly_seen_are_said_to_be():
     def said(low, high, value=100.0):
-        return cadence_sentences(gait_table([[("cadence", "", value, "1/min", low, high, 4)]]), 0)
+        return cadence_sentences(gait_table([lines([("cadence", "", value, "1/min", low, high, 4)])]), 0)
 
     assert said(90.0, 110.0) == [] == said(np.nan, np.nan, np.nan)
     assert said(-2.0, 202.0) == [

@@ -29,10 +29,10 @@ def tracked(scene, **given):
 
 def walk(**values):
     usual = {
-        "height": (1.7, 0.02, "given"),
-        "measured_height": (1.71, 0.04),
+        "height": _memo.BodyHeight(1.7, 0.02, "given"),
+        "measured_height": _memo.BodyHeight(1.71, 0.04, "measured"),
         "height_is_contradicted": False,
-        "walk_ratio": (0.006, 0.004, 0.011),
+        "walk_ratio": _memo.WalkRatio(0.006, 0.004, 0.011),
         "fit": types.SimpleNamespace(sole_m=0.002, is_off_ground=False),
     }
     return types.SimpleNamespace(**usual | values)
@@ -49,11 +49,11 @@ def test_the_height_is_measured_in_a_calibrated_camera(scene):
 
 
 def test_without_camera_and_height_the_scale_is_the_population_s(scene):
-    track, default = tracked(scene), _memo.defaults("track")
-    assert track.summary["height_m"] == default["height_m"] and track.summary["height_source"] == "assumed"
-    assert track.summary["height_sd_m"] == default["height_sd_m"]
+    track, (height_m, sd_m) = tracked(scene), _memo.population_height_m()
+    assert track.summary["height_m"] == height_m and track.summary["height_source"] == "assumed"
+    assert track.summary["height_sd_m"] == sd_m
     assert track.sentences[0].startswith("No height and no camera were given")
-    scale_sd = default["height_sd_m"] / default["height_m"]
+    scale_sd = sd_m / height_m
     assert (track.columns["sd_z_m"] > scale_sd * track.columns["z_m"]).all()
     for quantity in ("speed", "stride_length"):
         row = lookup(track.gait_parameters, 0, quantity)
@@ -95,7 +95,9 @@ def test_what_is_as_usual_is_not_mentioned():
     ("camera_given", "why"), [(False, "no camera were given"), (True, "does not show it")]
 )
 def test_an_assumed_height_is_said_with_its_reason(camera_given, why):
-    (said,) = assumed_height_sentences(walk(height=(1.7, 0.1, "assumed")), camera_given=camera_given)
+    (said,) = assumed_height_sentences(
+        walk(height=_memo.BodyHeight(1.7, 0.1, "assumed")), camera_given=camera_given
+    )
     assert why in said and "1.70 m tall" in said and "by 12%" in said
 
 
@@ -107,5 +109,5 @@ def test_feet_off_the_ground_are_mentioned():
 
 def test_a_ratio_outside_its_limits_is_mentioned():
     for ratio, rate in ((0.0036, "high"), (0.0125, "low")):
-        (said,) = implausible_sentences(walk(walk_ratio=(ratio, 0.004, 0.011)))
+        (said,) = implausible_sentences(walk(walk_ratio=_memo.WalkRatio(ratio, 0.004, 0.011)))
         assert f"frame rate is too {rate}" in said and "4.0 to 11.0 mm" in said

@@ -125,8 +125,8 @@ def axes(*grid):
 
 def test_similarity_shows_the_curve_of_its_frame(track):
     ax = plot_similarity(axes(1, 1)[0, 0], track, 3)
-    np.testing.assert_array_equal(ax.lines[0].get_ydata(), track.start["similarity"][3])
-    assert ax.lines[1].get_xdata()[0] == track.start["phase"][3]
+    np.testing.assert_array_equal(ax.lines[0].get_ydata(), track.start.similarity[3])
+    assert ax.lines[1].get_xdata()[0] == track.start.phase[3]
 
 
 def test_start_line_passes_through_the_tracked_phases(track):
@@ -180,5 +180,5 @@ def test_all_plots_are_saved(tmp_path, track):
     for path in paths:
         with VideoReader(path) as reader:
             assert min(reader.size) > 300
-    track.start = {}
+    track.start = None
     assert {path.name for path in write_plots(track, tmp_path)} == {"motion.png", "angles.png"}

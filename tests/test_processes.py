@@ -57,7 +57,7 @@ def update(tracker, index):
 
 def walks(tracker):
     tracker.finish()
-    return [walk.columns() for walk in tracker.take_finished()]
+    return [walk.columns for walk in tracker.take_finished()]
 
 def tracked():
     tracker = new_tracker()
@@ -283,7 +283,7 @@ def test_a_tracker_goes_on_after_an_interrupt_with_the_frame_that_it_interrupted
     signal.signal(signal.SIGALRM, interrupt)
     for index in range(FRAMES):
         frame = drawn(index)
-        while tracker.seek_report()["frames"] == index:
+        while tracker.seek_report().frames == index:
             armed = True
             try:
                 try:

@@ -157,7 +157,7 @@ def test_a_pickled_track_answers_all_it_did(track):
     np.testing.assert_array_equal(again.contours(7), track.contours(7))
     np.testing.assert_array_equal(again.contour_parts(7), track.contour_parts(7))
     np.testing.assert_array_equal(again.measured["phase"], track.measured["phase"])
-    np.testing.assert_array_equal(again.start["similarity"], track.start["similarity"])
+    np.testing.assert_array_equal(again.start.similarity, track.start.similarity)
 
 
 def test_cameras_are_pickled_to_the_last_bit():

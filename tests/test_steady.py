@@ -34,19 +34,20 @@ def test_a_picture_turned_by_opencv_is_turned_back():
     matrix, wall = np.array(camera.parameters()["matrix"]), textured(1)
     steadier = _memo.Steadier(camera)
     first = shot(wall, camera, [0, 0, 0])
-    assert steadier.update(first)["state"] == "still"
+    assert steadier.update(first).motion.state == "still"
     places = np.array([[[0, 0]], [[319, 0]], [[0, 239]], [[319, 239]], [[160, 120]]], float)
     for turn_rad in ([0.01, -0.015, 0.01], [-0.004, 0.02, -0.02]):
-        found = steadier.update(shot(wall, camera, turn_rad))
+        steadied = steadier.update(shot(wall, camera, turn_rad))
+        found = steadied.motion
 
         def moved(turn):
             rotation = cv2.Rodrigues(np.array(turn, float))[0]
             return cv2.perspectiveTransform(places, matrix @ rotation @ np.linalg.inv(matrix))
 
-        off_px = np.linalg.norm(moved(found["turn_rad"]) - moved(turn_rad), axis=2).max()
-        assert found["state"] == "turned" and off_px < 0.1, (off_px, found["turn_rad"])
-        seen = ~found["unseen"]
-        differs = np.abs(found["picture"].astype(int) - first)[seen]
+        off_px = np.linalg.norm(moved(found.turn_rad) - moved(turn_rad), axis=2).max()
+        assert found.state == "turned" and off_px < 0.1, (off_px, found.turn_rad)
+        seen = ~steadied.unseen
+        differs = np.abs(steadied.picture.astype(int) - first)[seen]
         assert seen.mean() > 0.85 and differs.mean() < 3, differs.mean()
 
 
@@ -70,14 +71,14 @@ def test_a_hand_held_recording_is_steadied():
     with open(scene / "camera_motion.csv") as file, memo.video.VideoReader(scene / "video.mp4") as video:
         off_px = []
         for frame, row in zip(video, csv.DictReader(file), strict=True):
-            found = steadier.update(frame.luma)
+            found = steadier.update(frame.luma).motion
             yaw, pitch, roll = (float(row[name]) for name in ("u_px", "v_px", "roll_rad"))
             about = [
                 cv2.Rodrigues(np.array(turn, float))[0]
                 for turn in ([0, 0, roll], [pitch / focal, 0, 0], [0, yaw / focal, 0])
             ]
             rest = cv2.Rodrigues(
-                cv2.Rodrigues(np.array(found["turn_rad"]))[0].T @ about[0] @ about[1] @ about[2]
+                cv2.Rodrigues(np.array(found.turn_rad))[0].T @ about[0] @ about[1] @ about[2]
             )
             off_px.append(focal * np.linalg.norm(rest[0]))
     assert np.sqrt(np.mean(np.square(off_px))) < 0.15 and steadier.losses() == []

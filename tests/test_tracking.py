@@ -117,7 +117,7 @@ def test_options_are_those_documented(options, error, reason):
 def test_nobody_is_a_result(count):
     track = memo.track([GREY] * count, height_m=1.75, fps=25)
     assert len(track) == 0 and track.summary["status"] == "nobody" and track.summary["walks"] == 0
-    assert track.events == [] and track.start == {} and track.camera is None
+    assert track.events == [] and track.start is None and track.camera is None
     assert list(track.columns) == list(TRACK_COLUMNS)
     assert all(column.shape == (0,) for column in track.columns.values())
     assert all(column.shape == (0,) for column in track.measured.values())
@@ -207,7 +207,7 @@ def average_walker(frames):
 def test_the_stream_can_be_ended_at_any_frame(walk):
     tracker = memo.Tracker(1.75, adapt=False)
     states = [tracker.update(frame, index / 25) for index, frame in enumerate(walk[:30])]
-    assert states[0] is None and states[-1]["time_s"] == pytest.approx(28 / 25), "known one frame later"
+    assert states[0] is None and states[-1].time_s == pytest.approx(28 / 25), "known one frame later"
     columns = tracker.finish().columns
     np.testing.assert_array_equal(columns["frame"], np.arange(30))
 

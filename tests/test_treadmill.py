@@ -5,32 +5,34 @@ import types
 import memo
 import numpy as np
 import pytest
+from memo import _memo
 from memo.treadmill import treadmill_figures, treadmill_sentence
 
 
-def walk(treadmill, heading_rad=0.4):
+def walk(*treadmill, heading_rad=0.4):
     return types.SimpleNamespace(
-        treadmill=treadmill, columns=lambda: {"heading_rad": np.full(9, heading_rad)}
+        treadmill=_memo.Treadmill(*treadmill) if treadmill else None,
+        columns={"heading_rad": np.full(9, heading_rad)},
     )
 
 
 def test_over_ground_there_is_no_belt():
-    assert treadmill_figures(walk(None)) == {"treadmill": False}
+    assert treadmill_figures(walk()) == {"treadmill": False}
 
 
 def test_the_sentence_has_the_belt_and_a_likely_other_heading():
-    said = treadmill_sentence(walk((1.204, 0.031, None)), 8.04, 108.2)
+    said = treadmill_sentence(walk(1.204, 0.031, None, None), 8.04, 108.2)
     assert said == (
         "Somebody walks on a treadmill for 8.0 s, belt speed 1.20 ± 0.03 m/s, 108 steps per minute."
     )
-    assert treadmill_sentence(walk((1.2, 0.03, (-0.4, 0.01))), 8.0, np.nan).endswith("± 0.03 m/s.")
-    open_heading = treadmill_sentence(walk((1.2, 0.03, (-0.4, 0.31))), 8.0, np.nan)
+    assert treadmill_sentence(walk(1.2, 0.03, -0.4, 0.01), 8.0, np.nan).endswith("± 0.03 m/s.")
+    open_heading = treadmill_sentence(walk(1.2, 0.03, -0.4, 0.31), 8.0, np.nan)
     assert "heading is 23 degrees, or 337 degrees with left and right exchanged" in open_heading
     assert "31%" in open_heading
 
 
 def test_the_figures_name_the_belt_and_both_headings():
-    figures = treadmill_figures(walk((1.2, 0.03, (-0.4, 0.31))))
+    figures = treadmill_figures(walk(1.2, 0.03, -0.4, 0.31))
     assert figures == {
         "treadmill": True,
         "belt_mps": 1.2,
@@ -39,7 +41,7 @@ def test_the_figures_name_the_belt_and_both_headings():
         "other_heading_rad": -0.4,
         "p_other_heading": 0.31,
     }
-    assert treadmill_figures(walk((1.2, 0.03, None)))["p_other_heading"] is None
+    assert treadmill_figures(walk(1.2, 0.03, None, None))["p_other_heading"] is None
 
 
 @pytest.fixture(scope="module")

@@ -8,17 +8,26 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "BodyHeight",
     "Camera",
     "ClothedScene",
     "CountTable",
+    "Departure",
     "Explainer",
+    "Explanation",
+    "FrameMotion",
     "FrameSurvivors",
+    "GaitCycle",
+    "GaitEvent",
+    "GaitParameter",
     "HeadColumn",
     "HingeTrials",
     "ImageStages",
     "InternalError",
     "LastStage",
     "LimbSides",
+    "LostView",
+    "PhaseLine",
     "PlanarChain",
     "PlanarInterpretation",
     "PlanarLink",
@@ -30,14 +39,20 @@ __all__ = [
     "RodTrials",
     "Scene",
     "SecondMotion",
+    "SeekReport",
+    "SteadiedFrame",
     "Steadier",
     "TableInputs",
     "Tracker",
+    "Treadmill",
     "Walk",
     "WalkFit",
+    "WalkRatio",
     "WalkSimilarity",
+    "WalkStart",
     "WalkerCalibration",
     "WalkerMotion",
+    "WalkerState",
     "__version__",
     "_camera",
     "_panic",
@@ -77,6 +92,7 @@ __all__ = [
     "planar_rods",
     "pointlight",
     "pointlight_together",
+    "population_height_m",
     "posture",
     "posture_tree",
     "recorded_contours",
@@ -84,6 +100,7 @@ __all__ = [
     "rohr_numbers",
     "search_windows",
     "segment_names",
+    "shrunk",
     "side_pairs",
     "silhouettes",
     "similarity",
@@ -252,14 +269,14 @@ class Tracker:
         camera: Camera | None = None,
         *,
         fov_deg: float | None = None,
-        gait: str = "dense",
+        gait: str | None = None,
         adapt: bool = True,
-        start_frames: int = 13,
+        start_frames: int | None = None,
         treadmill: bool | None = None,
         compensate_gain: bool = False,
         background: bool = False,
         steady: bool = True,
-        measure: str = "rohr",
+        measure: str | None = None,
         full_gradient: float | None = None,
         full_velocity: float | None = None,
         part_weights: Sequence[float] | None = None,
@@ -267,34 +284,148 @@ class Tracker:
     def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> None: ...
     def finish(self) -> None: ...
     def take_finished(self) -> list[Walk]: ...
-    def people(self) -> list[dict[str, float]]: ...
-    def seek_report(self) -> dict[str, int]: ...
-    def camera_motion(self) -> list[tuple[int, str, list[float], float, float, float]]: ...
-    def lost_views(self) -> list[tuple[int, str]]: ...
+    def people(self) -> list[WalkerState]: ...
+    def seek_report(self) -> SeekReport: ...
+    def camera_motion(self) -> list[FrameMotion]: ...
+    def lost_views(self) -> list[LostView]: ...
+
+@final
+class WalkerState:
+    """Filtered state of a person who is followed."""
+
+    person: Final[int]
+    """Number of the person, in order of appearance."""
+    frame: Final[int]
+    time_s: Final[float]
+    x_m: Final[float]
+    """Centre of the torso, world metres."""
+    y_m: Final[float]
+    z_m: Final[float]
+    heading_rad: Final[float]
+    """Angle of the body's forward axis about world Z."""
+    phase: Final[float]
+    """Gait phase in [0, 1), 0 at right heel strike."""
+    p_swapped: Final[float]
+    """Probability that left and right are swapped."""
+    speed_mps: Final[float]
+    """Speed along the path, m/s."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class SeekReport:
+    """Counts over a stream; if nobody was followed, they show why."""
+
+    frames: Final[int]
+    frames_with_candidate: Final[int]
+    """Frames with a moving region large enough for a person."""
+    frames_cut_off: Final[int]
+    """Of these, frames in which the image border cut the region."""
+    refused_starts: Final[int]
+    """Refused starts: the region moved too slowly, did not fit the height, or did not walk."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class FrameMotion:
+    """The camera in a frame."""
+
+    frame: Final[int]
+    state: Final[str]
+    """"still", "turned", "unknown" or "lost"."""
+    turn_rad: Final[list[float]]
+    """Rotation vector from the first frame's camera to this one's, camera axes."""
+    shift_px: Final[float]
+    """Largest displacement of the picture against the first frame, pixels."""
+    rms_px: Final[float]
+    """Its root mean square over the picture, pixels."""
+    support: Final[float]
+    """Share of the points that the rotation explains; NaN where none was estimated."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class LostView:
+    """Where a view of the camera ended."""
+
+    frame: Final[int]
+    """The first frame of another view."""
+    reason: Final[str]
+    """"cut", "zoom" or "other view"."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class SteadiedFrame:
+    """A frame after steadying."""
+
+    motion: Final[FrameMotion]
+    """The camera in it."""
+    picture: Final[npt.NDArray[np.uint8] | None]
+    """(H, W) as the camera of the first frame would have seen it; None if the frame was left as it is."""
+    unseen: Final[npt.NDArray[np.bool_] | None]
+    """(H, W) pixels that the frame does not show."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Steadier:
-    """Steadies frames of a camera held in the hand, as `Tracker` does.
-
-    A frame's `state` is "still", "turned", "unknown" or "lost"; a frame that was turned back has `picture`,
-    as the camera of the first frame would have seen it, and `unseen`, the pixels that it does not show.
-    `turn_rad` is the rotation vector from the first frame's camera to the frame's, camera axes.
-    """
+    """Steadies frames of a camera held in the hand, as `Tracker` does."""
 
     def __new__(
         cls, camera: Camera | None = None, *, fov_deg: float | None = None, still_px: float | None = None
     ) -> Self: ...
-    def update(self, frame: npt.NDArray[np.uint8]) -> dict[str, Any]: ...
-    def losses(self) -> list[tuple[int, str]]: ...
+    def update(self, frame: npt.NDArray[np.uint8]) -> SteadiedFrame: ...
+    def losses(self) -> list[LostView]: ...
 
 @final
 class Explainer:
     """Takes frames and explains the requested ones, one frame later; `memo.explain` wraps it."""
 
     def __new__(cls, tracker: Tracker, records: Sequence[dict[str, Any]], wanted: set[int]) -> Self: ...
-    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> list[dict[str, Any]]: ...
-    def finish(self) -> list[dict[str, Any]]: ...
+    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> list[Explanation]: ...
+    def finish(self) -> list[Explanation]: ...
 
+@final
+class Explanation:
+    """The evidence of a walk in one frame; its attributes are those of `memo.explain.Why`."""
+
+    frame: Final[int]
+    time_s: Final[float]
+    walk: Final[int]
+    window_px: Final[tuple[int, int, int, int]]
+    luma: Final[npt.NDArray[np.uint8]]
+    change_mask: Final[npt.NDArray[np.bool_]]
+    edge_points: Final[npt.NDArray[np.float64]]
+    segments: Final[npt.NDArray[np.float64]]
+    model: Final[npt.NDArray[np.float64]]
+    model_part: Final[npt.NDArray[np.uint8]]
+    model_px: Final[npt.NDArray[np.float64]]
+    model_edge: Final[npt.NDArray[np.int64]]
+    overlap_px: Final[npt.NDArray[np.float64]]
+    distance_px: Final[npt.NDArray[np.float64]]
+    angle_rad: Final[npt.NDArray[np.float64]]
+    similarity_px: Final[npt.NDArray[np.float64]]
+    phase_grid: Final[npt.NDArray[np.float64]]
+    similarity: Final[npt.NDArray[np.float64]]
+    phase: Final[float]
+    chosen_similarity: Final[float]
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+def population_height_m() -> tuple[float, float]: ...
 def recorded_contours(
     record: dict[str, Any], frames: Sequence[int]
 ) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]]: ...
@@ -329,44 +460,211 @@ class WalkFit:
     def __getnewargs__(self) -> tuple[Any, ...]: ...
 
 @final
+class GaitEvent:
+    """A gait event."""
+
+    time_s: Final[float]
+    frame: Final[float]
+    """The time as a frame, between frames."""
+    event: Final[str]
+    """"heel_strike" or "toe_off"."""
+    side: Final[str]
+    """"right" or "left"."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class GaitParameter:
+    """A gait parameter with its 95 % interval."""
+
+    parameter: Final[str]
+    """A key of `memo.gait.DEFINITIONS`."""
+    side: Final[str]
+    """"right", "left", or "" for both."""
+    value: Final[float]
+    """NaN if unknown, as are the ends of the interval."""
+    unit: Final[str]
+    low: Final[float]
+    high: Final[float]
+    n: Final[int]
+    """Number of steps or cycles used."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class GaitCycle:
+    """A gait cycle of one side, or the mean of its cycles."""
+
+    side: Final[str]
+    curve: Final[str]
+    """"cycle", "partial" or "mean"."""
+    start_s: Final[float]
+    """NaN for a mean, as is the end."""
+    end_s: Final[float]
+    values: Final[npt.NDArray[np.float64]]
+    """(5, 101, 6): of hip, knee, ankle, shoulder and elbow, at 0 to 100 %, angle, stated standard deviation,
+    standard deviation over cycles, low and high end of the 95 % interval (degrees), and number of cycles."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class Departure:
+    """A joint whose mean cycle is outside of average walking."""
+
+    side: Final[str]
+    joint: Final[str]
+    """"hip" or "knee"."""
+    excess_deg: Final[float]
+    """How far outside, where that is most; positive is more flexed."""
+    half_deg: Final[float]
+    """Half of its 95 % interval."""
+    at_percent: Final[int]
+    """Where that is, per cent of the cycle."""
+    share: Final[float]
+    """Share of the cycle that is outside with the whole interval."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class BodyHeight:
+    """A body height."""
+
+    height_m: Final[float]
+    sd_m: Final[float]
+    source: Final[str]
+    """"given", "measured" or "assumed"."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class WalkRatio:
+    """Step length over cadence, metres per step per minute."""
+
+    value: Final[float]
+    low: Final[float]
+    """The smallest that is usual at this height."""
+    high: Final[float]
+    """The largest."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class Treadmill:
+    """A treadmill under a walk."""
+
+    belt_mps: Final[float]
+    belt_sd_mps: Final[float]
+    other_heading_rad: Final[float | None]
+    """The heading that looks alike from the camera, with left and right exchanged; None if there is none."""
+    p_other_heading: Final[float | None]
+    """Probability of that heading."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class PhaseLine:
+    """A line of the gait phase over time."""
+
+    phase_at_start: Final[float]
+    """Phase at the first frame, in [0, 1)."""
+    rate_hz: Final[float]
+    """Gait cycles per second; negative for a cycle run backwards."""
+    similarity: Final[float]
+    """Mean similarity along the line."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class WalkStart:
+    """The starting phase of a walk."""
+
+    frame: Final[npt.NDArray[np.int64]]
+    time_s: Final[npt.NDArray[np.float64]]
+    phase: Final[npt.NDArray[np.float64]]
+    """The most similar phase of each frame."""
+    similarity: Final[npt.NDArray[np.float32]]
+    """(frames, phases)."""
+    line: Final[PhaseLine]
+    """The chosen line."""
+    twin: Final[PhaseLine]
+    """The best line of the other half cycle."""
+    other_direction: Final[PhaseLine]
+    """The best line in the other walking direction."""
+    two_line_rule: Final[PhaseLine]
+    """The line of the paper's rule, for comparison."""
+    p_other_direction: Final[float]
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
 class Walk:
     """One walk that has ended."""
 
-    def columns(self) -> dict[str, npt.NDArray[Any]]: ...
-    def events(self) -> list[tuple[float, float, str, str]]: ...
-    def gait_parameters(self) -> list[tuple[str, str, float, str, float, float, int]]: ...
-    def cycles(self) -> list[tuple[str, str, float, float, npt.NDArray[np.float64]]]: ...
-    def departures(self) -> list[tuple[str, str, float, float, int, float]]: ...
-    def record(self) -> dict[str, Any]: ...
-    def measured(self) -> npt.NDArray[np.float64]: ...
+    person: Final[int]
+    """Number of the person, in order of appearance."""
+    direction: Final[str]
+    """"forward" or "backward"."""
+    p_other_direction: Final[float]
+    """Probability that the person walks in the other direction."""
+    p_swapped: Final[float]
+    """Probability that left and right are swapped."""
+    is_frontal: Final[bool]
+    """True for a walk towards the camera or away from it, whose place and phase the feet show: left and right
+    stay open, and the angles are those of average walking."""
+    columns: Final[dict[str, npt.NDArray[Any]]]
+    """The columns of `track.csv`, one array per column."""
+    events: Final[list[GaitEvent]]
+    gait_parameters: Final[list[GaitParameter]]
+    """Every walk has the same."""
+    cycles: Final[list[GaitCycle]]
+    """Right, then left, each side's mean last."""
+    departures: Final[list[Departure]]
+    height: Final[BodyHeight]
+    """The body height that the walk was tracked with."""
+    measured_height: Final[BodyHeight | None]
+    """The height measured in a calibrated camera, also if another was given."""
+    height_is_contradicted: Final[bool]
+    """Whether the measured height contradicts the given one by more than three standard deviations."""
+    walk_ratio: Final[WalkRatio | None]
+    """None for backward or very short walks."""
+    treadmill: Final[Treadmill | None]
+    """None for a walk over ground."""
+    fit: Final[WalkFit | None]
+    """The measured person; None if there was no fit, or if it failed."""
+    fit_problem: Final[str | None]
+    """Why no person was measured; None if there is a fit, or if none was asked for."""
+    camera: Final[Camera]
+    """The camera, given or assumed."""
+    start: Final[WalkStart]
+    """The starting phase."""
+    measured: Final[npt.NDArray[np.float64]]
+    """Best measured hypotheses per frame, (rows, 3): world x of the position along the path and z in metres,
+    phase; NaN for frames without a measurement."""
+    record: Final[dict[str, Any]]
+    """What `memo.explain` needs besides the video, as plain numbers."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
     def contours(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]: ...
-    def start(self) -> dict[str, Any]: ...
-    @property
-    def person(self) -> int: ...
-    @property
-    def height(self) -> tuple[float, float, str]: ...
-    @property
-    def measured_height(self) -> tuple[float, float] | None: ...
-    @property
-    def height_is_contradicted(self) -> bool: ...
-    @property
-    def walk_ratio(self) -> tuple[float, float, float] | None: ...
-    @property
-    def treadmill(self) -> tuple[float, float, tuple[float, float] | None] | None: ...
-    @property
-    def is_frontal(self) -> bool: ...
-    @property
-    def camera(self) -> Camera: ...
-    @property
-    def direction(self) -> str: ...
-    @property
-    def p_other_direction(self) -> float: ...
-    @property
-    def p_swapped(self) -> float: ...
-    @property
-    def fit(self) -> WalkFit | None: ...
-    @property
-    def fit_problem(self) -> str | None: ...
     def __len__(self) -> int: ...
 
 def change_mask(
@@ -385,6 +683,7 @@ def similarity(
     c_r: float = ...,
     sigma_phi_rad: float = ...,
 ) -> tuple[float, npt.NDArray[np.float64]]: ...
+def shrunk(frame: npt.NDArray[np.uint8], n: int) -> npt.NDArray[np.uint8]: ...
 def edge_segments(
     frame: npt.NDArray[np.uint8],
     mask: npt.NDArray[np.bool_] | None = None,

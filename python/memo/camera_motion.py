@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo.files import write_columns_csv
 from memo.wording import counted
+
+if TYPE_CHECKING:
+    from memo._memo import FrameMotion, LostView
 
 __all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "write_camera_motion_csv"]
 
@@ -27,12 +30,10 @@ _STATES = ("still", "turned", "unknown", "lost")
 class CameraMotion:
     """The camera in the frames of a video; empty if it was not looked for (`steady=False`)."""
 
-    rows: Sequence[tuple[int, str, Sequence[float], float, float, float]] = ()
-    """Per frame: number, state ("still", "turned", "unknown" or "lost"), rotation vector from the camera of
-    the first frame to that of the frame (radians, camera axes), largest and root mean square displacement of
-    the picture (pixels), and the share of its points that the rotation explains."""
-    lost: Sequence[tuple[int, str]] = field(default=())
-    """Where a view ended: the first frame of another one, and "cut", "zoom" or "other view"."""
+    rows: Sequence[FrameMotion] = ()
+    """The camera in each frame, in frames and pixels as given to the tracker."""
+    lost: Sequence[LostView] = ()
+    """Where a view ended."""
     first_frame: int = 0
     """Number in the video of the first frame given."""
     shrink: int = 1
@@ -43,23 +44,22 @@ class CameraMotion:
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """One array per column of `camera_motion.csv`, in pixels and frames of the video."""
-        turns = np.array([row[2] for row in self.rows], np.float64).reshape(-1, 3)
-        numbers = np.array([row[3:6] for row in self.rows], np.float64).reshape(-1, 3)
+        turns = np.array([row.turn_rad for row in self.rows], np.float64).reshape(-1, 3)
         return {
-            "frame": np.array([row[0] + self.first_frame for row in self.rows], np.int64),
-            "state": np.array([row[1] for row in self.rows], object),
+            "frame": np.array([row.frame + self.first_frame for row in self.rows], np.int64),
+            "state": np.array([row.state for row in self.rows], object),
             "rx_rad": turns[:, 0],
             "ry_rad": turns[:, 1],
             "rz_rad": turns[:, 2],
-            "shift_px": numbers[:, 0] * self.shrink,
-            "shift_rms_px": numbers[:, 1] * self.shrink,
-            "support": numbers[:, 2],
+            "shift_px": np.array([row.shift_px * self.shrink for row in self.rows], np.float64),
+            "shift_rms_px": np.array([row.rms_px * self.shrink for row in self.rows], np.float64),
+            "support": np.array([row.support for row in self.rows], np.float64),
         }
 
     @property
     def moved(self) -> bool:
         """True if frames were steadied or a view ended."""
-        return bool(self.lost) or any(row[1] == "turned" for row in self.rows)
+        return bool(self.lost) or any(row.state == "turned" for row in self.rows)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -73,7 +73,7 @@ class CameraMotion:
             "largest_px": float(largest.max()) if turned.any() else 0.0,
             "rms_px": float(np.sqrt(np.mean(rms**2))) if turned.any() else 0.0,
             **counts,
-            "lost": [[frame + self.first_frame, reason] for frame, reason in self.lost],
+            "lost": [[view.frame + self.first_frame, view.reason] for view in self.lost],
         }
 
     @property

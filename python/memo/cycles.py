@@ -5,15 +5,18 @@ The core computes the numbers (`memo_core::track::cycles` and `memo_core::track:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import count
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo.files import ANGLES, read_typed_columns, write_columns_csv
+
+if TYPE_CHECKING:
+    from memo._memo import Departure, GaitCycle
 
 __all__ = [
     "CYCLE_COLUMNS",
@@ -33,13 +36,9 @@ _POINTS = 101
 _WHOLE = ("walk", "person", "percent", "n")
 _TEXTS = ("side", "joint", "curve")
 
-Curve = tuple[str, str, float, float, npt.NDArray[np.float64]]
-"""Side, kind of curve, first and last second, (5, 101, 6) values."""
-Departure = tuple[str, str, float, float, int, float]
-
 
 def cycle_table(
-    walks: Iterable[Sequence[Curve]], people: Iterable[int] | None = None
+    walks: Iterable[Iterable[GaitCycle]], people: Iterable[int] | None = None
 ) -> dict[str, npt.NDArray[Any]]:
     """The columns of `cycles.csv` from the curves of each walk, as `_memo.Walk.cycles` gives them.
 
@@ -48,13 +47,14 @@ def cycle_table(
     blocks: list[dict[str, npt.NDArray[Any]]] = []
     for (walk, curves), person in zip(enumerate(walks), people or count(), strict=False):
         counts: dict[str, int] = {}
-        for side, curve, start_s, end_s, values in curves:
+        for found in curves:
+            side, curve, values = found.side, found.curve, found.values
             cycle = float("nan") if curve == "mean" else counts.setdefault(side, 0)
             counts[side] = counts.get(side, 0) + 1
             joints, points, _ = values.shape
             alike = {"walk": walk, "person": person, "side": side, "curve": curve, "cycle": cycle}
             block = {name: np.full(joints * points, value) for name, value in alike.items()}
-            block |= {"start_s": np.full(joints * points, start_s), "end_s": np.full(joints * points, end_s)}
+            block |= {name: np.full(joints * points, getattr(found, name)) for name in ("start_s", "end_s")}
             block["joint"] = np.repeat(ANGLES, points)
             block["percent"] = np.tile(np.arange(points), joints)
             block |= dict(zip(_VALUES, values.reshape(-1, len(_VALUES)).T, strict=True))
@@ -107,9 +107,9 @@ def mean_cycle(
 def departure_sentences(departures: Iterable[Departure]) -> list[str]:
     """Reports each joint whose mean cycle is outside of average walking with its whole interval."""
     return [
-        f"The {side} {joint} is {'more' if excess_deg > 0 else 'less'} flexed than in average walking: "
-        f"{abs(excess_deg):.0f}° ({abs(excess_deg) - half_deg:.0f} to {abs(excess_deg) + half_deg:.0f}) "
-        f"outside the band of healthy adults at {at_percent} % of the cycle, and surely outside for "
-        f"{share:.0%} of it."
-        for side, joint, excess_deg, half_deg, at_percent, share in departures
+        f"The {d.side} {d.joint} is {'more' if d.excess_deg > 0 else 'less'} flexed than in average walking: "
+        f"{abs(d.excess_deg):.0f}° ({abs(d.excess_deg) - d.half_deg:.0f} to "
+        f"{abs(d.excess_deg) + d.half_deg:.0f}) outside the band of healthy adults at {d.at_percent} % of "
+        f"the cycle, and surely outside for {d.share:.0%} of it."
+        for d in departures
     ]

@@ -12,7 +12,7 @@ camera that moved are compared as the first frame's camera would have seen them,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.extras import install
-from memo.pixels import averaged, of_video
+from memo.pixels import of_video
 from memo.run import NAME, RunError, read_run
 
 if TYPE_CHECKING:
@@ -200,19 +200,19 @@ def _found(
     shrink: int,
     total: int,
     progress: Callable[[int, int], object] | None,
-) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.uint8]]]:
+) -> Iterator[tuple[_memo.Explanation, npt.NDArray[np.uint8]]]:
     """The evidence in the pictures, averaged as for the tracker, each with its frame of the video."""
     before = np.empty((0, 0), np.uint8)
     for done, frame in enumerate(reader, 1):
         whole = frame.luma if shrink == 1 else np.array(frame.luma)
-        found = explainer.update(whole if shrink == 1 else averaged(whole, shrink), frame.time_s)
+        found = explainer.update(whole if shrink == 1 else _memo.shrunk(whole, shrink), frame.time_s)
         if progress is not None:
             progress(done, total)
         for each in found:  # from the previous frame
-            yield each, _whole(each["luma"], before, shrink)
+            yield each, _whole(each.luma, before, shrink)
         before = whole
     for each in explainer.finish():
-        yield each, _whole(each["luma"], before, shrink)
+        yield each, _whole(each.luma, before, shrink)
 
 
 def _whole(
@@ -221,7 +221,7 @@ def _whole(
     """The picture that was compared, as large as the video; a steadied one is the average, enlarged."""
     if shrink == 1:
         return compared
-    if np.array_equal(compared, averaged(whole, shrink)):
+    if np.array_equal(compared, _memo.shrunk(whole, shrink)):
         return whole
     shown = np.zeros_like(whole)
     enlarged = np.kron(compared, np.ones((shrink, shrink), np.uint8))
@@ -229,11 +229,13 @@ def _whole(
     return shown
 
 
+_EVIDENCE = tuple(field.name for field in fields(Why) if hasattr(_memo.Explanation, field.name))
 _PLACES = ("edge_points", "segments", "model")
 _LENGTHS = ("model_px", "overlap_px", "distance_px", "similarity_px")
 
 
-def _why(found: dict[str, Any], luma: npt.NDArray[np.uint8], first: int, shrink: int) -> Why:
+def _why(explanation: _memo.Explanation, luma: npt.NDArray[np.uint8], first: int, shrink: int) -> Why:
+    found = {name: getattr(explanation, name) for name in _EVIDENCE}
     with np.errstate(divide="ignore", invalid="ignore"):
         matched = np.where(found["model_px"] > 0, found["similarity_px"] / found["model_px"], 0.0)
     edges = np.unique(found["model_edge"][found["model_edge"] >= 0])

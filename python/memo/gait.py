@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import count
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from memo.files import read_typed_columns, write_columns_csv
+
+if TYPE_CHECKING:
+    from memo._memo import GaitParameter
 
 __all__ = [
     "DEFINITIONS",
@@ -75,7 +78,7 @@ Table = dict[str, npt.NDArray[Any]]
 
 
 def gait_table(
-    walks: Iterable[Iterable[tuple[str, str, float, str, float, float, int]]],
+    walks: Iterable[Iterable[GaitParameter]],
     people: Iterable[int] | None = None,
 ) -> Table:
     """The columns of `gait_parameters.csv` from the core's rows, one walk after another.
@@ -83,7 +86,7 @@ def gait_table(
     `people` are the numbers of the persons of the walks, by default another one each.
     """
     lines = [
-        (walk, person, *line)
+        (walk, person, line.parameter, line.side, line.value, line.unit, line.low, line.high, line.n)
         for (walk, table), person in zip(enumerate(walks), people or count(), strict=False)
         for line in table
     ]

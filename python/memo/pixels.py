@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["averaged", "camera_of_video", "columns_of_video", "of_averaged", "of_video", "shrink_of_table"]
+__all__ = ["camera_of_video", "columns_of_video", "of_averaged", "of_video", "shrink_of_table"]
 
 Array = npt.NDArray[np.float64]
 
@@ -55,16 +55,6 @@ def camera_of_video(
         cx, cy = of_video([cx, cy], n).tolist()
         found["matrix"] = [[n * fx, n * skew, cx], [0.0, n * fy, cy], last]
     return found
-
-
-def averaged(luma: npt.NDArray[np.uint8], n: int) -> npt.NDArray[np.uint8]:
-    """Means of n by n grey values, rounded; a rest at the right and at the bottom is left out."""
-    height, width = luma.shape[0] // n, luma.shape[1] // n
-    total = np.zeros((height, width), np.uint32 if n > 16 else np.uint16)
-    for row in range(n):
-        for column in range(n):
-            total += luma[row : height * n : n, column : width * n : n]
-    return ((total + n * n // 2) // (n * n)).astype(np.uint8)
 
 
 def shrink_of_table(path: str | PathLike[str]) -> int:

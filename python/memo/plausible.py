@@ -5,13 +5,10 @@ The core decides (`memo_core::track::height`, `plausible` and `fit`); this modul
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from memo import _memo
-    from memo.tracking import StoredWalk
-
-    Walk: TypeAlias = _memo.Walk | StoredWalk
+    from memo._memo import Walk
 
 __all__ = [
     "assumed_height_sentences",
@@ -23,8 +20,8 @@ __all__ = [
 
 def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[str]:
     """Says that the height is that of an average person, if it is, and why."""
-    height_m, sd_m, source = walk.height
-    if source != "assumed":
+    height_m, sd_m = walk.height.height_m, walk.height.sd_m
+    if walk.height.source != "assumed":
         return []
     why = "No height and no camera were given"
     if camera_given:
@@ -38,10 +35,11 @@ def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[
 
 def measured_height_sentences(walk: Walk) -> list[str]:
     """The measured height, where none was given, or where it contradicts the given one."""
-    height_m, sd_m, source = walk.height
-    if source == "measured":
+    height = walk.height
+    if height.source == "measured":
         return [
-            f"The person is {height_m:.2f} m tall, measured in the picture (standard deviation {sd_m:.2f} m)."
+            f"The person is {height.height_m:.2f} m tall, measured in the picture "
+            f"(standard deviation {height.sd_m:.2f} m)."
         ]
     return contradiction_sentences(walk)
 
@@ -50,10 +48,10 @@ def contradiction_sentences(walk: Walk) -> list[str]:
     """Says that the given height contradicts the picture by more than three standard deviations."""
     if not walk.height_is_contradicted or walk.measured_height is None:
         return []
-    seen_m, sd_m = walk.measured_height
+    seen = walk.measured_height
     return [
-        f"The given height of {walk.height[0]:.2f} m contradicts the picture, in which the person is "
-        f"{seen_m:.2f} m tall (standard deviation {sd_m:.2f} m): check height and camera."
+        f"The given height of {walk.height.height_m:.2f} m contradicts the picture, in which the person is "
+        f"{seen.height_m:.2f} m tall (standard deviation {seen.sd_m:.2f} m): check height and camera."
     ]
 
 
@@ -61,7 +59,7 @@ def implausible_sentences(walk: Walk) -> list[str]:
     """Says that steps and cadence do not go together, or that the feet do not stand on the ground."""
     said = []
     if walk.walk_ratio is not None:
-        ratio, least, most = walk.walk_ratio
+        ratio, least, most = walk.walk_ratio.value, walk.walk_ratio.low, walk.walk_ratio.high
         if not least <= ratio <= most:
             rate = "high" if ratio < least else "low"
             said.append(

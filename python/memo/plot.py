@@ -48,13 +48,13 @@ def new_axes() -> Axes:
 def plot_similarity(ax: Axes, track: Any, start_row: int = 0) -> Axes:
     """Similarity of model and image edges over the gait phase, in one frame of the start (Fig. 19)."""
     start = track.start
-    curve = np.asarray(start["similarity"])[start_row]
+    curve = np.asarray(start.similarity)[start_row]
     ax.plot(np.arange(len(curve)) / len(curve), curve, color=NEUTRAL, linewidth=1.2)
-    best = start["phase"][start_row]
+    best = start.phase[start_row]
     ax.axvline(best, color=RIGHT, linewidth=1, label=f"best, {best:.2f}")
     ax.axvline((best + 0.5) % 1, color=LEFT, linewidth=1, linestyle="--", label="half a cycle away")
     ax.set(xlim=(0, 1), xlabel="gait phase", ylabel="similarity")
-    ax.set_title(f"frame {start['frame'][start_row]}", loc="left")
+    ax.set_title(f"frame {start.frame[start_row]}", loc="left")
     _legend_above(ax)
     return ax
 
@@ -62,7 +62,7 @@ def plot_similarity(ax: Axes, track: Any, start_row: int = 0) -> Axes:
 def plot_start(ax: Axes, track: Any) -> Axes:
     """Best phase of each frame of the starting phase, with the tracked line and the line half a cycle away
     (Fig. 23)."""
-    frames, phases = np.asarray(track.start["frame"]), np.asarray(track.start["phase"])
+    frames, phases = np.asarray(track.start.frame), np.asarray(track.start.phase)
     ax.plot(frames, phases, **{**MEASURED, "markersize": 7, "label": "best in the frame"})
     line = _phase_line(track.columns, frames)
     if line is not None:
@@ -186,9 +186,8 @@ def write_plots(track: Any, out_dir: str | PathLike[str]) -> list[Path]:
         "motion": ((3, 2), (8, 6), lambda axes: plot_motion(axes, track)),
         "angles": ((2, 1), (6, 5), lambda axes: plot_angles(axes[:, 0], track)),
     }
-    start_frames = len(track.start.get("frame", ()))
-    if start_frames:
-        middle = start_frames // 2
+    if track.start is not None:
+        middle = len(track.start.frame) // 2
         plots["similarity"] = ((1, 1), (5, 3), lambda axes: plot_similarity(axes[0, 0], track, middle))
         plots["start"] = ((1, 1), (5, 3), lambda axes: plot_start(axes[0, 0], track))
     return [_save(Path(out_dir) / f"{name}.png", *how) for name, how in plots.items()]

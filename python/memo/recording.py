@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import memo
+from memo import _memo
 from memo.camera_motion import CameraMotion, write_camera_motion_csv
 from memo.cycles import write_cycles_csv
 from memo.exits import Exit
@@ -103,7 +104,7 @@ class Recorded:
 
     columns: dict[str, Any]
     events: list[dict[str, Any]]
-    start: dict[str, Any]
+    start: _memo.WalkStart | None
     measured: dict[str, Any]
     contours: Callable[[int], Any] = field(repr=False)
     summary: dict[str, Any]
@@ -338,10 +339,14 @@ def _recorded(
     def renumbered(table: Mapping[str, Any]) -> dict[str, Any]:
         return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else {**table}
 
+    start = track.start
+    if start is not None:
+        frames, *others = start.__getnewargs__()
+        start = _memo.WalkStart(frames + first_frame, *others)
     return Recorded(
         columns=renumbered(track.columns),
         events=[{**event, "frame": event["frame"] + first_frame} for event in track.events],
-        start=renumbered(track.start),
+        start=start,
         measured=renumbered(track.measured),
         contours=track.contours,
         summary=dict(track.summary),

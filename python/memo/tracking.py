@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import logging
 from collections.abc import Callable, Iterable, Sequence, Sized
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
+from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
     assumed_height_sentences,
@@ -63,6 +64,8 @@ class Tracker:
     `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
     per frame) are weighted in proportion, w_G and w_V of eq. 11; None weights all equally.
     `part_weights`: w_K, 14 numbers in the order of `Track.contour_parts`.
+
+    Defaults: `fov_deg` 62, `gait` "dense", `start_frames` 13, `measure` "rohr".
     """
 
     def __init__(
@@ -71,14 +74,14 @@ class Tracker:
         camera: _memo.Camera | None = None,
         *,
         fov_deg: float | None = None,
-        gait: str = "dense",
+        gait: str | None = None,
         adapt: bool = True,
-        start_frames: int = 13,
+        start_frames: int | None = None,
         treadmill: bool | None = None,
         compensate_gain: bool = False,
         background: bool = False,
         steady: bool = True,
-        measure: str = "rohr",
+        measure: str | None = None,
         full_gradient: float | None = None,
         full_velocity: float | None = None,
         part_weights: Sequence[float] | None = None,
@@ -103,16 +106,16 @@ class Tracker:
         self._camera = camera
         self._walks: list[_memo.Walk] = []
 
-    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> dict[str, float] | None:
+    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> _memo.WalkerState | None:
         """Takes the next frame, (H, W) uint8; times must increase.
 
-        Returns the filtered state of the first person being followed (keys `person, frame, time_s, x_m, y_m,
-        z_m, heading_rad, phase, p_swapped, speed_mps`), or None if there is none; `people` has everybody's.
+        Returns the filtered state of the first person being followed, or None if there is none; `people` has
+        everybody's.
         """
         self._core.update(frame, time_s)
         return next(iter(self._core.people()), None)
 
-    def people(self) -> list[dict[str, float]]:
+    def people(self) -> list[_memo.WalkerState]:
         """The filtered states of everybody who is followed, in order of appearance: as from `update`."""
         return self._core.people()
 
@@ -132,7 +135,7 @@ class Tracker:
         return found
 
     def __repr__(self) -> str:
-        seen = self._core.seek_report()["frames"]
+        seen = self._core.seek_report().frames
         return (
             f"Tracker({'following' if self._core.people() else 'seeking'}, "
             f"{counted(seen, 'frame')} without a walker)"
@@ -148,14 +151,14 @@ def track(
     camera: _memo.Camera | None = None,
     progress: Callable[[int, int | None], object] | None = None,
     fov_deg: float | None = None,
-    gait: str = "dense",
+    gait: str | None = None,
     adapt: bool = True,
-    start_frames: int = 13,
+    start_frames: int | None = None,
     treadmill: bool | None = None,
     compensate_gain: bool = False,
     background: bool = False,
     steady: bool = True,
-    measure: str = "rohr",
+    measure: str | None = None,
     full_gradient: float | None = None,
     full_velocity: float | None = None,
     part_weights: Sequence[float] | None = None,
@@ -220,72 +223,8 @@ def _feed(
         raise ValueError(f"times_s has more values than the {counted(index + 1, 'frame')}")
 
 
-@dataclass(frozen=True)
-class StoredWalk:
-    """A walk read from a file or from another process: all values of `_memo.Walk`."""
-
-    tables: dict[str, Any]
-    camera: _memo.Camera
-    person: int
-    direction: str
-    p_other_direction: float
-    p_swapped: float
-    fit: _memo.WalkFit | None
-    fit_problem: str | None
-    height: tuple[float, float, str]
-    measured_height: tuple[float, float] | None
-    height_is_contradicted: bool
-    walk_ratio: tuple[float, float, float] | None
-    treadmill: tuple[float, float, tuple[float, float] | None] | None
-    is_frontal: bool
-
-    @classmethod
-    def of(cls, walk: _memo.Walk | StoredWalk) -> StoredWalk:
-        """Reads all values of a walk."""
-        tables: dict[str, Any] = {name: getattr(walk, name)() for name in _TABLES}
-        tables["contours"] = [walk.contours(row) for row in range(len(walk))]
-        single = {name: getattr(walk, name) for name in cls.__dataclass_fields__ if name != "tables"}
-        return cls(tables, **single)
-
-    def columns(self) -> dict[str, npt.NDArray[Any]]:
-        return dict(self.tables["columns"])
-
-    def events(self) -> list[tuple[float, float, str, str]]:
-        return list(self.tables["events"])
-
-    def measured(self) -> npt.NDArray[np.float64]:
-        return self.tables["measured"]  # type: ignore[no-any-return]
-
-    def start(self) -> dict[str, Any]:
-        return dict(self.tables["start"])
-
-    def gait_parameters(self) -> list[tuple[str, str, float, str, float, float, int]]:
-        return list(self.tables["gait_parameters"])
-
-    def cycles(self) -> list[tuple[str, str, float, float, npt.NDArray[np.float64]]]:
-        return list(self.tables["cycles"])
-
-    def departures(self) -> list[tuple[str, str, float, float, int, float]]:
-        return list(self.tables["departures"])
-
-    def record(self) -> dict[str, Any]:
-        return dict(self.tables["record"])
-
-    def contours(self, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint8]]:
-        return self.tables["contours"][row]  # type: ignore[no-any-return]
-
-    def __len__(self) -> int:
-        return len(self.tables["measured"])
-
-    def __repr__(self) -> str:
-        return f"StoredWalk({counted(len(self), 'row')}, {self.direction})"
-
-
 ALONG_SIGHT = float(np.cos(np.radians(35)))
 """Paths that are within this angle of the line of sight, as its cosine, lead towards the camera or away."""
-
-_TABLES = ("columns", "events", "measured", "start", "gait_parameters", "cycles", "departures", "record")
-
 
 _FRAMES = ("columns", "gait_parameters", "cycles")
 
@@ -294,21 +233,21 @@ class Track:
     """All walks of a video: the contents of `track.csv` and `events.csv`, and all intermediate results.
 
     Pixels are those of the frames given to the tracker, or those of the video from which they were averaged
-    (`of_video`). A track can be pickled; it then holds the values of its walks, not the walks themselves.
+    (`of_video`).
     """
 
     def __init__(
         self,
-        walks: Sequence[_memo.Walk | StoredWalk],
-        seek_report: dict[str, int],
+        walks: Sequence[_memo.Walk],
+        seek_report: _memo.SeekReport,
         camera: _memo.Camera | None = None,
         *,
         shrink: int = 1,
         video_size: tuple[int, int] | None = None,
         camera_motion: CameraMotion | None = None,
     ) -> None:
-        self.walks: list[_memo.Walk | StoredWalk] = list(walks)
-        self.seek_report: dict[str, int] = seek_report
+        self.walks: list[_memo.Walk] = list(walks)
+        self.seek_report: _memo.SeekReport = seek_report
         self.shrink: int = shrink
         """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
         self._camera = camera
@@ -334,7 +273,7 @@ class Track:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
         people = self.people
         tables = [
-            {**walk.columns(), "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
+            {**walk.columns, "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
             for k, walk in enumerate(self.walks)
         ]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
@@ -374,20 +313,26 @@ class Track:
         """Heel strikes and toe-offs, one walk after another: `time_s, frame, event, side, walk, person`."""
         people = self.people
         return [
-            dict(zip(EVENT_COLUMNS, (*event, k, people[k]), strict=True))
+            dict(
+                zip(
+                    EVENT_COLUMNS,
+                    (event.time_s, event.frame, event.event, event.side, k, people[k]),
+                    strict=True,
+                )
+            )
             for k, walk in enumerate(self.walks)
-            for event in walk.events()
+            for event in walk.events
         ]
 
     @property
     def gait_parameters(self) -> dict[str, npt.NDArray[Any]]:
         """The columns of `gait_parameters.csv`, see `memo.gait.DEFINITIONS`; one walk after another."""
-        return gait_table((walk.gait_parameters() for walk in self.walks), self.people)
+        return gait_table((walk.gait_parameters for walk in self.walks), self.people)
 
     @property
     def cycles(self) -> dict[str, npt.NDArray[Any]]:
         """The columns of `cycles.csv`: every gait cycle of each side at 0 to 100 %, and their mean."""
-        return cycle_table((walk.cycles() for walk in self.walks), self.people)
+        return cycle_table((walk.cycles for walk in self.walks), self.people)
 
     @property
     def sentences(self) -> list[str]:
@@ -407,7 +352,7 @@ class Track:
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
             told += symmetry_sentences(self.gait_parameters, index)
             if walk.p_swapped <= LIKELY_SWAPPED:
-                told += departure_sentences(walk.departures())
+                told += departure_sentences(walk.departures)
             several = f"Walk {index + 1} of {len(self.walks)}" if len(self.walks) > 1 else ""
             several += f" (person {self.people[index] + 1})" if max(self.people) > 0 else ""
             several += ": " if several else ""
@@ -420,13 +365,13 @@ class Track:
         return [
             {
                 "message": self._message(walk),
-                "start_s": float(walk.columns()["time_s"][0]),
-                "end_s": float(walk.columns()["time_s"][-1]),
+                "start_s": float(walk.columns["time_s"][0]),
+                "end_s": float(walk.columns["time_s"][-1]),
                 "direction": self._way(walk),
                 "gait": walk.direction,
                 "p_swapped": walk.p_swapped,
                 "person": person,
-                **walk.record(),
+                **walk.record,
             }
             for walk, person in zip(self.walks, self.people, strict=True)
         ]
@@ -443,14 +388,14 @@ class Track:
         )
 
     @property
-    def start(self) -> dict[str, Any]:
-        """The starting phase of the longest walk: `frame`, `phase` and `similarity` (frames, phases)."""
-        return self._main.start() if self._main is not None else {}
+    def start(self) -> _memo.WalkStart | None:
+        """The starting phase of the longest walk; None if there is no walk."""
+        return self._main.start if self._main is not None else None
 
     @property
     def measured(self) -> dict[str, npt.NDArray[Any]]:
         """Raw measurements `x`, `z` (metres) and `phase` before filtering, one per row; NaN if missing."""
-        tables = [walk.measured() for walk in self.walks]
+        tables = [walk.measured for walk in self.walks]
         x, z, phase = np.concatenate(tables).T if tables else np.empty((3, 0))
         return {"x": x, "z": z, "phase": phase}
 
@@ -473,7 +418,7 @@ class Track:
         raise IndexError(f"row {row} of a track with {counted(len(self), 'row')}")
 
     @property
-    def _main(self) -> _memo.Walk | StoredWalk | None:
+    def _main(self) -> _memo.Walk | None:
         return max(self.walks, key=lambda walk: (walk.direction == "forward", len(walk)), default=None)
 
     @property
@@ -503,19 +448,19 @@ class Track:
             "speed_mps": speed,
             **treadmill_figures(main),
             "cadence_steps_per_min": cadence,
-            "height_m": main.height[0],
-            "height_sd_m": main.height[1],
-            "height_source": main.height[2],
-            "measured_height_m": main.measured_height[0] if main.measured_height else None,
-            "measured_height_sd_m": main.measured_height[1] if main.measured_height else None,
+            "height_m": main.height.height_m,
+            "height_sd_m": main.height.sd_m,
+            "height_source": main.height.source,
+            "measured_height_m": main.measured_height.height_m if main.measured_height else None,
+            "measured_height_sd_m": main.measured_height.sd_m if main.measured_height else None,
             "doubts": [*contradiction_sentences(main), *implausible_sentences(main)],
             "fit": _fit(main),
             "camera_motion": self.camera_motion.summary,
         }
 
     @classmethod
-    def _message(cls, walk: _memo.Walk | StoredWalk) -> str:
-        times_s = walk.columns()["time_s"]
+    def _message(cls, walk: _memo.Walk) -> str:
+        times_s = walk.columns["time_s"]
         speed, cadence = cls._pace(walk)
         if walk.treadmill is not None:
             return treadmill_sentence(walk, times_s[-1] - times_s[0], cadence)
@@ -529,19 +474,19 @@ class Track:
         )
 
     @staticmethod
-    def _pace(walk: _memo.Walk | StoredWalk) -> tuple[float, float]:
+    def _pace(walk: _memo.Walk) -> tuple[float, float]:
         """Speed, m/s, never negative, and cadence, steps per minute; NaN for a walk that is too short."""
-        table = gait_table([walk.gait_parameters()])
+        table = gait_table([walk.gait_parameters])
         speed, cadence = (float(lookup(table, 0, name)["value"]) for name in ("speed", "cadence"))
         if np.isnan(speed):
-            speed = float(np.median(walk.columns()["speed_mps"]))
+            speed = float(np.median(walk.columns["speed_mps"]))
         return abs(speed), cadence
 
     @staticmethod
-    def _way(walk: _memo.Walk | StoredWalk) -> str:
+    def _way(walk: _memo.Walk) -> str:
         if walk.treadmill is not None:
             return "on a treadmill"
-        columns = walk.columns()
+        columns = walk.columns
         ends = np.column_stack([columns[f"right_hip_{axis}_m"][[0, -1]] for axis in "xyz"])
         ahead, sight = (ends[1] - ends[0])[:2], (ends.mean(0) - walk.camera.position)[:2]
         along = float(ahead @ sight) / float(np.linalg.norm(ahead) * np.linalg.norm(sight))
@@ -552,11 +497,11 @@ class Track:
 
     def _why_nobody(self) -> str:
         seek = self.seek_report
-        if seek["frames_with_candidate"] == 0:
+        if seek.frames_with_candidate == 0:
             return "nobody"
-        if seek["refused_starts"]:
+        if seek.refused_starts:
             return "not walking"
-        if seek["frames_cut_off"] > 0.5 * seek["frames_with_candidate"]:
+        if seek.frames_cut_off > 0.5 * seek.frames_with_candidate:
             return "never fully visible"
         return "nobody"
 
@@ -579,8 +524,10 @@ class Track:
     def __len__(self) -> int:
         return sum(map(len, self.walks))
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "walks": [StoredWalk.of(walk) for walk in self.walks]}
+    def _repr_html_(self) -> str:
+        rows: list[tuple[str, object]] = [(f"walk {k}", walk) for k, walk in enumerate(self.walks)]
+        rows += [(f"finding {k + 1}", sentence) for k, sentence in enumerate(self.sentences)]
+        return table(repr(self), *zip(*rows, strict=True))
 
     def __repr__(self) -> str:
         walks = counted(len(self.walks), "walk")
@@ -594,7 +541,7 @@ _NOBODY = {
 }
 
 
-def _fit(walk: _memo.Walk | StoredWalk) -> dict[str, Any]:
+def _fit(walk: _memo.Walk) -> dict[str, Any]:
     """How well the model fits the person, or why it does not."""
     fit = walk.fit
     if fit is None:
@@ -609,7 +556,7 @@ def _fit(walk: _memo.Walk | StoredWalk) -> dict[str, Any]:
     }
 
 
-def fit_sentence(walk: _memo.Walk | StoredWalk) -> str | None:
+def fit_sentence(walk: _memo.Walk) -> str | None:
     """The verdict on the fit, the first thing to know of a walk; None if none was asked for."""
     fit = walk.fit
     if fit is None:

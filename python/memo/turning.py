@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from memo import _memo
-    from memo.tracking import StoredWalk
-
-    Walk: TypeAlias = _memo.Walk | StoredWalk
+    from memo._memo import Walk
 
 __all__ = ["turned_deg", "turning_words"]
 
@@ -21,7 +18,7 @@ STATED_DEG = 20.0
 
 def turned_deg(walk: Walk) -> float:
     """How far the path turns from the first to the last frame, degrees; positive to the left."""
-    heading_rad = np.unwrap(walk.columns()["heading_rad"])
+    heading_rad = np.unwrap(walk.columns["heading_rad"])
     return float(np.degrees(heading_rad[-1] - heading_rad[0]))
 
 

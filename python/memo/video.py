@@ -25,8 +25,8 @@ import numpy as np
 import numpy.typing as npt
 from av.video.reformatter import ColorRange
 
+from memo import _memo
 from memo.given import nothing_at
-from memo.pixels import averaged
 from memo.wording import counted
 
 __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
@@ -172,7 +172,7 @@ class VideoReader:
             raise VideoError(
                 f"{self.path}: frame {index} is {now_width}x{now_height}, the previous ones {width}x{height}"
             )
-        return luma if self.shrink == 1 else averaged(luma, self.shrink)
+        return luma if self.shrink == 1 else _memo.shrunk(luma, self.shrink)
 
     def _report_damage(self, read: int) -> None:
         announced, undecodable = self._source.announced, self._source.undecodable

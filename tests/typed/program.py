@@ -24,7 +24,7 @@ def main(out: Path) -> None:
     for frame, time_s in zip(scene.frames, scene.times_s.tolist(), strict=True):
         state = tracker.update(frame, time_s)
         if state is not None:
-            print(f"x = {state['x_m']:.2f} m")
+            print(f"x = {state.x_m:.2f} m")
     track = tracker.finish()
     print(track, knee_range(track), track.summary["message"], [event["side"] for event in track.events])
     write_track_csv(out / "track.csv", track.columns)

@@ -9,11 +9,24 @@ use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
     ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, Image, LineOptions,
     SILHOUETTE_THRESHOLD, clean, edge_segments as core_edge_segments, fill_holes, group_regions,
-    pair_changes, regions,
+    pair_changes, regions, shrunk as core_shrunk,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+
+/// Means of `n` by `n` grey values of a frame (H, W), rounded, (H // n, W // n); a rest at the right and at the bottom is
+/// left out.
+#[pyfunction]
+pub fn shrunk<'py>(
+    py: Python<'py>,
+    frame: &Bound<'py, PyAny>,
+    n: usize,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let frame = frame_from_numpy(frame)?;
+    let frame = frame.as_frame()?;
+    numpy_from_image(py, py.detach(|| core_shrunk(&frame, n)).map_err(value_error)?)
+}
 
 /// Mask of pixels that changed between two frames (eq. 1); `threshold` in grey levels, by default from the noise.
 #[pyfunction]

@@ -16,6 +16,7 @@ mod planar;
 mod pointlight;
 mod pool;
 mod posture;
+mod record;
 mod reproduce;
 mod result;
 mod score;
@@ -24,6 +25,7 @@ mod synth;
 mod tracker;
 mod unswap;
 mod wait;
+mod walk;
 
 use pyo3::prelude::*;
 
@@ -39,17 +41,17 @@ mod _memo {
     #[pymodule_export]
     use super::camera::{PyCamera, camera_of_parameters};
     #[pymodule_export]
-    use super::cycles::py_normal_cycle;
+    use super::cycles::{Departure, GaitCycle, py_normal_cycle};
     #[pymodule_export]
     use super::defaults::defaults;
     #[pymodule_export]
     use super::euler::euler_angles;
     #[pymodule_export]
-    use super::explain::{PyExplainer, recorded_contours};
+    use super::explain::{Explanation, PyExplainer};
     #[pymodule_export]
     use super::fit::WalkFit;
     #[pymodule_export]
-    use super::image::{change_mask, edge_segments, moving_regions, silhouettes, velocity_field};
+    use super::image::{change_mask, edge_segments, moving_regions, shrunk, silhouettes, velocity_field};
     #[pymodule_export]
     use super::keypoints::{
         follow_person, foot_points, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts,
@@ -65,6 +67,8 @@ mod _memo {
     };
     #[pymodule_export]
     use super::posture::{PostureSequence, SecondMotion, posture, posture_tree};
+    #[pymodule_export]
+    use super::record::recorded_contours;
     #[pymodule_export]
     use super::reproduce::hoffman_flinchbaugh::{
         HingeTrials, PrintedRod, RodTrials, hoffman_flinchbaugh_degenerate,
@@ -85,15 +89,19 @@ mod _memo {
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
-    use super::steady::PySteadier;
+    use super::steady::{FrameMotion, LostView, PySteadier, SteadiedFrame};
     #[pymodule_export]
     use super::synth::{PyClothedScene, PyScene};
     #[pymodule_export]
-    use super::tracker::{PyTracker, PyWalk};
+    use super::tracker::{PyTracker, SeekReport, WalkerState, population_height_m};
     #[pymodule_export]
     use super::unswap::{LimbSides, unswap};
     #[pymodule_export]
     use super::wait::panic_on_purpose;
+    #[pymodule_export]
+    use super::walk::{
+        BodyHeight, GaitEvent, GaitParameter, PhaseLine, Treadmill, Walk, WalkRatio, WalkStart,
+    };
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,8 +6,8 @@ use pyo3::types::PyTuple;
 use pyo3::{PyClass, PyClassInitializer};
 
 /// Declares a class whose objects hold one result: read-only attributes, which pickling keeps, each with its type and
-/// what it is made of, or else the field of the same name of the core's result; the text within the `repr`; and
-/// methods, if any.
+/// what it is made of, or else the field of the same name of the core's result; hidden fields, if any, which pickling
+/// drops for their default; the text within the `repr`; and methods, if any.
 macro_rules! result {
     (@value $core:ident $field:ident) => { $core.$field };
     (@value $core:ident $field:ident $value:expr) => { $value };
@@ -16,16 +16,23 @@ macro_rules! result {
         $name:ident |$py:ident, $core:ident: $of:ty $(, $given:ident: $kind:ty)*| {
             $($(#[$meaning:meta])* $field:ident: $type:ty $(= $value:expr)?,)*
         }
+        $(@hidden { $($hidden:ident: $kept:ty = $made:expr,)* })?
         $described:expr
         $(; methods { $($methods:tt)* })?
     ) => {
         $(#[$about])*
-        #[pyo3::pyclass(frozen, get_all, module = "memo._memo")]
-        pub struct $name { $($(#[$meaning])* pub $field: $type,)* }
+        #[pyo3::pyclass(frozen, module = "memo._memo")]
+        pub struct $name {
+            $($(#[$meaning])* #[pyo3(get)] pub $field: $type,)*
+            $($(pub $hidden: $kept,)*)?
+        }
 
         impl $name {
             pub(crate) fn of($py: Python<'_>, $core: $of $(, $given: $kind)*) -> PyResult<Self> {
-                Ok(Self { $($field: crate::result::result!(@value $core $field $($value)?).into()),* })
+                Ok(Self {
+                    $($field: crate::result::result!(@value $core $field $($value)?).into(),)*
+                    $($($hidden: $made,)*)?
+                })
             }
         }
 
@@ -35,7 +42,10 @@ macro_rules! result {
             #[pyo3(signature = (*fields))]
             fn new(fields: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<Self> {
                 let mut fields = fields.iter();
-                Ok(Self { $($field: crate::result::next_field(&mut fields, stringify!($field))?),* })
+                Ok(Self {
+                    $($field: crate::result::next_field(&mut fields, stringify!($field))?,)*
+                    $($($hidden: Default::default(),)*)?
+                })
             }
 
             fn __getnewargs__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, pyo3::types::PyTuple>> {
@@ -45,6 +55,10 @@ macro_rules! result {
             fn __repr__(&self) -> String {
                 let described: fn(&Self) -> String = $described;
                 format!("{}({})", stringify!($name), described(self))
+            }
+
+            fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
+                crate::result::html_of(slf, &[$(stringify!($field)),*])
             }
 
             $($($methods)*)?
@@ -66,6 +80,13 @@ pub fn next_field<'py, T: FromPyObjectOwned<'py>>(
 pub fn fields_of<'py, T>(object: &Bound<'py, T>, names: &[&str]) -> PyResult<Bound<'py, PyTuple>> {
     let fields: PyResult<Vec<_>> = names.iter().map(|name| object.as_any().getattr(name)).collect();
     PyTuple::new(object.py(), fields?)
+}
+
+/// A table of these attributes, for notebooks.
+pub fn html_of<T>(object: &Bound<'_, T>, names: &[&str]) -> PyResult<String> {
+    let notebook = object.py().import("memo.notebook")?;
+    let title = object.as_any().repr()?;
+    notebook.call_method1("table", (title, names.to_vec(), fields_of(object, names)?))?.extract()
 }
 
 /// One object for each of several results.

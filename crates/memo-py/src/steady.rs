@@ -3,25 +3,61 @@
 use crate::array::{frame_from_numpy, numpy_from_image};
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::result::{objects, result};
 use crate::wait::pooled;
 use memo_core::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD;
 use memo_core::option_error::OptionError;
 use memo_core::track::steady::{CameraMotion, Loss, Steadied, Steadier, SteadyOptions};
+use numpy::PyArray2;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
-/// The camera in a frame: (frame, state, turn_rad, shift_px, rms_px, support).
-pub type MotionTuple = (usize, &'static str, [f64; 3], f64, f64, f64);
-
-/// The columns of `camera_motion.csv` for one frame.
-pub fn motion_tuple(motion: &CameraMotion) -> MotionTuple {
-    let [shift_px, rms_px] = motion.shift_px;
-    (motion.frame, motion.state.name(), motion.turn_rad.to_array(), shift_px, rms_px, motion.support)
+result! {
+    /// The camera in a frame.
+    FrameMotion |_py, motion: &CameraMotion| {
+        /// Number of the frame, from 0.
+        frame: usize,
+        /// "still", "turned", "unknown" or "lost".
+        state: String = motion.state.name(),
+        /// Rotation vector from the first frame's camera to this one's, radians, camera axes.
+        turn_rad: [f64; 3] = motion.turn_rad.to_array(),
+        /// Largest displacement of the picture against the first frame, pixels.
+        shift_px: f64 = motion.shift_px[0],
+        /// Its root mean square over the picture, pixels.
+        rms_px: f64 = motion.shift_px[1],
+        /// Share of the points that the rotation explains; NaN where none was estimated.
+        support: f64,
+    }
+    |own| format!("frame {}, {}, {:.2} px", own.frame, own.state, own.shift_px)
 }
 
-/// The end of a view: its first frame that is another one, and what happened.
-pub fn loss_tuple(loss: &Loss) -> (usize, &'static str) {
-    (loss.frame, loss.reason.name())
+result! {
+    /// Where a view of the camera ended.
+    LostView |_py, loss: &Loss| {
+        /// The first frame of another view.
+        frame: usize,
+        /// "cut", "zoom" or "other view".
+        reason: String = loss.reason.name(),
+    }
+    |own| format!("{} at frame {}", own.reason, own.frame)
+}
+
+result! {
+    /// A frame after steadying.
+    SteadiedFrame |py, found: &CameraMotion, steadied: Steadied| {
+        /// The camera in it.
+        motion: Py<FrameMotion> = Py::new(py, FrameMotion::of(py, found)?)?,
+        /// (H, W) as the camera of the first frame would have seen it; None if the frame was left as it is.
+        picture: Option<Py<PyArray2<u8>>> = match &steadied {
+            Steadied::Moved { picture, .. } => Some(numpy_from_image(py, picture.clone())?.unbind()),
+            _ => None,
+        },
+        /// (H, W) pixels that the frame does not show.
+        unseen: Option<Py<PyArray2<bool>>> = match &steadied {
+            Steadied::Moved { unseen, .. } => Some(numpy_from_image(py, unseen.clone())?.unbind()),
+            _ => None,
+        },
+    }
+    |own| own.motion.get().__repr__()
 }
 
 /// Steadies a stream of frames, as `Tracker` does before it compares them.
@@ -46,31 +82,18 @@ impl PySteadier {
         Ok(Self(Steadier::new(options, camera.map(|c| c.0).as_ref(), field_of_view_rad)))
     }
 
-    /// Takes the next frame, (H, W) uint8: a dict of `frame`, `state`, `turn_rad`, `shift_px`, `rms_px`, `support`, and
-    /// of a frame that was steadied also `picture` (H, W) and `unseen`, the pixels that the frame does not show.
-    fn update<'py>(&mut self, py: Python<'py>, frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    /// Takes the next frame, (H, W) uint8.
+    fn update(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<SteadiedFrame> {
         let array = frame_from_numpy(frame)?;
         let frame = array.as_frame()?;
         let steadier = &mut self.0;
         let steadied = pooled(py, || steadier.push(&frame))?.map_err(value_error)?;
         let motion = self.0.motions().back().expect("every frame leaves one");
-        let (frame, state, turn_rad, shift_px, rms_px, support) = motion_tuple(motion);
-        let dict = PyDict::new(py);
-        dict.set_item("frame", frame)?;
-        dict.set_item("state", state)?;
-        dict.set_item("turn_rad", turn_rad)?;
-        dict.set_item("shift_px", shift_px)?;
-        dict.set_item("rms_px", rms_px)?;
-        dict.set_item("support", support)?;
-        if let Steadied::Moved { picture, unseen } = steadied {
-            dict.set_item("picture", numpy_from_image(py, picture)?)?;
-            dict.set_item("unseen", numpy_from_image(py, unseen)?)?;
-        }
-        Ok(dict)
+        SteadiedFrame::of(py, motion, steadied)
     }
 
-    /// The views that have ended: (first frame of another view, "cut", "zoom" or "other view").
-    fn losses(&self) -> Vec<(usize, &'static str)> {
-        self.0.losses().iter().map(loss_tuple).collect()
+    /// The views that have ended.
+    fn losses(&self, py: Python<'_>) -> PyResult<Vec<Py<LostView>>> {
+        objects(py, self.0.losses().iter().map(|loss| LostView::of(py, loss)))
     }
 }

@@ -327,7 +327,7 @@ def _filter_rows(numbers: dict[str, float], deviations: dict[str, float]) -> lis
 
 
 def _result_rows(filmed: Sequence | None, scene: Sequence) -> list[Row]:
-    measured, filtered = scene.walk.measured(), _memo.walk_filtered(scene.walk)
+    measured, filtered = scene.walk.measured, _memo.walk_filtered(scene.walk)
     rows = []
     for column, (name, unit, scale) in enumerate(
         (("x_m", "cm", 100), ("z_m", "cm", 100), ("phase", "cycles", 1))

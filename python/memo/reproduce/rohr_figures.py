@@ -214,10 +214,9 @@ def similarity_peaks(sequence: Sequence, look: Look) -> tuple[float, float, floa
 
 def start_outliers(sequence: Sequence) -> tuple[int, int]:
     """Number of frames of the start that prefer a phase over a quarter cycle off the line, and the total."""
-    start = sequence.track.start
-    at, rate, _ = start["line"]
-    line = at + rate * (np.asarray(start["time_s"]) - start["time_s"][0])
-    off = np.abs((np.asarray(start["phase"]) - line + 0.5) % 1 - 0.5)
+    start = sequence.walk.start
+    line = start.line.phase_at_start + start.line.rate_hz * (start.time_s - start.time_s[0])
+    off = np.abs((start.phase - line + 0.5) % 1 - 0.5)
     return int(np.sum(off > 0.25)), len(off)
 
 
@@ -536,7 +535,7 @@ def _draw_start(figure: Figure, sequence: Sequence) -> None:
 def _draw_filter(figure: Figure, sequence: Sequence) -> None:
     """Left the best hypothesis of each frame, right the Kalman filter before smoothing."""
     frames = sequence.track.columns["frame"]
-    measured, filtered = sequence.walk.measured(), _memo.walk_filtered(sequence.walk)
+    measured, filtered = sequence.walk.measured, _memo.walk_filtered(sequence.walk)
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
     names = (("x_m", "X, m"), ("z_m", "Y (height), m"), ("phase", "pose"))
     for column, ((left, right), (name, label)) in enumerate(zip(axes, names, strict=True)):

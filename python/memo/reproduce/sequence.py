@@ -135,13 +135,12 @@ def _sequence(
         progress(f"rohr: tracking {label}", done, count)
         tracker.update(luma, time_s)
     whole = tracker.finish()
-    walks = [walk for walk in whole.walks if isinstance(walk, _memo.Walk)]
-    if not walks:
+    if not whole.walks:
         raise NobodyTracked(f"{label}: {whole.summary['message']}")
-    longest = max(walks, key=lambda walk: (walk.direction == "forward", len(walk)))
+    longest = max(whole.walks, key=lambda walk: (walk.direction == "forward", len(walk)))
     track = Track([longest], whole.seek_report, whole.camera)
     row_of = {int(frame): row for row, frame in enumerate(track.columns["frame"])}
-    example_rows = _spread(sorted(row_of[int(f)] for f in track.start["frame"] if int(f) in row_of), 2)
+    example_rows = _spread(sorted(row_of[int(f)] for f in longest.start.frame if int(f) in row_of), 2)
     shown_rows = _spread(range(len(track)), 4)
     step = max(1, len(track) // RECTANGLES)
     examples: list[Look] = []

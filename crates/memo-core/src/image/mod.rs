@@ -14,6 +14,7 @@ pub mod line;
 pub mod outline;
 pub mod region;
 pub mod runs;
+pub mod shrink;
 pub mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
@@ -30,4 +31,5 @@ pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from
 pub use outline::{Outline, outlines};
 pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};
 pub use runs::Run;
+pub use shrink::shrunk;
 pub use silhouette::{SILHOUETTE_THRESHOLD, SilhouetteError, silhouettes};

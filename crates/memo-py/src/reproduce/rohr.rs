@@ -6,9 +6,10 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::record::{SegmentsWithParts, segments_with_parts};
 use crate::result::result;
-use crate::tracker::{PyWalk, SegmentsWithParts, segments_with_parts};
 use crate::wait::pooled;
+use crate::walk::Walk;
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, Mask, Outline, Rectangle, outlines};
 use memo_core::model::body::Part;
@@ -208,8 +209,8 @@ pub fn search_windows<'py>(
 /// State of the Kalman filter after each frame of a walk, not smoothed: (rows, 6) of world x, z in metres, phase,
 /// and their standard deviations.
 #[pyfunction]
-pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let tracked = &walk.walk;
+pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, Walk>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (tracked, _) = walk.tracked()?;
     let row = |step: &memo_core::track::walk::Step| {
         let (s, path) = (&step.state, step.look.path);
         let phase = s.phase.position.rem_euclid(1.0);
@@ -227,14 +228,15 @@ pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, PyWalk>) -> PyResult
 #[pyo3(signature = (walk, row, phase=None))]
 pub fn walk_lines<'py>(
     py: Python<'py>,
-    walk: PyRef<'py, PyWalk>,
+    walk: PyRef<'py, Walk>,
     row: usize,
     phase: Option<f64>,
 ) -> PyResult<SegmentsWithParts<'py>> {
     let at = hypothesis(&walk, row)?;
     let at = Hypothesis { phase: phase.unwrap_or(at.phase), ..at };
-    let visible = walk.walk.scene(at.along_m).visible(&at, &VisibilityOptions::default());
-    segments_with_parts(py, &visible, &walk.walk.camera)
+    let (tracked, _) = walk.tracked()?;
+    let visible = tracked.scene(at.along_m).visible(&at, &VisibilityOptions::default());
+    segments_with_parts(py, &visible, &tracked.camera)
 }
 
 /// Similarity (eq. 11) of a frame's edges (N, 4 or more) in pixels and a walk's model near the position of a row,
@@ -243,7 +245,7 @@ pub fn walk_lines<'py>(
 #[pyo3(signature = (walk, row, edges, *, along_m=0.0, height_m=0.0))]
 pub fn walk_similarity(
     py: Python<'_>,
-    walk: PyRef<'_, PyWalk>,
+    walk: PyRef<'_, Walk>,
     row: usize,
     edges: Vec<Vec<f64>>,
     along_m: f64,
@@ -255,7 +257,7 @@ pub fn walk_similarity(
         }
     }
     let at = hypothesis(&walk, row)?;
-    let tracked = &walk.walk;
+    let (tracked, _) = walk.tracked()?;
     let camera = &tracked.camera;
     let ideal = |u: f64, v: f64| {
         let p = DVec2::new(u, v);
@@ -282,8 +284,8 @@ fn values(axis: &Axis, from: f64) -> Vec<f64> {
     (0..axis.count).map(|i| axis.at(i) - from).collect()
 }
 
-fn hypothesis(walk: &PyWalk, row: usize) -> PyResult<Hypothesis> {
-    let rows = &walk.rows;
+fn hypothesis(walk: &Walk, row: usize) -> PyResult<Hypothesis> {
+    let (_, rows) = walk.tracked()?;
     rows.get(row).map(|row| row.hypothesis).ok_or_else(|| {
         PyIndexError::new_err(format!("row {row} of a walk with {}", counted(rows.len(), "row")))
     })
