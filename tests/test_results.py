@@ -1,8 +1,10 @@
 """What every result can do beside holding numbers: a short repr, pandas, plots, pickling; and long calls that
 can be watched and interrupted."""
 
+import html
 import logging
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +16,7 @@ import pandas
 import pytest
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from memo import notebook
 
 matplotlib.use("Agg")
 
@@ -74,6 +77,28 @@ def test_a_repr_fits_in_two_lines(results, name):
     assert text.startswith(type(results[name]).__name__ + "(")
     assert len(text) < 220
     assert "array" not in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_notebooks_show_a_table(results, name):
+    shown = results[name]._repr_html_()
+    title, rows = shown.split("<table>")
+    assert html.unescape(title) == f"<p><b>{results[name]!r}</b></p>" and rows.count("<tr>") >= 2
+    assert len(shown) < 10_000, "long values are described"
+
+
+def test_a_table_describes_what_is_long_and_escapes_what_is_not():
+    values = [np.zeros((3, 2)), 1 / 3, "<b>", [1] * 200, {"a" * 200: 1}, "word " * 60, None]
+    shown = notebook.table("<i>", [f"v{k}" for k in range(7)], values)
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", shown)
+    assert cells[:4] == ["array (3, 2) float64", "0.333333", "&lt;b&gt;", "200 x int"]
+    assert cells[4].startswith("1 by name: aaa") and cells[5].startswith("word word") and cells[6] == "None"
+    assert "&lt;i&gt;" in shown and max(map(len, cells)) < 250
+
+
+def test_a_walk_shows_its_attributes(track):
+    shown = track.walks[0]._repr_html_()
+    assert "Walk(person 0" in shown and "<th" in shown and "columns" in shown and "by name" in shown
 
 
 @pytest.mark.parametrize("name", NAMES)

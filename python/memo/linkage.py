@@ -20,6 +20,7 @@ from memo import _memo
 from memo.files import JOINTS, read_text, write_table
 from memo.given import nothing_at
 from memo.keypoints import read_keypoints
+from memo.notebook import Shown
 from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
 from memo.wording import counted
@@ -91,7 +92,7 @@ class Points:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class PlanarFigure:
+class PlanarFigure(Shown):
     """The linkage found in tracks, window by window.
 
     `depth` (T, K) is each point's depth relative to the first point of its chain

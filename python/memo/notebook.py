@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from html import escape
 
 import numpy as np
 
-__all__ = ["table"]
+__all__ = ["Shown", "table"]
 
 _LONGEST = 100
+
+
+class Shown:
+    """A dataclass that notebooks show as a table of its fields."""
+
+    def _repr_html_(self) -> str:
+        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
+        return table(repr(self), names, [getattr(self, name) for name in names])
 
 
 def table(title: str, names: Iterable[str], values: Iterable[object]) -> str:

@@ -25,6 +25,7 @@ from memo import _memo, sides
 from memo.files import write_columns_csv, write_json
 from memo.given import nothing_at
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+from memo.notebook import Shown
 from memo.spreadsheet import CsvRows, Error
 from memo.table import data_frame
 from memo.wording import counted
@@ -101,7 +102,7 @@ class SecondBest:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Postures:
+class Postures(Shown):
     """The postures of one person over T frames. World: right-handed, Z up, metres; NaN where unknown."""
 
     frames: Whole

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, SIDES
+from memo.notebook import Shown
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -25,7 +26,7 @@ Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class DemoScene:
+class DemoScene(Shown):
     """Frames with ground truth."""
 
     #: Grey frames, (T, H, W) uint8.

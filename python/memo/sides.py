@@ -15,6 +15,7 @@ import numpy as np
 from memo import _memo
 from memo.files import FLIP_COLUMNS
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
+from memo.notebook import Shown
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -32,7 +33,7 @@ _LEVELS = {
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class SideRepair:
+class SideRepair(Shown):
     """Keypoints with corrected right and left, and the changes."""
 
     keypoints: Keypoints
