@@ -101,7 +101,11 @@ class Tracker:
             "full_velocity": full_velocity,
             "part_weights": part_weights,
         }
-        """All options but the camera."""
+        """All options but the camera; a run's record has them as they were, whatever the defaults become."""
+        usual = _memo.defaults("track")
+        for name in ("gait", "start_frames", "measure"):
+            if self.options[name] is None:
+                self.options[name] = usual[name]
         self._core = _memo.Tracker(camera=camera, **self.options)
         self._camera = camera
         self._walks: list[_memo.Walk] = []
