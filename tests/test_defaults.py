@@ -89,3 +89,11 @@ def test_pictures_of_displays_have_the_defaults_of_the_core(option):
 def test_a_function_without_options_of_the_core_has_no_defaults():
     with pytest.raises(ValueError, match="no_function"):
         _memo.defaults("no_function")
+
+
+def test_a_tracker_keeps_the_values_of_the_defaults():
+    options, usual = memo.Tracker().options, _memo.defaults("track")
+    assert {name: options[name] for name in ("gait", "start_frames", "measure")} == {
+        name: usual[name] for name in ("gait", "start_frames", "measure")
+    }
+    assert memo.Tracker(gait="boulic", start_frames=9).options["start_frames"] == 9
