@@ -86,7 +86,7 @@ def curve(side, kind, knee_deg, half_deg=np.nan, n=1):
         known = [np.ones(101), np.full(101, np.nan), angle - half_deg, angle + half_deg, np.full(101, n)]
         values[joint] = np.column_stack([angle, *known])
     times = (np.nan, np.nan) if kind == "mean" else (0.2, 1.3)
-    return side, kind, *times, values
+    return _memo.GaitCycle(side, kind, *times, values)
 
 
 CURVES = [
@@ -232,7 +232,7 @@ def test_the_page_holds_the_cycles(run_folder):
     curves = data["cycles"]["curves"]
     assert len(curves) == 3 * len(CURVES) and data["cycles"]["walks"] == [0]
     knees = [(c["side"], c["curve"], c["ys"][0]) for c in curves if c["joint"] == "knee"]
-    assert knees == [(side, kind, values[1, 0, 0]) for side, kind, _, _, values in CURVES]
+    assert knees == [(curve.side, curve.curve, curve.values[1, 0, 0]) for curve in CURVES]
     [mean] = [c for c in curves if (c["side"], c["joint"], c["curve"]) == ("right", "hip", "mean")]
     assert mean["n"] == 2 and mean["half"] == [3.0] * 101
     written, data, _ = page_of(run_folder(without=["cycles.csv"]))
@@ -251,7 +251,10 @@ def two_folders(run_folder, tmp_path):
     second = tmp_path / "after"
     shutil.copytree(first, second)
     added = np.array([30, 0, 0, 30, 30, 0])
-    more = [(*told, values + added) for *told, values in CURVES]
+    more = [
+        _memo.GaitCycle(curve.side, curve.curve, curve.start_s, curve.end_s, curve.values + added)
+        for curve in CURVES
+    ]
     write_cycles_csv(second / "cycles.csv", cycle_table([more]))
     return first, second
 
