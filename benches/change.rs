@@ -2,9 +2,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use memo_core::image::{
-    Background, BackgroundOptions, ChangeOptions, CleanOptions, GroupOptions, Image, Mask, clean, dilate,
-    fill_holes, group_regions, pair_changes, regions,
+    Background, BackgroundOptions, ChangeOptions, CleanOptions, GroupOptions, clean, dilate, fill_holes,
+    group_regions, pair_changes, regions,
 };
+use memo_core::{Image, Mask};
 use std::hint::black_box;
 
 const SIZES: [(usize, usize); 2] = [(640, 480), (1920, 1080)];

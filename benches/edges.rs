@@ -1,8 +1,9 @@
 //! Edges and straight segments of a frame, whole and restricted to the size of a person.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use memo_core::Image;
 use memo_core::image::{
-    EdgeDomain, EdgeOptions, Image, LineOptions, Window, edge_chains, edge_segments, segments_from_chains,
+    EdgeDomain, EdgeOptions, LineOptions, Window, edge_chains, edge_segments, segments_from_chains,
 };
 use std::hint::black_box;
 

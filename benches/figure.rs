@@ -2,11 +2,10 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec2;
-use memo_core::model::{Body, Gait, GaitStyle, Walker};
-use memo_core::planar::{
-    FigureOptions, FitOptions, PlanarEvidenceOptions, interpret_figure, test_pairs, test_triples,
-};
-use memo_core::synth::{DisplayView, Random, SampledWalkOptions, sampled_walk};
+use memo_core::model::GaitStyle;
+use memo_core::planar::{FitOptions, PlanarEvidenceOptions, test_pairs, test_triples};
+use memo_core::synth::{DisplayView, Random, SampledWalkOptions};
+use memo_core::{Body, FigureOptions, Gait, Walker, interpret_figure, sampled_walk};
 use std::hint::black_box;
 
 /// Tracks of `points` points over a walk at 60 Hz, 1 px of noise: the walker's joints and head, then

@@ -1,7 +1,8 @@
 //! Velocity field of regions of several sizes in a textured scene that moves by a few pixels.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use memo_core::image::{FlowOptions, Image, Mask, velocity_field};
+use memo_core::image::{FlowOptions, velocity_field};
+use memo_core::{Image, Mask};
 use std::hint::black_box;
 
 /// A texture of a few waves with noise, moved to the right.

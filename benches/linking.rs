@@ -3,11 +3,11 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
-use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::link::{FrontPoints, LinkFrame, LinkOptions, link};
 use memo_core::reproduce::stick_walker::StickWalker;
 use memo_core::synth::Random;
+use memo_core::{Joint, PerJoint, SegmentLengths};
 use std::hint::black_box;
 
 const FRAMES: usize = 10_000;

@@ -3,13 +3,13 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
-use memo_core::model::skeleton::{Joint, SegmentLengths, StickFigure};
 use memo_core::posture::Bearings;
 use memo_core::posture::group::{DEFAULT_GROUP_M, group};
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::rules::MotionModel;
 use memo_core::posture::tree::{TreeOptions, View};
 use memo_core::synth::Random;
+use memo_core::{Joint, SegmentLengths, StickFigure};
 use std::hint::black_box;
 
 /// A walker in mid-step, camera axes, 4 m away, turned by an angle from facing the camera.

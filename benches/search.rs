@@ -3,9 +3,10 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
-use memo_core::model::{Body, Camera, Gait, GaitStyle, Walker};
+use memo_core::model::GaitStyle;
 use memo_core::track::score::{EdgeLine, SimilarityOptions};
 use memo_core::track::search::{Grid, HiddenLines, Hypothesis, Path, Scene, search};
+use memo_core::{Body, Camera, Gait, Walker};
 use std::hint::black_box;
 
 /// The walker's own contours, broken in two, plus clutter: about as many edges as a real frame's region

@@ -1,10 +1,8 @@
 //! The whole tracker on frames of a person in clothes, and the drawing of such a frame.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use memo_core::image::Image;
-use memo_core::synth::{ClothedOptions, ClothedScene};
-use memo_core::track::options::TrackerOptions;
-use memo_core::track::tracker::Tracker;
+use memo_core::synth::ClothedOptions;
+use memo_core::{ClothedScene, Image, Tracker, TrackerOptions};
 use std::hint::black_box;
 
 fn track(c: &mut Criterion) {

@@ -1,8 +1,9 @@
 //! Repair of exchanged left and right labels over 10,000 frames of a walking figure.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use memo_core::keypoints::unswap::{Keypoints, Level, LimbGroup, UnswapOptions, unswap};
+use memo_core::keypoints::{Keypoints, Level, LimbGroup};
 use memo_core::synth::Random;
+use memo_core::{UnswapOptions, unswap};
 use std::hint::black_box;
 
 const FRAMES: usize = 10_000;

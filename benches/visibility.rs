@@ -2,10 +2,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
+use memo_core::Camera;
 use memo_core::image::Window;
-use memo_core::model::{
-    Camera, EllipticCylinder, PreparedView, VisibilityOptions, surface_map, visible_contours,
-};
+use memo_core::model::{EllipticCylinder, PreparedView, VisibilityOptions, surface_map, visible_contours};
 use std::hint::black_box;
 
 /// A cylinder from one end's centre to the other's, its x axis as near to `forward` as possible.

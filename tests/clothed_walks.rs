@@ -5,13 +5,11 @@
 //! `MEMO_FULL=1` draws eight times as many.
 
 use glam::DVec2;
-use memo_core::synth::{ClothedOptions, ClothedScene, FootContact, Mover};
+use memo_core::synth::{ClothedOptions, FootContact, Mover};
 use memo_core::track::fit::FitError;
-use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
-use memo_core::track::options::TrackerOptions;
-use memo_core::track::result::{EventKind, Row, Side, TrackedWalk};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::Tracker;
+use memo_core::track::{EventKind, Row};
+use memo_core::{ClothedScene, GaitParameter, GaitQuantity, Side, TrackedWalk, Tracker, TrackerOptions};
 use std::sync::LazyLock;
 
 /// Above this probability of interchanged sides a walk claims nothing by side.

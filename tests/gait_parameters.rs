@@ -7,12 +7,9 @@
 //! tilted by 0.03, strides 7 % longer or shorter, joints 1.2 % of the height higher or lower (chosen: the offsets
 //! `track::person` reckons with are larger, but the model's foot does not bend and would leave the ground).
 
-use memo_core::synth::{Random, SceneOptions, SynthScene, Uneven};
-use memo_core::track::gait_parameters::{GaitParameter, GaitQuantity};
-use memo_core::track::options::TrackerOptions;
-use memo_core::track::result::{Side, TrackedWalk};
+use memo_core::synth::{Random, SceneOptions, Uneven};
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::Tracker;
+use memo_core::{GaitParameter, GaitQuantity, Side, SynthScene, TrackedWalk, Tracker, TrackerOptions};
 use std::collections::BTreeMap;
 
 fn normal(random: &mut Random, sd: f64) -> f64 {

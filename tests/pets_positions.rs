@@ -7,10 +7,11 @@ use crate::recordings;
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
-use memo_core::model::position::{
-    height_on_ground, position_from_feet, position_from_head, position_from_rectangle, position_on_ground,
+use memo_core::Camera;
+use memo_core::model::{
+    FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters, height_on_ground,
+    position_from_feet, position_from_head, position_from_rectangle, position_on_ground,
 };
-use memo_core::model::{Camera, FootPosition, Midpoints, PositionError, PositionOptions, TsaiParameters};
 
 /// From box coordinates to pixels with centres at integers from 0.
 ///

@@ -11,8 +11,9 @@ use crate::mocap;
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use memo_core::planar::{Figure, FigureOptions, FitOptions, interpret_figure};
+use memo_core::planar::{Figure, FitOptions};
 use memo_core::synth::Random;
+use memo_core::{FigureOptions, interpret_figure};
 
 const PX_PER_M: f64 = 200.0;
 const LIMBS: [[usize; 2]; 8] = [[0, 1], [1, 2], [3, 4], [4, 5], [6, 7], [7, 8], [9, 10], [10, 11]];

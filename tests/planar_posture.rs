@@ -6,12 +6,10 @@
 use crate::mocap;
 
 use glam::{DVec2, DVec3};
-use memo_core::model::{Body, Gait, GaitStyle, Walker};
-use memo_core::planar::{
-    FigureOptions, FitOptions, PlanarEvidenceOptions, Verdict, fit_hinge, hinge_evidence, interpret_figure,
-    interpret_named_figure, joint_of,
-};
-use memo_core::synth::{DisplayView, Random, SampledWalkOptions, limbs_of, sampled_walk};
+use memo_core::model::GaitStyle;
+use memo_core::planar::{FitOptions, PlanarEvidenceOptions, Verdict, fit_hinge, hinge_evidence, joint_of};
+use memo_core::synth::{DisplayView, Random, SampledWalkOptions, limbs_of};
+use memo_core::{Body, FigureOptions, Gait, Walker, interpret_figure, interpret_named_figure, sampled_walk};
 use mocap::JOINTS;
 use mocap::stride::{LIMBS, noisy, walks};
 

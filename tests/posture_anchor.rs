@@ -2,13 +2,12 @@
 
 use crate::recorded;
 
-use memo_core::model::Camera;
-use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::anchor::{
     Anchor, AnchorOptions, Ground, SmoothOptions, combine, from_extent, from_ground, from_trunk, smooth,
 };
 use memo_core::posture::lift::JointRays;
 use memo_core::synth::Random;
+use memo_core::{Camera, Joint, PerJoint, SegmentLengths, StickFigure};
 
 use crate::recordings;
 use recorded::{camera, detected, triangulated, view, walks};

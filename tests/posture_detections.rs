@@ -6,13 +6,11 @@
 use crate::recorded;
 
 use glam::{DVec2, DVec3};
-use memo_core::keypoints::Layout;
-use memo_core::keypoints::detector::Detector;
-use memo_core::model::Camera;
-use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths, StickFigure};
 use memo_core::posture::anchor::AnchorSource;
-use memo_core::posture::sequence::{
-    AnchorChoice, KeypointSequence, Motion, PostureSequence, SequenceOptions, Warning, postures,
+use memo_core::posture::{AnchorChoice, Motion, Warning};
+use memo_core::{
+    Camera, Detector, Joint, KeypointSequence, Layout, PerJoint, PostureSequence, SegmentLengths,
+    SequenceOptions, StickFigure, postures,
 };
 
 use crate::recordings;

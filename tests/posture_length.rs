@@ -3,12 +3,11 @@
 use crate::recorded;
 
 use glam::DVec3;
-use memo_core::model::Camera;
-use memo_core::model::skeleton::{Joint, PerJoint, SegmentLengths};
 use memo_core::posture::anchor::{AnchorOptions, Ground};
 use memo_core::posture::length::{LengthBasis, LengthFit, LengthPrior, ScaleFrom, estimate_from_sequence};
 use memo_core::posture::lift::JointRays;
 use memo_core::synth::Random;
+use memo_core::{Camera, Joint, PerJoint, SegmentLengths};
 
 use crate::recordings;
 use recorded::{Walk, camera, detected, triangulated, view, walks};
@@ -37,9 +36,7 @@ fn length_of(lengths: &SegmentLengths, kind: &str) -> f64 {
 
 /// Body height by the height of the shoulders, whose share Drillis and Contini give.
 fn height_m(walk: &Walk) -> f64 {
-    let shoulder = |f: &memo_core::model::skeleton::StickFigure| {
-        0.5 * (f[Joint::RightShoulder].z + f[Joint::LeftShoulder].z)
-    };
+    let shoulder = |f: &memo_core::StickFigure| 0.5 * (f[Joint::RightShoulder].z + f[Joint::LeftShoulder].z);
     walk.figures.iter().map(shoulder).sum::<f64>() / walk.figures.len() as f64 / 0.818
 }
 

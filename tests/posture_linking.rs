@@ -6,10 +6,11 @@
 use crate::mocap;
 
 use glam::DVec3;
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, SegmentLengths, StickFigure};
+use memo_core::model::JOINT_COUNT;
 use memo_core::posture::lift::{JointRays, roots};
 use memo_core::posture::link::{FrontPoints, LinkFrame, LinkOptions, LinkedPath, link};
 use memo_core::posture::prior::MotionPrior;
+use memo_core::{Joint, SegmentLengths, StickFigure};
 
 /// Joints nearer than this count as the same, metres.
 const NEAR_M: f64 = 0.10;

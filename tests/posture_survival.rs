@@ -4,7 +4,7 @@ use crate::mocap;
 
 use std::collections::BTreeMap;
 
-use memo_core::model::skeleton::SegmentLengths;
+use memo_core::SegmentLengths;
 use memo_core::posture::Bearings;
 use memo_core::posture::group::{DEFAULT_GROUP_M, group};
 use memo_core::posture::rules::MotionModel;

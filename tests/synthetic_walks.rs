@@ -2,11 +2,10 @@
 //! reaches where the model is right. People who differ from it are in `clothed_walks`.
 
 use glam::{DVec2, DVec3};
-use memo_core::synth::{SceneOptions, SynthScene};
-use memo_core::track::options::{GaitChoice, TrackerOptions};
-use memo_core::track::result::{EventKind, Side, TrackedWalk};
+use memo_core::synth::SceneOptions;
 use memo_core::track::start::Direction;
-use memo_core::track::tracker::{TrackError, Tracker};
+use memo_core::track::{EventKind, GaitChoice};
+use memo_core::{Side, SynthScene, TrackError, TrackedWalk, Tracker, TrackerOptions};
 
 fn options_for(scene: &SynthScene) -> TrackerOptions {
     TrackerOptions {
@@ -152,7 +151,7 @@ fn other_gaits_and_velocity_weights_track_as_well() {
         assert!(errors(&scene, &walks[0])[2] < 0.06, "{gait:?}");
     }
     let mut options = options_for(&scene);
-    options.evidence.flow = Some(memo_core::image::flow::FlowOptions::default());
+    options.evidence.flow = Some(memo_core::image::FlowOptions::default());
     options.walk.similarity.full_velocity = Some(2.0);
     let walks = tracked_with(&scene, 0..scene.len(), options);
     assert!(errors(&scene, &walks[0])[2] < 0.02);
@@ -170,7 +169,7 @@ fn an_empty_scene_has_nobody_and_misuse_is_refused() {
         matches!(tracker.update(&frame.as_frame(), 0.0), Err(TrackError::Evidence(_))),
         "times must increase"
     );
-    let small = memo_core::image::Image::filled(32, 32, 0u8);
+    let small = memo_core::Image::filled(32, 32, 0u8);
     assert!(matches!(tracker.update(&small.as_frame(), 1.0), Err(TrackError::CameraSize { .. })));
     tracker.finish().unwrap();
     assert!(matches!(tracker.update(&frame.as_frame(), 2.0), Err(TrackError::Finished)));
@@ -183,7 +182,7 @@ fn an_empty_scene_has_nobody_and_misuse_is_refused() {
 fn a_high_camera_does_not_make_a_straight_path_slant() {
     for seed in [2, 9, 14] {
         let mut scene = SynthScene::new(SceneOptions { seed, ..SceneOptions::default() }).unwrap();
-        scene.camera = memo_core::model::Camera::level([640, 480], 0.9, 2.0, 7.0).unwrap();
+        scene.camera = memo_core::Camera::level([640, 480], 0.9, 2.0, 7.0).unwrap();
         let walk = &tracked(&scene)[0];
         let off = walk.rows()[30].heading_rad - scene.path.heading_rad;
         assert!(off.sin().abs() < 0.01, "seed {seed}: heading off by {off}");
@@ -208,7 +207,7 @@ fn a_sliding_box_is_not_a_walker_and_cut_off_feet_are_not_fully_visible() {
             .truth(scene.len() - 1)
             .map_or(0.0, |t| scene.camera.project(t.posed.right.ankle).unwrap().y);
         let rows = sole as usize - 20;
-        let view = memo_core::image::Frame::new(walked.pixels(), 640, rows, 640).unwrap();
+        let view = memo_core::Frame::new(walked.pixels(), 640, rows, 640).unwrap();
         cropped.update(&view, scene.time_s(k)).unwrap();
     }
     for tracker in [&mut slid, &mut cropped] {

@@ -15,9 +15,7 @@ from memo.turning import turned_deg, turning_words
 
 
 def walk(*headings_deg, treadmill=None):
-    return types.SimpleNamespace(
-        treadmill=treadmill, columns=lambda: {"heading_rad": np.radians(headings_deg)}
-    )
+    return types.SimpleNamespace(treadmill=treadmill, columns={"heading_rad": np.radians(headings_deg)})
 
 
 def test_a_turn_is_told_from_20_degrees_on_and_not_on_a_treadmill():

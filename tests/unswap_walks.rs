@@ -5,10 +5,9 @@
 
 use crate::recordings;
 
-use memo_core::keypoints::unswap::{
-    Keypoints, Level, LimbGroup, Reason, SideVerdict, UnswapOptions, Unswapped, unswap,
-};
+use memo_core::keypoints::{Keypoints, Level, LimbGroup, Reason, SideVerdict, Unswapped};
 use memo_core::synth::Random;
+use memo_core::{UnswapOptions, unswap};
 
 const WALKS: [(&str, usize); 4] =
     [("BTK_ANTO_M_hole", 0), ("BTK_BELT_C", 0), ("CMU_02_01", 0), ("CMU_12_01", 10)];

@@ -10,9 +10,9 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use memo_core::model::EllipticCylinder;
-use memo_core::model::silhouette::{ContourKind, side_lines};
-use memo_core::model::visibility::{VisibilityOptions, VisibleSegment, visible_contours};
+use memo_core::model::{
+    ContourKind, EllipticCylinder, VisibilityOptions, VisibleSegment, side_lines, visible_contours,
+};
 
 const POSTURES: u64 = 1000;
 const SAMPLES: usize = 400;

@@ -7,10 +7,10 @@
 pub mod stride;
 
 use glam::{DMat3, DVec2, DVec3};
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, StickFigure};
-use memo_core::model::{Camera, Distortion};
+use memo_core::model::{Distortion, JOINT_COUNT};
 use memo_core::posture::lift::JointRays;
 use memo_core::synth::Random;
+use memo_core::{Camera, Joint, PerJoint, StickFigure};
 
 use crate::recordings;
 

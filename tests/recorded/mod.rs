@@ -4,10 +4,10 @@
 //! is 1.2 m high, f = 1920 px.
 
 use glam::{DMat3, DVec2, DVec3};
-use memo_core::model::Camera;
-use memo_core::model::skeleton::{Joint, PELVIS_ON_TRUNK, PerJoint, SegmentLengths, StickFigure};
+use memo_core::model::PELVIS_ON_TRUNK;
 use memo_core::posture::lift::JointRays;
 use memo_core::synth::Random;
+use memo_core::{Camera, Joint, PerJoint, SegmentLengths, StickFigure};
 
 use crate::recordings;
 

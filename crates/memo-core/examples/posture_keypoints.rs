@@ -8,12 +8,11 @@
 //! of the linked joints.
 
 use memo_core::glam::DVec2;
-use memo_core::model::CameraFileOptions;
-use memo_core::model::skeleton::JOINT_COUNT;
-use memo_core::synth::{Random, SampledWalkOptions, sampled_walk};
+use memo_core::model::{CameraFileOptions, JOINT_COUNT};
+use memo_core::synth::{Random, SampledWalkOptions};
 use memo_core::{
     Camera, Detector, Joint, KeypointSequence, PerJoint, PostureSequence, SequenceOptions, TrackerOptions,
-    postures,
+    postures, sampled_walk,
 };
 use std::error::Error;
 use std::time::Instant;

@@ -3,8 +3,7 @@
 //! `cargo run --release -p memo-core --example track_frames -- FRAMES_DIR RATE_HZ HEIGHT_M [CAMERA.toml]`
 
 use memo_core::model::{CameraFileOptions, SideJoints};
-use memo_core::track::result::Row;
-use memo_core::track::tracker::SeekReport;
+use memo_core::track::{Row, SeekReport};
 use memo_core::{Camera, Frame, TrackedWalk, Tracker, TrackerOptions};
 use std::error::Error;
 use std::path::PathBuf;
@@ -99,7 +98,8 @@ fn csv_row(row: &Row, walk: &TrackedWalk) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use memo_core::synth::{SceneOptions, SynthScene};
+    use memo_core::SynthScene;
+    use memo_core::synth::SceneOptions;
 
     #[test]
     fn a_walker_in_a_folder_of_frames_is_followed_in_the_order_of_their_numbers() -> Result<(), Box<dyn Error>>

@@ -6,10 +6,11 @@
 //! # A walker through frames
 //!
 //! Frames are borrowed grey values. This example draws them; frames of a camera are
-//! [`image::Frame::new`]`(&bytes, width, height, stride)`.
+//! [`Frame::new`]`(&bytes, width, height, stride)`.
 //!
 //! ```
-//! use memo_core::synth::{SceneOptions, SynthScene};
+//! use memo_core::SynthScene;
+//! use memo_core::synth::SceneOptions;
 //! use memo_core::{Tracker, TrackerOptions};
 //!
 //! let scene = SynthScene::new(SceneOptions::default())?;
@@ -32,19 +33,20 @@
 //! ```
 //!
 //! `tracker.current()` is the filtered estimate while frames are still coming.
-//! [`track::result::TrackedWalk::events`] and [`gait_parameters`](track::result::TrackedWalk::gait_parameters)
+//! [`TrackedWalk::events`] and [`gait_parameters`](TrackedWalk::gait_parameters)
 //! are the gait events and gait parameters of a finished walk.
 //!
 //! # Postures from keypoints
 //!
 //! The inputs are image points of joints, a camera, and segment lengths or a body height.
-//! [`posture::sequence::postures`] returns every posture they allow and the most probable motion.
-//! [`keypoints::Detector`] converts the points of a detector to the fourteen joints, and
-//! [`model::Camera::from_file`] reads the camera.
+//! [`postures`] returns every posture they allow and the most probable motion.
+//! [`Detector`] converts the points of a detector to the fourteen joints, and
+//! [`Camera::from_file`] reads the camera.
 //!
 //! ```
 //! use memo_core::glam::DVec2;
-//! use memo_core::synth::{SampledWalkOptions, sampled_walk};
+//! use memo_core::sampled_walk;
+//! use memo_core::synth::SampledWalkOptions;
 //! use memo_core::{
 //!     Camera, Detector, Joint, KeypointSequence, PerJoint, SequenceOptions, TrackerOptions, postures,
 //! };
@@ -86,10 +88,11 @@
 //!
 //! # Limbs among unnamed dots
 //!
-//! [`planar::interpret_figure`] finds which dots are linked, and in which planes they swing.
+//! [`interpret_figure`] finds which dots are linked, and in which planes they swing.
 //!
 //! ```
-//! use memo_core::synth::{PointLightOptions, SampledWalkOptions, limbs_of, point_light_display, sampled_walk};
+//! use memo_core::{PointLightOptions, point_light_display, sampled_walk};
+//! use memo_core::synth::{SampledWalkOptions, limbs_of};
 //! use memo_core::{FigureOptions, TrackerOptions, interpret_figure};
 //!
 //! let walker = TrackerOptions::for_height(1.75).walker(1.75, 1.3)?;
@@ -131,28 +134,35 @@ pub mod estimate;
 pub mod image;
 pub mod keypoints;
 pub mod model;
-pub mod option_error;
+mod option_error;
 pub mod planar;
 pub mod posture;
-pub mod progress;
+mod progress;
 #[cfg(any(test, feature = "reproduce"))]
 pub mod reproduce;
 pub mod synth;
 pub mod track;
 pub mod wording;
 
-// What most callers need, by one short path; each wing has the rest.
-pub use calibrate::{camera_from_points, camera_from_walker};
-pub use image::{Frame, Image, Mask};
+// What most callers need. Each public item has one path: here, or in its wing.
+pub use calibrate::points::camera_from_points;
+pub use calibrate::walker::camera_from_walker;
+pub use image::frame::{Frame, Image, Mask};
+pub use keypoints::detector::Detector;
+pub use keypoints::layouts::Layout;
 pub use keypoints::unswap::{UnswapOptions, unswap};
-pub use keypoints::{Detector, Layout};
+pub use model::body::{Body, Walker};
+pub use model::camera::Camera;
+pub use model::gait::Gait;
 pub use model::skeleton::{Joint, PerJoint, SegmentLengths, Side, StickFigure};
-pub use model::{Body, Camera, Gait, Walker};
 pub use option_error::OptionError;
-pub use planar::{FigureOptions, interpret_figure, interpret_named_figure};
+pub use planar::figure::{FigureOptions, interpret_figure, interpret_named_figure};
 pub use posture::sequence::{KeypointSequence, PostureSequence, SequenceError, SequenceOptions, postures};
-pub use progress::Progress;
-pub use synth::{ClothedScene, PointLightOptions, SynthScene, point_light_display, sampled_walk};
+pub use progress::{Progress, Stopped};
+pub use synth::clothed::ClothedScene;
+pub use synth::motion::sampled_walk;
+pub use synth::pointlight::{PointLightOptions, point_light_display};
+pub use synth::scene::SynthScene;
 pub use track::gait_parameters::{GaitParameter, GaitQuantity};
 pub use track::options::TrackerOptions;
 pub use track::result::TrackedWalk;
@@ -164,20 +174,20 @@ mod tests {
     #[test]
     fn what_people_hold_is_send_and_sync() {
         fn sent_and_shared<T: Send + Sync + 'static>() {}
-        sent_and_shared::<crate::model::Camera>();
+        sent_and_shared::<crate::Camera>();
         sent_and_shared::<crate::model::CameraFileError>();
-        sent_and_shared::<crate::image::Image<u8>>();
-        sent_and_shared::<crate::image::Frame<'static>>();
-        sent_and_shared::<crate::track::tracker::Tracker>();
-        sent_and_shared::<crate::track::tracker::TrackError>();
-        sent_and_shared::<crate::track::result::TrackedWalk>();
-        sent_and_shared::<crate::posture::sequence::PostureSequence>();
-        sent_and_shared::<crate::posture::sequence::SequenceError>();
+        sent_and_shared::<crate::Image<u8>>();
+        sent_and_shared::<crate::Frame<'static>>();
+        sent_and_shared::<crate::Tracker>();
+        sent_and_shared::<crate::TrackError>();
+        sent_and_shared::<crate::TrackedWalk>();
+        sent_and_shared::<crate::PostureSequence>();
+        sent_and_shared::<crate::SequenceError>();
         sent_and_shared::<crate::planar::FigureInterpretation>();
         sent_and_shared::<crate::planar::FigureError>();
         sent_and_shared::<crate::calibrate::PointCalibration>();
         sent_and_shared::<crate::calibrate::WalkerCalibration>();
-        sent_and_shared::<crate::progress::Progress>();
-        sent_and_shared::<crate::synth::SynthScene>();
+        sent_and_shared::<crate::Progress>();
+        sent_and_shared::<crate::SynthScene>();
     }
 }

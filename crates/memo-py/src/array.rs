@@ -2,8 +2,8 @@
 
 use crate::error::value_error;
 use glam::DVec2;
-use memo_core::image::{Frame, Image, Mask};
-use memo_core::model::skeleton::{JOINT_COUNT, StickFigure};
+use memo_core::model::JOINT_COUNT;
+use memo_core::{Frame, Image, Mask, StickFigure};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,

@@ -8,10 +8,10 @@ use crate::error::value_error;
 use crate::result::result;
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::{
-    Estimate, KnownLens, PointOptions, WalkerOptions, WalkerSighting, camera_from_points, camera_from_walker,
-    points, sightings_from_joints, walker,
+    Estimate, KnownLens, PointOptions, WalkerOptions, WalkerSighting, sightings_from_joints,
 };
 use memo_core::wording::counted;
+use memo_core::{camera_from_points, camera_from_walker};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ use pyo3::types::{IntoPyDict, PyDict};
 
 result! {
     /// A camera calibrated from measured points, and its uncertainty.
-    PointCalibration |py, found: points::PointCalibration| {
+    PointCalibration |py, found: memo_core::calibrate::PointCalibration| {
         /// The camera.
         camera: PyCamera = PyCamera(found.camera),
         /// Value and standard deviation of what was fitted: `focal_px`, `centre_u_px`, `centre_v_px`, `k1`, `k2`, and
@@ -49,7 +49,7 @@ result! {
 result! {
     /// A camera calibrated from a walker, and its uncertainty. The origin is on the ground below the mean position of
     /// the person, Y is the viewing direction.
-    WalkerCalibration |py, found: walker::WalkerCalibration| {
+    WalkerCalibration |py, found: memo_core::calibrate::WalkerCalibration| {
         /// The camera.
         camera: PyCamera = PyCamera(found.camera),
         /// Value and standard deviation of `focal_px` unless it was given, `pitch_deg` (down), `roll_deg`, and

@@ -3,10 +3,10 @@
 use crate::array::{numpy_from_column, numpy_from_rows, numpy_of_shape, vectors_from_numpy};
 use crate::error::value_error;
 use glam::{DMat3, DVec2, DVec3};
-use memo_core::model::position::{position_from_rectangle, position_on_ground};
+use memo_core::Camera;
 use memo_core::model::{
-    Camera, CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints,
-    PositionError, PositionOptions, TsaiParameters,
+    CameraFileError, CameraFileOptions, Distortion, FootPosition, LengthUnit, Midpoints, PositionError,
+    PositionOptions, TsaiParameters, position_from_rectangle, position_on_ground,
 };
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};

@@ -2,10 +2,9 @@
 
 use crate::result::{objects, result};
 use crate::tracker::choice_error;
-use memo_core::model::skeleton::Side;
 use memo_core::track::cycles::{AngleAt, CYCLE_POINTS, MeanAngle, mean_cycles};
 use memo_core::track::normal_gait::{self, NormalJoint, departures, normal_cycle};
-use memo_core::track::result::TrackedWalk;
+use memo_core::{Side, TrackedWalk};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 

@@ -1,7 +1,7 @@
 //! The measured person of a walk.
 
 use crate::result::result;
-use memo_core::model::Body;
+use memo_core::Body;
 use memo_core::track::fit;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;

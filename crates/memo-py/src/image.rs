@@ -4,12 +4,12 @@ use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_fr
 use crate::defaults::dict;
 use crate::error::value_error;
 use crate::wait::interruptible;
-use memo_core::image::flow::{FlowOptions, velocity_field as core_velocity_field};
+use memo_core::Image;
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
-    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, GroupOptions, Image, LineOptions,
+    ChangeOptions, CleanOptions, EdgeDomain, EdgeOptions, FlowOptions, GroupOptions, LineOptions,
     SILHOUETTE_THRESHOLD, clean, edge_segments as core_edge_segments, fill_holes, group_regions,
-    pair_changes, regions, shrunk as core_shrunk,
+    pair_changes, regions, shrunk as core_shrunk, velocity_field as core_velocity_field,
 };
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -137,7 +137,7 @@ pub fn velocity_field<'py>(
             }
         }
     }
-    let image = |data| memo_core::image::Image::from_vec(width, height, data).map_err(value_error);
+    let image = |data| memo_core::Image::from_vec(width, height, data).map_err(value_error);
     let [u, v] = components;
     Ok((numpy_from_image(py, image(u)?)?, numpy_from_image(py, image(v)?)?))
 }

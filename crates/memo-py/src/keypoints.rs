@@ -3,9 +3,9 @@
 use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
 use crate::error::value_error;
 use glam::DVec2;
-use memo_core::keypoints::detector::{Detector, WeightedPoints};
 use memo_core::keypoints::person::{FollowOptions, follow_person as core_follow_person};
-use memo_core::keypoints::{DetectorError, LAYOUTS, Layout, joint_name as core_joint_name};
+use memo_core::keypoints::{DetectorError, LAYOUTS, WeightedPoints, joint_name as core_joint_name};
+use memo_core::{Detector, Layout};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 

@@ -7,12 +7,12 @@ use crate::result::{objects, result};
 use crate::wait::watched;
 use glam::DVec2;
 use memo_core::planar::{
-    Chain, DepthSource, FalseTargetRate, FigureInterpretation, FigureOptions, FigureWindow, FitOptions, Link,
-    Method, PlanarEvidenceOptions, Status, Undecided, Verdict, at_one_scale, hinge_depths,
-    interpret_with_progress, joint_of, perspective_of_figure_px, rod_depths,
+    Chain, DepthSource, FalseTargetRate, FigureInterpretation, FigureWindow, FitOptions, Link, Method,
+    PlanarEvidenceOptions, Status, Undecided, Verdict, at_one_scale, hinge_depths, interpret_with_progress,
+    joint_of, perspective_of_figure_px, rod_depths,
 };
-use memo_core::progress::Progress;
 use memo_core::wording::counted;
+use memo_core::{FigureOptions, Progress};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -6,13 +6,14 @@ use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::result;
 use glam::{DVec2, DVec3};
-use memo_core::model::{Body, Gait, GaitStyle, Walker};
+use memo_core::model::GaitStyle;
 use memo_core::synth::{
-    self, CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
-    NoiseDots, NoiseKind, PhaseScramble, PointLightOptions, PointMotion, PositionScramble,
-    SampledWalkOptions, ScrambleAxes, WALKER_HEIGHT_M, displays_together, point_light_display, sampled_walk,
+    CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
+    NoiseDots, NoiseKind, PhaseScramble, PointMotion, PositionScramble, SampledWalkOptions, ScrambleAxes,
+    WALKER_HEIGHT_M, displays_together,
 };
 use memo_core::wording::counted;
+use memo_core::{Body, Gait, PointLightOptions, Walker, point_light_display, sampled_walk, synth};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -10,17 +10,17 @@ use crate::error::value_error;
 use crate::result::result;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, PerJoint, SegmentLengths};
+use memo_core::model::JOINT_COUNT;
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::link::Alternative;
-use memo_core::posture::sequence::{
-    self, AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameProblem, FrameReading, KeypointSequence, Motion,
-    ReasonTotal, SequenceOptions, Strength, postures_with_progress, reason_totals,
-};
 use memo_core::posture::tree::{CutCount, LevelCount, View};
-use memo_core::progress::Progress;
+use memo_core::posture::{
+    AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameProblem, FrameReading, Motion, ReasonTotal, Strength,
+    postures_with_progress, reason_totals,
+};
 use memo_core::wording::counted;
+use memo_core::{Joint, KeypointSequence, PerJoint, Progress, SegmentLengths, SequenceOptions};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -29,7 +29,7 @@ use std::collections::HashMap;
 
 result! {
     /// What `memo.Postures` is made of; its fields have the same names.
-    PostureSequence |py, found: sequence::PostureSequence| {
+    PostureSequence |py, found: memo_core::PostureSequence| {
         lengths_m: Py<PyDict> = found.lengths.lengths.named().into_py_dict(py)?,
         length_sd_m: Py<PyDict> = names(&found).zip(&found.lengths.sd_m).into_py_dict(py)?,
         length_basis: Py<PyDict> =
@@ -107,7 +107,7 @@ fn total(total: ReasonTotal) -> Total {
     (constraint.name(), kind, joint, total.branches, total.frames, constraint.description())
 }
 
-fn names(found: &sequence::PostureSequence) -> impl Iterator<Item = String> {
+fn names(found: &memo_core::PostureSequence) -> impl Iterator<Item = String> {
     found.lengths.lengths.named().map(|(name, _)| name)
 }
 

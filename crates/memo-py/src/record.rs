@@ -5,14 +5,14 @@ use crate::camera::PyCamera;
 use crate::error::value_error;
 use glam::{DVec2, DVec3};
 use memo_core::image::Rectangle;
-use memo_core::model::visibility::visible_contours;
 use memo_core::model::{
-    Body, Camera, Gait, GaitStyle, PosedBody, Posture, Proportions, VisibilityOptions, VisibleSegment, Walker,
+    GaitStyle, PosedBody, Posture, Proportions, VisibilityOptions, VisibleSegment, visible_contours,
 };
-use memo_core::track::result::{Row, TrackedWalk};
+use memo_core::track::Row;
 use memo_core::track::search::{Axis, Hypothesis, POSITION_STEP_M, Path, Scene};
 use memo_core::track::walk::Look;
 use memo_core::wording::counted;
+use memo_core::{Body, Camera, Gait, TrackedWalk, Walker};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

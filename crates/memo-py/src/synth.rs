@@ -3,10 +3,10 @@
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
-use memo_core::image::Image;
 use memo_core::model::{SideAngles, SideJoints};
-use memo_core::synth::{ClothedOptions, ClothedScene, Mover, SceneOptions, SynthScene};
+use memo_core::synth::{ClothedOptions, Mover, SceneOptions};
 use memo_core::wording::counted;
+use memo_core::{ClothedScene, Image, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;

@@ -8,15 +8,14 @@ use crate::result::{objects, result};
 use crate::steady::{FrameMotion, LostView};
 use crate::wait::{LOOK, watched};
 use crate::walk::Walk;
-use memo_core::image::BackgroundOptions;
-use memo_core::image::flow::FlowOptions;
+use memo_core::image::{BackgroundOptions, FlowOptions};
 use memo_core::track::fit::FitOptions;
 use memo_core::track::height::{POPULATION_HEIGHT_M, POPULATION_SD_M};
-use memo_core::track::options::{GaitChoice, TrackerOptions};
 use memo_core::track::score::Measure;
 use memo_core::track::steady::SteadyOptions;
-use memo_core::track::tracker::{self, Now, Tracker};
+use memo_core::track::{GaitChoice, Now};
 use memo_core::wording::counted;
+use memo_core::{Tracker, TrackerOptions};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -59,7 +58,7 @@ result! {
 
 result! {
     /// Counts over a stream; if nobody was followed, they show why.
-    SeekReport |_py, report: tracker::SeekReport| {
+    SeekReport |_py, report: memo_core::track::SeekReport| {
         /// Frames seen.
         frames: usize,
         /// Frames with a moving region large enough for a person.

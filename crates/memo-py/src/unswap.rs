@@ -4,10 +4,9 @@ use crate::array::{numpy_from_column, scores_from_numpy, times_from_numpy, track
 use crate::error::value_error;
 use crate::result::result;
 use crate::wait::interruptible;
-use memo_core::keypoints::unswap::{
-    GroupResult, Keypoints, Level, LimbGroup, UnswapOptions, unswap as core_unswap,
-};
+use memo_core::keypoints::{GroupResult, Keypoints, Level, LimbGroup};
 use memo_core::wording::counted;
+use memo_core::{UnswapOptions, unswap as core_unswap};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};

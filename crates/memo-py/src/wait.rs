@@ -2,7 +2,7 @@
 //! is reported.
 
 use crate::pool::pool;
-use memo_core::progress::Progress;
+use memo_core::Progress;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

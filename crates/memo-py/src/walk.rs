@@ -7,12 +7,11 @@ use crate::fit::WalkFit;
 use crate::record::{Recorded, SegmentsWithParts, WalkRecord};
 use crate::result::{objects, result};
 use glam::{DVec2, DVec3};
+use memo_core::TrackedWalk;
 use memo_core::model::SideJoints;
-use memo_core::track::plausible;
-use memo_core::track::result::{Event, Row, TrackedWalk};
 use memo_core::track::start::{Direction, PhaseLine as CoreLine, StartReport};
 use memo_core::track::walk::Step;
-use memo_core::track::{gait_parameters as parameters, height, treadmill};
+use memo_core::track::{Event, Row, height, plausible, treadmill};
 use memo_core::wording::counted;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
@@ -37,7 +36,7 @@ result! {
 
 result! {
     /// A gait parameter with its 95 % interval.
-    GaitParameter |_py, line: &parameters::GaitParameter| {
+    GaitParameter |_py, line: &memo_core::GaitParameter| {
         /// Its name, a key of `memo.gait.DEFINITIONS`.
         parameter: String = line.quantity.name(),
         /// "right", "left", or "" for both.

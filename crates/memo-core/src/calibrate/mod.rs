@@ -2,21 +2,20 @@
 //!
 //! | function | needs | undetermined |
 //! |---|---|---|
-//! | [`camera_from_points`] | six points with measured positions, four in a plane | only what the points do
-//! not determine |
-//! | [`camera_from_walker`] | a person of known height at several distances | the direction of the world's X
-//! axis |
+//! | [`camera_from_points`] | six points with measured positions, four in a plane | what the points leave open |
+//! | [`camera_from_walker`] | a person of known height at several distances | the direction of the world's X axis |
+//!
+//! [`camera_from_points`]: crate::camera_from_points
+//! [`camera_from_walker`]: crate::camera_from_walker
 //!
 //! Both fit by least squares and return the covariance of the fitted parameters. Pixels are assumed to be
 //! square.
 
-pub mod points;
-pub mod walker;
+pub(crate) mod points;
+pub(crate) mod walker;
 
-pub use points::{KnownLens, PointCalibration, PointError, PointOptions, camera_from_points};
-pub use walker::{
-    WalkerCalibration, WalkerError, WalkerOptions, WalkerSighting, camera_from_walker, sightings_from_joints,
-};
+pub use points::{KnownLens, PointCalibration, PointError, PointOptions};
+pub use walker::{WalkerCalibration, WalkerError, WalkerOptions, WalkerSighting, sightings_from_joints};
 
 /// The focal length is determined if its relative standard deviation is below this.
 const MAX_FOCAL_SD: f64 = 0.25;

@@ -5,7 +5,7 @@
 //! one of them. Time is in seconds instead of the paper's images, so any frame rate and uneven time stamps
 //! work.
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 
 /// Process and measurement noise of one coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,7 +13,7 @@
 use super::change::{ChangeOptions, pair_changes};
 use super::clean::fill_holes;
 use super::frame::{Frame, FrameError, Image, Mask};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use thiserror::Error;
 
 /// Options for the background.

@@ -23,7 +23,7 @@
 use super::fit::{BORDER, NORM_SCALE, WINDOW, for_each_window, window_norm};
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
-use crate::option_error::OptionError;
+use crate::OptionError;
 
 /// How far beyond the visible edge of a moving object eq. (1) marks pixels, in pixels: a window reaches the
 /// edge from two pixels away.

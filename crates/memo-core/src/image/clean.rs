@@ -16,7 +16,7 @@
 use super::frame::{Image, Mask};
 use super::region::{self, Rectangle};
 use super::runs::{Connectivity, connected_runs, runs};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use std::collections::VecDeque;
 
 /// Numbers of neighbours at which a pixel changes.

@@ -13,7 +13,7 @@
 //! than about 2 sigma give two edges.
 
 use super::frame::{Frame, FrameError, Mask};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::Vec2;
 use std::ops::Range;
 use thiserror::Error;

@@ -34,7 +34,7 @@ use self::domain::Domain;
 use self::multigrid::{Goal, Multigrid, Vectors};
 use super::edge::Window;
 use super::frame::{Frame, FrameError, Image, Mask};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::{DVec2, Vec2};
 use thiserror::Error;
 

@@ -9,7 +9,7 @@
 
 use super::edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, edge_chains};
 use super::frame::Frame;
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::DVec2;
 use std::ops::Range;
 use thiserror::Error;

@@ -1,21 +1,21 @@
 //! Image processing: from grey frames to moving regions, velocity fields and straight edges.
 
-pub mod background;
+pub(crate) mod background;
 #[cfg(feature = "image")]
 mod buffers;
-pub mod change;
-pub mod clean;
-pub mod edge;
+pub(crate) mod change;
+pub(crate) mod clean;
+pub(crate) mod edge;
 mod fit;
-pub mod flow;
-pub mod frame;
-pub mod gain;
-pub mod line;
-pub mod outline;
-pub mod region;
-pub mod runs;
-pub mod shrink;
-pub mod silhouette;
+pub(crate) mod flow;
+pub(crate) mod frame;
+pub(crate) mod gain;
+pub(crate) mod line;
+pub(crate) mod outline;
+pub(crate) mod region;
+pub(crate) mod runs;
+pub(crate) mod shrink;
+pub(crate) mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
 pub use change::{
@@ -25,7 +25,7 @@ pub use change::{
 pub use clean::{CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};
 pub use flow::{FlowComponent, FlowError, FlowEvidence, FlowField, FlowOptions, velocity_field};
-pub use frame::{Frame, FrameError, Image, Mask};
+pub use frame::FrameError;
 pub use gain::{Gain, estimate_gain};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
@@ -33,3 +33,5 @@ pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions}
 pub use runs::Run;
 pub use shrink::shrunk;
 pub use silhouette::{SILHOUETTE_THRESHOLD, SilhouetteError, silhouettes};
+// The crate exports these.
+pub(crate) use frame::{Frame, Image, Mask};

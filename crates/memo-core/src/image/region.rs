@@ -13,7 +13,7 @@ use super::change::CHANGE_REACH_PX;
 use super::frame::{Image, Mask};
 use super::outline::{Outline, outlines};
 use super::runs::{Connectivity, Run, connected_runs, runs};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use std::cmp::Reverse;
 
 /// An axis-aligned rectangle of whole pixels. The first and the last column and row belong to it.

@@ -1,7 +1,7 @@
 //! Frames of fewer pixels: each is the mean of n by n.
 
 use super::frame::{Frame, Image};
-use crate::option_error::OptionError;
+use crate::OptionError;
 
 /// Means of `n` by `n` grey values, rounded to the nearest, halves up. Columns at the right and rows at the bottom
 /// that do not fill `n` are left out.

@@ -8,7 +8,7 @@ use super::background::{Background, BackgroundError, BackgroundOptions};
 use super::clean::{CleanOptions, clean, fill_holes};
 use super::frame::{Frame, FrameError, Mask};
 use super::region::{GroupOptions, group_regions, regions};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use thiserror::Error;
 
 /// Why no silhouettes were computed.
@@ -67,9 +67,10 @@ fn silhouette(frame: &Frame<'_>, background: &Background, threshold: f64) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SynthScene;
     use crate::image::Image;
     use crate::model::surface::{NO_PART, surface_map};
-    use crate::synth::{SceneOptions, SynthScene};
+    use crate::synth::SceneOptions;
 
     #[test]
     fn the_drawn_walker_is_cut_out() {

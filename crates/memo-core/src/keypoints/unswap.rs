@@ -24,7 +24,7 @@
 mod chain;
 mod relative;
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 use crate::wording::counted;
 use chain::{Chain, Posterior, Prior, Step};
 use relative::{Sample, Scale, Track};

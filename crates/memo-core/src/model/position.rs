@@ -18,7 +18,7 @@
 //! Limits: each function uses one rectangle and does not filter over time; a stooped or seated person gets a
 //! wrong position.
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::{DMat2, DMat3, DVec2, DVec3};
 use thiserror::Error;
 

@@ -6,16 +6,16 @@
 //! effect. Depths and planes are known up to a reflection about the image plane: the mirror of (p, q) is (-p,
 //! -q).
 
-pub mod batch;
-pub mod depth_change;
-pub mod evidence;
-pub mod figure;
+pub(crate) mod batch;
+pub(crate) mod depth_change;
+pub(crate) mod evidence;
+pub(crate) mod figure;
 mod fit;
-pub mod group;
-pub mod hinge;
-pub mod motion;
-pub mod plane;
-pub mod rod;
+pub(crate) mod group;
+pub(crate) mod hinge;
+pub(crate) mod motion;
+pub(crate) mod plane;
+pub(crate) mod rod;
 
 pub use batch::{hinge_depths, rod_depths};
 pub use depth_change::{
@@ -27,13 +27,14 @@ pub use evidence::{
     link_three, rod_evidence,
 };
 pub use figure::{
-    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureInterpretation, FigureOptions,
-    FigureWindow, Link, Method, Status, interpret_figure, interpret_named_figure, interpret_with_progress,
-    joint_of,
+    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureInterpretation, FigureWindow, Link,
+    MOST_POINTS, MOST_TRACKS, Method, Status, interpret_with_progress, joint_of,
 };
 pub use fit::{FitError, FitOptions};
 pub use group::{Pair, Triple, test_pairs, test_triples};
 pub use hinge::{Hinge, HingeFit, HingeRefusal, fit_hinge, hinge_from_two_views};
 pub use motion::{MotionFit, MotionRefusal, RodMotion, plane_from_motions};
 pub use plane::Plane;
-pub use rod::{Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views};
+pub use rod::{
+    ROUNDING, Rod, RodFit, RodRefusal, fit_rod, rod_by_paper, rod_from_ellipse, rod_from_three_views,
+};

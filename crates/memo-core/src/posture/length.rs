@@ -11,8 +11,8 @@
 //! is not visible in one view: it comes from body height, from the ground or a given distance, or is assumed
 //! ([`ScaleFrom`]).
 
+use crate::OptionError;
 use crate::estimate::median::median;
-use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;

@@ -15,8 +15,14 @@ pub mod link;
 pub(crate) mod placed;
 pub mod prior;
 pub mod rules;
-pub mod sequence;
+pub(crate) mod sequence;
 pub mod tree;
 pub mod uncertainty;
 
 pub use placed::{Bearings, HeadingSource};
+pub use sequence::{
+    AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameProblem, FrameReading, Heading, HeadingFrom, LengthOrigin,
+    MOST_GROUPED, Motion, NeckFrom, NeckTrack, ReasonTotal, RepresentedGroup, SequenceLengths,
+    SourceConflict, Strength, Warning, figure_in_camera, figure_in_world, postures_with_progress,
+    reason_totals,
+};

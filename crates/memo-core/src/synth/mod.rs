@@ -1,19 +1,19 @@
 //! Seeded generators of scenes with ground truth, shared by tests, benches and the demo.
 
-pub mod clothed;
-pub mod motion;
-pub mod pointlight;
-pub mod random;
-pub mod scene;
+pub(crate) mod clothed;
+pub(crate) mod motion;
+pub(crate) mod pointlight;
+pub(crate) mod random;
+pub(crate) mod scene;
 
-pub use clothed::{ClothedOptions, ClothedScene, ClothedTruth, FootContact, Mover};
+pub use clothed::{ClothedOptions, ClothedTruth, FootContact, Mover};
 pub use motion::{
-    MotionError, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, WALKER_LIMBS, limbs_of, sampled_walk,
+    MotionError, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, WALKER_LIMBS, WALKER_NAMES, limbs_of,
 };
 pub use pointlight::{
     CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
-    NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay, PointLightError, PointLightOptions,
-    PositionScramble, ScrambleAxes, displays_together, point_light_display,
+    NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay, PointLightError, PositionScramble, ScrambleAxes,
+    displays_together,
 };
 pub use random::Random;
-pub use scene::{SceneError, SceneOptions, SynthScene, Truth, Uneven};
+pub use scene::{SceneError, SceneOptions, Truth, Uneven};

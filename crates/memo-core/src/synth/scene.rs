@@ -7,11 +7,11 @@
 //! pixels.
 
 use super::random::Random;
+use crate::OptionError;
 use crate::image::{Image, Window};
 use crate::model::body::Part;
 use crate::model::surface::{NO_PART, SurfaceMap, surface_map};
 use crate::model::{Body, Camera, Gait, GaitStyle, PosedBody, Walker};
-use crate::option_error::OptionError;
 use crate::track::search::{Hypothesis, Path, Scene};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;

@@ -12,14 +12,15 @@
 //! The 95 % interval of the mean is for the person's mean cycle, of which the measured cycles are a sample. Two terms
 //! decrease with their number: the variation of a person from cycle to cycle (`CYCLE_SD_DEG`), and late or early
 //! contacts, which matter where the angle is steep. Both are a prior scatter, combined with that of the cycles as the
-//! steps of [`gait_parameters`](super::gait_parameters). Two terms do not: the stated standard deviation of the angles,
+//! steps of [`gait_parameters`](crate::TrackedWalk::gait_parameters). Two terms do not: the stated standard deviation of the angles,
 //! and the error that contacts have in common.
 
 use super::fit::JOINTS;
 use super::gait_parameters::{
     CONTACT_COMMON_SD_S, CONTACT_SD_S, LONGEST_STRIDE, NATURAL_SHARE, PRIOR_STEPS, Z, student_quantile,
 };
-use super::result::{Event, EventKind, Side, TrackedWalk};
+use super::result::{Event, EventKind, TrackedWalk};
+use crate::model::skeleton::Side;
 
 /// Points of a cycle: 0, 1, ..., 100 %.
 pub const CYCLE_POINTS: usize = 101;

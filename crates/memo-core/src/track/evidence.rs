@@ -6,6 +6,7 @@
 
 use super::score::EdgeLine;
 use super::steady::{CameraMotion, Loss, Steadied, Steadier};
+use crate::OptionError;
 use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chains};
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
@@ -14,7 +15,6 @@ use crate::image::{
     GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions, regions,
 };
 use crate::model::Camera;
-use crate::option_error::OptionError;
 use glam::DVec2;
 use thiserror::Error;
 

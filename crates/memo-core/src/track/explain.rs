@@ -92,7 +92,8 @@ fn nearest(axis: &Axis, value: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::{SceneOptions, SynthScene};
+    use crate::SynthScene;
+    use crate::synth::SceneOptions;
     use crate::track::evidence::EvidenceStream;
     use crate::track::options::TrackerOptions;
     use crate::track::result::TrackedWalk;

@@ -40,10 +40,11 @@
 
 use super::fit::belt::Belt;
 use super::fit::contacts::Contact;
-use super::result::{EventKind, Row, Side, TrackedWalk};
+use super::result::{EventKind, Row, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
 use crate::estimate::line::line_through;
+use crate::model::skeleton::Side;
 
 /// If the probability that sides are swapped, or that the person walks in the other direction, is larger, no
 /// value by side is reported.

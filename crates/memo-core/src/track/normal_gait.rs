@@ -14,7 +14,7 @@
 
 use super::cycles::{CYCLE_POINTS, MeanAngle, MeanCycle};
 use super::gait_parameters::Z;
-use super::result::Side;
+use crate::model::skeleton::Side;
 use crate::model::{Gait, GaitStyle};
 
 /// Clinical angle less the angle between joint centres, radians: hip, knee.

@@ -5,9 +5,9 @@ use super::fit::FitOptions;
 use super::start::CadenceRange;
 use super::steady::{Steadier, SteadyOptions};
 use super::walk::WalkOptions;
+use crate::OptionError;
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
-use crate::option_error::OptionError;
 
 /// Which average gait the model uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

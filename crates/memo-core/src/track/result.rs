@@ -18,7 +18,7 @@ use crate::model::{Camera, PosedBody, Posture, SideJoints};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 
-pub use crate::model::skeleton::Side;
+use crate::model::skeleton::Side;
 
 /// A finished walk with all intermediate results.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,8 +7,8 @@
 //! with the first if several are equal. Both are straight lines in ideal (distortion-free) pixels. Scores are f32
 //! and differ from f64 by some 1e-7; geometry is f64 until it is projected.
 
+use crate::OptionError;
 use crate::model::body::PART_COUNT;
-use crate::option_error::OptionError;
 
 /// Measure that compares one model line with one edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

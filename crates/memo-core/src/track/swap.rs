@@ -1,6 +1,6 @@
 //! Probability that right and left are swapped, from the similarities of the two half-cycle twins.
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 
 /// Model of the margin between the twins, from a handful of real and motion-captured walks. A probability far
 /// from 1/2 means that the sides are known; its value is not a counted error rate.

@@ -37,10 +37,10 @@ use super::result::TrackedWalk;
 use super::steady::{CameraMotion, Loss};
 use super::treadmill::Standing;
 use super::walk::FrameEdges;
+use crate::OptionError;
 use crate::image::{Frame, GroupOptions, Mask, Rectangle, Region, group_regions, regions};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
-use crate::option_error::OptionError;
 use glam::DVec2;
 use thiserror::Error;
 

@@ -8,10 +8,10 @@ use super::route::Route;
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
 use super::swap::{SwapModel, swap_probability};
+use crate::OptionError;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
 use crate::image::Rectangle;
 use crate::model::{Camera, EllipticCylinder, Others, Walker};
-use crate::option_error::OptionError;
 
 /// Options of the following stage.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -3,14 +3,15 @@
 use crate::array::{numpy_from_column, numpy_from_figures, numpy_from_rows};
 use crate::error::value_error;
 use crate::result::result;
+use memo_core::model::JOINT_COUNT;
 use memo_core::model::limits::{AngleRange, Limits};
-use memo_core::model::skeleton::{JOINT_COUNT, Joint, SegmentLengths};
 use memo_core::posture::head::{HeadModel, HeadPoint};
 use memo_core::reproduce::head_table::{HeadTableColumn, exact_projections, table_2};
 use memo_core::reproduce::lee_chen;
 use memo_core::reproduce::lee_chen::{Counts, LevelCounts, Reading, Sequence};
 use memo_core::reproduce::stick_walker::FRAME_S;
 use memo_core::wording::counted;
+use memo_core::{Joint, SegmentLengths};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

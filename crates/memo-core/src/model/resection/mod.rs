@@ -40,9 +40,9 @@ pub use linear::{Conditioning, LinearResection, PaperView, linear_resection};
 pub use pose::{Facing, PointEstimate, ResectedPose};
 pub use search::{Focal, Resection, ResectionOptions, resect, resect_in_image};
 
+use crate::OptionError;
 use crate::model::body::BodyError;
 use crate::model::camera::CameraError;
-use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{DMatrix, Matrix3};

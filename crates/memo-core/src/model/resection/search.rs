@@ -23,12 +23,12 @@ use super::linear::LINEAR_POINTS;
 use super::pose::{Matrix7, Vector7, point_jacobian};
 use super::three_points::rotations_onto_rays;
 use super::{
-    Conditioning, MAX_COORDINATE, ResectedPose, ResectionError, Shape, checked_shape, linear_resection,
+    Conditioning, MAX_COORDINATE, ResectedPose, ResectionError, Shape, centroid_and_spread, checked_shape,
+    linear_resection, right_svd,
 };
-use super::{centroid_and_spread, right_svd};
+use crate::OptionError;
 use crate::estimate::least_squares::Damping;
 use crate::model::Camera;
-use crate::option_error::OptionError;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::DMatrix;
 

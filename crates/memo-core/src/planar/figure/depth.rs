@@ -259,8 +259,9 @@ fn smoothest(sizes: &[f64], start: [f64; 2], end: Option<[f64; 2]>) -> (Vec<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::planar::FitOptions;
     use crate::planar::figure::example::{limbs, sorted_links, walker};
-    use crate::planar::{FigureOptions, FitOptions, interpret_figure};
+    use crate::{FigureOptions, interpret_figure};
     use std::f64::consts::TAU;
 
     /// One full turn between 1.8 and 2.6 s of 4.4 s.

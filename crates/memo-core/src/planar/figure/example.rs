@@ -2,7 +2,8 @@
 
 use super::Figure;
 use crate::model::{Body, Gait, GaitStyle, Walker};
-use crate::synth::{DisplayView, Random, SampledWalkOptions, limbs_of, sampled_walk};
+use crate::sampled_walk;
+use crate::synth::{DisplayView, Random, SampledWalkOptions, limbs_of};
 use glam::{DVec2, DVec3};
 
 /// The body model walking for `frames` frames at 60 Hz, rotated about its pelvis by `turn(time)`, seen 35 degrees

@@ -34,9 +34,8 @@ pub use reflection::joint_of;
 
 use super::{FitOptions, PlanarEvidenceOptions, Verdict};
 use crate::model::skeleton::Joint;
-use crate::option_error::OptionError;
-use crate::progress::{Progress, Stopped};
 use crate::wording::counted;
+use crate::{OptionError, Progress, Stopped};
 use depth::depth_over_time;
 use glam::DVec2;
 use group::best_figure;

@@ -243,8 +243,8 @@ mod tests {
     #[test]
     fn anatomy_finds_the_reflection_of_a_walk() {
         use crate::planar::figure::example::walker;
-        use crate::planar::{FigureOptions, interpret_figure};
         use crate::synth::motion::WALKER_NAMES;
+        use crate::{FigureOptions, interpret_figure};
         for turn in [0.0, -1.2, 0.9, 2.0, 3.0, 4.4] {
             let (tracks, times_s, truth) = walker(66, |_| turn, 0.0);
             let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
@@ -281,8 +281,8 @@ mod tests {
     #[test]
     fn the_margin_is_in_degrees() {
         use crate::planar::figure::example::walker;
-        use crate::planar::{FigureOptions, interpret_figure};
         use crate::synth::motion::WALKER_NAMES;
+        use crate::{FigureOptions, interpret_figure};
         let (tracks, times_s, _) = walker(66, |_| 0.3, 0.0);
         let joints: Vec<Option<Joint>> = WALKER_NAMES.iter().take(12).map(|name| joint_of(name)).collect();
         let mut windows = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap().windows;

@@ -1,6 +1,6 @@
 //! Options of the fits, and their errors.
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 use thiserror::Error;
 
 /// Why points in several views could not be fitted.

@@ -1,13 +1,13 @@
 //! The anchor: the neck's position along its ray, from which all other joints are found.
 //!
 //! Lee and Chen (1985, section 2.1) compute it from six points of the head. A head is small, so its depth is not
-//! accurate. This module adds a given distance, the ground under the feet for a calibrated camera ([`ground`]),
-//! the rigid trunk ([`trunk`]) and the extent from neck to feet ([`from_extent`]). Each source gives a standard
-//! deviation. [`combine`] combines them, and [`track::smooth`] filters them over time.
+//! accurate. This module adds a given distance, the ground under the feet for a calibrated camera ([`from_ground`]),
+//! the rigid trunk ([`from_trunk`]) and the extent from neck to feet ([`from_extent`]). Each source gives a standard
+//! deviation. [`combine`] combines them, and [`smooth`] filters them over time.
 //!
 //! Distances are along the neck's unit ray from the centre of projection, not along z. All sources except a given
 //! distance depend on segment lengths; only the ground and a given distance determine the scale of these lengths.
-//! For [`ground`], the feet must be on the ground z = 0: a beam or a step under them shifts the neck.
+//! For [`from_ground`], the feet must be on the ground z = 0: a beam or a step under them shifts the neck.
 //!
 //! The posture constants ([`AnchorOptions`]) were measured on four walks of motion capture. The neck is above the
 //! lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk 0.005-0.012),
@@ -15,9 +15,9 @@
 //! The lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and jumping violate these
 //! assumptions.
 
-pub mod ground;
-pub mod track;
-pub mod trunk;
+mod ground;
+mod track;
+mod trunk;
 
 use crate::wording::counted;
 use glam::DVec3;

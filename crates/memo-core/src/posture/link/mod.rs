@@ -29,7 +29,7 @@ use super::prior::{MotionPrior, chi_sq};
 use crate::estimate::smooth::Measured;
 use crate::model::angles::trunk_axes;
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
-use crate::progress::{Progress, Stopped};
+use crate::{Progress, Stopped};
 use flip::Flip;
 pub use front::FrontPoints;
 use limbs::Limbs;

@@ -19,7 +19,7 @@ mod options;
 mod warning;
 mod warning_text;
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -34,7 +34,7 @@ use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, StickFigure};
-use crate::progress::{Progress, Stopped};
+use crate::{Progress, Stopped};
 
 pub use frame::{FrameProblem, FrameReading, MOST_GROUPED, ReasonTotal, RepresentedGroup, reason_totals};
 pub use heading::{Heading, HeadingFrom};

@@ -20,7 +20,7 @@ use crate::posture::anchor::{
 use crate::posture::head::{HeadModel, LEE_CHEN_BODY_HEIGHT_M};
 use crate::posture::lift::JointRays;
 use crate::posture::placed::Bearings;
-use crate::progress::{Progress, Stopped};
+use crate::{Progress, Stopped};
 
 /// Input of all stages.
 pub(super) struct Scene<'a> {

@@ -1,7 +1,7 @@
 //! Options of [`super::postures`]: the motion, the strength of its limits, the source of the neck's distance, and
 //! their ranges.
 
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::DVec3;
 
 use super::SequenceError;

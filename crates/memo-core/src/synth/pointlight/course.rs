@@ -2,7 +2,7 @@
 //! both: the locomotion, the direction of time, and shifts of single points in time.
 
 use super::{Locomotion, PointLightError, below};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use crate::synth::Random;
 use crate::synth::motion::PointMotion;
 use glam::DVec3;

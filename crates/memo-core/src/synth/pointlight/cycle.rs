@@ -7,7 +7,7 @@
 use super::PointLightError;
 use super::course::Course;
 use super::period::{closes_itself, found_period, mean};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use crate::synth::motion::PointMotion;
 use glam::DVec3;
 use std::f64::consts::TAU;

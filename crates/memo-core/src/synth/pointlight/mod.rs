@@ -28,7 +28,7 @@ pub use picture::{DotPicture, DotShape};
 
 use super::motion::PointMotion;
 use super::random::Random;
-use crate::option_error::OptionError;
+use crate::OptionError;
 use course::Course;
 use cycle::closed_cycle;
 use dots::{Layer, all_points, beside, limbs, limited, noise_layer};
@@ -82,7 +82,7 @@ impl PointLightDisplay {
     }
 
     /// The tracks of the dots, N tracks of T pixel positions, in the form of
-    /// [`interpret_figure`](crate::planar::interpret_figure).
+    /// [`interpret_figure`](crate::interpret_figure).
     pub fn tracks(&self) -> Vec<Vec<DVec2>> {
         let track = |dot| self.positions_px.iter().skip(dot).step_by(self.dots).copied().collect();
         (0..self.dots).map(track).collect()

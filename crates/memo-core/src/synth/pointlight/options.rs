@@ -1,7 +1,7 @@
 //! Options of a display, and errors.
 
+use crate::OptionError;
 use crate::model::Camera;
-use crate::option_error::OptionError;
 use crate::wording::counted;
 use glam::{DVec2, DVec3};
 use thiserror::Error;

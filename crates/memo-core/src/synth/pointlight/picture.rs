@@ -1,7 +1,7 @@
 //! Pictures of a display: dots of one size, shape and colour at the display's own scale, never scaled to fit.
 
 use super::{PointLightDisplay, PointLightError};
-use crate::option_error::OptionError;
+use crate::OptionError;
 use glam::DVec2;
 
 /// Longest side of a picture, pixels.

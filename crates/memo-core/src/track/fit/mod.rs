@@ -32,8 +32,8 @@ pub(crate) mod views;
 
 use super::height::BodyHeight;
 use super::route::Route;
+use crate::OptionError;
 use crate::model::{Body, Gait, GaitStyle, PosedBody, Posture, Walker};
-use crate::option_error::OptionError;
 use crate::wording::counted;
 use belt::Belt;
 use contacts::Contact;

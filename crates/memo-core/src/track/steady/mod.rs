@@ -21,9 +21,9 @@ mod pyramid;
 mod template;
 mod warp;
 
+use crate::OptionError;
 use crate::image::{Frame, FrameError, Image, Mask};
 use crate::model::Camera;
-use crate::option_error::OptionError;
 use crate::wording::counted;
 use estimate::{Comparison, Estimate};
 use glam::{DMat3, DQuat, DVec2, DVec3};
