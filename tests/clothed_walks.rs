@@ -331,6 +331,14 @@ fn two_people_who_cross_are_followed_through_it_and_never_exchanged() {
 }
 
 /// Someone who turns is followed along a curve, with the heading of every frame.
+/// Whoever was followed in a scene, and the number of frames of each walk.
+fn followed(options: ClothedOptions) -> (Followed, Vec<usize>) {
+    let (seed, scene) = (options.seed, scene(options));
+    let walks = tracked(&scene, 0..scene.len(), true);
+    let frames = walks.iter().map(|walk| walk.steps().len()).collect();
+    (Followed { seed, scene, walks }, frames)
+}
+
 #[test]
 fn a_walk_that_turns_is_followed_round_its_curve() {
     for (seed, turn_rad) in [(3, 1.1), (8, -1.4)] {
@@ -342,10 +350,7 @@ fn a_walk_that_turns_is_followed_round_its_curve() {
             seed,
             ..ClothedOptions::default()
         };
-        let scene = scene(options);
-        let walks = tracked(&scene, 0..scene.len(), true);
-        let frames: Vec<usize> = walks.iter().map(|walk| walk.steps().len()).collect();
-        let followed = Followed { seed, scene, walks };
+        let (followed, frames) = followed(options);
         let off = |row: &Row| {
             let off = row.heading_rad - followed.scene.truth(row.frame).unwrap().heading_rad;
             off.sin().atan2(off.cos()).to_degrees().abs()
@@ -445,10 +450,7 @@ fn a_walk_along_the_line_of_sight_is_followed_by_its_feet() {
         seed,
         ..ClothedOptions::default()
     };
-    let scene = scene(options);
-    let walks = tracked(&scene, 0..scene.len(), true);
-    let frames: Vec<usize> = walks.iter().map(|walk| walk.steps().len()).collect();
-    let followed = Followed { seed, scene, walks };
+    let (followed, frames) = followed(options);
     let errors = followed.errors();
     let along = rms(errors.iter().map(|e| e[0]));
     let wrapped = |e: f64| (2.0 * e - (2.0 * e).round()).abs() / 2.0;

@@ -35,6 +35,35 @@ def shared_video(name):
     return folder
 
 
+def ran(*arguments):
+    """Runs `memo ARGUMENTS` in this process, without an error."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["memo", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            cli.main()
+    assert not exited.value.code
+
+
+def grey_video(path, frames, rate=25):
+    """Writes frames, unchanged (lossless), as a grey video; returns its path."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=rate, options={"qp": "0", "preset": "ultrafast"})
+        stream.height, stream.width = frames[0].shape
+        stream.pix_fmt = "gray"
+        for frame in frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+        container.mux(stream.encode(None))
+    return path
+
+
+def opencv_pixels(table, points):
+    """Pixels (N, 2) of points (N, 3) by OpenCV, from the keys of a camera.toml."""
+    cv2 = pytest.importorskip("cv2")
+    keys = ("rotation", "translation", "matrix", "distortions")
+    pixels, _ = cv2.projectPoints(points, *(np.array(table[key]) for key in keys))
+    return pixels.reshape(-1, 2)
+
+
 @pytest.fixture
 def core(monkeypatch):
     """Puts the stand-in core in place of the compiled one."""

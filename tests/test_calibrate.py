@@ -7,7 +7,7 @@ import tomllib
 import memo
 import numpy as np
 import pytest
-from conftest import shared_video
+from conftest import opencv_pixels, shared_video
 from memo.calibration import board_places, draw_ground, read_picture, write_picture
 from memo.keypoints.points import layouts
 
@@ -159,15 +159,8 @@ def test_points_from_the_command_line(memo_command, tmp_path):
     assert code == 0 and "Left out" in said and "line 9 (1" in said and "A 1.7 m person is" in said
     assert read_picture(out / "ground.png").shape == (720, 1280)
     section = tomllib.loads((out / "camera.toml").read_text())["cam"]
-    theirs, _ = cv2.projectPoints(
-        places,
-        np.array(section["rotation"]),
-        np.array(section["translation"]),
-        np.array(section["matrix"]),
-        np.array(section["distortions"]),
-    )
     ours = memo.Camera.from_file(out / "camera.toml").project(places)
-    np.testing.assert_allclose(ours, theirs.reshape(-1, 2), atol=1e-9, rtol=0)
+    np.testing.assert_allclose(ours, opencv_pixels(section, places), atol=1e-9, rtol=0)
     code, said, _ = memo_command(
         "calibrate", "points", table, "--size", "1280x720", "--out", out, "--json", "--fov-deg", "60.4"
     )

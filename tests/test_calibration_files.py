@@ -6,6 +6,7 @@ import tomllib
 import memo
 import numpy as np
 import pytest
+from conftest import opencv_pixels
 
 cv2 = pytest.importorskip("cv2")
 
@@ -117,14 +118,7 @@ def test_what_is_written_is_read_by_others(tmp_path):
     source = memo.Camera.from_file(written(tmp_path / "camera.yml"))
     source.to_toml(tmp_path / "camera.toml", "cam_01")
     table = tomllib.loads((tmp_path / "camera.toml").read_text())["cam_01"]
-    pixels, _ = cv2.projectPoints(
-        POINTS,
-        np.array(table["rotation"]),
-        np.array(table["translation"]),
-        np.array(table["matrix"]),
-        np.array(table["distortions"]),
-    )
-    np.testing.assert_allclose(pixels.reshape(-1, 2), source.project(POINTS), atol=1e-9, rtol=0)
+    np.testing.assert_allclose(opencv_pixels(table, POINTS), source.project(POINTS), atol=1e-9, rtol=0)
     again = memo.Camera.from_file(tmp_path / "camera.toml")
     np.testing.assert_allclose(again.project(POINTS), source.project(POINTS), atol=1e-9, rtol=0)
     assert list(tmp_path.glob("*.part")) == []

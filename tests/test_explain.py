@@ -3,15 +3,14 @@
 import copy
 import json
 import shutil
-import sys
 from itertools import islice
 from pathlib import Path
 
 import memo
 import numpy as np
 import pytest
-from conftest import shared_video
-from memo import _memo, cli
+from conftest import ran, shared_video
+from memo import _memo
 from memo.explain import Why, explain
 from memo.files import read_track_csv
 from memo.run import RunError, read_run
@@ -27,21 +26,7 @@ def run(tmp_path_factory):
     clip = shared_video("mocap_a")
     folder = tmp_path_factory.mktemp("run")
     options = ["--camera", clip / "camera.toml", "--height", "1.86", "--frames", f"{FIRST}:{STOP}"]
-    arguments = [
-        "track",
-        clip / "video.mp4",
-        *options,
-        "--out",
-        folder,
-        "--no-overlay",
-        "--no-plots",
-        "--quiet",
-    ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-    assert not exited.value.code
+    ran("track", clip / "video.mp4", *options, "--out", folder, "--no-overlay", "--no-plots", "--quiet")
     return folder
 
 

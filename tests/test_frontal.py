@@ -1,13 +1,11 @@
 """Walks towards the camera and away from it: the whole chain on a drawn person, and what the summary says."""
 
 import pickle
-import sys
 
-import av
 import memo
 import numpy as np
 import pytest
-from memo import cli
+from conftest import grey_video, ran
 from memo.explain import explain
 from memo.files import read_track_csv
 from memo.report import write_report
@@ -63,21 +61,10 @@ def test_without_a_calibrated_camera_nobody_is_followed_by_the_feet(scene):
     assert not any(walk.is_frontal for walk in track.walks)
 
 
-def test_frames_are_explained_and_reported(scene, tmp_path, monkeypatch):
-    with av.open(str(tmp_path / "video.mkv"), "w") as container:
-        stream = container.add_stream("libx264", rate=25, options={"qp": "0", "preset": "ultrafast"})
-        stream.height, stream.width = scene.frames[0].shape
-        stream.pix_fmt = "gray"
-        for frame in scene.frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
-        container.mux(stream.encode(None))
+def test_frames_are_explained_and_reported(scene, tmp_path):
+    video = grey_video(tmp_path / "video.mkv", scene.frames)
     scene.camera.to_toml(tmp_path / "camera.toml")
-    arguments = ["track", tmp_path / "video.mkv", "--camera", tmp_path / "camera.toml"]
-    arguments += ["--no-plots", "--quiet", "--out", tmp_path]
-    monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-    with pytest.raises(SystemExit) as exited:
-        cli.main()
-    assert not exited.value.code
+    ran("track", video, "--camera", tmp_path / "camera.toml", "--no-plots", "--quiet", "--out", tmp_path)
     columns = read_track_csv(tmp_path / "track.csv")
     whys = list(explain(tmp_path))
     assert [why.frame for why in whys] == columns["frame"].tolist()

@@ -1,11 +1,8 @@
 """Several people in one video: the whole chain on drawn people who cross, told apart by `person`."""
 
-import sys
-
 import numpy as np
 import pytest
-from conftest import SHARED_DATA
-from memo import cli
+from conftest import SHARED_DATA, ran
 from memo.cycles import read_cycles_csv
 from memo.explain import explain
 from memo.files import read_events_csv, read_track_csv
@@ -20,13 +17,8 @@ def run(tmp_path_factory):
     if not scene.is_dir():
         pytest.skip(f"no scene in {scene} (set MEMO_SHARED_DATA)")
     folder = tmp_path_factory.mktemp("people")
-    arguments = ["track", scene / "video.mp4", "--camera", scene / "camera.toml"]
-    arguments += ["--no-overlay", "--no-plots", "--quiet", "--out", folder]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-    assert not exited.value.code
+    given = [scene / "video.mp4", "--camera", scene / "camera.toml"]
+    ran("track", *given, "--no-overlay", "--no-plots", "--quiet", "--out", folder)
     return folder
 
 

@@ -9,7 +9,6 @@ import json
 import os
 import re
 import shutil
-import sys
 import time
 
 import fake_core
@@ -18,7 +17,7 @@ import memo
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo import _memo, cli
+from memo import _memo
 from memo.cycles import cycle_table, write_cycles_csv
 from memo.files import JOINTS, read_track_csv, write_events_csv, write_track_csv
 from memo.gait import DEFINITIONS
@@ -104,14 +103,6 @@ def page_of(folder, **options):
     written = report.path.read_text(encoding="utf-8")
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', written, re.DOTALL)[1]
     return written, json.loads(data), report
-
-
-def memo_command(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-    with pytest.raises(SystemExit) as exited:
-        cli.main()
-    said = capsys.readouterr()
-    return exited.value.code or 0, said.out, said.err
 
 
 # What the page holds
@@ -373,13 +364,13 @@ def test_a_video_of_another_size_is_not_taken(run_folder, write_video, luma_fram
     assert "32x24 pixels, the run 64x48" in page_of(folder)[0]
 
 
-def test_a_video_named_by_hand_must_be_the_one(run_folder, write_video, luma_frames, monkeypatch, capsys):
+def test_a_video_named_by_hand_must_be_the_one(run_folder, write_video, luma_frames, memo_command):
     folder, other = run_folder(), write_video("other.mp4", luma_frames(size=(32, 24)))
     page_of(folder)
     older = (folder / "report.html").read_bytes()
-    code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--video", other)
+    code, _, complaint = memo_command("report", folder, "--video", other)
     assert code == 1 and complaint == f"memo: {other}: it has 32x24 pixels, the run 64x48\n"
-    code, _, complaint = memo_command(monkeypatch, capsys, "report", folder, "--frames", "500:600")
+    code, _, complaint = memo_command("report", folder, "--frames", "500:600")
     assert code == 1 and complaint.endswith("among those requested; it read 0 to 19\n")
     assert (folder / "report.html").read_bytes() == older
 
@@ -485,42 +476,35 @@ def test_unknown_numbers_are_dashes(run_folder):
         ("events.csv", "time_s,frame,event,side\nsoon,1,heel_strike,right\n", "events.csv: "),
     ],
 )
-def test_a_broken_file_is_named(run_folder, monkeypatch, capsys, name, content, said):
+def test_a_broken_file_is_named(run_folder, name, content, said, memo_command):
     folder = run_folder()
     if content is None:
         (folder / name).write_text((folder / name).read_text().replace("0.040000", "now", 1))
     else:
         (folder / name).write_text(content)
-    code, out, err = memo_command(monkeypatch, capsys, "report", folder)
+    code, out, err = memo_command("report", folder)
     assert code == 1 and out == "" and said in err and err.count("\n") == 1
     assert not list(folder.glob("*report.html"))
 
 
-def test_folders_of_another_kind_are_refused(run_folder, tmp_path, monkeypatch, capsys):
+def test_folders_of_another_kind_are_refused(run_folder, tmp_path, memo_command):
     empty = tmp_path / "empty"
     empty.mkdir()
-    code, _, err = memo_command(monkeypatch, capsys, "report", empty)
+    code, _, err = memo_command("report", empty)
     assert code == 1 and "postures.json of memo posture, points3d.csv of memo planar" in err
-    assert memo_command(monkeypatch, capsys, "report", tmp_path / "none")[2].endswith(
-        "none: no such folder\n"
-    )
+    assert memo_command("report", tmp_path / "none")[2].endswith("none: no such folder\n")
     folder = run_folder()
     (folder / "postures.json").write_text("{}")
-    assert (
-        "holds results of memo track and of memo posture"
-        in memo_command(monkeypatch, capsys, "report", folder)[2]
-    )
+    assert "holds results of memo track and of memo posture" in memo_command("report", folder)[2]
 
 
-def test_the_command_says_what_it_wrote(run_folder, monkeypatch, capsys, tmp_path):
+def test_the_command_says_what_it_wrote(run_folder, tmp_path, memo_command):
     folder = run_folder()
-    code, out, err = memo_command(monkeypatch, capsys, "report", folder)
+    code, out, err = memo_command("report", folder)
     assert (code, err) == (0, "") and out.startswith("20 frames with pictures, 20 explained; 0.")
     assert f"Written to {folder}: report.html." in out
     other = tmp_path / "other.html"
-    code, out, _ = memo_command(
-        monkeypatch, capsys, "report", folder, "--out", other, "--json", "--frames", "2:5"
-    )
+    code, out, _ = memo_command("report", folder, "--out", other, "--json", "--frames", "2:5")
     told = json.loads(out)
     assert (
         code == 0
@@ -528,25 +512,22 @@ def test_the_command_says_what_it_wrote(run_folder, monkeypatch, capsys, tmp_pat
         and told["files"] == [str(other)]
         and told["bytes"] == other.stat().st_size
     )
-    assert memo_command(monkeypatch, capsys, "report", folder, "--quiet")[1] == ""
-    assert memo_command(monkeypatch, capsys, "report", folder, "--every", "0")[0] == 2
-    assert memo_command(monkeypatch, capsys, "report", folder, "--frames", "5:2")[0] == 1
-    assert "is a folder" in memo_command(monkeypatch, capsys, "report", folder, "--out", tmp_path)[2]
-    assert (
-        "there is no folder"
-        in memo_command(monkeypatch, capsys, "report", folder, "--out", tmp_path / "a" / "b")[2]
-    )
+    assert memo_command("report", folder, "--quiet")[1] == ""
+    assert memo_command("report", folder, "--every", "0")[0] == 2
+    assert memo_command("report", folder, "--frames", "5:2")[0] == 1
+    assert "is a folder" in memo_command("report", folder, "--out", tmp_path)[2]
+    assert "there is no folder" in memo_command("report", folder, "--out", tmp_path / "a" / "b")[2]
 
 
-def test_open_shows_the_page(run_folder, monkeypatch, capsys):
+def test_open_shows_the_page(run_folder, monkeypatch, memo_command):
     shown = []
     monkeypatch.setattr("webbrowser.open", shown.append)
     folder = run_folder()
-    memo_command(monkeypatch, capsys, "report", folder, "--open")
+    memo_command("report", folder, "--open")
     assert shown == [(folder / "report.html").resolve().as_uri()]
 
 
-def test_an_interrupt_leaves_the_older_page(run_folder, monkeypatch, capsys):
+def test_an_interrupt_leaves_the_older_page(run_folder, monkeypatch, memo_command):
     folder = run_folder()
     (folder / "report.html").write_text("older")
 
@@ -554,7 +535,7 @@ def test_an_interrupt_leaves_the_older_page(run_folder, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("memo.report.track.explain", interrupted)
-    assert memo_command(monkeypatch, capsys, "report", folder)[0] == 130
+    assert memo_command("report", folder)[0] == 130
     assert (folder / "report.html").read_text() == "older" and not list(folder.glob(".*"))
 
 
@@ -664,9 +645,9 @@ def test_postures_have_a_page(posture_folder):
 @pytest.mark.parametrize(
     "content", ["{", "[]", '{"joints": [], "per_frame": [1]}', '{"joints": 1, "per_frame": []}']
 )
-def test_a_broken_postures_json_is_named(posture_folder, monkeypatch, capsys, content):
+def test_a_broken_postures_json_is_named(posture_folder, content, memo_command):
     (posture_folder / "postures.json").write_text(content)
-    code, _, err = memo_command(monkeypatch, capsys, "report", posture_folder)
+    code, _, err = memo_command("report", posture_folder)
     assert code == 1 and "postures.json: " in err and err.count("\n") == 1
 
 
@@ -707,13 +688,13 @@ def test_limbs_from_dots_have_a_page(limb_folder):
         ("windows.csv", None, "windows.csv"),
     ],
 )
-def test_a_broken_table_of_limbs_is_named(limb_folder, tmp_path, monkeypatch, capsys, name, content, said):
+def test_a_broken_table_of_limbs_is_named(limb_folder, tmp_path, name, content, said, memo_command):
     folder = tmp_path / "limbs"
     shutil.copytree(limb_folder, folder)
     (folder / name).unlink()
     if content is not None:
         (folder / name).write_text(content)
-    code, _, err = memo_command(monkeypatch, capsys, "report", folder)
+    code, _, err = memo_command("report", folder)
     assert code == 1 and said in err and err.count("\n") == 1
 
 
@@ -1082,13 +1063,11 @@ def test_dark_and_paper(run_folder, opened):
 # A real run, from the command line to the browser
 
 
-def test_a_tracked_video_and_its_page(monkeypatch, capsys, tmp_path, opened):
+def test_a_tracked_video_and_its_page(tmp_path, opened, memo_command):
     """All that the page shows of real footage is in the tables, and comes from the frames themselves."""
     video = shared_video("weizmann_ido_walk") / "ido_walk.avi"
     folder = tmp_path / "run"
-    code, out, err = memo_command(
-        monkeypatch, capsys, "track", video, "--out", folder, "--report", "--no-plots"
-    )
+    code, out, err = memo_command("track", video, "--out", folder, "--report", "--no-plots")
     assert code == 0, err
     assert "report.html" in out
     written = (folder / "report.html").read_text()
@@ -1110,11 +1089,11 @@ def test_a_tracked_video_and_its_page(monkeypatch, capsys, tmp_path, opened):
     assert shown_text(page, "#clock") == f"frame 3, {table['time_s'][3]:.2f} s, phase {phase:.2f}"
 
 
-def test_a_video_of_nobody_has_a_page_too(monkeypatch, capsys, tmp_path, write_video):
+def test_a_video_of_nobody_has_a_page_too(tmp_path, write_video, memo_command):
     video = write_video("black.mp4", np.full((20, 96, 128), 16, np.uint8))
     folder = tmp_path / "run"
-    code, out, _ = memo_command(monkeypatch, capsys, "track", video, "--out", folder, "--report", "--json")
+    code, out, _ = memo_command("track", video, "--out", folder, "--report", "--json")
     assert code == 3 and str(folder / "report.html") in json.loads(out)["files"]
     assert "Nothing moves in the 19 frames of this page." in (folder / "report.html").read_text()
-    assert memo_command(monkeypatch, capsys, "track", video, "--out", folder, "--quiet")[0] == 3
+    assert memo_command("track", video, "--out", folder, "--quiet")[0] == 3
     assert not (folder / "report.html").exists()  # it would stand beside tables it does not belong to

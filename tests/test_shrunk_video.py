@@ -17,6 +17,7 @@ import av
 import memo
 import numpy as np
 import pytest
+from conftest import grey_video, ran
 from memo import cli
 from memo.explain import explain
 from memo.files import JOINTS, read_track_csv
@@ -35,24 +36,6 @@ FIRST, STOP = 10, 52
 def full(pixels, n):
     """Where the n by n pixels of the video have their middle: 0 to n - 1 for pixel 0."""
     return n * np.asarray(pixels) + (n - 1) / 2
-
-
-def memo_command(*arguments):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["memo", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-    assert not exited.value.code
-
-
-def write_video(path, frames, rate):
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=rate, options={"qp": "0", "preset": "ultrafast"})
-        stream.height, stream.width = frames[0].shape
-        stream.pix_fmt = "gray"
-        for frame in frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
-        container.mux(stream.encode(None))
 
 
 def enlarged(scene, n):
@@ -79,13 +62,13 @@ def runs(tmp_path_factory):
     for n in (1, 2, 3):
         frames, camera = enlarged(scene, n)
         video = folder / f"{n}.mkv"
-        write_video(video, frames, rate)
+        grey_video(video, frames, rate)
         camera.to_toml(folder / f"{n}.toml")
         options = ("--height", scene.height_m, "--shrink", n, "--no-plots", "--quiet")
         given, guessed = folder / f"given_{n}", folder / f"guessed_{n}"
-        memo_command("track", video, *options, "--camera", folder / f"{n}.toml", "--out", given)
+        ran("track", video, *options, "--camera", folder / f"{n}.toml", "--out", given)
         if n < 3:
-            memo_command("track", video, *options, "--no-overlay", "--out", guessed)
+            ran("track", video, *options, "--no-overlay", "--out", guessed)
         found[n] = SimpleNamespace(given=given, guessed=guessed, video=video, camera=camera, frames=frames)
     assert len(read_track_csv(found[1].given / "track.csv")["frame"]) > 25
     return found
@@ -177,7 +160,7 @@ def test_contours_and_boxes_are_those_of_the_video(runs, n, tmp_path):
     np.testing.assert_allclose(contours[n][9], full(contours[1][9], n), atol=0.1 * n)
     boxes = {}
     for k in (1, n):
-        memo_command("convert", runs[k].given, tmp_path / f"{k}.txt", "--quiet")
+        ran("convert", runs[k].given, tmp_path / f"{k}.txt", "--quiet")
         boxes[k] = read_motchallenge(tmp_path / f"{k}.txt")
     for side, moved in (("left_px", True), ("top_px", True), ("width_px", False), ("height_px", False)):
         wanted = full(boxes[1][side], n) if moved else n * boxes[1][side]
@@ -186,7 +169,7 @@ def test_contours_and_boxes_are_those_of_the_video(runs, n, tmp_path):
 
 def test_contours_of_a_part_of_a_video_are_those_of_its_frames(runs, tmp_path):
     first, n = 6, 1
-    memo_command(
+    ran(
         *("track", runs[n].video, "--camera", runs[n].video.with_suffix(".toml"), "--height", 1.75),
         *("--frames", f"{first}:", "--no-plots", "--no-overlay", "--quiet", "--out", tmp_path),
     )
@@ -204,7 +187,7 @@ def test_contours_of_a_part_of_a_video_are_those_of_its_frames(runs, tmp_path):
 def test_keypoint_files_are_of_the_video(runs, n, tmp_path):
     for name in ("walk.json", "walk"):
         for k in (1, n):
-            memo_command("convert", runs[k].given, tmp_path / str(k) / name, "--quiet")
+            ran("convert", runs[k].given, tmp_path / str(k) / name, "--quiet")
         small, large = (read_keypoints(tmp_path / str(k) / name, fps=25) for k in (1, n))
         np.testing.assert_allclose(large.points, full(small.points, n), atol=0.05)
     dots, wanted = (read_tracks(runs[k].given / "track.csv").positions for k in (n, 1))
@@ -267,7 +250,7 @@ def test_regions_that_move_are_of_the_video(tmp_path):
     found = {}
     for n in (1, 2):
         video = tmp_path / f"{n}.mkv"
-        write_video(video, np.kron(frames, np.ones((1, n, n), np.uint8)), 25)
+        grey_video(video, np.kron(frames, np.ones((1, n, n), np.uint8)), 25)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sys, "argv", ["memo", "track", str(video), "--shrink", str(n), "--quiet"])
             patch.chdir(tmp_path)
@@ -311,7 +294,7 @@ def test_an_older_folder_is_read_in_pixels_of_the_video(runs, older, tmp_path):
     ):
         np.testing.assert_allclose(read(older), read(runs[2].given), atol=0.03)
     for folder, name in ((older, "older.txt"), (runs[2].given, "newer.txt")):
-        memo_command("convert", folder, tmp_path / name, "--quiet")
+        ran("convert", folder, tmp_path / name, "--quiet")
     boxes, newer_boxes = (read_motchallenge(tmp_path / name) for name in ("older.txt", "newer.txt"))
     np.testing.assert_allclose(boxes["left_px"], newer_boxes["left_px"], atol=0.2)
     (page, _), (newer_page, _) = page_of(older), page_of(runs[2].given)

@@ -1,13 +1,11 @@
 """Walks on a curve: the whole chain on a drawn person, and what the summary says."""
 
-import sys
 import types
 
-import av
 import memo
 import numpy as np
 import pytest
-from memo import cli
+from conftest import grey_video, ran
 from memo.explain import explain
 from memo.files import read_track_csv
 from memo.report import write_report
@@ -39,29 +37,10 @@ def scene():
 def run(scene, tmp_path_factory):
     """The folder of a run over the drawn video."""
     folder = tmp_path_factory.mktemp("turning")
-    with av.open(str(folder / "video.mkv"), "w") as container:
-        stream = container.add_stream("libx264", rate=25, options={"qp": "0", "preset": "ultrafast"})
-        stream.height, stream.width = scene.frames[0].shape
-        stream.pix_fmt = "gray"
-        for frame in scene.frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
-        container.mux(stream.encode(None))
+    video = grey_video(folder / "video.mkv", scene.frames)
     scene.camera.to_toml(folder / "camera.toml")
-    arguments = [
-        "track",
-        folder / "video.mkv",
-        "--camera",
-        folder / "camera.toml",
-        "--height",
-        scene.height_m,
-    ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            sys, "argv", ["memo", *map(str, arguments), "--no-plots", "--quiet", "--out", str(folder)]
-        )
-        with pytest.raises(SystemExit) as exited:
-            cli.main()
-    assert not exited.value.code
+    given = ["--camera", folder / "camera.toml", "--height", scene.height_m]
+    ran("track", video, *given, "--no-plots", "--quiet", "--out", folder)
     return folder
 
 

@@ -44,7 +44,7 @@ class Page:
         """The whole file."""
         style = _asset("page.css")
         script = "\n".join(map(_asset, (*self.scripts, f"{self.layout}.js")))
-        body = _filled(_asset(f"{self.layout}.html"), self.filled)
+        body = _filled(_asset(f"{self.layout}.html"), {"player": _asset("player.html"), **self.filled})
         places = {
             "title": text(self.title),
             "style": style,

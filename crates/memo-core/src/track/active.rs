@@ -392,7 +392,7 @@ impl Active {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::route::Route;
-    use super::super::search::tests::{camera, edges_of, walker};
+    use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
     use super::super::search::{Axis, Path, Scene};
     use super::super::start::Direction;
     use super::super::start::tests::report;
@@ -568,23 +568,17 @@ pub(super) mod tests {
         seen: &Route,
     ) -> Vec<(Option<Sighting>, FrameEdges)> {
         let (walker, camera) = (walker(), camera());
-        let crown_m = walker.level_crown_height_m();
         let frame = |k: usize| {
             let time_s = frame_s * k as f64;
             let along_m = -0.6 + 1.2 * time_s;
             let height_m = walker.level_torso_height_m();
             let scene = Scene::new(&walker, &camera, &route.at(along_m));
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s });
-            let [sole, crown] =
-                [0.0, crown_m].map(|z| camera.project(seen.at(along_m).point(along_m, z)).unwrap());
-            let rectangle = Rectangle {
-                left: (sole.x - 40.0).round() as usize,
-                right: (sole.x + 40.0).round() as usize,
-                top: (crown.y - 2.0).round() as usize,
-                bottom: sole.y.round() as usize,
-            };
             (
-                Some(Sighting { time_s, rectangle }),
+                Some(Sighting {
+                    time_s,
+                    rectangle: rectangle_of(&walker, &camera, &seen.at(along_m), along_m),
+                }),
                 FrameEdges { frame: k, time_s, window: WINDOW, edges, others: Vec::new(), shared: false },
             )
         };

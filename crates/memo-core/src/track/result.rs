@@ -416,4 +416,4 @@ impl Coordinate {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -270,7 +270,7 @@ mod tests {
     use super::super::locate::Crown;
     use super::super::locate::locate;
     use super::super::search::Hypothesis;
-    use super::super::search::tests::{camera, edges_of, walker};
+    use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
     use super::*;
 
     const PLACE: DVec2 = DVec2::new(0.2, 0.3);
@@ -286,21 +286,13 @@ mod tests {
         let path = path(heading_rad);
         let scene = Scene::new(&walker, &camera, &path);
         let height_m = walker.level_torso_height_m();
-        let crown_m = walker.level_crown_height_m();
         let window = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
         let frame = |k: usize| {
             let time_s = 0.1 * k as f64;
             let along_m = drift_mps * time_s;
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.3 + rate_hz * time_s });
-            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(path.point(along_m, z)).unwrap());
-            let rectangle = Rectangle {
-                left: (sole.x - 40.0).round() as usize,
-                right: (sole.x + 40.0).round() as usize,
-                top: (crown.y - 2.0).round() as usize,
-                bottom: sole.y.round() as usize,
-            };
             (
-                Some(Sighting { time_s, rectangle }),
+                Some(Sighting { time_s, rectangle: rectangle_of(&walker, &camera, &path, along_m) }),
                 FrameEdges { frame: k, time_s, window, edges, others: Vec::new(), shared: false },
             )
         };

@@ -1,5 +1,5 @@
-use super::super::height::BodyHeight;
-use super::super::search::tests::{camera, walker};
+use super::super::result;
+use super::super::search::tests::walker;
 use super::super::search::{Axis, Hypothesis, Path};
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Walk, WalkOptions};
@@ -106,19 +106,8 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
     walk.twins[0].steps = measured.iter().enumerate().map(step).collect();
     walk.twins[0].similarity_sum = 0.5 * measured.len() as f64;
     TrackedWalk {
-        person: 0,
-        camera_turns: Vec::new(),
-        walk,
-        camera: camera(),
-        camera_is_guessed: false,
-        is_on_treadmill: false,
-        is_frontal: false,
-        height: BodyHeight::given(1.75),
         depth_sd_m: 0.1,
-        start: report(path, beginning, direction),
-        gait_speed_mps: 1.2,
-        fit: None,
-        options,
+        ..result::tests::tracked(walk, report(path, beginning, direction), options)
     }
 }
 

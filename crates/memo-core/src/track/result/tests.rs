@@ -59,6 +59,11 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
     let mut walk = Walk::new(walker(), path, beginning);
     walk.twins[0].similarity_sum = 5.0;
     walk.twins[0].steps = steps;
+    tracked(walk, report(path, beginning, Direction::Forward), options)
+}
+
+/// A walk across the picture with a given height, no fit, and a distance known exactly.
+pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedWalk {
     TrackedWalk {
         person: 0,
         camera_turns: Vec::new(),
@@ -69,7 +74,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
         is_frontal: false,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
-        start: report(path, beginning, Direction::Forward),
+        start,
         gait_speed_mps: 1.2,
         fit: None,
         options,

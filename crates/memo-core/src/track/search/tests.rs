@@ -1,5 +1,6 @@
 use super::super::score::{Measure, similarity};
 use super::*;
+use crate::image::Rectangle;
 use crate::model::{Body, Gait, GaitStyle};
 
 pub fn walker() -> Walker {
@@ -8,6 +9,18 @@ pub fn walker() -> Walker {
 
 pub fn camera() -> Camera {
     Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
+}
+
+/// The rectangle of the changes of a person at this place of a path.
+pub fn rectangle_of(walker: &Walker, camera: &Camera, path: &Path, along_m: f64) -> Rectangle {
+    let [sole, crown] =
+        [0.0, walker.level_crown_height_m()].map(|z| camera.project(path.point(along_m, z)).unwrap());
+    Rectangle {
+        left: (sole.x - 40.0).round() as usize,
+        right: (sole.x + 40.0).round() as usize,
+        top: (crown.y - 2.0).round() as usize,
+        bottom: sole.y.round() as usize,
+    }
 }
 
 /// The edges of the image that a hypothesis would show.
