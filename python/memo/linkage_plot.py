@@ -102,19 +102,24 @@ def write_turned_video(
         )
         ax.set_axis_off()
     left.set_title("as seen", color="white")
-    (dots,) = left.plot([], [], "o", color="white", markersize=5)
+    (dots,) = left.plot([], [], "o", color="white", markersize=5, animated=True)
+    title = right.set_title(" ", color="white")
+    title.set_animated(True)
+    most = max(map(len, links_at), default=0)
+    lines = [right.plot([], [], "o-", linewidth=3, animated=True)[0] for _ in range(most)]
+    canvas.draw()
+    empty = canvas.copy_from_bbox(drawing.bbox)  # what is the same in all frames
     with complete_file(path) as temporary, _h264(str(temporary), _rate(points.times_s)) as write:
         for frame in range(len(flat)):
+            canvas.restore_region(empty)
             dots.set_data(flat[frame, :, 0], flat[frame, :, 1])
-            for line in list(right.lines):
-                line.remove()
-            for index, a, b in links_at[frame]:
-                ends = turned[frame, [a, b]]
-                right.plot(ends[:, 0], ends[:, 1], "o-", color=COLOURS[index % len(COLOURS)], linewidth=3)
-            right.set_title(f"turned {turn_deg:g} deg: {figure.sources[frame]}", color="white")
-            canvas.draw()
-            if frame == 0:
-                drawing.set_layout_engine("none")  # the same for all frames, and slow
+            left.draw_artist(dots)
+            for line, (index, a, b) in zip(lines, links_at[frame], strict=False):
+                line.set_data(*turned[frame, [a, b]].T)
+                line.set_color(COLOURS[index % len(COLOURS)])
+                right.draw_artist(line)
+            title.set_text(f"turned {turn_deg:g} deg: {figure.sources[frame]}")
+            right.draw_artist(title)
             write(np.asarray(canvas.buffer_rgba())[..., :3].copy(), float(points.times_s[frame]))
             if progress is not None:
                 progress(frame + 1, len(flat))

@@ -110,6 +110,7 @@ impl<T: Copy> Image<T> {
     /// # Panics
     ///
     /// If `y` is not less than the height.
+    #[inline]
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
@@ -119,6 +120,7 @@ impl<T: Copy> Image<T> {
     /// # Panics
     ///
     /// If `y` is not less than the height.
+    #[inline]
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         &mut self.data[y * self.width..(y + 1) * self.width]
     }
@@ -129,6 +131,7 @@ impl<T: Copy> Image<T> {
     ///
     /// If the index `y * width + x` is past the last pixel. `x` is not compared with the width: a larger `x`
     /// reads a pixel of a later row.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
     }
@@ -151,6 +154,7 @@ impl<T: Copy> Image<T> {
 
 impl Image<u8> {
     /// Borrows the image as a [`Frame`].
+    #[inline]
     pub fn as_frame(&self) -> Frame<'_> {
         Frame { data: &self.data, width: self.width, height: self.height, stride: self.width }
     }
@@ -198,6 +202,7 @@ impl<'a> Frame<'a> {
     /// # Panics
     ///
     /// If `y` is not less than the height.
+    #[inline]
     pub fn row(&self, y: usize) -> &'a [u8] {
         let start = y * self.stride;
         &self.data[start..start + self.width]
@@ -209,6 +214,7 @@ impl<'a> Frame<'a> {
     ///
     /// If the index `y * stride + x` is past the end of the data. `x` is not compared with the width: a
     /// larger `x` reads padding or a later row.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> u8 {
         self.data[y * self.stride + x]
     }
@@ -216,19 +222,7 @@ impl<'a> Frame<'a> {
     /// The grey value between four pixels, linear along both axes; `None` outside the centres of the outermost pixels.
     #[inline]
     pub(crate) fn between(&self, p: DVec2) -> Option<f64> {
-        let is_inside =
-            p.x >= 0.0 && p.y >= 0.0 && p.x < self.width as f64 - 1.0 && p.y < self.height as f64 - 1.0;
-        if !is_inside {
-            return None;
-        }
-        let (x, y) = (p.x as usize, p.y as usize);
-        let (right, down) = (p.x - x as f64, p.y - y as f64);
-        let row = |y: usize| {
-            let [a, b] = [self.row(y)[x], self.row(y)[x + 1]].map(f64::from);
-            a + right * (b - a)
-        };
-        let (upper, lower) = (row(y), row(y + 1));
-        Some(upper + down * (lower - upper))
+        Between::new(p, [self.width, self.height], self.stride).map(|place| place.of(self.data))
     }
 
     /// An owned copy without padding.
@@ -251,6 +245,40 @@ impl<'a> Frame<'a> {
             width: other.width,
             height: other.height,
         })
+    }
+}
+
+/// A place between four pixels of pictures of one size.
+#[derive(Clone, Copy)]
+pub(crate) struct Between {
+    /// Index of the upper left pixel, and that of the lower left one.
+    rows: [usize; 2],
+    /// How far the place is from the upper left pixel, pixels.
+    right: f64,
+    down: f64,
+}
+
+impl Between {
+    /// `None` outside the centres of the outermost pixels.
+    #[inline]
+    pub(crate) fn new(p: DVec2, [width, height]: [usize; 2], stride: usize) -> Option<Self> {
+        let is_inside = p.x >= 0.0 && p.y >= 0.0 && p.x < width as f64 - 1.0 && p.y < height as f64 - 1.0;
+        if !is_inside {
+            return None;
+        }
+        let (x, y) = (p.x as usize, p.y as usize);
+        let at = y * stride + x;
+        Some(Self { rows: [at, at + stride], right: p.x - x as f64, down: p.y - y as f64 })
+    }
+
+    /// The grey value there, linear along both axes.
+    #[inline]
+    pub(crate) fn of(&self, data: &[u8]) -> f64 {
+        let [upper, lower] = self.rows;
+        let (a, b) = (f64::from(data[upper]), f64::from(data[upper + 1]));
+        let (c, d) = (f64::from(data[lower]), f64::from(data[lower + 1]));
+        let (above, below) = (a + self.right * (b - a), c + self.right * (d - c));
+        above + self.down * (below - above)
     }
 }
 

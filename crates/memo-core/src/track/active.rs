@@ -1,6 +1,10 @@
 //! The current walk: whether it continues, its path, and the fit of the person at its end.
 
 use super::crowd::{Expected, body_box, expected};
+use super::decisions::{
+    DECIDING_SHARE, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN, SLOWEST_HZ, SLOWEST_MPS,
+    STRIDE_HEIGHTS,
+};
 use super::fit::edge_search::View;
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot, fitted_route};
@@ -20,32 +24,13 @@ use crate::model::{Camera, EllipticCylinder, Walker};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Nobody walks slower than this, m/s.
-pub(super) const SLOWEST_MPS: f64 = 0.25;
 /// Somebody who moves faster over the last frames has left the treadmill, m/s.
 const LEAVING_MPS: f64 = 0.7;
-/// Minimum cadence of a walk, gait cycles per second.
-const SLOWEST_HZ: f64 = 0.3;
-/// Range of stride lengths (two steps) as shares of the body height. Some 90 walks (motion-captured, on video and
-/// drawn) had 0.60 to 1.05.
-const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
-/// Relative gain of similarity that an oblique path needs over a path parallel to the image plane. Seen from
-/// above, a walk can look oblique, but then it fits worse.
-const SLANT_GAIN: f64 = 0.02;
-/// A person whose fit to the first frames misses more of the outline is not followed. Of the drawn walks, the good
-/// fits missed 0.10 and less, and the only wrong one 0.113.
-const MOST_MISSED_TO_ADOPT: f64 = 0.1;
 /// Number of last frames that decide whether a walk continues.
 const RECENT_FRAMES: usize = 12;
-/// A walk ends if the mean similarity of those frames is below this share of the walk's mean.
-const LOST_SHARE: f64 = 0.45;
 
 /// So many last frames without the person are removed; a single one may only be matched badly.
 const LEAST_GONE: usize = 3;
-/// Frames in which less of the person is visible decide nothing.
-const DECIDING_SHARE: f32 = 0.3;
-/// A person who is hidden for longer is given up, seconds.
-const LONGEST_HIDDEN_S: f64 = 2.0;
 
 /// Mean similarity of frames by the share that is visible; `None` if they show too little.
 fn matched(steps: &[Step]) -> Option<f64> {

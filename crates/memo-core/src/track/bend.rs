@@ -8,6 +8,7 @@
 //! route of a person who turned is smoothed again.
 
 use super::active::Active;
+use super::decisions::{EARLY_TURN_GAIN, QUICK_TURN_GAIN, TURN_GAIN};
 use super::locate::{Crown, Sighting, foot};
 use super::options::TrackerOptions;
 use super::route::Route;
@@ -20,16 +21,6 @@ use glam::{DVec2, DVec3};
 
 /// A turn is looked for after this many further frames.
 const EVERY: usize = 10;
-/// Relative gain of similarity that a curve needs over the route so far.
-///
-/// Of the windows of drawn people who turned, the best gained 0.01 to 0.1. Of 60 windows of 40 frames and more of drawn
-/// people who went straight, three gained 0.002 to 0.006 and none more; 18 further people stayed on a straight path.
-const LEAST_GAIN: f64 = 0.01;
-/// The same before the path is settled, when a straight line may be off too. Of 24 drawn people who went straight, 16 to 35
-/// frames gained up to 0.04; of 16 who turned by 40 to 69 degrees, most gained 0.05 to 0.36.
-const LEAST_EARLY_GAIN: f64 = 0.05;
-/// The same of the quick comparison, after which the frames are followed again.
-const LEAST_QUICK_GAIN: f64 = 0.008;
 /// The quick comparison looks at one frame of so many.
 const QUICK_EVERY: usize = 4;
 /// Number of last frames on the route so far to which a curve is joined, and the standard deviation of their places,
@@ -59,14 +50,14 @@ impl Active {
             self.kept.drain(..self.kept.len().saturating_sub(longest));
         }
         if self.settled && self.steps().len().is_multiple_of(EVERY) {
-            self.bend(self.latest(options), LEAST_GAIN, true, options);
+            self.bend(self.latest(options), TURN_GAIN, true, options);
         }
     }
 
     /// Looks for a turn when the walk seems to be over; true if it goes on around one.
     pub(super) fn goes_on(&mut self, options: &TrackerOptions) -> bool {
         let before = self.walk.clone();
-        let goes_on = self.bend(self.latest(options), LEAST_GAIN, false, options) && !self.is_over();
+        let goes_on = self.bend(self.latest(options), TURN_GAIN, false, options) && !self.is_over();
         if !goes_on {
             self.walk = before;
         }
@@ -75,7 +66,7 @@ impl Active {
 
     /// Looks for a turn in the latest frames; true if there is one.
     pub(super) fn has_turned(&mut self, options: &TrackerOptions) -> bool {
-        let least_gain = if self.settled { LEAST_GAIN } else { LEAST_EARLY_GAIN };
+        let least_gain = if self.settled { TURN_GAIN } else { EARLY_TURN_GAIN };
         self.bend(self.latest(options), least_gain, false, options)
     }
 
@@ -122,7 +113,7 @@ impl Active {
         let quick = |new: &Route| -> f64 {
             frames().map(|(step, (_, edges))| self.similarity_on(new, step, edges, options)).sum()
         };
-        if is_quick && quick(&curved) < (1.0 + LEAST_QUICK_GAIN) * quick(route) {
+        if is_quick && quick(&curved) < (1.0 + QUICK_TURN_GAIN) * quick(route) {
             return false;
         }
         // 3. The frames on the curve.

@@ -1,6 +1,7 @@
 //! A moving region that may be a person: its frames, and the start of a walk on them (Rohr 1994, section 6).
 
-use super::active::{Active, SLOWEST_MPS};
+use super::active::Active;
+use super::decisions::{FASTEST_MPS, OTHER_GAIT_GAIN, SLOWEST_MPS, WALKER_CONTRAST};
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M, start_height};
 use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
@@ -14,15 +15,8 @@ use crate::model::{Camera, GaitStyle, Walker};
 pub(super) const MISSED_FRAMES: usize = 3;
 /// Speed of a comfortable walk, used before the speed is known, m/s.
 pub(super) const COMFORTABLE_MPS: f64 = 1.3;
-/// Nobody walks faster than this, m/s.
-pub(super) const FASTEST_MPS: f64 = 3.0;
-/// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
-/// this factor. Measured: walkers 1.35 and more, backward walkers 1.23; sliding boxes up to 1.20.
-const LEAST_CONTRAST: f64 = 1.22;
 /// Gaits other than the average with which a walk can start.
 const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle::CROUCHED];
-/// Another gait starts if it is more similar than the average one by this factor.
-const OTHER_GAIN: f64 = 1.05;
 
 /// One frame of a candidate.
 #[derive(Debug, Clone)]
@@ -91,11 +85,11 @@ impl Candidate {
         let Started { camera, course, walker, start } = others
             .iter()
             .filter_map(|style| self.started(&sightings, given, &height, style))
-            .filter(|other| similarity(other) > OTHER_GAIN * similarity(&average))
+            .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
             .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
             .unwrap_or(average);
         // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
-        if start.contrast() < LEAST_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
+        if start.contrast() < WALKER_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
             return None;
         }
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);

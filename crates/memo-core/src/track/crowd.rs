@@ -6,6 +6,7 @@
 //! * An edge belongs to one person. A wholly visible person would otherwise drift onto the edges of somebody behind.
 //! * Changes that the bodies explain start nobody.
 
+use super::decisions::{EXPLAINED, NEARER, OWNED, TURNED};
 use super::score::{EdgeLine, ModelLine};
 use super::search::Scene;
 use super::walk::State;
@@ -13,15 +14,6 @@ use crate::image::{Mask, Rectangle};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, Vec2};
-
-/// An edge within this distance of another person's contours, and nearer to them by this much, belongs to that
-/// person; shares of that person's height in the image. Of a person of 200 pixels 8 and 3 pixels.
-const OWNED: f32 = 0.04;
-const NEARER: f32 = 0.015;
-/// What an angle of 90 degrees between edge and contour counts, share of the height.
-const TURNED: f32 = 0.075;
-/// Changes within this share of the height of a body are explained by it.
-const EXPLAINED: f64 = 0.05;
 
 /// One person as expected in a frame.
 #[derive(Debug, Clone)]

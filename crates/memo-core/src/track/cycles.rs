@@ -15,10 +15,9 @@
 //! steps of [`gait_parameters`](crate::TrackedWalk::gait_parameters). Two terms do not: the stated standard deviation of the angles,
 //! and the error that contacts have in common.
 
+use super::decisions::{CONTACT_COMMON_SD_S, CONTACT_SD_S};
 use super::fit::JOINTS;
-use super::gait_parameters::{
-    CONTACT_COMMON_SD_S, CONTACT_SD_S, LONGEST_STRIDE, NATURAL_SHARE, PRIOR_STEPS, Z, student_quantile,
-};
+use super::gait_parameters::{LONGEST_STRIDE, NATURAL_SHARE, PRIOR_STEPS, Z, student_quantile};
 use super::result::{Event, EventKind, TrackedWalk};
 use crate::model::skeleton::Side;
 

@@ -16,8 +16,8 @@
 //! Both feet reach alike, so the phase is known up to half a cycle: left and right stay open. Only walking forwards is
 //! looked for.
 
-use super::active::{Active, SLOWEST_MPS};
-use super::candidate::FASTEST_MPS;
+use super::active::Active;
+use super::decisions::{ALONG_THE_SIGHT_RAD, COMMON_ROW_SD_PX, FASTEST_MPS, FRONTAL_GAIN, SLOWEST_MPS};
 use super::height::BodyHeight;
 use super::locate::{Course, MASK_MARGIN_PX, Sighting};
 use super::options::TrackerOptions;
@@ -49,20 +49,11 @@ const ALL_MARGIN_PX: f64 = 2.0;
 /// walkers may be off even motion by any of `SCALES_M`.
 const WALKERS_OFF_M: f64 = 0.06;
 const SCALES_M: [f64; 8] = [0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.3, 0.6];
-/// A walk starts if the feet are that much more likely (as the logarithm of the ratio) on a line of phase than on one of
-/// even motion. Of seven drawn people, six reached 7 to 14 in the first 66 frames, the seventh, seen from above, -1.8;
-/// noise of many kinds about even motion reached 5.3 in 40 frames and 2.6 in 80.
-const LEAST_GAIN: f64 = 6.0;
 /// Steps of the reweighted line and of Gauss and Newton's method.
 const STEPS: usize = 6;
 /// Standard deviation of the reach of people's feet about the model's, metres, and of the lowest row, pixels.
 const REACH_SD_M: f64 = 0.08;
 const ROW_SD_PX: f64 = 1.5;
-/// The same of what all frames have in common: shadows and shoes. Of 13 drawn people the mean place was -0.24 to 0.26 m off,
-/// 0.16 m in the root mean square.
-const COMMON_ROW_SD_PX: f64 = 3.0;
-/// Standard deviation of the phase that all frames have in common, cycles: of the `LEAD`.
-pub(super) const COMMON_PHASE_SD: f64 = 0.04;
 /// Residuals of so many neighbouring frames are alike.
 const LIKE_FRAMES: f64 = 4.0;
 /// Beyond this many standard deviations, residuals count ever less (Cauchy weights).
@@ -70,9 +61,6 @@ const CAUCHY_SD: f64 = 1.5;
 /// Changes in a second, as standard deviations: of the speed, m/s, and of the cadence, cycles/s.
 const SPEED_CHANGE_SD: f64 = 0.1;
 const CADENCE_CHANGE_SD: f64 = 0.03;
-/// A path within this angle of the line of sight is along it; of others, contours show the phase. Drawn people were followed
-/// by their feet up to 20 degrees beside it. One at 45 degrees, who stood with arms spread at first, was started falsely.
-const ALONG_THE_SIGHT_RAD: f64 = 0.5;
 /// A live walk solves for so many last frames at a time; the first two of them are held.
 const WINDOW: usize = 250;
 const HELD: f64 = 1e6;
@@ -219,7 +207,7 @@ impl Frontal {
             .map(|(by_all, sightings)| Self::on_line(&sightings, by_all, camera, walker, rates));
         let (gain, mut frontal, line) =
             tried.into_iter().flatten().reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-        if gain < LEAST_GAIN || line.place[1] < SLOWEST_MPS {
+        if gain < FRONTAL_GAIN || line.place[1] < SLOWEST_MPS {
             return None;
         }
         for (firm, edges) in &standing.kept {

@@ -38,6 +38,10 @@
 //! together over the cycle), shadows and reflections at the feet, for which the scale leaves room, and a tilted
 //! camera if none is given.
 
+use super::decisions::{
+    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, FOCAL_SD, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
+    STRIKE_SD_CYCLES,
+};
 use super::fit::belt::Belt;
 use super::fit::contacts::Contact;
 use super::result::{EventKind, Row, TrackedWalk};
@@ -50,23 +54,10 @@ use crate::model::skeleton::Side;
 /// value by side is reported.
 pub const LIKELY_MISTAKEN: f64 = 0.2;
 
-/// Standard deviation over people of the image-based phase at heel strike, cycles, independent for each side.
-const STRIKE_SD_CYCLES: f64 = 0.008;
-/// Standard deviation over people of the reach asymmetry, metres: how much farther ahead of the trunk one foot
-/// lands.
-const REACH_SD_M: f64 = 0.012;
-/// Step-length error per metre of reach asymmetry: a leg that swings farther ahead also looks later in the cycle.
-const REACH_COUNTS: f64 = 1.35;
 /// Step variability of a healthy adult, as a share of step length or step time.
 pub(super) const NATURAL_SHARE: f64 = 0.03;
 /// Weight of the prior step variability, in observed steps.
 pub(super) const PRIOR_STEPS: f64 = 4.0;
-/// Relative standard deviation over people of the height while walking, compared with the model of the same body
-/// height: legs bend more or less than the average's, and feet point in other directions.
-const POSTURE_SD: f64 = 0.015;
-/// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely,
-/// when 60 is assumed.
-const FOCAL_SD: f64 = 0.18;
 /// Frames within this distance of a strike, in cycles, are used for its time.
 const NEAR_STRIKE: f64 = 0.125;
 /// Minimum number of frames near a strike.
@@ -78,11 +69,6 @@ const LEAST_CYCLES: f64 = 0.5;
 const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 pub(super) const Z: f64 = 1.959_964;
-/// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
-pub(super) const CONTACT_SD_S: f64 = 0.028;
-pub(super) const CONTACT_COMMON_SD_S: f64 = 0.015;
-/// Standard deviation over people of how much earlier contacts of one side are found than those of the other, seconds.
-const CONTACT_SIDE_SD_S: f64 = 0.018;
 /// A fitted strike this much later than the one before is not its next, strides.
 const LONGEST_STEP: f64 = 0.8;
 /// Two strikes of one side that are farther apart are not successive, strides.

@@ -5,6 +5,7 @@
 //! 7-10 cm, reflections change the depth by half a metre), so rows are pooled over the frames before they become
 //! a depth.
 
+use super::decisions::SLANT_M;
 use super::search::Path;
 use crate::estimate::line::line_through;
 use crate::image::Rectangle;
@@ -150,10 +151,6 @@ pub fn locate(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Result<
     let along_m = places.iter().map(|(_, along)| along * speed.signum()).collect();
     Ok(Course { path, along_m, speed_mps: speed.abs(), depth_sd_m: foot.depth_sd_m })
 }
-
-/// Minimum change of depth over the sightings for an oblique path, metres. Measured between the first and the
-/// last third of 40 sightings: up to 0.13 on walks across the image, 0.43 on a path at 25 degrees.
-const SLANT_M: f64 = 0.2;
 
 /// Finds the oblique path of a person who approaches or moves away; `None` if the sightings do not show one
 /// clearly.

@@ -6,6 +6,7 @@ mod candidate;
 mod column;
 mod crowd;
 pub mod cycles;
+mod decisions;
 pub mod evidence;
 pub mod explain;
 pub mod fit;

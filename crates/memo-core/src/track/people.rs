@@ -3,6 +3,7 @@
 //! A walk can end because a person was hidden, stood still or could not be told from the background. A walk that
 //! starts soon after where that person would be by then, in the same direction, is the same person's.
 
+use super::decisions::{PLACE_M, PLACE_M_PER_S, SAME_WAY};
 use glam::{DVec2, DVec3};
 
 /// The latest filtered estimate.
@@ -36,11 +37,6 @@ pub(super) struct Sign {
 
 /// A person is expected back for this long, seconds.
 const EXPECTED_S: f64 = 3.0;
-/// How far from the expected place, metres, and how much farther per second.
-const PLACE_M: f64 = 0.8;
-const PLACE_M_PER_S: f64 = 0.3;
-/// Cosine of the largest turn: 60 degrees.
-const SAME_WAY: f64 = 0.5;
 
 /// The numbers given so far.
 #[derive(Debug, Default)]

@@ -5,9 +5,10 @@
 //! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
 //! the difference between the person's body and the model, and the distance.
 
+use super::decisions::COMMON_PHASE_SD;
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
-use super::frontal::{ACROSS_SD_M, COMMON_PHASE_SD};
+use super::frontal::ACROSS_SD_M;
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};

@@ -25,6 +25,7 @@ mod on_the_spot;
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
+use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceStream};
 use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
@@ -82,10 +83,6 @@ pub const LONGEST_WALK: usize = 20_000;
 const MOST_CANDIDATES: usize = 3;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
-/// A start this near to somebody who is followed is the same person, metres.
-const SAME_PLACE_M: f64 = 0.3;
-/// A walk ends when this share of the body's height or width is outside the image.
-const OUTSIDE_SHARE: f64 = 0.4;
 /// Edges are searched this far around the predicted body, pixels.
 const WINDOW_MARGIN_PX: f64 = 16.0;
 

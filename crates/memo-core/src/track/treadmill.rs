@@ -9,7 +9,8 @@
 //! ahead stand higher or lower in the image than feet behind ([`fit`](super::fit)). Walking backwards on a treadmill is
 //! not looked for.
 
-use super::active::{Active, SLOWEST_MPS};
+use super::active::Active;
+use super::decisions::{SLOWEST_MPS, TREADMILL_CONTRAST};
 use super::fit::MirroredHeading;
 use super::fit::belt::Belt;
 use super::fit::views::{Backdrop, Piece};
@@ -33,8 +34,6 @@ const HEADINGS: usize = 24;
 const REACH_M: [f64; 2] = [0.1, 0.04];
 /// Every third frame is compared.
 const EVERY: usize = 3;
-/// Similarity along the best line of phase, divided by the mean over all phases, that the legs of a walker exceed.
-pub(super) const LEAST_CONTRAST: f64 = 1.3;
 /// What stays is forgotten after this many consecutive frames without it.
 const MISSED_FRAMES: usize = 3;
 /// Arms in the order of the parts of the body.
@@ -218,7 +217,7 @@ impl Spot<'_> {
         let course = Course { path, along_m: vec![0.0; frames.len()], ..self.course.clone() };
         let start = start(frames, &course, &self.walker, &self.camera, &self.options.cadence, &options)?;
         let walks =
-            start.contrast() >= LEAST_CONTRAST && start.frozen.similarity < start.lines.best.similarity;
+            start.contrast() >= TREADMILL_CONTRAST && start.frozen.similarity < start.lines.best.similarity;
         (walks && start.direction == Direction::Forward).then_some(start)
     }
 
@@ -267,8 +266,7 @@ pub(super) fn mirrored(path: &Path, camera: &Camera) -> Path {
 
 #[cfg(test)]
 mod tests {
-    use super::super::locate::Crown;
-    use super::super::locate::locate;
+    use super::super::locate::{Crown, locate};
     use super::super::search::Hypothesis;
     use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
     use super::*;

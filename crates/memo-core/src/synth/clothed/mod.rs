@@ -34,6 +34,7 @@ use room::Room;
 use round_cone::RoundCone;
 use sizes::Sizes;
 use std::f64::consts::{PI, TAU};
+use std::sync::OnceLock;
 use stride::{Figure, Stride};
 
 /// What moves through the room.
@@ -153,7 +154,8 @@ pub struct ClothedScene {
     start_cycles: f64,
     sway: [f64; 2],
     room: Room,
-    empty: Image<f32>,
+    /// Drawn with the first frame.
+    empty: OnceLock<Image<f32>>,
     /// Other movers in the room, and by how much their paths are shifted.
     companions: Vec<(ClothedScene, DVec3)>,
 }
@@ -185,7 +187,6 @@ impl ClothedScene {
         let across_rad = if options.leftward.unwrap_or(leftward) { PI } else { 0.0 };
         let heading_rad = across_rad + options.slant_rad.unwrap_or(slant);
         let noise_sd = random.uniform(2.0, 5.0) as f32;
-        let empty = room.seen_by(&camera);
         Ok(Self {
             camera,
             height_m,
@@ -201,7 +202,7 @@ impl ClothedScene {
             start_cycles: random.uniform(0.0, 1.0),
             sway: [random.uniform(0.0, 0.03) * SWAY_CYCLES / TAU, random.uniform(0.0, TAU)],
             room,
-            empty,
+            empty: OnceLock::new(),
             companions: Vec::new(),
         })
     }
@@ -212,6 +213,11 @@ impl ClothedScene {
     pub fn joined_by(mut self, other: Self, shift_m: DVec2) -> Self {
         self.companions.push((other, shift_m.extend(0.0)));
         self
+    }
+
+    /// The room without anybody.
+    fn empty(&self) -> &Image<f32> {
+        self.empty.get_or_init(|| self.room.seen_by(&self.camera))
     }
 
     /// Number of frames.
@@ -285,7 +291,7 @@ impl ClothedScene {
 
     /// The rendered grey frame.
     pub fn frame(&self, frame: usize) -> Image<u8> {
-        let mut levels = self.empty.clone();
+        let mut levels = self.empty().clone();
         let (solids, shadows) = self.solids(self.time_s(frame));
         draw(&solids, &shadows, &self.room, &self.camera, &mut levels);
         let lot = (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);

@@ -228,7 +228,7 @@ fn the_picture_shows_the_body_where_the_truth_has_it() {
         let scene =
             scene(ClothedOptions { seed: 5, mover, noise_sd: Some(0.0), ..ClothedOptions::default() });
         let (frame, time_s) = (scene.frame(30), scene.time_s(30));
-        let empty = super::super::scene::with_noise(&scene.empty, 0.0, Random::new(0));
+        let empty = super::super::scene::with_noise(scene.empty(), 0.0, Random::new(0));
         let differs = |x: i64, y: i64| {
             let (x, y) = (x.clamp(0, 639) as usize, y.clamp(0, 479) as usize);
             frame.at(x, y).abs_diff(empty.at(x, y)) > 3

@@ -141,16 +141,22 @@ impl DotPicture {
     /// everywhere and how much of it (straight alpha), and no background.
     pub fn pixels(&self, display: &PointLightDisplay, frame: usize, alpha: bool) -> Vec<u8> {
         let covered = self.coverage(display, frame);
-        let mixed = |share: f32, channel: usize| {
-            let [dot, ground] = [self.colour, self.background].map(|colour| f32::from(colour[channel]));
-            (ground + (dot - ground) * share).round() as u8
-        };
         let [r, g, b] = self.colour;
-        if alpha {
-            covered.iter().flat_map(|share| [r, g, b, (255.0 * share).round() as u8]).collect()
-        } else {
-            covered.iter().flat_map(|&share| [0, 1, 2].map(|channel| mixed(share, channel))).collect()
+        let empty = if alpha { vec![r, g, b, 0] } else { self.background.to_vec() };
+        let mut pixels = empty.repeat(covered.len());
+        // Dots cover few of the pixels.
+        let drawn = pixels.chunks_exact_mut(empty.len()).zip(covered).filter(|(_, share)| *share > 0.0);
+        for (pixel, share) in drawn {
+            if alpha {
+                pixel[3] = (255.0 * share).round() as u8;
+                continue;
+            }
+            for (value, colour) in pixel.iter_mut().zip(self.colour) {
+                let ground = f32::from(*value);
+                *value = (ground + (f32::from(colour) - ground) * share).round() as u8;
+            }
         }
+        pixels
     }
 }
 

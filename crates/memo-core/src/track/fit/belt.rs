@@ -2,8 +2,9 @@
 //!
 //! A foot that lies flat moves with the belt. While the heel lands and while it rises, it is slower, so the speed of a
 //! stance is the largest mean speed of the heel over `WINDOW` of the cycle. The same over ground, where the floor
-//! stands still, is the error: see `COMMON_SHARE`.
+//! stands still, is the error: see `BELT_COMMON_SHARE`.
 
+use super::super::decisions::{BELT_COMMON_SHARE, BELT_STANCE_SHARE};
 use crate::estimate::line::line_through;
 use glam::{DVec2, DVec3};
 
@@ -23,10 +24,6 @@ const SHIFT: f64 = 0.025;
 const END: f64 = 0.55;
 /// Minimum number of frames in a part.
 const LEAST_FRAMES: usize = 3;
-/// Standard deviation over people and clips, as a share of the speed, and of one stance. On ten drawn treadmills the
-/// error was -3 to 6 %, its root mean square 2.8 %; part of it is that motion-captured ankles creep forward in stance.
-const COMMON_SHARE: f64 = 0.03;
-const STANCE_SHARE: f64 = 0.03;
 
 /// The belt's speed; `None` if no stance was seen from its beginning to its end. `feet` has heel and ball of the right
 /// and the left foot in each frame, metres.
@@ -42,8 +39,8 @@ pub fn belt(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead: DV
     let n = speeds.len() as f64;
     let speed_mps = speeds.iter().sum::<f64>() / n;
     let scatter = speeds.iter().map(|speed| (speed - speed_mps).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let of_stance = (STANCE_SHARE * speed_mps).hypot(scatter.sqrt()) / n.sqrt();
-    (n > 0.0).then(|| Belt { speed_mps, sd_mps: of_stance.hypot(COMMON_SHARE * speed_mps) })
+    let of_stance = (BELT_STANCE_SHARE * speed_mps).hypot(scatter.sqrt()) / n.sqrt();
+    (n > 0.0).then(|| Belt { speed_mps, sd_mps: of_stance.hypot(BELT_COMMON_SHARE * speed_mps) })
 }
 
 /// The feet where they would be if the belt stood still and the walker moved on with this velocity.

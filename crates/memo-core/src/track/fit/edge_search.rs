@@ -7,6 +7,7 @@
 //! the strongest step counts, the less the farther it is from the line.
 
 use crate::image::Image;
+use crate::image::frame::Between;
 use crate::model::EllipticCylinder;
 use glam::DVec2;
 
@@ -111,10 +112,12 @@ impl View {
     }
 
     /// Grey value, and absolute difference from the background, between pixels; `None` outside the piece.
+    #[inline]
     fn sample(&self, p: DVec2) -> Option<[f64; 2]> {
-        let grey = self.grey.as_frame().between(p)?;
-        let behind = self.background.as_ref().and_then(|behind| behind.as_frame().between(p));
-        Some([grey, behind.map_or(0.0, |behind| (grey - behind).abs())])
+        let width = self.grey.width();
+        let place = Between::new(p, [width, self.grey.height()], width)?;
+        let grey = place.of(self.grey.pixels());
+        Some([grey, self.background.as_ref().map_or(0.0, |behind| (grey - place.of(behind.pixels())).abs())])
     }
 }
 

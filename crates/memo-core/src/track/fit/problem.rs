@@ -1,17 +1,20 @@
 //! The least-squares problem of the fit: steps, normal equations, and the result with its standard deviations.
 
-use super::belt;
-use super::contacts;
+use super::super::decisions::{
+    FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MODEL_SD_RAD, MOST_MISSED, MOST_RESIDUAL, MOST_SD_RAD, OFF_ACROSS_SD_M,
+    OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX, ZERO_SD,
+};
 use super::edge_search::{Border, Reach, View};
 use super::lines::{Figure, Sample, Workspace, gradient, row_of, samples};
 use super::seen::{LEAST_STEP, Seen};
-use super::sides;
 use super::unknowns::{
     self, ANGLES, FIGURE, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior,
     STATURE, Slope, TORSO, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_HEADING, WHOLE_LEAN, body, flatten, mean_of,
     posture, priors, slopes,
 };
-use super::{FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit};
+use super::{
+    FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit, belt, contacts, sides,
+};
 use crate::estimate::arrow::{Arrow, Solution, velocity_change};
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::{BodyHeight, HeightSource};
@@ -520,15 +523,15 @@ impl<'a> Problem<'a> {
             sd(
                 &[(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())],
                 &at(FRAME_ALONG),
-                PLACE_SD[0],
+                FIT_PLACE_SD[0],
             ),
             sd(
                 &[(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)],
                 &[],
-                PLACE_SD[1].hypot(OFF_ACROSS_SD_M * fitted.seen.off()),
+                FIT_PLACE_SD[1].hypot(OFF_ACROSS_SD_M * fitted.seen.off()),
             ),
-            sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), PLACE_SD[2]),
-            sd(&[], &at(FRAME_PHASE), PLACE_SD[3]),
+            sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), FIT_PLACE_SD[2]),
+            sd(&[], &at(FRAME_PHASE), FIT_PLACE_SD[3]),
         ]
     }
 }
@@ -609,27 +612,6 @@ const RATES: [f64; FRAME] = {
     rates[FRAME_PHASE] = 0.19;
     rates
 };
-/// Errors that the equations do not contain, because edges of neighbouring samples and frames err together, and
-/// because people are no cylinders: a factor, and standard deviations to add.
-const SD_FACTOR: f64 = 1.3;
-const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
-const PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
-/// Where the outline is missed, what is found beside it is often something else: standard deviations per share of the
-/// outline that is missed beyond `Seen::USUALLY_MISSED`. Low-contrast clothes miss 3 to 8 %, and hip and distance are
-/// 2 to 7 degrees and up to 30 cm off.
-const OFF_SD_RAD: f64 = 1.2;
-const OFF_ACROSS_SD_M: f64 = 5.0;
-/// The same of the body height: hair, soles, and heads that are no cylinders.
-const HEIGHT_MODEL_SD_M: f64 = 0.015;
-/// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
-const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
-/// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and
-/// the error of a measured one times the person's height in pixels.
-const ZERO_SD: f64 = 0.03;
-const ZERO_BLUR_PX: f64 = 3.0;
-/// A fit that misses more of its outline, or is farther from the edges, is no fit.
-const MOST_MISSED: f64 = 0.2;
-const MOST_RESIDUAL: f64 = 0.012;
 
 /// Adds weight (Σ slope q - offset)² to normal equations over the figure.
 fn add_terms(

@@ -1,5 +1,6 @@
 //! How well the model fits the person.
 
+use super::super::decisions::{MOST_SOLE_M, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED};
 /// How well the contours of the fitted person lie on the edges of the frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitQuality {
@@ -39,17 +40,6 @@ impl FitVerdict {
         }
     }
 }
-
-/// A fit that misses more of the outline, or is farther from the edges by a share of the height, is a poor one.
-const POORLY_MISSED: f64 = 0.1;
-const POORLY_OFF: f64 = 0.007;
-/// Of 65 drawn walks of motion-captured people, 51 fit well by these, all with hip and knee within 3 and 4 degrees RMS;
-/// of the 14 others, 9 are farther off. Of 90 people in clothes of `ClothedScene`, 3 fit well with a knee 5 to 6 degrees
-/// off.
-const WELL_MISSED: f64 = 0.023;
-const WELL_LENGTH_SD: f64 = 3.0;
-/// Feet farther from the ground, metres, do not stand on it. Drawn walks: up to 0.01.
-const MOST_SOLE_M: f64 = 0.05;
 
 impl FitQuality {
     /// The verdict.

@@ -3,14 +3,8 @@
 //! With wrong sides the outline can be the same, but then the far limbs are drawn in front of the near ones: their
 //! lines inside the body, where the frames have edges, are hidden. So the right sides explain more of these lines.
 
+use super::super::decisions::{SIDES_LOG_ODDS, SIDES_LOST, SIDES_OF_TRACKER};
 use super::seen::Seen;
-
-/// Log odds per unit of evidence.
-const LOG_ODDS: f64 = 8.0;
-/// The tracker's log odds come from the same frames, so they count half.
-const OF_TRACKER: f64 = 0.5;
-/// Weight of the share of inner lines that found no edge.
-const LOST: f64 = 3.0;
 
 /// Evidence for one choice of sides against another: logarithms of the ratios of explained inner lines and of costs,
 /// and the difference of the shares of lost inner lines.
@@ -20,13 +14,13 @@ pub fn evidence(chosen: &Seen, other: &Seen) -> f64 {
     let cost = |seen: &Seen| seen.cost.max(1e-9);
     (explained(chosen) / explained(other)).ln()
         + (cost(other) / cost(chosen)).ln()
-        + LOST * (lost(other) - lost(chosen))
+        + SIDES_LOST * (lost(other) - lost(chosen))
 }
 
 /// Probability of the `other` choice of sides; `p_tracked` is that by the tracker.
 pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64) -> f64 {
     let p = p_tracked.clamp(1e-6, 1.0 - 1e-6);
-    let log_odds = LOG_ODDS * evidence(chosen, other) + OF_TRACKER * ((1.0 - p) / p).ln();
+    let log_odds = SIDES_LOG_ODDS * evidence(chosen, other) + SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
     1.0 / (1.0 + log_odds.exp())
 }
 

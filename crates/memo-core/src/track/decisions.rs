@@ -1,0 +1,171 @@
+//! The constants that decide most: who walks, where a walk ends, which way it goes, and how sure all of it is.
+//!
+//! Each is stated with what was measured about it. Where nothing else is said, "of 60 people" means starts, frames or
+//! fits of 25 drawn walks of motion-captured people, ten scenes with one to three of them, five clips (one filmed,
+//! with a woman who walks backwards), and 16 people of [`ClothedScene`](crate::ClothedScene); things are its trolley,
+//! rider and waver. Errors that all frames of a walk share are checked from both sides by `tests/gait_parameters.rs`,
+//! `tests/clothed_walks.rs` and `tests/score_walks.py`. The model of right and left is
+//! [`SwapModel`](super::swap::SwapModel).
+
+use super::fit::JOINTS;
+
+// Who walks.
+/// Nobody walks faster than this, m/s.
+pub(in crate::track) const FASTEST_MPS: f64 = 3.0;
+/// Nobody walks slower than this, m/s.
+pub(in crate::track) const SLOWEST_MPS: f64 = 0.25;
+/// Minimum cadence of a walk, gait cycles per second.
+pub(in crate::track) const SLOWEST_HZ: f64 = 0.3;
+/// Range of stride lengths (two steps) as shares of the body height. Some 90 walks (motion-captured, on video and
+/// drawn) had 0.60 to 1.05.
+pub(in crate::track) const STRIDE_HEIGHTS: std::ops::Range<f64> = 0.25..1.6;
+/// A moving region is a walker if the similarity along the best line of phase exceeds the mean over all phases by
+/// this factor, and if the best line is better than any constant phase.
+///
+/// Of 60 people, 56 started at 1.32 and more; the others had 1.22 (at 30 degrees), 1.23 (backwards), 1.23 (at 45
+/// degrees) and 1.25 (at 38 degrees). Things had up to 1.21, and a constant phase was better by 10 % and more.
+/// Somebody who stood with the arms spread had up to 1.29, and a constant phase was better, but for three frames of
+/// 1.14 to 1.20.
+pub(in crate::track) const WALKER_CONTRAST: f64 = 1.22;
+/// Similarity along the best line of phase, divided by the mean over all phases, that the legs of a walker exceed. On
+/// two treadmills 1.54 and 1.57; of somebody who comes towards the camera 1.04.
+pub(in crate::track) const TREADMILL_CONTRAST: f64 = 1.3;
+/// Another gait starts if it is more similar than the average one by this factor. Of 60 people, the two who crouched
+/// had 1.27 and 1.81, the others up to 0.94, and who stood with the arms spread up to 1.15.
+pub(in crate::track) const OTHER_GAIT_GAIN: f64 = 1.05;
+/// A walk starts if the feet are that much more likely (as the logarithm of the ratio) on a line of phase than on one
+/// of even motion. Of seven drawn people, six reached 7 to 14 in the first 66 frames, the seventh, seen from above,
+/// -1.8; noise of many kinds about even motion reached 5.3 in 40 frames and 2.6 in 80.
+pub(in crate::track) const FRONTAL_GAIN: f64 = 6.0;
+/// A path within this angle of the line of sight is along it; of others, contours show the phase. Drawn people were
+/// followed by their feet up to 20 degrees beside it. One at 45 degrees, who stood with arms spread at first, was
+/// started falsely.
+pub(in crate::track) const ALONG_THE_SIGHT_RAD: f64 = 0.5;
+
+// Whether a walk goes on.
+/// A walk ends if the mean similarity of its last frames is below this share of the walk's mean. Of 60 people, those
+/// alone had 0.75 and more throughout, and 0.60 along the line of sight; two who went behind others ended at 0.43 and
+/// 0.45.
+pub(in crate::track) const LOST_SHARE: f64 = 0.45;
+/// Frames in which less of the person is visible decide nothing.
+pub(in crate::track) const DECIDING_SHARE: f32 = 0.3;
+/// A person who is hidden for longer is given up, seconds.
+pub(in crate::track) const LONGEST_HIDDEN_S: f64 = 2.0;
+/// A walk ends when this share of the body's height or width is outside the image.
+pub(in crate::track) const OUTSIDE_SHARE: f64 = 0.4;
+
+// Which way it goes.
+/// Minimum change of depth over the sightings for an oblique path, metres, between the first and the last third of 40
+/// sightings. Of 60 people, those within 7 degrees of the image plane had up to 0.17, those at 10 and 15 degrees 0.23
+/// to 0.37, and from 25 degrees on 0.43 and more.
+pub(in crate::track) const SLANT_M: f64 = 0.2;
+/// Relative gain of similarity that an oblique path needs over a path parallel to the image plane. Seen from above, a
+/// walk can look oblique, but then it fits worse. Of 60 people, true oblique paths gained 0.05 and more; the one at
+/// 10 degrees from afar lost 0.03, that at 15 degrees 0.02 (the fit finds both afterwards), and wrong ones lost more.
+pub(in crate::track) const SLANT_GAIN: f64 = 0.02;
+/// Relative gain of similarity that a curve needs over the route so far.
+///
+/// Of the windows of drawn people who turned, the best gained 0.01 to 0.1. Of 60 windows of 40 frames and more of
+/// drawn people who went straight, three gained 0.002 to 0.006 and none more; 18 further people stayed on a straight
+/// path.
+pub(in crate::track) const TURN_GAIN: f64 = 0.01;
+/// The same before the path is settled, when a straight line may be off too. Of 24 drawn people who went straight, 16
+/// to 35 frames gained up to 0.04; of 16 who turned by 40 to 69 degrees, most gained 0.05 to 0.36.
+pub(in crate::track) const EARLY_TURN_GAIN: f64 = 0.05;
+/// The same of the quick comparison, after which the frames are followed again.
+pub(in crate::track) const QUICK_TURN_GAIN: f64 = 0.008;
+
+// Whose it is.
+/// A start this near to somebody who is followed is the same person, metres: bodies do not pass through each other,
+/// and a trunk is 0.3 m wide.
+pub(in crate::track) const SAME_PLACE_M: f64 = 0.3;
+/// How far from the expected place somebody may start again, metres, and how much farther per second. One who did was
+/// 0.09 m away, another who came back from the other side 2.6 m.
+pub(in crate::track) const PLACE_M: f64 = 0.8;
+pub(in crate::track) const PLACE_M_PER_S: f64 = 0.3;
+/// Cosine of the largest turn between the two: 60 degrees.
+pub(in crate::track) const SAME_WAY: f64 = 0.5;
+/// An edge within this distance of another person's contours, and nearer to them by this much, belongs to that
+/// person; shares of that person's height in the image. Of a person of 200 pixels 8 and 3 pixels.
+pub(in crate::track) const OWNED: f32 = 0.04;
+pub(in crate::track) const NEARER: f32 = 0.015;
+/// What an angle of 90 degrees between edge and contour counts, share of the height.
+pub(in crate::track) const TURNED: f32 = 0.075;
+/// Changes within this share of the height of a body are explained by it.
+pub(in crate::track) const EXPLAINED: f64 = 0.05;
+
+// How well the person fits.
+/// A person whose fit to the first frames misses more of the outline is not followed: the average is. Of 60 people 59
+/// missed 0.093 and less, and the one who walks backwards 0.15; the only wrong fit of further drawn walks missed
+/// 0.113.
+pub(in crate::track) const MOST_MISSED_TO_ADOPT: f64 = 0.1;
+/// A fit that misses more of its outline, or is farther from the edges by a share of the height, is no fit. Fits of
+/// 60 people missed up to 0.15 and were up to 0.0064 off.
+pub(in crate::track) const MOST_MISSED: f64 = 0.2;
+pub(in crate::track) const MOST_RESIDUAL: f64 = 0.012;
+/// A fit that misses more of the outline, or is farther from the edges by a share of the height, is a poor one.
+pub(in crate::track) const POORLY_MISSED: f64 = 0.1;
+pub(in crate::track) const POORLY_OFF: f64 = 0.007;
+/// Of 65 drawn walks of motion-captured people, 51 fit well by these, all with hip and knee within 3 and 4 degrees
+/// RMS; of the 14 others, 9 are farther off. Of 90 people in clothes of `ClothedScene`, 3 fit well with a knee 5 to 6
+/// degrees off.
+pub(in crate::track) const WELL_MISSED: f64 = 0.023;
+pub(in crate::track) const WELL_LENGTH_SD: f64 = 3.0;
+/// Feet farther from the ground, metres, do not stand on it. Drawn walks: up to 0.01.
+pub(in crate::track) const MOST_SOLE_M: f64 = 0.05;
+/// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
+pub(in crate::track) const MOST_SD_RAD: [f64; JOINTS] = [0.10, 0.12, 0.12, 0.14, 0.14];
+
+// How sure it is: sides.
+/// Log odds per unit of evidence.
+pub(in crate::track) const SIDES_LOG_ODDS: f64 = 8.0;
+/// The tracker's log odds come from the same frames, so they count half.
+pub(in crate::track) const SIDES_OF_TRACKER: f64 = 0.5;
+/// Weight of the share of inner lines that found no edge.
+pub(in crate::track) const SIDES_LOST: f64 = 3.0;
+
+// How sure it is: errors that all frames of a walk share.
+/// Errors that the equations do not contain, because edges of neighbouring samples and frames err together, and
+/// because people are no cylinders: a factor, and standard deviations to add.
+pub(in crate::track) const SD_FACTOR: f64 = 1.3;
+pub(in crate::track) const MODEL_SD_RAD: [f64; JOINTS] = [0.012, 0.017, 0.05, 0.07, 0.07];
+pub(in crate::track) const FIT_PLACE_SD: [f64; 4] = [0.005, 0.02, 0.022, 0.012];
+/// Where the outline is missed, what is found beside it is often something else: standard deviations per share of the
+/// outline that is missed beyond `Seen::USUALLY_MISSED`. Low-contrast clothes miss 3 to 8 %, and hip and distance are
+/// 2 to 7 degrees and up to 30 cm off.
+pub(in crate::track) const OFF_SD_RAD: f64 = 1.2;
+pub(in crate::track) const OFF_ACROSS_SD_M: f64 = 5.0;
+/// The same of the body height: hair, soles, and heads that are no cylinders.
+pub(in crate::track) const HEIGHT_MODEL_SD_M: f64 = 0.015;
+/// Standard deviation over people of the phase at which the average curves have their initial contact, cycles, and
+/// the error of a measured one times the person's height in pixels.
+pub(in crate::track) const ZERO_SD: f64 = 0.03;
+pub(in crate::track) const ZERO_BLUR_PX: f64 = 3.0;
+/// Standard deviation over people and clips, as a share of the speed, and of one stance. On ten drawn treadmills the
+/// error was -3 to 6 %, its root mean square 2.8 %; part of it is that motion-captured ankles creep forward in
+/// stance.
+pub(in crate::track) const BELT_COMMON_SHARE: f64 = 0.03;
+pub(in crate::track) const BELT_STANCE_SHARE: f64 = 0.03;
+/// The same of what all frames have in common: shadows and shoes. Of 13 drawn people the mean place was -0.24 to 0.26
+/// m off, 0.16 m in the root mean square.
+pub(in crate::track) const COMMON_ROW_SD_PX: f64 = 3.0;
+/// Standard deviation of the phase that all frames have in common, cycles: of the `LEAD`.
+pub(in crate::track) const COMMON_PHASE_SD: f64 = 0.04;
+/// Standard deviation over people of the image-based phase at heel strike, cycles, independent for each side.
+pub(in crate::track) const STRIKE_SD_CYCLES: f64 = 0.008;
+/// Standard deviation over people of the reach asymmetry, metres: how much farther ahead of the trunk one foot lands.
+pub(in crate::track) const REACH_SD_M: f64 = 0.012;
+/// Step-length error per metre of reach asymmetry: a leg that swings farther ahead also looks later in the cycle.
+pub(in crate::track) const REACH_COUNTS: f64 = 1.35;
+/// Relative standard deviation over people of the height while walking, compared with the model of the same body
+/// height: legs bend more or less than the average's, and feet point in other directions.
+pub(in crate::track) const POSTURE_SD: f64 = 0.015;
+/// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely, when
+/// 60 is assumed.
+pub(in crate::track) const FOCAL_SD: f64 = 0.18;
+/// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
+pub(in crate::track) const CONTACT_SD_S: f64 = 0.028;
+pub(in crate::track) const CONTACT_COMMON_SD_S: f64 = 0.015;
+/// Standard deviation over people of how much earlier contacts of one side are found than those of the other,
+/// seconds.
+pub(in crate::track) const CONTACT_SIDE_SD_S: f64 = 0.018;
