@@ -288,7 +288,8 @@ impl Active {
         let mut frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
         let route = &fitted_route(&self.camera, &self.average, &self.walk.route, &mut frames, fit);
         let problem = |route| {
-            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit);
+            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit)
+                .of_visible_share(self.walk.visible_share());
             match (&options.camera, self.height.source) {
                 (None, _) => problem.of_assumed_camera(),
                 (Some(_), HeightSource::Given) => problem,

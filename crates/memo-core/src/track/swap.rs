@@ -38,7 +38,7 @@ impl SwapModel {
 /// Probability that the twin with the summed similarity `other` is the true one, and not the twin with `chosen`.
 ///
 /// The margin m = (chosen - other) / max is normal about ±mu with variance v = person² + glimpse² / n, where n is
-/// the number of independent glimpses in `duration_s`; then log odds = 2 mu m / v.
+/// the number of independent glimpses in `duration_s`, in which the person was wholly visible; then log odds = 2 mu m / v.
 pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
     let top = chosen.max(other);
     if top <= 0.0 {

@@ -247,11 +247,18 @@ impl Walk {
         usize::from(self.twins[1].similarity_sum > self.twins[0].similarity_sum)
     }
 
-    /// Probability that the worse twin is the true one.
+    /// Mean share of the person that nobody else hid, 0 to 1.
+    pub fn visible_share(&self) -> f64 {
+        let steps = &self.twins[self.best()].steps;
+        let sum: f64 = steps.iter().map(|step| f64::from(step.visible)).sum();
+        if steps.is_empty() { 1.0 } else { sum / steps.len() as f64 }
+    }
+
+    /// Probability that the worse twin is the true one. Of a person who was hidden in part, fewer glimpses count.
     pub fn swap_probability(&self, options: &SwapModel) -> f64 {
         let best = self.best();
         let duration_s = match (self.first_time_s, self.twins[best].steps.last()) {
-            (Some(first), Some(last)) => last.time_s - first,
+            (Some(first), Some(last)) => (last.time_s - first) * self.visible_share(),
             _ => 0.0,
         };
         swap_probability(

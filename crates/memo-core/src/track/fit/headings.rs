@@ -7,7 +7,6 @@
 
 use super::problem::{Fitted, Problem};
 use super::seen::Seen;
-use super::sides;
 use super::{FitError, LEAST_FRAMES, MirroredHeading, WalkFit};
 use std::f64::consts::TAU;
 
@@ -103,8 +102,8 @@ fn weights(choices: &[Choice<'_, '_>], p_tracked: f64) -> Vec<f64> {
         let least = same_heading().map(|c| cost(&c.fitted.seen)).fold(f64::INFINITY, f64::min);
         let partner = same_heading().find(|c| c.is_exchanged != choice.is_exchanged);
         let p_partner = if choice.is_exchanged { 1.0 - p_tracked } else { p_tracked };
-        let p_other =
-            partner.map_or(0.0, |other| sides::p_other(&choice.fitted.seen, &other.fitted.seen, p_partner));
+        let p_other = partner
+            .map_or(0.0, |other| choice.problem.p_other_sides(&choice.fitted, &other.fitted, p_partner));
         -LOG_ODDS * least.ln() + (1.0 - p_other).max(1e-12).ln()
     };
     choices.iter().map(of).collect()

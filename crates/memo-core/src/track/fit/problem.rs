@@ -50,6 +50,8 @@ pub(crate) struct Problem<'a> {
     /// Standard deviation of the height of a standing foot, metres.
     ground_sd_m: f64,
     is_on_treadmill: bool,
+    /// Mean share of the person that nobody else hid.
+    visible_share: f64,
     /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
     origin: DVec2,
     origin_along_m: f64,
@@ -120,6 +122,7 @@ impl<'a> Problem<'a> {
             is_scale_seen: true,
             ground_sd_m: GROUND_SD_M,
             is_on_treadmill: false,
+            visible_share: 1.0,
             origin,
             origin_along_m,
         }
@@ -149,6 +152,17 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// The same of a person of whom others hid a part.
+    pub fn of_visible_share(mut self, share: f64) -> Self {
+        self.visible_share = share;
+        self
+    }
+
+    /// Probability that the sides are those of the `other` fit; `p_tracked` is that by the tracker.
+    pub(super) fn p_other_sides(&self, chosen: &Fitted, other: &Fitted, p_tracked: f64) -> f64 {
+        sides::p_other(&chosen.seen, &other.seen, p_tracked, self.visible_share)
+    }
+
     /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
     /// sides are exchanged; without it, the sides stay as tracked.
     pub fn fit(&self, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
@@ -163,7 +177,7 @@ impl<'a> Problem<'a> {
         });
         let p_tracked = p_tracked_swapped.unwrap_or(0.0);
         let p_exchanged =
-            exchanged.as_ref().map_or(0.0, |other| sides::p_other(&as_tracked.seen, &other.seen, p_tracked));
+            exchanged.as_ref().map_or(0.0, |other| self.p_other_sides(&as_tracked, other, p_tracked));
         let (best, p_swapped) = match exchanged {
             Some(other) if p_exchanged > 0.5 => (other, 1.0 - p_exchanged),
             _ => (as_tracked, p_exchanged),

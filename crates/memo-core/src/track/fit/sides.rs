@@ -17,10 +17,12 @@ pub fn evidence(chosen: &Seen, other: &Seen) -> f64 {
         + SIDES_LOST * (lost(other) - lost(chosen))
 }
 
-/// Probability of the `other` choice of sides; `p_tracked` is that by the tracker.
-pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64) -> f64 {
+/// Probability of the `other` choice of sides; `p_tracked` is that by the tracker. The evidence is of ratios: of a person
+/// of whom others hid a part, the same ratios show less, in proportion to the `visible` share.
+pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64, visible: f64) -> f64 {
     let p = p_tracked.clamp(1e-6, 1.0 - 1e-6);
-    let log_odds = SIDES_LOG_ODDS * evidence(chosen, other) + SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
+    let by_fit = SIDES_LOG_ODDS * visible * evidence(chosen, other);
+    let log_odds = by_fit + SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
     1.0 / (1.0 + log_odds.exp())
 }
 
@@ -34,15 +36,22 @@ mod tests {
 
     #[test]
     fn what_lies_nearer_and_loses_fewer_inner_lines_is_likelier() {
-        assert!((p_other(&seen(10.0, 5.0), &seen(10.0, 5.0), 0.5) - 0.5).abs() < 1e-12);
-        let by_cost = p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5);
-        let by_lines = p_other(&seen(10.0, 5.0), &seen(10.0, 15.0), 0.5);
+        assert!((p_other(&seen(10.0, 5.0), &seen(10.0, 5.0), 0.5, 1.0) - 0.5).abs() < 1e-12);
+        let by_cost = p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5, 1.0);
+        let by_lines = p_other(&seen(10.0, 5.0), &seen(10.0, 15.0), 0.5, 1.0);
         let fewer = Seen { inner: 50.0, ..seen(10.0, 2.5) };
-        let by_count = p_other(&seen(10.0, 5.0), &fewer, 0.5);
+        let by_count = p_other(&seen(10.0, 5.0), &fewer, 0.5, 1.0);
         assert!([by_cost, by_lines, by_count].iter().all(|&p| p < 0.05), "{by_cost} {by_lines} {by_count}");
         for (a, b) in [(seen(10.0, 5.0), seen(12.0, 1.0)), (seen(8.0, 0.0), seen(7.0, 9.0))] {
-            assert!((p_other(&a, &b, 0.5) + p_other(&b, &a, 0.5) - 1.0).abs() < 1e-12);
+            assert!((p_other(&a, &b, 0.5, 1.0) + p_other(&b, &a, 0.5, 1.0) - 1.0).abs() < 1e-12);
         }
-        assert!(p_other(&Seen::default(), &Seen::default(), 0.5).is_finite());
+        let [whole, half] =
+            [1.0, 0.5].map(|visible| p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5, visible));
+        let log_odds = |p: f64| ((1.0 - p) / p).ln();
+        assert!(
+            (log_odds(half) - 0.5 * log_odds(whole)).abs() < 1e-9,
+            "half of the person shows half as much"
+        );
+        assert!(p_other(&Seen::default(), &Seen::default(), 0.5, 1.0).is_finite());
     }
 }
