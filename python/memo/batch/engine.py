@@ -135,10 +135,7 @@ def run(
     resume = resume or retry_failed
     check_folder(folder.out, [row for row in mine if folder.record(row.name) is None])
     with folder.taken() as name:
-        known = {row.name: folder.record(row.name) for row in mine}
-        if not resume and any(known.values()):
-            done = sum(record is not None for record in known.values())
-            raise BatchError(f"{out}: videos have been run here ({done} of {len(mine)}); resume to go on")
+        known = _known(mine, folder, out, resume)
         fingerprints = {row.name: row.fingerprint for row in mine}
         to_do = [row for row in mine if _is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
         notes = _notes(read, folder, known, to_do, fingerprints)
@@ -158,6 +155,15 @@ def run(
         finally:
             _write_tables(folder, read.rows, status_only=False)
     return _result(folder, mine, time.monotonic() - start, teller.told, notes)
+
+
+def _known(mine: Sequence[Row], folder: OutFolder, out: Path, resume: bool) -> dict[str, Record | None]:
+    """The records of what has been done before, which needs `resume`."""
+    known = {row.name: folder.record(row.name) for row in mine}
+    if not resume and any(known.values()):
+        done = sum(record is not None for record in known.values())
+        raise BatchError(f"{out}: videos have been run here ({done} of {len(mine)}); resume to go on")
+    return known
 
 
 def _tasks(

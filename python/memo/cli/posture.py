@@ -136,13 +136,8 @@ def add_posture(app: "typer.Typer") -> None:
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
         reading = {"fps": fps, "layout": layout, "person": person, "image_size": image_size}
-        options = {
-            "rules": rules.value,
-            "strength": strength.value,
-            "anchor": anchor.value,
-            "unswap": unswap,
-            "noise_px": noise_px,
-        }
+        options: dict[str, Any] = {"rules": rules.value, "strength": strength.value, "anchor": anchor.value}
+        options |= {"unswap": unswap, "noise_px": noise_px}
 
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}

@@ -62,20 +62,15 @@ def add_report(app: "typer.Typer") -> None:
     ) -> None:
         """Makes one HTML file of the results in DIR, readable without memo or a network."""
 
-        def compare(path: Path) -> "Report":
-            if frames != ":" or every is not None or not why or video is not None:
-                raise InputError("--frames, --every, --no-why and --video have no effect on a comparison")
-            from memo.report import write_comparison
-
-            return write_comparison(folder, other or folder, path, walks=_walks(walks))
-
         def work() -> Exit:
             is_comparison = other is not None or walks is not None
             default = folder / ("comparison.html" if is_comparison else "report.html")
             path = default if out is None else _checked_file(out)
             delivery = Delivery(path.parent, as_json=as_json, quiet=quiet)
             if is_comparison:
-                report = compare(path)
+                if frames != ":" or every is not None or not why or video is not None:
+                    raise InputError("--frames, --every, --no-why and --video have no effect on a comparison")
+                report = compared(folder, other or folder, path, walks)
             else:
                 if video is not None and not video.exists():
                     raise InputError(nothing_at(video, "video"))
@@ -88,6 +83,13 @@ def add_report(app: "typer.Typer") -> None:
             return Exit.DONE
 
         raise typer.Exit(guarded(work))
+
+
+def compared(folder: Path, other: Path, path: Path, walks: str | None) -> "Report":
+    """Writes the comparison of a walk of each folder."""
+    from memo.report import write_comparison
+
+    return write_comparison(folder, other, path, walks=_walks(walks))
 
 
 def write_page(folder: Path, path: Path, delivery: Delivery, **options: Any) -> "Report":
