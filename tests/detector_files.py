@@ -32,8 +32,8 @@ def walker(layout):
     return points, np.round(scores, 3)
 
 
-def mediapipe(path):
-    """`[asdict(result) for result in results]`, with another person in frame 3 and nobody in frame 5."""
+def mediapipe(path, step_ms=None):
+    """`[asdict(result) for result in results]`, with another person in frame 3, nobody in frame 5."""
     points, scores = walker("MEDIAPIPE_33")
     results = []
     for frame in range(FRAMES):
@@ -41,6 +41,8 @@ def mediapipe(path):
         if frame == 3:
             people.append(_landmarks(points[frame] * 0.2 + 30, scores[frame] * 0.5))
         results.append({"pose_landmarks": people, "pose_world_landmarks": [], "segmentation_masks": None})
+        if step_ms is not None:
+            results[-1]["timestamp_ms"] = step_ms * frame
     path.write_text(json.dumps(results))
     return points, scores
 

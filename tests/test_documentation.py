@@ -164,7 +164,7 @@ def write_keypoints(folder, camera):
 
 def write_detections(folder):
     """Files of detectors, as each of them writes them."""
-    detector_files.mediapipe(folder / "mediapipe.json")
+    detector_files.mediapipe(folder / "mediapipe.json", step_ms=33)
     detector_files.mmpose_demo(folder / "rtmpose.json")
     detector_files.easy_vitpose(folder / "vitpose.json")
     detector_files.yolo_labels(folder / "labels")

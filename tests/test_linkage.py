@@ -307,7 +307,7 @@ def test_a_failure_promises_no_links_that_are_not_there():
     points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
     assert _about_figure(found_with(["edge-on"], "still"), points, 0.5)[-1].endswith("is in links.csv.")
     nothing = found_with(["edge-on"], "still", chains=[])
-    assert _about_figure(nothing, points, 0.5)[-1].endswith("nothing is claimed.")
+    assert _about_figure(nothing, points, 0.5)[-1].endswith("shows planar motion.")
 
 
 def test_tracks_without_a_window_are_told(tmp_path):

@@ -111,8 +111,8 @@ def run(
 
     `jobs` videos run at a time (default: the number of processors), or as many as the `executor` accepts: any
     of `concurrent.futures`, Dask's `client.get_executor()`, `memo.batch.RayExecutor`; its workers need memo
-    and the same paths. `shard=(2, 4)` does the second of four parts of the manifest; parts may run at the
-    same time on machines that share `out`.
+    and the same paths. `shard=(2, 4)` does every fourth row of the manifest, from the second on; parts may
+    run at the same time on machines that share `out`.
 
     A run in a folder that holds results needs `resume`: finished videos stay, unfinished ones are done, and
     those that changed since, in the manifest or on the disk, are done again. `retry_failed` also repeats

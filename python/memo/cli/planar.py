@@ -151,7 +151,7 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
         )
     if not figure.interpreted:
         guess = " The best guess is in links.csv." if any(w.chains for w in figure.windows) else ""
-        return [*lines, f"No window shows planar motion: nothing is claimed.{guess}"]
+        return [*lines, f"memo found no limb: no stretch of frames shows planar motion.{guess}"]
     lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
         lines.append(

@@ -118,7 +118,7 @@ def _cell(path: Path, line: int, name: str, written: str, is_number: bool) -> An
 
 def _sentences(windows: list[Row], links: list[Row], interpreted: int) -> list[str]:
     if not interpreted:
-        return ["No window shows planar motion: nothing is claimed."]
+        return ["memo found no limb: no stretch of frames shows planar motion."]
     found = {(link["a"], link["b"]) for link in links if link["verdict"] == "planar"}
     return [
         f"{counted(len(found), 'link swings', 'links swing')} in planes, in {interpreted} of "
