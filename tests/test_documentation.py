@@ -308,7 +308,7 @@ def built_example():
     built = [path.stat().st_mtime for path in target.glob("debug/examples/track_frames-*")]
     if max(built, default=0.0) < max(path.stat().st_mtime for path in CORE.rglob("*.rs")):
         return None
-    shell(f"cd {ROOT} && cargo build --workspace --example track_frames", "README.md")
+    shell(f"cd {ROOT} && cargo build --example track_frames", "README.md")
     return target / "debug/examples" / f"track_frames{'.exe' if sys.platform == 'win32' else ''}"
 
 

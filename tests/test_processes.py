@@ -82,6 +82,10 @@ def postures(frames=4, progress=None):
 def work(_=None):
     return digest([tracked(), figure(), postures()])
 
+def say(found):
+    """A line in one piece, whatever processes write at the same time."""
+    os.write(1, f"{found}\\n".encode())
+
 def waited(child):
     """The exit code of a forked child."""
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -149,15 +153,15 @@ def test_loky_gives_the_parents_numbers(tmp_path):
 @forks
 def test_a_fork_of_a_fork_gives_the_parents_numbers(tmp_path):
     body = """
-    print(work(), flush=True)
+    say(work())
     if not (child := os.fork()):
-        print(work(), flush=True)
+        say(work())
         if not (grandchild := os.fork()):
-            print(work(), flush=True)
+            say(work())
             os._exit(0)
         os._exit(waited(grandchild))
     code = waited(child)
-    print(work())
+    say(work())
     sys.exit(code)
 """
     found = run(tmp_path, body)
@@ -202,10 +206,10 @@ def test_a_tracker_goes_on_in_a_child_that_was_forked_between_two_frames(tmp_pat
             assert tracker.people()
             child = os.fork()
         update(tracker, index)
-    print(digest(walks(tracker)), flush=True)
+    say(digest(walks(tracker)))
     if child == 0:
         os._exit(0)
-    print(digest(tracked()))
+    say(digest(tracked()))
     sys.exit(waited(child))
 """
     found = run(tmp_path, body)
