@@ -135,6 +135,16 @@ impl MirrorOdds {
     }
 }
 
+/// Standard deviation of a joint's acceleration over 1/30 s, m/s²: trunk, elbows and knees, wrists and ankles.
+pub(crate) fn acceleration_mps2(joint: Joint) -> f64 {
+    match joint.class() {
+        Some('c') if !matches!(joint, Joint::RightWrist | Joint::LeftWrist) => 10.0,
+        Some('c' | 'd') => 20.0,
+        _ if matches!(joint, Joint::RightElbow | Joint::LeftElbow) => 10.0,
+        _ => 5.0,
+    }
+}
+
 impl MotionPrior {
     /// Prior of a walking person.
     pub fn walking() -> Self {

@@ -14,10 +14,10 @@ use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
 use super::people::{Now, Sign};
 use super::result::smoothed_hypotheses;
+use super::search::mirrored;
 use super::search::{Hypothesis, Scene};
 use super::start::{StartReport, start};
 use super::steady::CameraMotion;
-use super::treadmill;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
@@ -299,7 +299,7 @@ impl Active {
         if !self.is_on_treadmill {
             return Some(problem(route).fit(p_swapped));
         }
-        let mirrored = treadmill::mirrored(&route.at(0.0), &self.camera).into();
+        let mirrored = mirrored(&route.at(0.0), &self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
         Some(fit_on_the_spot(&here, &there, p_swapped))
     }

@@ -3,9 +3,10 @@
 use super::active::Active;
 use super::decisions::{FASTEST_MPS, OTHER_GAIT_GAIN, SLOWEST_MPS, WALKER_CONTRAST};
 use super::fit::views::Piece;
-use super::height::{BodyHeight, GIVEN_SD_M, start_height};
+use super::height::{BodyHeight, GIVEN_SD_M};
 use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
 use super::options::TrackerOptions;
+use super::options::start_height;
 use super::start::{StartReport, start};
 use super::walk::{FrameEdges, Walk};
 use crate::image::Rectangle;

@@ -16,9 +16,10 @@
 //! and the error that contacts have in common.
 
 use super::decisions::{CONTACT_COMMON_SD_S, CONTACT_SD_S};
+use super::event::EventKind;
 use super::fit::JOINTS;
 use super::gait_parameters::{LONGEST_STRIDE, NATURAL_SHARE, PRIOR_STEPS, Z, student_quantile};
-use super::result::{Event, EventKind, TrackedWalk};
+use super::result::{Event, TrackedWalk};
 use crate::model::skeleton::Side;
 
 /// Points of a cycle: 0, 1, ..., 100 %.

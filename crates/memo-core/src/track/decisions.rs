@@ -153,6 +153,8 @@ pub(in crate::track) const BELT_STANCE_SHARE: f64 = 0.03;
 /// The same of what all frames have in common: shadows and shoes. Of 13 drawn people the mean place was -0.24 to 0.26
 /// m off, 0.16 m in the root mean square.
 pub(in crate::track) const COMMON_ROW_SD_PX: f64 = 3.0;
+/// Standard deviation of the place across the path, from the middle columns, metres.
+pub(in crate::track) const ACROSS_SD_M: f64 = 0.03;
 /// Standard deviation of the phase that all frames have in common, cycles: of the `LEAD`.
 pub(in crate::track) const COMMON_PHASE_SD: f64 = 0.04;
 /// Standard deviation over people of the image-based phase at heel strike, cycles, independent for each side.

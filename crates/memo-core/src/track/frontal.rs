@@ -16,15 +16,12 @@
 //! Both feet reach alike, so the phase is known up to half a cycle: left and right stay open. Only walking forwards is
 //! looked for.
 
-use super::active::Active;
 use super::decisions::{ALONG_THE_SIGHT_RAD, COMMON_ROW_SD_PX, FASTEST_MPS, FRONTAL_GAIN, SLOWEST_MPS};
-use super::height::BodyHeight;
-use super::locate::{Course, MASK_MARGIN_PX, Sighting};
-use super::options::TrackerOptions;
+use super::locate::{MASK_MARGIN_PX, Sighting};
 use super::search::{Hypothesis, Path};
-use super::start::{CadenceRange, Direction, StartReport, start};
-use super::treadmill::Standing;
-use super::walk::{Beginning, FrameEdges, State, Walk, WalkOptions};
+use super::standing::Standing;
+use super::start::CadenceRange;
+use super::walk::{Beginning, State, Walk};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::kalman::ConstantVelocity;
 use crate::estimate::line::line_through;
@@ -62,10 +59,8 @@ const CAUCHY_SD: f64 = 1.5;
 const SPEED_CHANGE_SD: f64 = 0.1;
 const CADENCE_CHANGE_SD: f64 = 0.03;
 /// A live walk solves for so many last frames at a time; the first two of them are held.
-const WINDOW: usize = 250;
+pub(super) const WINDOW: usize = 250;
 const HELD: f64 = 1e6;
-/// Standard deviation of the place across the path, from the middle columns, metres.
-pub(super) const ACROSS_SD_M: f64 = 0.03;
 
 /// What the feet of one frame show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,19 +74,19 @@ struct Feet {
 
 /// Place along the path and phase (not wrapped) of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Pace {
+pub(super) struct Pace {
     time_s: f64,
     feet: Option<Feet>,
-    along_m: f64,
+    pub(super) along_m: f64,
     phase: f64,
 }
 
 /// A walk that the feet show.
 #[derive(Debug, Clone)]
 pub(super) struct Frontal {
-    path: Path,
+    pub(super) path: Path,
     reach: Reach,
-    paces: Vec<Pace>,
+    pub(super) paces: Vec<Pace>,
     /// Whether the feet are those of all changes, or those of the firm ones.
     pub(super) by_all: bool,
 }
@@ -200,7 +195,12 @@ struct Line {
 impl Frontal {
     /// The walk that the feet of some frames show; `None` if they show none. Feet that come nearer are seen best in the
     /// firm changes, and those that go away in all changes, so both are tried.
-    fn begin(standing: &Standing, camera: &Camera, walker: &Walker, rates: &CadenceRange) -> Option<Self> {
+    pub(super) fn begin(
+        standing: &Standing,
+        camera: &Camera,
+        walker: &Walker,
+        rates: &CadenceRange,
+    ) -> Option<Self> {
         let firm: Vec<Sighting> = standing.sightings();
         let all: Vec<Sighting> = standing.feet.values().copied().collect();
         let tried = [(false, firm), (true, all)]
@@ -257,7 +257,7 @@ impl Frontal {
     }
 
     /// The same walk on the line through the feet of all frames, with the variances of place and phase.
-    fn on_path_of_all(&self) -> Option<(Self, Vec<[f64; 2]>)> {
+    pub(super) fn on_path_of_all(&self) -> Option<(Self, Vec<[f64; 2]>)> {
         let seen: Vec<(f64, DVec2)> =
             self.paces.iter().filter_map(|pace| Some((pace.time_s, pace.feet?.place))).collect();
         let (path, _) = path_through(&seen)?;
@@ -298,7 +298,7 @@ impl Frontal {
     }
 
     /// State at the first frame.
-    fn beginning(&self) -> Beginning {
+    pub(super) fn beginning(&self) -> Beginning {
         let (first, last) = (&self.paces[0], &self.paces[self.paces.len() - 1]);
         let elapsed_s = last.time_s - first.time_s;
         Beginning {
@@ -312,14 +312,14 @@ impl Frontal {
 
     /// Standard deviation that all places along the path have in common, metres: of the reach of a person and of the
     /// lowest row.
-    fn depth_sd_m(&self) -> f64 {
+    pub(super) fn depth_sd_m(&self) -> f64 {
         let row_m: Vec<f64> = self.paces.iter().filter_map(|pace| Some(pace.feet?.row_m)).collect();
         let mean_m = row_m.iter().sum::<f64>() / row_m.len().max(1) as f64;
         REACH_SD_M.hypot(COMMON_ROW_SD_PX * mean_m)
     }
 
     /// A further frame, at first where speed and cadence lead.
-    fn push(&mut self, time_s: f64, sighting: Option<&Sighting>) {
+    pub(super) fn push(&mut self, time_s: f64, sighting: Option<&Sighting>) {
         let [before, last] = [2, 1].map(|n| self.paces[self.paces.len() - n]);
         let share = (time_s - last.time_s) / (last.time_s - before.time_s);
         self.paces.push(Pace {
@@ -351,7 +351,7 @@ impl Frontal {
     }
 
     /// Gives both twins the place and phase of a frame.
-    fn lay(&mut self, k: usize, variances: [f64; 2], walk: &mut Walk) {
+    pub(super) fn lay(&mut self, k: usize, variances: [f64; 2], walk: &mut Walk) {
         for (n, twin) in walk.twins.iter_mut().enumerate() {
             let Some(step) = twin.steps.get_mut(k) else { continue };
             step.state = self.state(k, n, variances, &step.state);
@@ -370,7 +370,7 @@ impl Frontal {
     ///
     /// Smallest Σ w (f - x - F)² / sd² + Σ (change of speed)² / (sd² time) + Σ (change of cadence)² / (sd² time).
     /// Returns the variances of place and phase: of all frames, or of the last one if earlier ones are held.
-    fn solve(&mut self, from: usize) -> Option<Vec<[f64; 2]>> {
+    pub(super) fn solve(&mut self, from: usize) -> Option<Vec<[f64; 2]>> {
         let mut variances = None;
         for step in 0..STEPS {
             let count = self.paces.len() - from;
@@ -464,107 +464,10 @@ fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
     -off_m.iter().map(|off| scale_m.ln() + (off / scale_m).powi(2).ln_1p()).sum::<f64>()
 }
 
-/// What a start needs besides the frames.
-pub(super) struct Approach<'a> {
-    pub camera: &'a Camera,
-    pub height: BodyHeight,
-    pub walker: Walker,
-    pub options: &'a TrackerOptions,
-}
-
-impl Approach<'_> {
-    /// Starts a walk towards the camera or away from it; gives the frames back if the feet show none.
-    pub fn begin(&self, standing: Standing) -> Result<Active, Standing> {
-        let Self { camera, height, walker, options } = self;
-        let Some(frontal) = Frontal::begin(&standing, camera, walker, &options.cadence) else {
-            return Err(standing);
-        };
-        let beginning = frontal.beginning();
-        let Some(start) = self.report(&standing, &frontal, &beginning) else { return Err(standing) };
-        let mut active = Active {
-            person: 0,
-            started_near: false,
-            camera: (*camera).clone(),
-            height: *height,
-            depth_sd_m: frontal.depth_sd_m(),
-            start,
-            walk: Walk::new(walker.clone(), frontal.path, beginning),
-            average: walker.clone(),
-            kept: Vec::new(),
-            gait_speed_mps: beginning.speed_mps,
-            settled: true,
-            is_on_treadmill: false,
-            early: None,
-            pieces: Vec::new(),
-            frontal: None,
-        };
-        for (_, edges) in &standing.kept {
-            active.walk.follow(edges, camera, &options.walk);
-        }
-        active.kept = standing.kept;
-        active.frontal = Some(frontal);
-        active.pace_all();
-        Ok(active)
-    }
-
-    /// The similarities of the first frames, which show little; the path and phase are those of the feet.
-    fn report(&self, standing: &Standing, frontal: &Frontal, beginning: &Beginning) -> Option<StartReport> {
-        let options = self.options;
-        let frames: Vec<&FrameEdges> =
-            standing.kept.iter().map(|(_, edges)| edges).take(options.start_frames).collect();
-        let course = Course {
-            path: frontal.path,
-            along_m: frontal.paces.iter().map(|pace| pace.along_m).collect(),
-            speed_mps: beginning.speed_mps,
-            depth_sd_m: frontal.depth_sd_m(),
-        };
-        let seen = start(&frames, &course, &self.walker, self.camera, &options.cadence, &options.walk)?;
-        let (path, beginning) = (frontal.path, *beginning);
-        let direction = Direction::Forward;
-        Some(StartReport { path, beginning, direction, p_other_direction: 0.0, ..seen })
-    }
-}
-
-impl Active {
-    /// Where the feet of the last frame are, of somebody who walks towards the camera or away from it.
-    pub(super) fn pace(&mut self, time_s: f64, feet: Option<&Sighting>) {
-        let Some(frontal) = &mut self.frontal else { return };
-        frontal.push(time_s, feet);
-        let last = frontal.paces.len() - 1;
-        let Some(variances) = frontal.solve(last.saturating_sub(WINDOW)) else { return };
-        frontal.lay(last, variances[variances.len() - 1], &mut self.walk);
-    }
-
-    /// The same of all frames, each from those before and after it.
-    pub(super) fn pace_all(&mut self) {
-        let Some(frontal) = &mut self.frontal else { return };
-        let Some(variances) = frontal.solve(0) else { return };
-        for (k, of) in variances.into_iter().enumerate() {
-            frontal.lay(k, of, &mut self.walk);
-        }
-    }
-
-    /// Follows all frames again, on the line through all feet. Without a fit, the first frames of a long walk are gone, and
-    /// it stays on its path.
-    pub(super) fn straighten(&mut self, options: &WalkOptions) {
-        let Some(frontal) = &self.frontal else { return };
-        if self.kept.len() != self.steps().len() {
-            return;
-        }
-        let Some((mut renewed, variances)) = frontal.on_path_of_all() else { return };
-        let mut walk = Walk::new(self.walk.walker.clone(), renewed.path, renewed.beginning());
-        for (k, ((_, edges), of)) in self.kept.iter().zip(variances).enumerate() {
-            walk.follow(edges, &self.camera, options);
-            renewed.lay(k, of, &mut walk);
-        }
-        self.walk = walk;
-        self.frontal = Some(renewed);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::search::tests::{camera, walker};
+    use super::super::walk::FrameEdges;
     use super::*;
     use crate::image::Rectangle;
 

@@ -42,9 +42,10 @@ use super::decisions::{
     CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, FOCAL_SD, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
     STRIKE_SD_CYCLES,
 };
+use super::event::EventKind;
 use super::fit::belt::Belt;
 use super::fit::contacts::Contact;
-use super::result::{EventKind, Row, TrackedWalk};
+use super::result::{Row, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
 use crate::estimate::line::line_through;

@@ -9,7 +9,6 @@
 //! [`WalkFit::height`]: super::fit::WalkFit::height
 
 use super::locate::{Sighting, person_midpoints};
-use super::options::TrackerOptions;
 use crate::model::position::{PositionOptions, height_on_ground};
 use crate::model::{Camera, Walker};
 
@@ -91,42 +90,6 @@ impl BodyHeight {
     }
 }
 
-/// The height with which a walk starts: the given one, or the one that a known camera shows.
-pub(super) fn start_height(
-    options: &TrackerOptions,
-    height_m: Option<f64>,
-    camera: Option<&Camera>,
-    sightings: &[Sighting],
-) -> BodyHeight {
-    let population = BodyHeight::POPULATION;
-    match (height_m, camera) {
-        (Some(height_m), _) => BodyHeight::given(height_m),
-        (None, None) => population,
-        (None, Some(camera)) => {
-            let average = options.walker(POPULATION_HEIGHT_M, 1.3);
-            let seen = average.ok().and_then(|walker| from_rectangles(camera, sightings, &walker));
-            seen.map_or(population, |seen| combined(&population, &seen))
-        }
-    }
-}
-
-/// The same of somebody who comes nearer or goes away: each rectangle has its own rows.
-pub(super) fn approaching_height(
-    options: &TrackerOptions,
-    height_m: Option<f64>,
-    camera: &Camera,
-    sightings: &[Sighting],
-) -> BodyHeight {
-    let of = |sighting: &Sighting| {
-        let one = std::slice::from_ref(sighting);
-        start_height(options, height_m, Some(camera), one)
-    };
-    let is_known = |height: &BodyHeight| height.source != HeightSource::Assumed;
-    let mut all: Vec<BodyHeight> = sightings.iter().map(of).filter(is_known).collect();
-    all.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
-    all.get(all.len() / 2).copied().unwrap_or(BodyHeight::POPULATION)
-}
-
 /// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m.
 pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
     let weight = PositionOptions::default().bottom_weight;
@@ -137,7 +100,11 @@ pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
 
 /// The height of a person whose rectangles stand on the ground; `average` walks with the share of the height by which
 /// bent legs lower the crown.
-fn from_rectangles(camera: &Camera, sightings: &[Sighting], average: &Walker) -> Option<BodyHeight> {
+pub(super) fn from_rectangles(
+    camera: &Camera,
+    sightings: &[Sighting],
+    average: &Walker,
+) -> Option<BodyHeight> {
     let midpoints = person_midpoints(sightings, camera).ok()?;
     let weight = PositionOptions::default().bottom_weight;
     let crown_m = height_on_ground(camera, &midpoints, weight).ok()?;
@@ -151,7 +118,7 @@ fn from_rectangles(camera: &Camera, sightings: &[Sighting], average: &Walker) ->
 }
 
 /// Mean of two heights weighted by their variances, as measured.
-fn combined(a: &BodyHeight, b: &BodyHeight) -> BodyHeight {
+pub(super) fn combined(a: &BodyHeight, b: &BodyHeight) -> BodyHeight {
     let [of_a, of_b] = [a, b].map(|height| height.sd_m.powi(-2));
     let height_m = (of_a * a.height_m + of_b * b.height_m) / (of_a + of_b);
     BodyHeight { height_m, sd_m: (of_a + of_b).sqrt().recip(), source: HeightSource::Measured }
@@ -159,6 +126,7 @@ fn combined(a: &BodyHeight, b: &BodyHeight) -> BodyHeight {
 
 #[cfg(test)]
 mod tests {
+    use super::super::options::{TrackerOptions, start_height};
     use super::*;
     use crate::image::Rectangle;
     use glam::DVec3;

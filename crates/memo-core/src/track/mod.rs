@@ -1,12 +1,14 @@
 //! Model-based tracking: similarity of model and edges, search, starting phase, filter, tracker.
 
 mod active;
+mod approach;
 mod bend;
 mod candidate;
 mod column;
 mod crowd;
 pub mod cycles;
 mod decisions;
+pub(crate) mod event;
 pub mod evidence;
 pub mod explain;
 pub mod fit;
@@ -22,6 +24,7 @@ pub(crate) mod result;
 pub mod route;
 pub mod score;
 pub mod search;
+mod standing;
 pub mod start;
 pub mod steady;
 pub mod swap;
@@ -29,7 +32,8 @@ pub(crate) mod tracker;
 pub mod treadmill;
 pub mod walk;
 
+pub use event::EventKind;
 pub use gait_parameters::LIKELY_MISTAKEN;
 pub use options::GaitChoice;
-pub use result::{Event, EventKind, Row};
+pub use result::{Event, Row};
 pub use tracker::{LONGEST_WALK, Now, SeekReport};

@@ -2,6 +2,8 @@
 
 use super::evidence::{EvidenceOptions, EvidenceStream};
 use super::fit::FitOptions;
+use super::height::{BodyHeight, HeightSource, POPULATION_HEIGHT_M, combined, from_rectangles};
+use super::locate::Sighting;
 use super::start::CadenceRange;
 use super::steady::{Steadier, SteadyOptions};
 use super::walk::WalkOptions;
@@ -134,4 +136,40 @@ impl TrackerOptions {
         let body = Body::from_height(height_m)?;
         Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })
     }
+}
+
+/// The height with which a walk starts: the given one, or the one that a known camera shows.
+pub(super) fn start_height(
+    options: &TrackerOptions,
+    height_m: Option<f64>,
+    camera: Option<&Camera>,
+    sightings: &[Sighting],
+) -> BodyHeight {
+    let population = BodyHeight::POPULATION;
+    match (height_m, camera) {
+        (Some(height_m), _) => BodyHeight::given(height_m),
+        (None, None) => population,
+        (None, Some(camera)) => {
+            let average = options.walker(POPULATION_HEIGHT_M, 1.3);
+            let seen = average.ok().and_then(|walker| from_rectangles(camera, sightings, &walker));
+            seen.map_or(population, |seen| combined(&population, &seen))
+        }
+    }
+}
+
+/// The same of somebody who comes nearer or goes away: each rectangle has its own rows.
+pub(super) fn approaching_height(
+    options: &TrackerOptions,
+    height_m: Option<f64>,
+    camera: &Camera,
+    sightings: &[Sighting],
+) -> BodyHeight {
+    let of = |sighting: &Sighting| {
+        let one = std::slice::from_ref(sighting);
+        start_height(options, height_m, Some(camera), one)
+    };
+    let is_known = |height: &BodyHeight| height.source != HeightSource::Assumed;
+    let mut all: Vec<BodyHeight> = sightings.iter().map(of).filter(is_known).collect();
+    all.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
+    all.get(all.len() / 2).copied().unwrap_or(BodyHeight::POPULATION)
 }

@@ -5,10 +5,11 @@
 //! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
 //! the difference between the person's body and the model, and the distance.
 
+use super::decisions::ACROSS_SD_M;
 use super::decisions::COMMON_PHASE_SD;
+use super::event::EventKind;
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
-use super::frontal::ACROSS_SD_M;
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
@@ -84,26 +85,6 @@ pub struct Row {
     pub similarity: f64,
     /// Place along the path, level height and phase.
     pub hypothesis: Hypothesis,
-}
-
-/// Kind of gait event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names say it")]
-#[non_exhaustive]
-pub enum EventKind {
-    HeelStrike,
-    ToeOff,
-}
-
-impl EventKind {
-    /// The name in files: `heel_strike` (initial contact) or `toe_off`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::HeelStrike => "heel_strike",
-            Self::ToeOff => "toe_off",
-        }
-    }
 }
 
 /// A gait event; its time lies between two frames in general.

@@ -443,5 +443,13 @@ fn inside_image(start: DVec2, end: DVec2, camera: &Camera) -> Option<(f64, f64)>
     (t0 < t1).then_some((t0, t1))
 }
 
+/// The path whose outlines look the same from the camera: mirrored at the line of sight.
+pub(super) fn mirrored(path: &Path, camera: &Camera) -> Path {
+    let sight = path.origin - camera.position().truncate();
+    let view = (camera.rotation.transpose() * DVec3::Z).truncate();
+    let sight = sight.try_normalize().or(view.try_normalize()).unwrap_or(DVec2::Y);
+    Path { heading_rad: 2.0 * sight.to_angle() + std::f64::consts::PI - path.heading_rad, ..*path }
+}
+
 #[cfg(test)]
 pub(super) mod tests;

@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::LinkFrame;
-use super::motion::acceleration_mps2;
 use crate::estimate::smooth::{Measured, smooth_track};
 use crate::model::skeleton::Joint;
+use crate::posture::prior::acceleration_mps2;
 
 /// A point farther than this from the median of itself and its neighbours, in standard deviations, is an outlier.
 const OUTLIER_SIGMAS: f64 = 5.0;

@@ -16,6 +16,7 @@ use super::LinkFrame;
 use super::denoise::image_point;
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::model::skeleton::{JOINT_COUNT, Joint, PerJoint, RigidDistance, SegmentLengths, StickFigure};
+use crate::posture::prior::acceleration_mps2;
 
 /// Unknowns of a frame: three coordinates of each joint.
 const BLOCK: usize = 3 * JOINT_COUNT;
@@ -39,16 +40,6 @@ const ROBUST_SIGMAS: f64 = 4.0;
 const ACCELERATION_STEP_S: f64 = 1.0 / 30.0;
 /// Frames farther apart are not smoothed together, seconds.
 const LONGEST_STEP_S: f64 = 0.25;
-
-/// Standard deviation of a joint's acceleration over 1/30 s, m/s²: trunk, elbows and knees, wrists and ankles.
-pub(super) fn acceleration_mps2(joint: Joint) -> f64 {
-    match joint.class() {
-        Some('c') if !matches!(joint, Joint::RightWrist | Joint::LeftWrist) => 10.0,
-        Some('c' | 'd') => 20.0,
-        _ if matches!(joint, Joint::RightElbow | Joint::LeftElbow) => 10.0,
-        _ => 5.0,
-    }
-}
 
 /// The motion that starts at `start`, smoothed in space; camera axes, metres. Joints that `start` does not have
 /// stay unknown.

@@ -26,7 +26,7 @@ use super::scene::{SceneError, check_ranges, check_size};
 use crate::image::Image;
 use crate::model::skeleton::Side;
 use crate::model::{Camera, SideAngles, SideJoints};
-use crate::track::result::EventKind;
+use crate::track::event::EventKind;
 use glam::{DMat3, DVec2, DVec3};
 use person::{Clothes, Solid};
 use render::draw;

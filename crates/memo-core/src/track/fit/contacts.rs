@@ -5,7 +5,7 @@
 //! one. Both are searched near the phases at which they happen in everybody, and interpolated between frames.
 
 use crate::model::skeleton::Side;
-use crate::track::result::EventKind;
+use crate::track::event::EventKind;
 use glam::{DVec2, DVec3};
 
 /// An initial contact or toe-off.

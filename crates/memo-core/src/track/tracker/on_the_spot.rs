@@ -1,8 +1,8 @@
 //! The tracker on somebody who walks on the spot, while nobody else is followed.
 
+use super::super::approach::Approach;
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
-use super::super::frontal::Approach;
-use super::super::height::{approaching_height, start_height};
+use super::super::options::{approaching_height, start_height};
 use super::super::treadmill::Spot;
 use super::*;
 

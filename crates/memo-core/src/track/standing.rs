@@ -1,0 +1,84 @@
+//! What stays in one place: its frames, until it walks on the spot, along the line of sight, or off.
+
+use super::fit::views::Piece;
+use super::locate::Sighting;
+use super::walk::FrameEdges;
+use crate::image::Rectangle;
+use std::collections::BTreeMap;
+
+/// What stays is forgotten after this many consecutive frames without it.
+const MISSED_FRAMES: usize = 3;
+
+/// Frames in which something stays in one place.
+#[derive(Debug, Default)]
+pub(super) struct Standing {
+    pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
+    pub(super) pieces: Vec<Piece>,
+    /// By frame, the rectangles of all changes, which reach down to feet that hardly move.
+    pub(super) feet: BTreeMap<usize, Sighting>,
+}
+
+impl Standing {
+    /// The part of the image that the thing covered so far, with this rectangle; `None` if there is none.
+    pub(super) fn window(&self, rectangle: Option<&Rectangle>) -> Option<Rectangle> {
+        let before = self.sightings().iter().map(|s| s.rectangle).reduce(|a, b| a.union(&b));
+        match (before, rectangle) {
+            (Some(before), Some(rectangle)) if before.gap(rectangle) == [0, 0] => {
+                Some(before.union(rectangle))
+            }
+            (_, Some(rectangle)) => Some(*rectangle),
+            (before, None) => before,
+        }
+    }
+
+    /// These frames and the next; frames of something elsewhere, or of something that was gone, are dropped.
+    pub(super) fn with(
+        self,
+        sighting: Option<Sighting>,
+        feet: Option<Sighting>,
+        edges: FrameEdges,
+        piece: Option<Piece>,
+    ) -> Self {
+        let is_there = |k: &(Option<Sighting>, FrameEdges)| k.0.is_some();
+        let is_gone = self.kept.iter().rev().take_while(|k| !is_there(k)).count() >= MISSED_FRAMES;
+        let is_elsewhere = self.kept.last().is_some_and(|(_, last)| last.window.gap(&edges.window) != [0, 0]);
+        let mut standing = if is_gone || is_elsewhere { Self::default() } else { self };
+        standing.feet.extend(feet.map(|feet| (edges.frame, feet)));
+        standing.kept.push((sighting, edges));
+        standing.pieces.extend(piece);
+        standing
+    }
+
+    /// Time from the first frame to the last, seconds.
+    pub(super) fn lasts_s(&self) -> f64 {
+        let ends = self.kept.first().zip(self.kept.last());
+        ends.map_or(0.0, |((_, first), (_, last))| last.time_s - first.time_s)
+    }
+
+    /// Without the first frames.
+    pub(super) fn later(mut self, count: usize) -> Self {
+        self.kept.drain(..count.min(self.kept.len()));
+        self.pieces.drain(..count.min(self.pieces.len()));
+        let first = self.kept.first().map_or(usize::MAX, |(_, edges)| edges.frame);
+        self.feet.retain(|frame, _| *frame >= first);
+        self
+    }
+
+    /// The frames of a walk, and those before and in between that the walk does not have.
+    pub(super) fn followed_by(mut self, kept: &[(Option<Sighting>, FrameEdges)], pieces: &[Piece]) -> Self {
+        let last = kept.last().map_or(usize::MAX, |(_, edges)| edges.frame);
+        let is_new = |frame: usize| frame < last && kept.iter().all(|(_, edges)| edges.frame != frame);
+        self.kept.retain(|(_, edges)| is_new(edges.frame));
+        self.pieces.retain(|piece| is_new(piece.frame));
+        self.kept.extend_from_slice(kept);
+        self.pieces.extend_from_slice(pieces);
+        self.kept.sort_by_key(|(_, edges)| edges.frame);
+        self.pieces.sort_by_key(|piece| piece.frame);
+        self
+    }
+
+    /// The rectangles.
+    pub(super) fn sightings(&self) -> Vec<Sighting> {
+        self.kept.iter().filter_map(|(sighting, _)| *sighting).collect()
+    }
+}
