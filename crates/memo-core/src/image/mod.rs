@@ -33,5 +33,5 @@ pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions}
 pub use runs::Run;
 pub use shrink::shrunk;
 pub use silhouette::{SILHOUETTE_THRESHOLD, SilhouetteError, silhouettes};
-// The crate exports these.
+// Public at the top of the crate alone.
 pub(crate) use frame::{Frame, Image, Mask};

@@ -33,7 +33,7 @@ pub use surface::{NO_PART, SurfaceError, SurfaceMap, surface_map};
 pub use visibility::{
     Others, PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours,
 };
-// The crate exports these.
+// Public at the top of the crate alone.
 pub(crate) use body::{Body, Walker};
 pub(crate) use camera::Camera;
 pub(crate) use gait::Gait;

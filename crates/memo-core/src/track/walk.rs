@@ -144,6 +144,8 @@ pub struct Twin {
     pub similarity_sum: f64,
     /// Sum of the visible shares of the same frames.
     pub visible_sum: f64,
+    /// Number of the same frames.
+    pub frame_count: usize,
 }
 
 /// State at the beginning of a walk.
@@ -195,7 +197,7 @@ pub struct Walk {
 impl Walk {
     /// A walk at its beginning, with no frame followed.
     pub fn new(walker: Walker, route: impl Into<Route>, beginning: Beginning) -> Self {
-        let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0 };
+        let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0, frame_count: 0 };
         Self { walker, route: route.into(), beginning, twins: [twin.clone(), twin], first_time_s: None }
     }
 
@@ -212,6 +214,7 @@ impl Walk {
         for (twin, step) in self.twins.iter_mut().zip([first, second]) {
             twin.similarity_sum += f64::from(step.similarity * step.visible);
             twin.visible_sum += f64::from(step.visible);
+            twin.frame_count += 1;
             twin.steps.push(step);
         }
         self.first_time_s.get_or_insert(edges.time_s);
@@ -249,9 +252,8 @@ impl Walk {
 
     /// Mean share of the person that nobody else hid, 0 to 1.
     pub fn visible_share(&self) -> f64 {
-        let steps = &self.twins[self.best()].steps;
-        let sum: f64 = steps.iter().map(|step| f64::from(step.visible)).sum();
-        if steps.is_empty() { 1.0 } else { sum / steps.len() as f64 }
+        let twin = &self.twins[self.best()];
+        if twin.frame_count == 0 { 1.0 } else { twin.visible_sum / twin.frame_count as f64 }
     }
 
     /// Probability that the worse twin is the true one. Of a person who was hidden in part, fewer glimpses count.
@@ -283,6 +285,7 @@ impl Walk {
             for step in twin.steps.split_off(end.min(twin.steps.len())) {
                 twin.similarity_sum -= f64::from(step.similarity * step.visible);
                 twin.visible_sum -= f64::from(step.visible);
+                twin.frame_count -= 1;
             }
         }
     }
@@ -511,6 +514,10 @@ mod tests {
         assert_eq!((walk.best(), walk.last().unwrap().frame), (1, 17));
         // Two seconds are 10 glimpses of 0.2 s: log odds 2 mu m / (person² + glimpse² / 10), m = 1 / 5.
         let log_odds = 2.0 * 0.13 * 0.2 / (0.05f64.powi(2) + 0.16f64.powi(2) / 10.0);
+        assert!((walk.swap_probability(&model) - 1.0 / (1.0 + log_odds.exp())).abs() < 1e-12);
+        // Of a person half of whom is hidden, these are 5 glimpses.
+        (walk.twins[1].visible_sum, walk.twins[1].frame_count) = (1.0, 2);
+        let log_odds = 2.0 * 0.13 * 0.2 / (0.05f64.powi(2) + 0.16f64.powi(2) / 5.0);
         assert!((walk.swap_probability(&model) - 1.0 / (1.0 + log_odds.exp())).abs() < 1e-12);
     }
 
