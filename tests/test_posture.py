@@ -447,7 +447,7 @@ def test_mistakes_are_told_in_one_line(scene, tmp_path, monkeypatch, memo_postur
 def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
     folder, _ = scene
     walk, camera = folder / "walk.csv", folder / "camera.toml"
-    assert memo_posture(walk)[0] == 2
+    assert memo_posture("--camera", camera)[0] == 2
     assert memo_posture(walk, "--camera", camera, "--rules", "flying")[0] == 2
     assert memo_posture(walk, "--camera", camera, "--anchor", "moon")[0] == 2
 

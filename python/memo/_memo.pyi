@@ -915,6 +915,7 @@ class SecondMotion:
 @final
 class PostureSequence:
     def __new__(cls, *fields: object) -> Self: ...
+    camera: Final[Camera]
     lengths_m: Final[dict[str, float]]
     length_sd_m: Final[dict[str, float]]
     length_basis: Final[dict[str, str]]
@@ -937,6 +938,7 @@ class PostureSequence:
     linked_m: Final[npt.NDArray[np.float64]]
     linked_breaks: Final[list[list[str]]]
     smoothed_m: Final[npt.NDArray[np.float64]]
+    angles_deg: Final[dict[str, npt.NDArray[np.float64]]]
     sd_m: Final[npt.NDArray[np.float64]]
     gap_m: Final[npt.NDArray[np.float64]]
     margin_nats: Final[npt.NDArray[np.float64]]
@@ -949,8 +951,10 @@ def posture(
     times_s: npt.NDArray[np.float64],
     points: npt.NDArray[np.float64],
     weights: npt.NDArray[np.float64],
-    camera: Camera,
+    camera: Camera | None = None,
     *,
+    size: tuple[int, int] | None = None,
+    fov_deg: float | None = None,
     lengths: dict[str, float] | None = None,
     height_m: float | None = None,
     noise_px: float | None = None,

@@ -24,6 +24,7 @@ __all__ = [
     "checked_fov",
     "checked_height",
     "frame_range",
+    "given_camera",
     "heights",
     "is_url",
     "load_camera",
@@ -129,20 +130,24 @@ def tracker_options(
         options["height_m"] = [checked_height(one) for one in height_m]
     elif height_m is not None:
         options["height_m"] = checked_height(height_m)
+    options |= given_camera(camera, reading, fov_deg)
+    if not steady:
+        options["steady"] = False
+    if treadmill is not None:
+        options["treadmill"] = treadmill
+    return options
+
+
+def given_camera(camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None) -> dict[str, Any]:
+    """The calibrated camera, or the field of view of an assumed one, if given; `reading` as above."""
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
     for name, value in reading.items():
         if camera is None and value is not None:
             raise InputError(f"--camera-{name.replace('_', '-')} needs --camera")
     if camera is not None:
-        options["camera"] = load_camera(camera, **reading)
-    if fov_deg is not None:
-        options["fov_deg"] = checked_fov(fov_deg)
-    if not steady:
-        options["steady"] = False
-    if treadmill is not None:
-        options["treadmill"] = treadmill
-    return options
+        return {"camera": load_camera(camera, **reading)}
+    return {} if fov_deg is None else {"fov_deg": checked_fov(fov_deg)}
 
 
 def frame_range(text: str) -> tuple[int, int | None]:

@@ -3,7 +3,8 @@
 The postures are computed by the core (Lee and Chen 1985, with additions for a detector's points). This module
 passes the keypoints on as 14 joints, names the results, and writes them.
 
-Limit: sizes need a scale. Without lengths, height, ground or distance there is none.
+Limits: sizes need a scale; without lengths, height, ground or distance, the height of an average adult is
+assumed. Without a camera, a level one is assumed: if it was tilted, the postures are tilted.
 """
 
 from __future__ import annotations
@@ -112,6 +113,9 @@ class Postures(Shown):
     joints: tuple[str, ...]
     """Names of the 14 joints, in the order of the levels of the tree and of every axis of 14."""
     camera: _memo.Camera
+    """The camera, given or assumed."""
+    camera_assumed: bool
+    """Whether the camera was assumed. It is then at the origin of the world, and level."""
     points_px: Array
     """(T, 14, 2) image points: pixels, u right, v down; NaN if not visible."""
     weights: Array
@@ -162,6 +166,11 @@ class Postures(Shown):
     """(T,) names of the constraints that the posture in the motion breaks."""
     smoothed_m: Array
     """(T, 14, 3) metres: the same, smoothed in space: close to the image points, with constant lengths."""
+    angles_deg: dict[str, Array]
+    """(T,) each: angles of the smoothed motion in degrees, NaN where unknown. `right_hip` is the flexion of
+    the thigh against the trunk, `right_knee` of the shank against the thigh, `right_shoulder` of the upper
+    arm against the trunk, `right_elbow` of the forearm against the upper arm; `right_hip_adduction` and
+    `right_shoulder_adduction` are towards the body. Signs are those of OpenSim's models."""
     sd_m: Array
     """(T, 14) standard deviation of each joint of the smoothed motion, metres."""
     gap_m: Array
@@ -271,6 +280,7 @@ class Postures(Shown):
             "possible": self.is_possible,
             "survivors_median": float(np.median(left)) if len(left) else 0.0,
             "scale_from": self.scale_from,
+            "camera_assumed": self.camera_assumed,
             "heading_source": self.heading_source,
             "undecided_frames": int(self.undecided.sum()),
             "most_cut": None if most is None else most._asdict(),
@@ -292,10 +302,11 @@ class Postures(Shown):
 
 def posture(
     keypoints: Keypoints | str | PathLike[str],
-    camera: _memo.Camera,
+    camera: _memo.Camera | None = None,
     lengths: Mapping[str, float] | str | PathLike[str] | None = None,
     height_m: float | None = None,
     *,
+    fov_deg: float | None = None,
     rules: str | None = None,
     strength: str | None = None,
     anchor: str | None = None,
@@ -317,6 +328,9 @@ def posture(
     in each frame; it may break limits at a cost, so it need not use the postures left (`linked_breaks`).
 
     `keypoints`: the result of `read_keypoints`, or a file or folder for it, with `fps`, `layout`, `person`.
+    `camera`: calibrated; without one, a level camera with the horizontal field of view `fov_deg` is assumed,
+    and the keypoints must give the size of the picture (`read_keypoints(image_size=)`). The ground is then
+    unknown, and distances are at least 18 % uncertain; figures relative to their necks depend little on it.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
     to sole, refined by the frames; with neither they are estimated, with the ground as scale.
     `rules`: "physical", "walking" or "walking-general" (holds for any way of
@@ -331,8 +345,8 @@ def posture(
     more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
     `progress` is called at intervals with the work done and the total.
 
-    Defaults: `rules` "walking", `strength` "measured", `anchor` "auto", `distance_sd_m` 0.05, `noise_px` 2,
-    `group_m` 0.1, `max_groups` 64.
+    Defaults: `fov_deg` 62, `rules` "walking", `strength` "measured", `anchor` "auto", `distance_sd_m` 0.05,
+    `noise_px` 2, `group_m` 0.1, `max_groups` 64.
 
     Raises ValueError or TypeError, with one line, for unusable input.
     """
@@ -363,7 +377,7 @@ def posture(
         raise ValueError("fps, layout and person apply to keypoints read from a file only")
     _check_joints_there(keypoints)
     keypoints.check_pixels()
-    _check_camera_fits(keypoints, camera)
+    size = _size_of(keypoints, camera, fov_deg)
     repair = sides.unswap(keypoints) if unswap else None
     used = keypoints if repair is None else repair.keypoints
     points_px, weights = _stick_points(used)
@@ -372,6 +386,8 @@ def posture(
         points_px,
         weights,
         camera,
+        size=size,
+        fov_deg=fov_deg,
         lengths=lengths,
         height_m=height_m,
         noise_px=noise_px,
@@ -387,7 +403,7 @@ def posture(
         max_groups=max_groups,
         progress=progress,
     )
-    postures = _named(found, used, camera, points_px, weights, repair)
+    postures = _named(found, used, camera is None, points_px, weights, repair)
     for warning in postures.warnings:
         _log.warning("%s", warning)
     return postures
@@ -474,9 +490,22 @@ def _check_joints_there(keypoints: Keypoints) -> None:
         )
 
 
-def _check_camera_fits(keypoints: Keypoints, camera: _memo.Camera) -> None:
+def _size_of(
+    keypoints: Keypoints, camera: _memo.Camera | None, fov_deg: float | None
+) -> tuple[int, int] | None:
+    """Without a camera, the size of the picture for the assumed one; a camera must be for that size."""
+    if camera is None:
+        if keypoints.image_size is None:
+            raise ValueError(
+                "without a camera, the size of the picture is needed: give image_size to read_keypoints"
+            )
+        if fov_deg is not None and not 5 <= float(_checked_numbers("fov_deg", fov_deg, dimensions=0)) <= 170:
+            raise ValueError(f"fov_deg must be a field of view of 5 to 170 degrees, got {fov_deg:g}")
+        return keypoints.image_size
+    if fov_deg is not None:
+        raise ValueError("the camera already has a field of view: leave fov_deg out")
     if keypoints.image_size is None or keypoints.image_size == tuple(camera.size):
-        return
+        return None
     (width, height), (own_width, own_height) = camera.size, keypoints.image_size
     raise ValueError(
         f"the camera is for {width}x{height} pixels, the keypoints are for {own_width}x{own_height}"
@@ -513,7 +542,7 @@ def _points_seen(part: Callable[..., tuple[Array, Array]], keypoints: Keypoints,
 def _named(
     found: _memo.PostureSequence,
     keypoints: Keypoints,
-    camera: _memo.Camera,
+    camera_assumed: bool,
     points_px: Array,
     weights: Array,
     repair: sides.SideRepair | None,
@@ -523,7 +552,8 @@ def _named(
         frames=keypoints.frames,
         times_s=keypoints.times_s,
         joints=tuple(_memo.joint_names()),
-        camera=camera,
+        camera=found.camera,
+        camera_assumed=camera_assumed,
         points_px=points_px,
         weights=weights,
         lengths_m=found.lengths_m,
@@ -548,6 +578,7 @@ def _named(
         linked_m=found.linked_m,
         linked_breaks=tuple(map(tuple, found.linked_breaks)),
         smoothed_m=found.smoothed_m,
+        angles_deg=found.angles_deg,
         sd_m=found.sd_m,
         gap_m=found.gap_m,
         margin_nats=found.margin_nats,
@@ -685,7 +716,7 @@ def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
         columns |= {f"{joint}_{axis}_m": postures.smoothed_m[:, k, i] for i, axis in enumerate("xyz")}
         columns[f"{joint}_sd_m"] = postures.sd_m[:, k]
         columns[f"{joint}_p_mirrored"] = postures.p_mirrored[:, k]
-    return columns
+    return columns | {f"{name}_deg": values for name, values in postures.angles_deg.items()}
 
 
 def _camera_columns(postures: Postures) -> dict[str, npt.ArrayLike]:

@@ -10,7 +10,8 @@ use crate::error::value_error;
 use crate::result::result;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
-use memo_core::model::JOINT_COUNT;
+use memo_core::model::angles::JointAngles;
+use memo_core::model::{ASSUMED_FOCAL_SD, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, JOINT_COUNT};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::link::Alternative;
@@ -20,7 +21,9 @@ use memo_core::posture::{
     postures_with_progress, reason_totals,
 };
 use memo_core::wording::counted;
-use memo_core::{Joint, KeypointSequence, PerJoint, Progress, SegmentLengths, SequenceOptions};
+use memo_core::{
+    Camera, Joint, KeypointSequence, PerJoint, Progress, SegmentLengths, SequenceOptions, Side, StickFigure,
+};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -29,7 +32,8 @@ use std::collections::HashMap;
 
 result! {
     /// What `memo.Postures` is made of; its fields have the same names.
-    PostureSequence |py, found: memo_core::PostureSequence| {
+    PostureSequence |py, found: memo_core::PostureSequence, camera: PyCamera| {
+        camera: PyCamera = camera,
         lengths_m: Py<PyDict> = found.lengths.lengths.named().into_py_dict(py)?,
         length_sd_m: Py<PyDict> = names(&found).zip(&found.lengths.sd_m).into_py_dict(py)?,
         length_basis: Py<PyDict> =
@@ -63,6 +67,7 @@ result! {
         linked_breaks: Vec<Vec<String>> =
             found.linked_breaks.iter().map(|c| texts(c.iter().map(|c| c.name()))).collect::<Vec<_>>(),
         smoothed_m: Py<PyArray3<f64>> = numpy_from_figures(py, &found.linked.smoothed)?,
+        angles_deg: Py<PyDict> = angles(py, &found.linked.smoothed)?,
         sd_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.sd_m.iter().map(|row| row.0).collect())?,
         gap_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.linked.gap_m.iter().map(|row| row.0).collect())?,
         margin_nats: Py<PyArray1<f64>> = numpy_from_column(py, found.linked.margin.clone()),
@@ -111,6 +116,27 @@ fn names(found: &memo_core::PostureSequence) -> impl Iterator<Item = String> {
     found.lengths.lengths.named().map(|(name, _)| name)
 }
 
+/// The angle of each name, such as `right_knee`, in all frames, degrees.
+fn angles<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, PyDict>> {
+    let named = PyDict::new(py);
+    for side in Side::BOTH {
+        let frames: Vec<JointAngles> = figures.iter().map(|figure| JointAngles::of(figure, side)).collect();
+        let of_joint: [(&str, fn(&JointAngles) -> f64); 6] = [
+            ("hip", |angles| angles.hip_flexion_rad),
+            ("hip_adduction", |angles| angles.hip_adduction_rad),
+            ("knee", |angles| angles.knee_flexion_rad),
+            ("shoulder", |angles| angles.shoulder_flexion_rad),
+            ("shoulder_adduction", |angles| angles.shoulder_adduction_rad),
+            ("elbow", |angles| angles.elbow_flexion_rad),
+        ];
+        for (joint, angle) in of_joint {
+            let column = frames.iter().map(|angles| angle(angles).to_degrees()).collect();
+            named.set_item(format!("{}_{joint}", side.name()), numpy_from_column(py, column))?;
+        }
+    }
+    Ok(named)
+}
+
 fn texts(items: impl IntoIterator<Item: ToString>) -> Vec<String> {
     items.into_iter().map(|item| item.to_string()).collect()
 }
@@ -142,10 +168,10 @@ pub enum Distances {
 
 /// Postures of one person: times (T,) s, points (T, 14, 2) px of the stick figure's joints with NaN if missing,
 /// weights (T, 14). Results in world axes, metres, Z up. `progress` is called with the work done and the work in
-/// all.
+/// all. Without a camera, one of the field of view `fov_deg` is assumed for pictures of `size`.
 #[pyfunction]
 #[pyo3(signature = (
-    times_s, points, weights, camera, *, lengths=None, height_m=None, noise_px=None, rules=None,
+    times_s, points, weights, camera=None, *, size=None, fov_deg=None, lengths=None, height_m=None, noise_px=None, rules=None,
     strength=None, anchor=None, distance_m=None, distance_sd_m=None, moving_direction=None,
     head_points=None, foot_points=None, group_m=None, max_groups=None, progress=None
 ))]
@@ -155,7 +181,9 @@ pub fn posture(
     times_s: &Bound<'_, PyAny>,
     points: &Bound<'_, PyAny>,
     weights: &Bound<'_, PyAny>,
-    camera: &PyCamera,
+    camera: Option<&PyCamera>,
+    size: Option<(u32, u32)>,
+    fov_deg: Option<f64>,
     lengths: Option<HashMap<String, f64>>,
     height_m: Option<f64>,
     noise_px: Option<f64>,
@@ -189,12 +217,24 @@ pub fn posture(
         motion: motion_of(rules)?,
         strength: strength_of(strength)?,
         anchor: anchor_choice(anchor, distance_m, distance_sd_m)?,
+        focal_sd: if camera.is_some() { 0.0 } else { ASSUMED_FOCAL_SD },
         moving_direction: moving_direction.map(DVec3::from),
         group_m: group_m.unwrap_or(usual.group_m),
         max_groups: max_groups.unwrap_or(usual.max_groups),
         ..usual
     };
-    let camera = camera.0.clone();
+    let camera = match (camera, size) {
+        (Some(camera), None) if fov_deg.is_none() => camera.0.clone(),
+        (None, Some(size)) => {
+            let fov_rad = fov_deg.map_or(DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, f64::to_radians);
+            Camera::assumed(size.into(), fov_rad).map_err(value_error)?
+        }
+        _ => {
+            let wanted = "wanted a camera, or the size of the pictures with or without their field of view";
+            return Err(PyValueError::new_err(wanted));
+        }
+    };
+    let used = PyCamera(camera.clone());
     let interpret = move |progress: &Progress| {
         let sequence = KeypointSequence {
             times_s: &times_s,
@@ -206,7 +246,7 @@ pub fn posture(
         postures_with_progress(&sequence, &camera, &options, progress)
     };
     let found = watched(py, progress, interpret)?.map_err(value_error)?;
-    PostureSequence::of(py, found)
+    PostureSequence::of(py, found, used)
 }
 
 /// All postures that one view allows. `rays` (14, 3) are unit vectors in camera axes with NaN for joints that are
@@ -251,6 +291,7 @@ pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         anchor: usual.anchor.name(),
         distance_sd_m: DEFAULT_DISTANCE_SD_M,
         noise_px: usual.noise_px,
+        fov_deg: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD.to_degrees(),
         group_m: usual.group_m,
         max_groups: usual.max_groups,
     })

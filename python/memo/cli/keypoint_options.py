@@ -25,7 +25,8 @@ LayoutName = Annotated[
 ImageSize = Annotated[
     str | None,
     typer.Option(
-        help="Width and height of the picture, pixels: for coordinates that are fractions of it.",
+        help="Width and height of the picture, pixels: for coordinates that are fractions of it, and for "
+        "`memo posture` without --camera.",
         metavar="WxH",
     ),
 ]

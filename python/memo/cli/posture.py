@@ -14,7 +14,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import exchanges, one_of_several
 from memo.exits import Exit
-from memo.given import InputError, check_apart, check_writable, checked_height, load_camera
+from memo.given import InputError, check_apart, check_writable, checked_height, given_camera
 from memo.postures import WRITTEN, write_postures
 from memo.wording import counted
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 EPILOG = """Examples:
   memo posture walk_json --camera camera.toml --fps 30 --height 1.75
   memo posture joints.csv --camera camera.toml --lengths lengths.csv --rules physical
+  memo posture walk_json --image-size 1920x1080 --fps 30 --height 1.75
 
 Exit codes: 0 postures were written; 1 the input cannot be used; 2 wrong usage; \
 3 no posture is left in any frame (the tables give the reasons); 4 the app extra is not installed; \
@@ -90,11 +91,20 @@ def add_posture(app: "typer.Typer") -> None:
     @app.command(epilog=EPILOG)
     def posture(
         keypoints: KeypointsPath,
-        camera: Annotated[Path, typer.Option(help=CAMERA_HELP)],
+        camera: Annotated[
+            Path | None,
+            typer.Option(
+                help=f"{CAMERA_HELP} Without it, a level camera is assumed "
+                "for pictures of --image-size; see --fov-deg."
+            ),
+        ] = None,
         camera_name: CameraName = None,
         camera_unit: CameraUnit = None,
         camera_size: CameraSize = None,
         camera_v_up: CameraVUp = None,
+        fov_deg: Annotated[
+            float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
+        ] = None,
         lengths: Annotated[
             Path | None, typer.Option(help="The 17 segment lengths, metres: CSV, JSON or a postures.json.")
         ] = None,
@@ -142,8 +152,9 @@ def add_posture(app: "typer.Typer") -> None:
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
             check_apart([keypoints, camera, lengths], [delivery.out / name for name in (*WRITTEN, _DRAWN)])
-            calibrated = load_camera(camera, camera_name, camera_unit, camera_size, camera_v_up)
-            return _posture(keypoints, reading, calibrated, scale | options, frame, delivery)
+            view = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
+            seen_by = given_camera(camera, view, fov_deg)
+            return _posture(keypoints, reading, seen_by | scale | options, frame, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -151,7 +162,6 @@ def add_posture(app: "typer.Typer") -> None:
 def _posture(
     path: Path,
     reading: dict[str, Any],
-    camera: Any,
     options: dict[str, Any],
     frame: int | None,
     delivery: Delivery,
@@ -163,7 +173,9 @@ def _posture(
     with with_count("finding postures", delivery) as progress:
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)
-        postures = memo.posture(keypoints, camera, **options, progress=progress)
+        if "camera" not in options and keypoints.image_size is None:
+            raise InputError("--camera is needed, or the size of the picture to assume one: --image-size")
+        postures = memo.posture(keypoints, **options, progress=progress)
         (delivery.out / _DRAWN).unlink(
             missing_ok=True
         )  # from an earlier run: it does not match the new tables
@@ -276,6 +288,8 @@ def _scale_line(postures: memo.Postures) -> str:
         usual = max(dict.fromkeys(sources), key=sources.count)
         distance_m, sd_m = np.median(postures.anchor_m[known]), np.median(postures.anchor_sd_m[known])
         line += f"; the neck is {distance_m:.2f} ± {sd_m:.2f} m away, {_SOURCES.get(usual, usual)}"
+    if postures.camera_assumed:
+        line += "; no --camera, so a level one is assumed: if it was tilted, so are the postures"
     return f"{line}."
 
 

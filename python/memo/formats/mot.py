@@ -13,10 +13,10 @@ to the right, and
     R = R_z(pelvis_tilt) R_x(pelvis_list) R_y(pelvis_rotation).
 
 Its Z is the line from the left hip to the right one, and it is tilted such that the thigh, at its
-`hip_flexion`, points to the knee: for `memo track` it is the trunk, which is upright. `pelvis_tx`,
-`pelvis_ty`, `pelvis_tz` are its origin, midway between the anterior superior iliac spines, as far from the
-hips as in the unscaled model of Rajagopal 2016. Instants with a missing value are left out, since OpenSim
-stops reading there.
+`hip_flexion`, points to the knee. So it is the trunk for `memo track`, whose trunk is upright, and for
+`memo posture`, whose hip angles are against the trunk. `pelvis_tx`, `pelvis_ty`, `pelvis_tz` are its origin,
+midway between the anterior superior iliac spines, as far from the hips as in the unscaled model of Rajagopal
+2016. Instants with a missing value are left out, since OpenSim stops reading there.
 
 In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
 left out, as are columns of a states file that are not the value of a coordinate;
@@ -46,13 +46,15 @@ OPENSIM = {
     for side in ("right", "left")
     for part, name in (
         ("hip", "hip_flexion"),
+        ("hip_adduction", "hip_adduction"),
         ("knee", "knee_angle"),
         ("ankle", "ankle_angle"),
         ("shoulder", "arm_flex"),
+        ("shoulder_adduction", "arm_add"),
         ("elbow", "elbow_flex"),
     )
 }
-"""OpenSim's coordinate for each flexion of `track.csv`."""
+"""OpenSim's coordinate for each angle of `track.csv` and `postures.csv`."""
 
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
 _HIPS_M = np.array([-0.056276, -0.07849, 0.0])

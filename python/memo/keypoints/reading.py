@@ -41,8 +41,9 @@ def read_keypoints(
     needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the file does
     not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether the
     points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels, is
-    needed if coordinates are fractions of the picture (MediaPipe, labels of YOLO). For a run of `memo track`
-    (a folder with `track.csv` or `track.parquet`) the projected joints are read.
+    needed if coordinates are fractions of the picture (MediaPipe, labels of YOLO), and for postures without a
+    camera. For a run of `memo track` (a folder with `track.csv` or `track.parquet`) the projected joints are
+    read.
     """
     path = Path(path)
     if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
@@ -59,8 +60,21 @@ def read_keypoints(
     except OSError as error:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
     keypoints = _assembled(found, person, fps, layout)
+    if image_size is not None:
+        keypoints = replace(keypoints, image_size=_own_size(keypoints, image_size))
     shrink = shrink_of_table(found.source.path) if found.source.path.name in _OF_A_TRACK else 1
     return keypoints if shrink == 1 else replace(keypoints, points=of_video(keypoints.points, shrink))
+
+
+def _own_size(keypoints: Keypoints, image_size: tuple[int, int]) -> tuple[int, int]:
+    """The size of the picture, which must be the file's, if the file gives it."""
+    width, height = keypoints.image_size or image_size
+    if (width, height) != tuple(image_size):
+        given = f"{image_size[0]}x{image_size[1]}"
+        raise KeypointsError(
+            f"{keypoints.source.path}: is for {width}x{height} pixels, not {given} (image_size)"
+        )
+    return width, height
 
 
 def _is_size(size: Any) -> bool:

@@ -104,6 +104,65 @@ impl PartAngles {
     }
 }
 
+/// Angles at the joints of one side in the sense of gait analysis, radians; NaN where a joint they need is unknown.
+///
+/// Thigh and upper arm: R_z(flexion) R_x(adduction) as in OpenSim's models, z along the line of the hips or of
+/// the shoulders and y along the trunk, made perpendicular to z. So flexion is that of the projection
+/// onto the plane across the line of the joints, and adduction is how far the limb is turned out of this plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointAngles {
+    /// Thigh against the trunk, to the front positive.
+    pub hip_flexion_rad: f64,
+    /// Thigh towards the other leg, positive.
+    pub hip_adduction_rad: f64,
+    /// Shank against the thigh, to the back positive; positive too where a hip is unknown.
+    pub knee_flexion_rad: f64,
+    /// Upper arm against the trunk, to the front positive.
+    pub shoulder_flexion_rad: f64,
+    /// Upper arm towards the trunk, positive.
+    pub shoulder_adduction_rad: f64,
+    /// Forearm against the upper arm, 0 to π.
+    pub elbow_flexion_rad: f64,
+}
+
+impl JointAngles {
+    /// No knee bends farther to the front. A larger angle in that sense is that of a leg turned about its length.
+    const MOST_BACKWARDS_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
+
+    /// The angles of a side.
+    pub fn of(figure: &StickFigure, side: Side) -> Self {
+        let down = figure[Joint::Pelvis] - figure[Joint::Neck];
+        let hips = across(down, figure[Joint::LeftHip] - figure[Joint::RightHip]);
+        let shoulders = across(down, figure[Joint::LeftShoulder] - figure[Joint::RightShoulder]);
+        let [thigh, shank] = [side.knee(), side.ankle()].map(|joint| figure.segment(joint).normalize());
+        let [upper_arm, forearm] =
+            [side.elbow(), side.wrist()].map(|joint| figure.segment(joint).normalize());
+        let bend_rad = thigh.angle_between(shank);
+        let backwards = hips.z_axis.dot(shank.cross(thigh)) > 0.0 && bend_rad < Self::MOST_BACKWARDS_RAD;
+        Self {
+            hip_flexion_rad: swing_rad(&hips, thigh),
+            hip_adduction_rad: turned_inwards_rad(&hips, thigh, side),
+            knee_flexion_rad: if backwards { -bend_rad } else { bend_rad },
+            shoulder_flexion_rad: swing_rad(&shoulders, upper_arm),
+            shoulder_adduction_rad: turned_inwards_rad(&shoulders, upper_arm, side),
+            elbow_flexion_rad: upper_arm.angle_between(forearm),
+        }
+    }
+}
+
+/// Axes in the sense of [`trunk_axes`], but with z exactly from right to left; NaN if unknown.
+fn across(down: DVec3, left: DVec3) -> DMat3 {
+    let z = left.normalize();
+    let x = down.cross(z).normalize();
+    DMat3::from_cols(x, z.cross(x), z)
+}
+
+/// Angle of a limb of direction `u` out of the plane across `axes.z_axis`, radians, towards the other side positive.
+fn turned_inwards_rad(axes: &DMat3, u: DVec3, side: Side) -> f64 {
+    let inward = if side == Side::Left { -axes.z_axis } else { axes.z_axis };
+    inward.dot(u).clamp(-1.0, 1.0).asin()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,5 +235,46 @@ mod tests {
         assert!((PartAngles::of_head(&torso, &nodding).flexion_rad - 0.25).abs() < 1e-12);
         let tilted = DMat3::from_axis_angle(DVec3::X, -0.25) * torso;
         assert!((PartAngles::of_head(&torso, &tilted).bending_rad - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn joint_angles_are_those_a_figure_was_turned_by() {
+        // OpenSim's axes: X forward, Y up, Z to the right. The limbs hang along -Y and are turned by R_z R_x.
+        let from_opensim = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y);
+        let turn = |flexion: f64, adduction: f64| {
+            DMat3::from_rotation_z(flexion) * DMat3::from_rotation_x(adduction)
+        };
+        for tilt in [0.0, 0.4] {
+            for (flexion, adduction, bend) in
+                [(0.5, 0.1, 0.9), (-0.2, -0.15, 0.02), (1.4, 0.6, 2.0), (0.1, 0.0, -0.1)]
+            {
+                for side in Side::BOTH {
+                    let mut figure = upright();
+                    let about_x = if side == Side::Right { adduction } else { -adduction };
+                    let mut hang = |start: Joint, end: Joint, tip: Joint, sense: f64| {
+                        let upper = turn(flexion, about_x);
+                        let lower = upper * DMat3::from_rotation_z(sense * bend);
+                        figure[end] = figure[start] + 0.4 * (from_opensim * upper * -DVec3::Y);
+                        figure[tip] = figure[end] + 0.35 * (from_opensim * lower * -DVec3::Y);
+                    };
+                    hang(side.hip(), side.knee(), side.ankle(), -1.0);
+                    hang(side.shoulder(), side.elbow(), side.wrist(), 1.0);
+                    // Angles are those of the body, however it leans and is turned.
+                    let pose = DMat3::from_rotation_z(2.0 * tilt) * DMat3::from_rotation_y(tilt);
+                    figure.0.iter_mut().for_each(|joint| *joint = pose * *joint);
+
+                    let angles = JointAngles::of(&figure, side);
+                    let close =
+                        |got: f64, wanted: f64| assert!((got - wanted).abs() < 1e-7, "{angles:?} {wanted}");
+                    close(angles.hip_flexion_rad, flexion);
+                    close(angles.hip_adduction_rad, adduction);
+                    close(angles.knee_flexion_rad, bend);
+                    close(angles.shoulder_flexion_rad, flexion);
+                    close(angles.shoulder_adduction_rad, adduction);
+                    close(angles.elbow_flexion_rad, bend.abs());
+                    assert!(JointAngles::of(&figure, side.other()).knee_flexion_rad.is_nan());
+                }
+            }
+        }
     }
 }

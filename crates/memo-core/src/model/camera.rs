@@ -21,6 +21,10 @@ use super::distortion::Distortion;
 /// landscape video. In portrait orientation the same camera covers about 37 degrees.
 pub const DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD: f64 = 62.0 * PI / 180.0;
 
+/// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely, when
+/// one in the middle is assumed.
+pub const ASSUMED_FOCAL_SD: f64 = 0.18;
+
 /// A camera farther from the origin of the world than this, metres, was probably calibrated in millimetres.
 pub const MAX_DISTANCE_M: f64 = 200.0;
 
@@ -217,6 +221,18 @@ impl Camera {
             translation: DVec3::new(0.0, camera_height_m, distance_m),
         };
         camera.validated()
+    }
+
+    /// A level camera at the origin of the world, for pictures without calibration: X right in the image, Y away from
+    /// the camera, Z up. The ground is unknown, and with it what the camera's height would tell. The focal length has
+    /// the relative standard deviation [`ASSUMED_FOCAL_SD`].
+    ///
+    /// # Errors
+    ///
+    /// A field of view outside 0 to 180 degrees, or an image without pixels.
+    pub fn assumed(size: [u32; 2], horizontal_field_of_view_rad: f64) -> Result<Self, CameraError> {
+        let level = Self::level(size, horizontal_field_of_view_rad, 1.0, 0.0)?;
+        Self { translation: DVec3::ZERO, ..level }.validated()
     }
 
     /// A level camera estimated from one upright person of known height, for video without calibration.

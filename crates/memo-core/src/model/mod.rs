@@ -18,7 +18,9 @@ pub(crate) mod surface;
 pub(crate) mod visibility;
 
 pub use body::{BodyError, PART_COUNT, Part, PosedBody, Proportions, SideJoints};
-pub use camera::{CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, MAX_DISTANCE_M, TsaiParameters};
+pub use camera::{
+    ASSUMED_FOCAL_SD, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, MAX_DISTANCE_M, TsaiParameters,
+};
 pub use camera_file::{CameraFileError, CameraFileOptions, FileFormat, LengthUnit, NearestLens, Place};
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;

@@ -170,9 +170,6 @@ pub(in crate::track) const REACH_COUNTS: f64 = 1.35;
 /// Relative standard deviation over people of the height while walking, compared with the model of the same body
 /// height: legs bend more or less than the average's, and feet point in other directions.
 pub(in crate::track) const POSTURE_SD: f64 = 0.015;
-/// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely, when
-/// 60 is assumed.
-pub(in crate::track) const FOCAL_SD: f64 = 0.18;
 /// Standard deviation of a fitted contact, and of the error that contacts of one kind have in common, seconds.
 pub(in crate::track) const CONTACT_SD_S: f64 = 0.028;
 pub(in crate::track) const CONTACT_COMMON_SD_S: f64 = 0.015;

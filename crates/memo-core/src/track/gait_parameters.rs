@@ -16,7 +16,7 @@
 //!    `REACH_SD_M`;
 //! 4. for lengths, the scale, which is the distance from the camera. It depends on the body height given (to 2
 //!    cm), on the rows of sole and crown (`track::locate`), on `POSTURE_SD` and, for oblique paths seen by an
-//!    assumed camera, on `FOCAL_SD`.
+//!    assumed camera, on `ASSUMED_FOCAL_SD`.
 //!
 //! On a treadmill, lengths and speed are those on the belt: displacement of the trunk plus that of the belt, whose
 //! standard deviation is a fifth term.
@@ -39,7 +39,7 @@
 //! camera if none is given.
 
 use super::decisions::{
-    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, FOCAL_SD, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
+    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
     STRIKE_SD_CYCLES,
 };
 use super::event::EventKind;
@@ -49,6 +49,7 @@ use super::result::{Row, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
 use crate::estimate::line::line_through;
+use crate::model::ASSUMED_FOCAL_SD;
 use crate::model::skeleton::Side;
 
 /// If the probability that sides are swapped, or that the person walks in the other direction, is larger, no
@@ -327,7 +328,7 @@ impl TrackedWalk {
         let distance = relative.hypot(POSTURE_SD);
         let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
         let along_view_sq = path.direction().dot(view).powi(2);
-        if self.camera_is_guessed { distance.hypot(FOCAL_SD * along_view_sq) } else { distance }
+        if self.camera_is_guessed { distance.hypot(ASSUMED_FOCAL_SD * along_view_sq) } else { distance }
     }
 }
 

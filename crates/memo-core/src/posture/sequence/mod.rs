@@ -216,6 +216,12 @@ pub fn postures_with_progress(
     let frames = (0..rays.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
     // 6. One posture per frame.
     let linked = link_frames(&scene, &heading, &necks, &frames, progress)?;
+    // A wrong focal length scales all distances, and hardly changes a figure relative to its neck.
+    let neck = if matches!(options.anchor, AnchorChoice::Given { .. }) {
+        neck
+    } else {
+        neck.of_focal(options.focal_sd)
+    };
     let sd_m = uncertainty(&scene, &neck, &linked);
     // 7. Reasons to doubt the results.
     let linked_breaks = broken(&trees, &frames, &linked);

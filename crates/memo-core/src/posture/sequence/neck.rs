@@ -122,6 +122,18 @@ pub struct NeckTrack {
 }
 
 impl NeckTrack {
+    /// The same distances in a camera whose focal length has a relative standard deviation.
+    pub(super) fn of_focal(mut self, focal_sd: f64) -> Self {
+        for (sd_m, distance_m) in self.sd_m.iter_mut().zip(&self.distance_m) {
+            *sd_m = sd_m.hypot(focal_sd * distance_m);
+        }
+        let known_m: Vec<f64> =
+            self.distance_m.iter().copied().filter(|distance_m| distance_m.is_finite()).collect();
+        let mean_m = known_m.iter().sum::<f64>() / known_m.len().max(1) as f64;
+        self.common_sd_m = self.common_sd_m.hypot(focal_sd * mean_m);
+        self
+    }
+
     /// Position of the neck in each frame, camera axes, metres; NaN if it is not seen or its distance is not
     /// known.
     pub fn places(&self, rays: &[JointRays]) -> Vec<DVec3> {

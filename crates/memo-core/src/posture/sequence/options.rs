@@ -149,6 +149,10 @@ pub struct SequenceOptions {
     pub strength: Strength,
     /// Source of the neck's distance.
     pub anchor: AnchorChoice,
+    /// Relative standard deviation of the camera's focal length, 0 if it is calibrated. All distances that are not
+    /// given are proportional to it. Of [`Camera::assumed`](crate::Camera::assumed):
+    /// [`ASSUMED_FOCAL_SD`](crate::model::ASSUMED_FOCAL_SD).
+    pub focal_sd: f64,
     /// The moving direction in world axes, if known; its vertical component is not used.
     pub moving_direction: Option<DVec3>,
     /// Joints with a lower weight count as missing. Default 0.2: detections with a lower score are mostly
@@ -176,6 +180,7 @@ impl Default for SequenceOptions {
             motion: Motion::Walking,
             strength: Strength::Measured,
             anchor: AnchorChoice::Auto,
+            focal_sd: 0.0,
             moving_direction: None,
             min_weight: 0.2,
             min_travel_m: 0.5,
@@ -191,6 +196,7 @@ impl Default for SequenceOptions {
 pub(super) fn check_options(options: &SequenceOptions) -> Result<(), SequenceError> {
     let at_least_0 = [
         ("noise_px", options.noise_px),
+        ("focal_sd", options.focal_sd),
         ("min_weight", options.min_weight),
         ("min_travel_m", options.min_travel_m),
         ("group_m", options.group_m),
@@ -270,11 +276,14 @@ mod tests {
         for value in [-0.1, f64::INFINITY, f64::NAN] {
             let said = [
                 refused(&|o| o.noise_px = value),
+                refused(&|o| o.focal_sd = value),
                 refused(&|o| o.min_weight = value),
                 refused(&|o| o.min_travel_m = value),
                 refused(&|o| o.group_m = value),
             ];
-            for (name, said) in ["noise_px", "min_weight", "min_travel_m", "group_m"].iter().zip(said) {
+            for (name, said) in
+                ["noise_px", "focal_sd", "min_weight", "min_travel_m", "group_m"].iter().zip(said)
+            {
                 let said = said.unwrap();
                 assert!(said.starts_with(&format!("{name} must be finite and not negative")), "{said}");
             }

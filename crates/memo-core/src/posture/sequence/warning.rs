@@ -260,7 +260,8 @@ fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
 pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let camera_height_m = scene.camera.position().z;
-    if scene.ground.is_none() {
+    // Of an assumed camera nobody expects a ground.
+    if scene.ground.is_none() && scene.options.focal_sd == 0.0 {
         warnings.push(Warning::NoGround { camera_height_m });
     }
     let is_given = matches!(scene.options.anchor, AnchorChoice::Given { .. });
