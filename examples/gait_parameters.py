@@ -30,7 +30,7 @@ for sentence in track.sentences:
 # Several walks: speed with its interval, and the speed with which each person was drawn. (For many videos
 # there is `memo batch`.)
 
-seeds = range(4)
+seeds = range(3)
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
 inside = 0
 for seed in seeds:

@@ -27,6 +27,14 @@ settings.load_profile("repeatable")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_xdist_make_scheduler(config, log):
+    """Tests of a file run in one process: what several of them need is made once. Files keep their order."""
+    from xdist.scheduler import LoadFileScheduling
+
+    config.option.loadscopereorder = False
+    return LoadFileScheduling(config, log)
+
+
 def shared_video(name):
     """The folder of a clip of the shared footage; skips the test where it is absent."""
     folder = SHARED_DATA / "video" / name

@@ -185,6 +185,8 @@ fn walking_backwards_has_a_negative_speed_and_no_sides() {
         SynthScene::new(SceneOptions { seed: 5, empty_frames: 0, ..SceneOptions::default() }).unwrap();
     let walk = tracked(&scene, (0..scene.len()).rev(), scene.walker.body.height_m, true).remove(0);
     assert_eq!(walk.direction(), Direction::Backward);
+    assert!(walk.start.p_other_direction < 0.1, "{}", walk.start.p_other_direction);
+    assert!(walk.rows().iter().all(|row| row.speed_mps < 0.0));
     let table = walk.gait_parameters();
     let speed = line(&table, GaitQuantity::Speed, None);
     assert!((speed.value.unwrap() + scene.speed_mps).abs() < 0.02, "{speed:?}");

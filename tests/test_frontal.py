@@ -57,7 +57,7 @@ def test_a_stored_walk_keeps_it(track):
 
 
 def test_without_a_calibrated_camera_nobody_is_followed_by_the_feet(scene):
-    track = memo.track(list(scene.frames), fps=25, height_m=scene.height_m)
+    track = memo.track(list(scene.frames[:45]), fps=25, height_m=scene.height_m)
     assert not any(walk.is_frontal for walk in track.walks)
 
 

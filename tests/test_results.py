@@ -39,7 +39,7 @@ def dots(frames=60):
 
 @pytest.fixture(scope="module")
 def track():
-    scene = memo.demo_scene(0)
+    scene = memo.demo_scene(0, frames=60)
     return memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera)
 
 
@@ -278,7 +278,7 @@ def test_a_callback_that_raises_ends_the_call():
 
 
 def test_a_tracker_loses_nothing_when_a_frame_is_interrupted(track, alarm):
-    scene = memo.demo_scene(0)
+    scene = memo.demo_scene(0, frames=60)
     tracker = memo.Tracker(scene.height_m, scene.camera)
     taken_all_the_same = 0
     for frame, time_s in zip(scene.frames, scene.times_s.tolist(), strict=True):

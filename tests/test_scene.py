@@ -66,7 +66,7 @@ def test_a_late_left_side_is_late():
 
 @pytest.mark.parametrize("mover", ["rider", "waver", "trolley"])
 def test_what_does_not_walk_has_no_truth_and_is_not_tracked(mover):
-    scene = memo.demo_scene(1, frames=45, mover=mover)
+    scene = memo.demo_scene(1, frames=26, mover=mover)
     assert len(scene.truth["frame"]) == 0 and len(scene.events["time_s"]) == 0
     track = memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera)
     assert len(track) == 0 and track.summary["status"] != "tracked"

@@ -30,7 +30,7 @@ from memo.run import RunError, Source, contours_of_run, read_run, write_run
 from memo.video import VideoReader
 
 PIXELS = [f"{joint}_{axis}_px" for joint in JOINTS for axis in "uv"]
-FIRST, STOP = 10, 52
+FIRST, STOP = 10, 47
 
 
 def full(pixels, n):
