@@ -1140,9 +1140,9 @@ def _(d):
         head_points=lambda: d.numbers(0, 600, frames, 6, 2),
         foot_points=lambda: d.numbers(0, 600, frames, 4, 2),
     )
-    return _memo.posture(
-        d.times(frames), stick_points(d, frames), d.numbers(0, 1, frames, 14), d.camera(), **options
-    )
+    assumed = {"size": d.picture()} | d.options(fov_deg=lambda: d.number(5, 170))
+    options |= d.one([{"camera": d.camera()}, assumed])
+    return _memo.posture(d.times(frames), stick_points(d, frames), d.numbers(0, 1, frames, 14), **options)
 
 
 @case("posture_tree")
@@ -1380,7 +1380,8 @@ def _(d):
 @case("memo.posture")
 def _(d):
     options = {**posture_options(d, 4), **d.options(unswap=lambda: d.choice(True, False))}
-    found = memo.posture(d.choice(*[keypoints(d)] * 3), d.camera(), **options)
+    options |= d.one([{"camera": d.camera()}, d.options(fov_deg=lambda: d.number(5, 170))])
+    found = memo.posture(d.choice(*[keypoints(d)] * 3), **options)
     return repr(found), found.summary
 
 

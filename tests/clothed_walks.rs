@@ -53,7 +53,7 @@ static FOLLOWED: LazyLock<Vec<Followed>> = LazyLock::new(|| {
         let walks = tracked(&scene, 0..scene.len(), true);
         Followed { seed, scene, walks }
     };
-    (0..many(8)).map(of).collect()
+    (0..many(6)).map(of).collect()
 });
 
 /// Difference of two phases, -0.5 to 0.5.

@@ -160,7 +160,7 @@ fn intervals_hold_what_was_drawn() {
 /// 20 % of the step time between the sides, as in a marked limp.
 #[test]
 fn a_limp_is_told_with_its_side() {
-    let seeds: u64 = if std::env::var_os("MEMO_FULL").is_some() { 40 } else { 2 };
+    let seeds: u64 = if std::env::var_os("MEMO_FULL").is_some() { 40 } else { 1 };
     let (mut signs, mut told) = (0, 0);
     for seed in 0..seeds {
         let late_left = if seed.is_multiple_of(2) { 0.08 } else { -0.08 };

@@ -11,7 +11,9 @@ are pooled over the motions of people for tuning and of the others:
   their parts: what is tuned on one is reported on the other.
 
 Kinds of rows: `lengths`, with the true lengths and toes; `bare`, the same without toes; `height`, with the
-body height alone.
+body height alone; `assumed`, with the body height and without the camera, whose field of view is drawn from
+45 to 75 degrees and whose height from 0.9 to 2.2 m, at the distance at which the person is 290 px tall.
+Figures are then compared in the axes of the camera, so its tilt is no error.
 
 Errors are in cm. `smooth` and `linked` are the mean distance of the 13 joints other than the neck from where
 they are, both relative to the neck; `flat` puts all joints as far away as the neck; `fast` is `smooth` over
@@ -20,7 +22,8 @@ degrees, `lean` that of frames whose trunk's axis is off by more than 30 degrees
 segments mirrored in depth in the smoothed motion, of those whose mirror image is more than 10 cm away. `ece`
 is the expected calibration error of `p_mirrored` on the same segments; `undec` is the share of these that are
 undecided, `ratio` how many times as often they are mirrored as the others. `bias`, `rms` and `sd` are of the
-neck's distance: mean error, its RMS over clips, and the stated standard deviation.
+neck's distance: mean error, its RMS over clips, and the stated standard deviation. `hip`, `knee`, `shldr` and
+`elbow` are RMS errors of the flexion of both sides, degrees.
 
 Cannot do: real detections, occlusion, cameras with distortion.
 """
@@ -44,6 +47,7 @@ from typing import Any
 import memo
 import numpy as np
 from conftest import SHARED_DATA
+from limb_angles import angles_of
 from memo.keypoints import Keypoints
 
 WALKS = {
@@ -72,6 +76,10 @@ AZIMUTHS_DEG = (0.0, 45.0, 90.0)
 NOISES_PX = (0.0, 2.0, 5.0)
 RATE_HZ, MOST_S = 30.0, 5.0
 DISTANCE_M, CAMERA_HEIGHT_M, FOCAL_PX, SIZE = 6.0, 1.3, 1000.0, (1280, 960)
+#: Fields of view and heights of cameras that are not told.
+FOV_DEG, CAMERA_HEIGHTS_M = (45.0, 75.0), (0.9, 2.2)
+#: Angles that are compared.
+ANGLES = ("hip", "knee", "shoulder", "elbow")
 #: Share of the pelvis between the middles of shoulders and hips, as `memo` places it in the image.
 PELVIS_FROM_SHOULDERS = 45.98 / (45.98 + 10.09)
 #: Heights of the shoulders and of the ankles over the body height (Drillis and Contini 1966).
@@ -113,6 +121,7 @@ class Score:
     probabilities: tuple[float, ...]
     mirrored: tuple[int, ...]
     undecided: tuple[int, ...]
+    angles_deg: tuple[float, ...]
     seconds: float
 
 
@@ -176,20 +185,22 @@ def heading_of(figures: np.ndarray) -> np.ndarray:
     return way / np.linalg.norm(way)
 
 
-def camera_for(figures: np.ndarray, azimuth_deg: float) -> memo.Camera:
+def camera_for(
+    figures: np.ndarray, azimuth_deg: float, focal_px: float = FOCAL_PX, height_m: float = CAMERA_HEIGHT_M
+) -> memo.Camera:
     """A camera that looks at the middle of the motion; at azimuth 0 the person comes towards it."""
     heading = heading_of(figures)
     aside = np.array([-heading[1], heading[0], 0.0])
     angle = math.radians(azimuth_deg)
     middle = 0.5 * (figures[:, 3].min(axis=0) + figures[:, 3].max(axis=0))
     back = math.cos(angle) * heading + math.sin(angle) * aside
-    position = np.array([*middle[:2], CAMERA_HEIGHT_M]) + DISTANCE_M * back
+    position = np.array([*middle[:2], height_m]) + DISTANCE_M * focal_px / FOCAL_PX * back
     target = np.array([*middle[:2], 0.9])
     z = (target - position) / np.linalg.norm(target - position)
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
     rotation = np.stack([x, np.cross(z, x), z])
-    matrix = [[FOCAL_PX, 0.0, SIZE[0] / 2], [0.0, FOCAL_PX, SIZE[1] / 2], [0.0, 0.0, 1.0]]
+    matrix = [[focal_px, 0.0, SIZE[0] / 2], [0.0, focal_px, SIZE[1] / 2], [0.0, 0.0, 1.0]]
     return memo.Camera(np.array(matrix), rotation, -rotation @ position, SIZE)
 
 
@@ -224,19 +235,24 @@ def found(job: Job) -> Score:
     points, times_s = motion(job.motion)
     figures = stick(points)
     lengths = segment_lengths(figures)
-    camera = camera_for(figures, job.azimuth_deg)
+    view: dict[str, Any] = {}
+    if job.row == "assumed":
+        drawn = np.random.default_rng(zlib.crc32(f"view {job.motion} {job.azimuth_deg}".encode()))
+        half_rad = math.radians(drawn.uniform(*FOV_DEG)) / 2
+        view = {"focal_px": SIZE[0] / 2 / math.tan(half_rad), "height_m": drawn.uniform(*CAMERA_HEIGHTS_M)}
+    camera = camera_for(figures, job.azimuth_deg, **view)
     names = [name for name in points if job.row == "lengths" or "toe" not in name]
     pixels = camera.project(np.concatenate([points[name] for name in names])).reshape(len(names), -1, 2)
     random = np.random.default_rng(zlib.crc32(f"{job.motion} {job.azimuth_deg} {job.noise_px}".encode()))
     pixels = pixels.transpose(1, 0, 2) + random.normal(0.0, job.noise_px, (len(times_s), len(names), 2))
-    keypoints = Keypoints.from_arrays(pixels, names=names, times_s=times_s)
+    keypoints = Keypoints.from_arrays(pixels, names=names, times_s=times_s, image_size=SIZE)
     body: dict[str, Any] = {"lengths": lengths}
-    if job.row == "height":
+    if job.row in ("height", "assumed"):
         body = {"height_m": body_height_m(lengths, figures)}
     started = time.perf_counter()
     postures = memo.posture(
         keypoints,
-        camera,
+        None if job.row == "assumed" else camera,
         **body,
         rules=KINDS[job.kind][1],
         noise_px=max(job.noise_px, 0.5),
@@ -251,8 +267,12 @@ def compare(
 ) -> Score:
     """The figures of one call."""
     rows = np.flatnonzero(postures.found)
-    smooth, linked, true = postures.smoothed_m[rows], postures.linked_m[rows], figures[rows]
-    position = np.asarray(camera.position)
+    position, true = np.asarray(camera.position), figures[rows]
+    # The figures as the camera sees them, in the world: an assumed camera has a world of its own.
+    smooth, linked = (
+        postures.in_camera(found_m[rows]) @ np.asarray(camera.rotation) + position
+        for found_m in (postures.smoothed_m, postures.linked_m)
+    )
 
     def off(got: np.ndarray, joints: Sequence[int] = range(1, 14)) -> float:
         apart = (got - got[:, :1]) - (true - true[:, :1])
@@ -262,7 +282,15 @@ def compare(
     neck_m = np.linalg.norm(rays[:, 0], axis=-1)
     depth = np.asarray(camera.rotation)[2]
     flat = position + rays * ((rays[:, :1] @ depth) / (rays @ depth))[..., None]
-    probabilities, mirrored, undecided = signs(postures, rows, true, rays)
+    probabilities, mirrored, undecided = signs(postures, rows, smooth, true, rays)
+    truth = angles_of(true)
+
+    def angle_rms(joint: str) -> float:
+        errors = [
+            postures.angles_deg[f"{s}_{joint}"][rows] - truth[f"{s}_{joint}"] for s in ("right", "left")
+        ]
+        return float(np.sqrt(np.nanmean(np.square((np.array(errors) + 180) % 360 - 180))))
+
     return Score(
         job,
         smooth_cm=off(smooth),
@@ -277,12 +305,13 @@ def compare(
         probabilities=tuple(np.round(probabilities, 4).tolist()),
         mirrored=tuple(mirrored.astype(int).tolist()),
         undecided=tuple(undecided.astype(int).tolist()),
+        angles_deg=tuple(angle_rms(joint) for joint in ANGLES),
         seconds=seconds,
     )
 
 
 def signs(
-    postures: memo.Postures, rows: np.ndarray, true: np.ndarray, rays: np.ndarray
+    postures: memo.Postures, rows: np.ndarray, smooth: np.ndarray, true: np.ndarray, rays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of limb segments in depth: the stated probability, whether mirrored, whether undecided."""
     units = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -291,7 +320,7 @@ def signs(
         segments = figure - figure[:, list(STARTS)]
         return np.einsum("tji,tji->tj", segments, units)[:, list(LIMBS)]
 
-    extent, got = along(true), along(postures.smoothed_m[rows])
+    extent, got = along(true), along(smooth)
     stated = postures.p_mirrored[rows][:, list(LIMBS)]
     counted = (2 * np.abs(extent) > DISTINCT_M) & np.isfinite(got) & np.isfinite(stated)
     undecided = postures.undecided_joints[rows][:, list(LIMBS)]
@@ -319,6 +348,10 @@ def pooled(scores: Sequence[Score]) -> dict[str, float]:
         "bias": _mean(bias),
         "rms": math.sqrt(_mean(bias**2)),
         "sd": _mean([score.sd_cm for score in scores]),
+        **{
+            name: math.sqrt(_mean([score.angles_deg[k] ** 2 for score in scores]))
+            for k, name in enumerate(("hip", "knee", "shldr", "elbow"))
+        },
         "ms": 1000.0 * _mean([score.seconds for score in scores]),
     }
 
@@ -386,7 +419,7 @@ def main() -> int:
     """Finds, prints, stores; 1 if a call failed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", metavar="PATTERN", default="", help="motions whose name has this (regex)")
-    parser.add_argument("--rows", default="lengths,bare,height", help="kinds of rows, with commas")
+    parser.add_argument("--rows", default="lengths,bare,height,assumed", help="kinds of rows, with commas")
     parser.add_argument("--noise", default="0,2,5", help="standard deviations of the noise, pixels")
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="stores the figures of every call")
     parser.add_argument("--workers", type=int, default=2)

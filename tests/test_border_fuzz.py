@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 FULL = bool(os.environ.get("MEMO_FULL"))
-CALLS = 1500 if FULL else 8
+CALLS = 1500 if FULL else 5
 LIMIT_S = 3600 if FULL else 300
 
 

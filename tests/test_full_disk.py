@@ -23,8 +23,8 @@ def test_a_full_disk_is_told_before_work_starts(monkeypatch, tmp_path, capsys):
     assert list((tmp_path / "out").iterdir()) == []
 
 
-@pytest.mark.parametrize("most_bytes", [0, 3_000, 60_000])
-def test_a_disk_that_becomes_full_leaves_whole_files_alone(tmp_path, most_bytes):
+@pytest.mark.parametrize(("command", "most_bytes"), [("demo", 0), ("pointlight", 3_000), ("demo", 60_000)])
+def test_a_disk_that_becomes_full_leaves_whole_files_alone(tmp_path, command, most_bytes):
     """No file can grow beyond so many bytes, as on a disk that is filling up."""
 
     def limited():
@@ -32,7 +32,11 @@ def test_a_disk_that_becomes_full_leaves_whole_files_alone(tmp_path, most_bytes)
 
     out = tmp_path / "out"
     done = subprocess.run(
-        [*COMMAND, "demo", "--out", str(out)], preexec_fn=limited, capture_output=True, text=True, timeout=100
+        [*COMMAND, command, "--out", str(out)],
+        preexec_fn=limited,
+        capture_output=True,
+        text=True,
+        timeout=100,
     )
     assert done.returncode == 1, done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
