@@ -398,7 +398,8 @@ pub(super) mod tests {
     pub fn active(steps: Vec<Step>) -> Active {
         let mut walk = Walk::new(walker(), PATH, BEGINNING);
         walk.twins[0].similarity_sum = steps.iter().map(|s| f64::from(s.similarity)).sum();
-        walk.twins[0].visible_sum = steps.len() as f64;
+        walk.twins[0].visible_sum = steps.iter().map(|s| f64::from(s.visible)).sum();
+        walk.twins[0].frame_count = steps.len();
         walk.twins[0].steps = steps;
         walk.twins[1].steps = walk.twins[0].steps.clone();
         Active {
@@ -463,6 +464,17 @@ pub(super) mod tests {
         ] {
             assert_eq!(ending(40, speed_mps, rate_hz, 0.5).is_over(), is_over, "{speed_mps}, {rate_hz}");
         }
+    }
+
+    /// What the model does not find of somebody behind others says nothing.
+    #[test]
+    fn hidden_frames_end_no_walk() {
+        let behind = |visible: f32| {
+            let mut walk = ending(40, 1.2, 0.9, 0.0);
+            walk.walk.twins[0].steps[28..].iter_mut().for_each(|step| step.visible = visible);
+            walk.is_over()
+        };
+        assert!(behind(1.0) && behind(0.5) && !behind(0.4) && !behind(0.0));
     }
 
     #[test]

@@ -259,6 +259,19 @@ mod tests {
         }
     }
 
+    /// An acceleration that a fifth of a second does not show is none.
+    #[test]
+    fn places_of_a_short_time_lie_on_a_line() {
+        let times_s: Vec<f64> = (0..6).map(|k| 0.04 * f64::from(k)).collect();
+        let noise_m = [0.02, -0.03, 0.04, 0.05, -0.02, -0.06];
+        let places = times_s.iter().zip(noise_m).map(|(t, off)| Measured { value: 1.2 * t + off, sd: 0.05 });
+        let smooth = smoothed(&times_s, &places.collect::<Vec<_>>());
+        for three in smooth.windows(3) {
+            let acceleration = (three[0] - 2.0 * three[1] + three[2]) / 0.04f64.powi(2);
+            assert!(acceleration.abs() < 3.0 * ACCELERATION_SD, "{smooth:?}");
+        }
+    }
+
     #[test]
     fn an_anchored_curve_begins_on_the_route_so_far() {
         let crown = Crown { height_m: active(Vec::new()).walk.walker.level_crown_height_m(), sd_m: 0.02 };

@@ -174,21 +174,27 @@ mod tests {
     #[test]
     fn an_edge_belongs_to_whom_it_is_nearest_or_to_both() {
         let upright = |x: f32| edge([x, 110.0], [x, 190.0]);
-        // Edges between two people whose contours are 20 pixels apart: 8 pixels and 3 pixels nearer make an owner.
-        for (x, first, second) in [
-            (300.0, true, false),
-            (307.0, true, false),
-            (309.0, true, true),
-            (311.0, true, true),
-            (313.0, false, true),
-            (320.0, false, true),
+        // Edges between two people whose contours are at 300 and at 320 or 308: within 8 pixels and 3 pixels nearer
+        // makes an owner.
+        for (x, second_at, first, second) in [
+            (300.0, 320.0, true, false),
+            (307.0, 320.0, true, false),
+            (309.0, 320.0, true, true),
+            (311.0, 320.0, true, true),
+            (313.0, 320.0, false, true),
+            (320.0, 320.0, false, true),
+            (250.0, 320.0, true, true),
+            (302.0, 308.0, true, false),
+            (303.0, 308.0, true, true),
+            (305.0, 308.0, true, true),
+            (306.0, 308.0, false, true),
         ] {
             let kept = |own: f32, other: f32| {
                 let mut edges = vec![upright(x)];
                 keep_own(&mut edges, &person(own), &[&person(other)]);
                 !edges.is_empty()
             };
-            assert_eq!((kept(300.0, 320.0), kept(320.0, 300.0)), (first, second), "{x}");
+            assert_eq!((kept(300.0, second_at), kept(second_at, 300.0)), (first, second), "{x} {second_at}");
         }
         let mut alone = vec![upright(500.0)];
         keep_own(&mut alone, &person(300.0), &[]);
@@ -198,10 +204,16 @@ mod tests {
     #[test]
     fn a_turned_or_distant_edge_is_nobody_s() {
         let across = edge([296.0, 150.0], [304.0, 150.0]);
-        let mut edges =
-            vec![across, edge([310.0, 110.0], [310.0, 190.0]), edge([302.0, 110.0], [302.0, 190.0])];
+        // Its middle is on the contour, its end 90 pixels below.
+        let long = edge([300.0, 110.0], [300.0, 290.0]);
+        let beside = edge([310.0, 110.0], [310.0, 190.0]);
+        let mut edges = vec![across, beside, long, edge([302.0, 110.0], [302.0, 190.0])];
         keep_unowned(&mut edges, &[&person(300.0)]);
-        assert_eq!(edges.len(), 2, "90 degrees count 15 pixels, and 10 pixels are more than 8");
+        assert_eq!(
+            edges,
+            [across, beside, long],
+            "90 degrees count 15 pixels, and 10 pixels are more than 8"
+        );
     }
 
     #[test]
@@ -212,6 +224,21 @@ mod tests {
         for part in &body {
             let pixel = camera.project(part.centre()).unwrap();
             assert!(!mask.at(pixel.x as usize, pixel.y as usize));
+        }
+        // About the body, as far as a share of its height.
+        let mut bare = Image::filled(640, 480, true);
+        clear_explained(&mut bare, &camera, &body, 0.0);
+        let cleared: Vec<(i32, i32)> = (0..480)
+            .flat_map(|y| (0..640).map(move |x| (x, y)))
+            .filter(|&(x, y)| !bare.at(x, y))
+            .map(|(x, y)| (x as i32, y as i32))
+            .collect();
+        let margin_px = EXPLAINED * 200.0;
+        for (x, y) in (0..480).step_by(5).flat_map(|y| (0..640).step_by(5).map(move |x| (x, y))) {
+            let apart_sq = cleared.iter().map(|(u, v)| (u - x as i32).pow(2) + (v - y as i32).pow(2)).min();
+            let apart_px = f64::from(apart_sq.unwrap()).sqrt();
+            assert!(apart_px > margin_px - 1.0 || !mask.at(x, y), "{x}, {y} is {apart_px} px off");
+            assert!(apart_px < margin_px + 1.5 || mask.at(x, y), "{x}, {y} is {apart_px} px off");
         }
         let [low, high] = body_box(&camera, &body).unwrap();
         let far = |x: usize, y: usize| {

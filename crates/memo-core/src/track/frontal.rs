@@ -620,6 +620,58 @@ mod tests {
         }
     }
 
+    /// A frame's own measurement lies where the body is; feet that are far off move neither place nor phase.
+    #[test]
+    fn feet_measure_the_place_of_the_body_and_outliers_move_nothing() {
+        let spoilt = |t: f64| {
+            let is_off = (t / FRAME_S).round() as usize % 5 == 2;
+            feet_of_steps(t) - if is_off { 1.2 * towards() } else { DVec2::ZERO }
+        };
+        let mut frontal = begun(&standing(66, feet_of_steps)).unwrap();
+        for k in 66..130 {
+            frontal.push(FRAME_S * k as f64, frame(k, spoilt(FRAME_S * k as f64)).0.as_ref());
+        }
+        frontal.solve(0).unwrap();
+        let still = ConstantVelocity::new(0.0, 0.0, 1.0, 1.0);
+        let before = State { along: still, height: still, phase: still };
+        let start_m = frontal.path.along(MIDDLE) - 1.2;
+        for k in 0..130 {
+            let pace = frontal.paces[k];
+            let true_m = start_m + SPEED_MPS * pace.time_s;
+            assert!((pace.along_m - true_m).abs() < 0.08, "{k}: {} of {true_m}", pace.along_m);
+            let state = frontal.state(k, 0, [0.01, 0.01], &before);
+            let measured_m = frontal.measured(k, &state).unwrap().along_m;
+            let expected_m = if k >= 66 && k % 5 == 2 { true_m - 1.2 } else { true_m };
+            assert!((measured_m - expected_m).abs() < 0.1, "{k}: {measured_m} of {expected_m}");
+        }
+    }
+
+    /// Feet whose errors are alike in neighbouring frames: places are off by about as much as is stated.
+    #[test]
+    fn the_stated_variance_is_that_of_errors_that_last_for_frames() {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for draw in 0..12u64 {
+            let mut random = crate::synth::Random::new(draw);
+            let blocks: Vec<f64> = (0..40).map(|_| REACH_SD_M * f64::from(random.normal_pair()[0])).collect();
+            let place = |t: f64| {
+                let block = (t / FRAME_S / LIKE_FRAMES).round() as usize;
+                feet_of_steps(t) + blocks[block] * towards()
+            };
+            let Some(mut frontal) = begun(&standing(66, place)) else { continue };
+            for k in 66..110 {
+                frontal.push(FRAME_S * k as f64, frame(k, place(FRAME_S * k as f64)).0.as_ref());
+            }
+            let variances = frontal.solve(0).unwrap();
+            let start_m = frontal.path.along(MIDDLE) - 1.2;
+            for k in (10..100).step_by(10) {
+                let off_m = frontal.paces[k].along_m - start_m - SPEED_MPS * frontal.paces[k].time_s;
+                (sum, count) = (sum + off_m * off_m / variances[k][0], count + 1.0);
+            }
+        }
+        let z = f64::sqrt(sum / count);
+        assert!(count >= 72.0 && (0.5..1.4).contains(&z), "{z} of {count}");
+    }
+
     #[test]
     fn a_reweighted_line_ignores_what_lies_far_off() {
         let mut points: Vec<(f64, f64)> =

@@ -183,10 +183,12 @@ fn best_heading(
 mod tests {
     use super::super::locate::Sighting;
     use super::super::locate::{Crown, locate};
+    use super::super::result::tests::tracked;
     use super::super::search::Hypothesis;
     use super::super::search::mirrored;
     use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
     use super::super::walk::FrameEdges;
+    use super::super::walk::WalkOptions;
     use super::*;
     use crate::image::Rectangle;
     use std::f64::consts::PI;
@@ -240,6 +242,20 @@ mod tests {
         assert!((active.start.lines.best.rate_hz - 0.9).abs() < 0.05);
         assert!(found.origin.distance(PLACE) < 0.1, "{found:?}");
         assert_eq!(active.walk.twins[0].steps.len(), 12);
+    }
+
+    /// Without a fit, the speed is that of the walker whose legs swing like that over ground.
+    #[test]
+    fn the_belt_of_the_average_gait_has_the_walker_s_speed() {
+        let active = begun(standing(PI - 0.5, 0.9, 0.0), None).unwrap();
+        let walk = tracked(active.walk, active.start, WalkOptions::default());
+        let belt = TrackedWalk { is_on_treadmill: true, ..walk }.belt();
+        // In single stance the body moves over the ankle, which lies still: by its way while the other leg swings.
+        let ankle = |phase: f64| walker().pose(DVec3::ZERO, 0.0, phase).right.ankle.x;
+        let swing = 0.5 - 0.11;
+        let speed_mps = 0.9 * (ankle(0.11) - ankle(0.11 + swing)) / swing;
+        assert!((belt.speed_mps / speed_mps - 1.0).abs() < 0.15, "{belt:?} of {speed_mps}");
+        assert_eq!(belt.sd_mps, AVERAGE_GAIT_SHARE * belt.speed_mps);
     }
 
     #[test]

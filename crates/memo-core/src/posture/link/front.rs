@@ -217,6 +217,13 @@ mod tests {
         front.cost(&mirrored) - front.cost(&figure)
     }
 
+    /// How far the walker's front points to the right.
+    fn front_right() -> f64 {
+        let (_, [figure, _], ..) = walk();
+        let fronts = [trunk_axes(&figure), hip_axes(&figure)].map(|axes| axes.unwrap().x_axis);
+        (fronts[0] + fronts[1]).normalize().x
+    }
+
     /// Legs and travel show the front; toes, face and a given direction do so more clearly.
     #[test]
     fn a_mirrored_trunk_costs_more_with_everything_that_shows_the_front() {
@@ -233,6 +240,9 @@ mod tests {
             frames[12].front.nose = (head + 0.08 * DVec3::X).normalize();
         });
         assert!(face > own + 1.0, "{face} {own}");
+        let stays = gain(|frames, _, figure| frames.iter_mut().for_each(|f| f.neck = figure[Joint::Neck]));
+        let half_speed = 1.2 * BACKWARDS_PER_MPS * front_right();
+        assert!((own - stays - half_speed).abs() < 0.3, "{own} {stays} {half_speed}");
         let given = gain(|_, options, _| options.facing = Some(DVec3::X));
         assert!((given - own - AGAINST_DIRECTION).abs() < 0.5, "{given} {own}");
     }

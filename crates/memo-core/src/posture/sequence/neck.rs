@@ -666,4 +666,23 @@ mod tests {
         let vague = NeckTrack { sd_m: vec![9.0; 30], ..found.neck.clone() }.without_vague();
         assert!(vague.distance_m.iter().all(|d| d.is_nan()) && vague.vague.iter().all(Option::is_some));
     }
+
+    /// The error of an assumed focal length is a share of every distance, and common to all.
+    #[test]
+    fn an_assumed_focal_length_makes_distances_less_sure() {
+        let walk = walk(60.0, 12, 0.3);
+        let [known, assumed] = [0.0, 0.2]
+            .map(|focal_sd| walk.postures(&SequenceOptions { focal_sd, ..with_lengths() }).unwrap());
+        assert_eq!(known.linked, assumed.linked, "the figures are the same");
+        for t in 0..12 {
+            let distance_m = known.neck.distance_m[t];
+            let expected_m = known.neck.sd_m[t].hypot(0.2 * distance_m);
+            assert!((assumed.neck.sd_m[t] - expected_m).abs() < 1e-12);
+            assert!(assumed.sd_m[t][Joint::Neck] > 0.19 * distance_m);
+        }
+        assert!(assumed.neck.common_sd_m > 0.19 * known.neck.distance_m[0]);
+        let anchor = AnchorChoice::Given { distance_m: vec![4.0], sd_m: 0.05 };
+        let given = walk.postures(&SequenceOptions { focal_sd: 0.2, anchor, ..with_lengths() }).unwrap();
+        assert!(given.neck.sd_m.iter().all(|sd_m| (sd_m - 0.05).abs() < 1e-12));
+    }
 }

@@ -88,6 +88,32 @@ mod tests {
         })
     }
 
+    /// A belt that changes its speed makes stances that differ, and the mean less sure.
+    #[test]
+    fn stances_that_differ_make_the_speed_less_sure() {
+        let times_s: Vec<f64> = (0..300).map(|k| 0.04 * f64::from(k)).collect();
+        let speed_at = |cycle: f64| if cycle as usize % 2 == 0 { 0.8 } else { 1.2 };
+        let all: Vec<_> = times_s
+            .iter()
+            .map(|&t| [feet(t, speed_at(t.floor()))[0], feet(t, speed_at((t + 0.5).floor()))[1]])
+            .collect();
+        let even: Vec<_> = times_s.iter().map(|&t| feet(t, 1.0)).collect();
+        let [uneven, even] = [all, even].map(|feet| belt(&times_s, &times_s, &feet, DVec2::X).unwrap());
+        // About 22 stances of 0.8 or 1.2 m/s.
+        let more = (uneven.sd_mps.powi(2) - even.sd_mps.powi(2)).sqrt();
+        assert!((0.03..0.06).contains(&more), "{uneven:?} {even:?}");
+    }
+
+    /// Seen from the belt, a foot that lies on it stays, and the walker moves on.
+    #[test]
+    fn feet_on_a_belt_stand_still_beside_it() {
+        let times_s: Vec<f64> = (0..8).map(|k| 0.13 + 0.03 * f64::from(k)).collect();
+        let mut all: Vec<_> = times_s.iter().map(|&t| feet(t, 1.3)).collect();
+        move_with(&mut all, &times_s, 1.3 * DVec2::X);
+        let heels: Vec<f64> = all.iter().map(|feet| feet[0][0].x).collect();
+        assert!(heels.iter().all(|heel| (heel - heels[0]).abs() < 1e-9), "{heels:?}");
+    }
+
     #[test]
     fn a_flat_foot_shows_the_belt() {
         let times_s: Vec<f64> = (0..100).map(|k| 0.04 * f64::from(k)).collect();

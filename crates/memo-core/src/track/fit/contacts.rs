@@ -147,4 +147,24 @@ mod tests {
         let backwards: Vec<f64> = phases.iter().map(|p| -p).collect();
         assert!(contacts(&times_s, &backwards, &all, &ahead).is_empty());
     }
+
+    /// A foot that slips after it has landed is slow twice; the landing is the contact.
+    #[test]
+    fn a_slip_is_no_contact() {
+        let times_s: Vec<f64> = (0..150).map(|k| 0.02 * f64::from(k) + 0.003).collect();
+        let slipping = |t: f64| {
+            let mut feet = feet(t);
+            let slip_m = 0.03 * ((t.fract() - 0.1) / 0.04).clamp(0.0, 1.0);
+            feet[0].iter_mut().for_each(|point| point.x += slip_m);
+            feet
+        };
+        let all: Vec<_> = times_s.iter().map(|&t| slipping(t)).collect();
+        let found = contacts(&times_s, &times_s, &all, &vec![DVec2::X; times_s.len()]);
+        let strikes = found.iter().filter(|c| (c.kind, c.side) == (EventKind::HeelStrike, Side::Right));
+        let times: Vec<f64> = strikes.map(|contact| contact.time_s).collect();
+        // Before the first frame nobody knows whether the foot moved.
+        let landed = times.iter().filter(|t| **t > 0.5).zip([1.0, 2.0]);
+        assert_eq!(landed.clone().count(), 2, "{times:?}");
+        landed.for_each(|(t, expected)| assert!((t - expected).abs() < 0.02, "{times:?}"));
+    }
 }

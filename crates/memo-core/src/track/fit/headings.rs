@@ -96,15 +96,67 @@ fn choices<'p, 'a>(
 
 /// Logarithms of the weights: of the heading by the costs, of the sides in it by their evidence.
 fn weights(choices: &[Choice<'_, '_>], p_tracked: f64) -> Vec<f64> {
-    let cost = |seen: &Seen| (seen.cost + seen.outer_missed).max(1e-9);
-    let of = |choice: &Choice<'_, '_>| {
-        let same_heading = || choices.iter().filter(|c| c.is_mirrored == choice.is_mirrored);
-        let least = same_heading().map(|c| cost(&c.fitted.seen)).fold(f64::INFINITY, f64::min);
-        let partner = same_heading().find(|c| c.is_exchanged != choice.is_exchanged);
-        let p_partner = if choice.is_exchanged { 1.0 - p_tracked } else { p_tracked };
-        let p_other = partner
-            .map_or(0.0, |other| choice.problem.p_other_sides(&choice.fitted, &other.fitted, p_partner));
+    let seen: Vec<Alternative<'_>> = choices
+        .iter()
+        .map(|c| Alternative {
+            is_mirrored: c.is_mirrored,
+            is_exchanged: c.is_exchanged,
+            seen: &c.fitted.seen,
+        })
+        .collect();
+    log_weights(&seen, p_tracked, |choice, other, p| {
+        choices[choice].problem.p_other_sides(&choices[choice].fitted, &choices[other].fitted, p)
+    })
+}
+
+/// What a fit in a heading with a choice of sides saw.
+struct Alternative<'s> {
+    is_mirrored: bool,
+    is_exchanged: bool,
+    seen: &'s Seen,
+}
+
+/// The same; `p_other_sides` of one fit against another of the same heading, with the tracker's probability of the other.
+fn log_weights(
+    all: &[Alternative<'_>],
+    p_tracked: f64,
+    p_other_sides: impl Fn(usize, usize, f64) -> f64,
+) -> Vec<f64> {
+    let cost = |k: usize| (all[k].seen.cost + all[k].seen.outer_missed).max(1e-9);
+    let of = |choice: usize| {
+        let same_heading = || (0..all.len()).filter(|&k| all[k].is_mirrored == all[choice].is_mirrored);
+        let least = same_heading().map(cost).fold(f64::INFINITY, f64::min);
+        let partner = same_heading().find(|&k| all[k].is_exchanged != all[choice].is_exchanged);
+        let p_partner = if all[choice].is_exchanged { 1.0 - p_tracked } else { p_tracked };
+        let p_other = partner.map_or(0.0, |other| p_other_sides(choice, other, p_partner));
         -LOG_ODDS * least.ln() + (1.0 - p_other).max(1e-12).ln()
     };
-    choices.iter().map(of).collect()
+    (0..all.len()).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A heading whose edges are twice as far off is less likely by 2 to the power of `LOG_ODDS`, whatever its sides; the
+    /// sides in a heading have the probabilities of their evidence.
+    #[test]
+    fn costs_decide_the_heading_and_evidence_the_sides_in_it() {
+        let seen = |cost: f64| Seen { cost, ..Seen::default() };
+        let [own, exchanged, mirrored, both] = [10.0, 14.0, 20.0, 25.0].map(seen);
+        let all =
+            [(&own, false, false), (&exchanged, false, true), (&mirrored, true, false), (&both, true, true)]
+                .map(|(seen, is_mirrored, is_exchanged)| Alternative { is_mirrored, is_exchanged, seen });
+        let weights = log_weights(&all, 0.3, |choice, _, p_other| {
+            // The tracker's probability of the other sides comes in as it is.
+            let expected = if all[choice].is_exchanged { 0.7 } else { 0.3 };
+            assert!((p_other - expected).abs() < 1e-12);
+            p_other
+        });
+        let sums = [0, 2].map(|k| weights[k].exp() + weights[k + 1].exp());
+        assert!((sums[0] / sums[1] - 2f64.powf(LOG_ODDS)).abs() < 1e-6, "{weights:?}");
+        for k in [0, 2] {
+            assert!(((weights[k] - weights[k + 1]).exp() - 7.0 / 3.0).abs() < 1e-9, "{weights:?}");
+        }
+    }
 }

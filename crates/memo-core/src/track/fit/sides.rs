@@ -52,6 +52,8 @@ mod tests {
             (log_odds(half) - 0.5 * log_odds(whole)).abs() < 1e-9,
             "half of the person shows half as much"
         );
+        // Where both fits are alike, the tracker's odds of nine to one count half: three to one.
+        assert!((p_other(&seen(10.0, 5.0), &seen(10.0, 5.0), 0.1, 1.0) - 0.25).abs() < 1e-12);
         assert!(p_other(&Seen::default(), &Seen::default(), 0.5, 1.0).is_finite());
     }
 }
