@@ -485,13 +485,26 @@ fn everybody_is_told_in_order_of_appearance() {
 fn nobody_is_started_on_the_changes_of_somebody_who_is_followed() {
     let mut tracker = following(40, 0.0, 1.2);
     let expected = tracker.predicted(&tracker.people[0], &evidence(40, &[])).unwrap();
-    let [low, high] = body_box(&camera(), &expected.body).unwrap();
-    let middle = (0.5 * (low.x + high.x)) as usize;
-    let hips = (0.5 * (low.y + high.y)) as usize;
-    let body = Rectangle { left: middle - 15, top: low.y as usize, right: middle + 15, bottom: hips };
-    tracker.advance(&evidence(40, &[body])).unwrap();
+    // All of the body changes.
+    let mut around = Image::filled(SIZE[0], SIZE[1], true);
+    clear_explained(&mut around, &camera(), &expected.body, 0.0);
+    let body_and = |frame: usize, boxes: &[Rectangle]| {
+        let mut seen = evidence(frame, boxes);
+        for (x, y) in (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y))) {
+            if !around.at(x, y) {
+                seen.mask.set(x, y, true);
+                seen.firm_mask.set(x, y, true);
+            }
+        }
+        seen
+    };
+    let mut nobody = following(40, 0.0, 1.2);
+    nobody.people.clear();
+    nobody.advance(&body_and(40, &[])).unwrap();
+    assert_eq!(nobody.candidates.len(), 1, "it could be a person");
+    tracker.advance(&body_and(40, &[])).unwrap();
     assert!(tracker.candidates.is_empty(), "{:?}", tracker.candidates);
-    tracker.advance(&evidence(41, &[body, person(20)])).unwrap();
+    tracker.advance(&body_and(41, &[person(20)])).unwrap();
     let sought: Vec<Rectangle> = tracker.candidates.iter().map(|c| c.seen[0].sighting.rectangle).collect();
     assert_eq!(sought, [person(20)]);
 }
