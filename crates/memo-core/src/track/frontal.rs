@@ -670,7 +670,7 @@ mod tests {
         }
         let z = f64::sqrt(sum / count);
         println!("errors over stated deviations: {z:.2} of {count}");
-        assert!(count >= 72.0 && (0.5..1.4).contains(&z), "{z} of {count}");
+        assert!(count >= 72.0 && (0.4..1.0).contains(&z), "{z} of {count}");
     }
 
     #[test]
