@@ -121,18 +121,16 @@ fn angles<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, 
     let named = PyDict::new(py);
     for side in Side::BOTH {
         let frames: Vec<JointAngles> = figures.iter().map(|figure| JointAngles::of(figure, side)).collect();
-        let of_joint: [(&str, fn(&JointAngles) -> f64); 6] = [
-            ("hip", |angles| angles.hip_flexion_rad),
-            ("hip_adduction", |angles| angles.hip_adduction_rad),
-            ("knee", |angles| angles.knee_flexion_rad),
-            ("shoulder", |angles| angles.shoulder_flexion_rad),
-            ("shoulder_adduction", |angles| angles.shoulder_adduction_rad),
-            ("elbow", |angles| angles.elbow_flexion_rad),
-        ];
-        for (joint, angle) in of_joint {
+        let name = |joint: &str, angle: fn(&JointAngles) -> f64| {
             let column = frames.iter().map(|angles| angle(angles).to_degrees()).collect();
-            named.set_item(format!("{}_{joint}", side.name()), numpy_from_column(py, column))?;
-        }
+            named.set_item(format!("{}_{joint}", side.name()), numpy_from_column(py, column))
+        };
+        name("hip", |angles| angles.hip_flexion_rad)?;
+        name("hip_adduction", |angles| angles.hip_adduction_rad)?;
+        name("knee", |angles| angles.knee_flexion_rad)?;
+        name("shoulder", |angles| angles.shoulder_flexion_rad)?;
+        name("shoulder_adduction", |angles| angles.shoulder_adduction_rad)?;
+        name("elbow", |angles| angles.elbow_flexion_rad)?;
     }
     Ok(named)
 }

@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn stances_that_differ_make_the_speed_less_sure() {
         let times_s: Vec<f64> = (0..300).map(|k| 0.04 * f64::from(k)).collect();
-        let speed_at = |cycle: f64| if cycle as usize % 2 == 0 { 0.8 } else { 1.2 };
+        let speed_at = |cycle: f64| if (cycle as usize).is_multiple_of(2) { 0.8 } else { 1.2 };
         let all: Vec<_> = times_s
             .iter()
             .map(|&t| [feet(t, speed_at(t.floor()))[0], feet(t, speed_at((t + 0.5).floor()))[1]])
