@@ -175,7 +175,7 @@ def scored(truth: Rows, found: Rows) -> dict[str, Any]:
     return {"people": len({row[1] for row in found}), **summary}
 
 
-def share_alone(truth: Rows, found: Rows) -> dict[int, float]:
+def share_on_somebody(truth: Rows, found: Rows) -> dict[int, float]:
     """Of every walk of 20 frames and more, the share of frames with an overlap with anybody of a half."""
     at: dict[int, list[Array]] = {}
     for frame, _, box in truth:
@@ -220,7 +220,7 @@ def main() -> int:
                 f"{s['num_switches']:8.0f} {s['recall']:6.2f} {s['precision']:9.2f}"
             )
         alone = ", ".join(
-            f"{identity}: {share:.2f}" for identity, share in share_alone(truth, of_memo).items()
+            f"{identity}: {share:.2f}" for identity, share in share_on_somebody(truth, of_memo).items()
         )
         print(f"{name:15} walks of memo on somebody: {alone or 'none'}; {took_s:.0f} s")
     return 0

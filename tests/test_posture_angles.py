@@ -140,3 +140,18 @@ def test_a_size_that_contradicts_the_file_is_refused(scene, tmp_path):  # noqa: 
     camera = memo.Camera.level((640, 480), 60, 1.2, 4.0)
     with pytest.raises(ValueError, match="640x480 pixels, the keypoints are for 1280x720"):
         memo.posture(keypoints, camera)
+
+
+def test_an_upright_picture_is_taken_for_one_of_a_turned_camera(scene):  # noqa: F811
+    folder, _ = scene
+    upright = memo.read_keypoints(folder / "walk.csv", fps=RATE_HZ, image_size=(1280, 2276))
+    (focal_px, *_), *_ = memo.posture(upright, height_m=1.62).camera.parameters()["matrix"]
+    assert focal_px == pytest.approx(2276 / 2 / math.tan(math.radians(31)))
+
+
+def test_a_plot_without_a_camera_has_no_ground(scene, found):  # noqa: F811
+    folder, _ = scene
+    plotted = [postures.plot() for postures in (found, uncalibrated(folder / "walk.csv"))]
+    assert [ax.get_ylabel() for ax in plotted] == ["height, m", "height above the camera, m"]
+    level = [[line for line in ax.lines if list(line.get_ydata()) == [0, 0]] for ax in plotted]
+    assert [len(lines) for lines in level] == [1, 0]

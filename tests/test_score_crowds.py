@@ -28,7 +28,7 @@ def test_what_is_true_scores_one_and_nothing_scores_nothing():
     assert crowds.scored(truth, [])["recall"] == 0
     shifted = [(frame, identity, box + np.array([20, 0, 0, 0])) for frame, identity, box in truth]
     assert crowds.scored(truth, shifted)["recall"] < 0.2
-    assert crowds.share_alone(truth, truth) == {1: 1.0, 2: 1.0}
+    assert crowds.share_on_somebody(truth, truth) == {1: 1.0, 2: 1.0}
 
 
 def test_overlaps_are_intersections_over_unions():

@@ -124,7 +124,7 @@ def tracker_options(
     steady: bool = True,
     treadmill: bool | None = None,
 ) -> dict[str, Any]:
-    """Options of `Tracker`; `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`."""
+    """Options of `Tracker`; camera, `reading` and field of view as for `given_camera`."""
     options: dict[str, Any] = {}
     if isinstance(height_m, Sequence):
         options["height_m"] = [checked_height(one) for one in height_m]
@@ -139,7 +139,10 @@ def tracker_options(
 
 
 def given_camera(camera: Path | None, reading: Mapping[str, Any], fov_deg: float | None) -> dict[str, Any]:
-    """The calibrated camera, or the field of view of an assumed one, if given; `reading` as above."""
+    """The calibrated camera, or the field of view of an assumed one, if given.
+
+    `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`.
+    """
     if camera is not None and fov_deg is not None:
         raise InputError("--camera already holds the field of view: leave --fov-deg out")
     for name, value in reading.items():

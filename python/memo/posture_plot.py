@@ -62,7 +62,7 @@ def plot_from_the_side(ax: Axes, postures: Postures, row: int) -> Axes:
 
     _draw_choice(ax, postures, row, plane)
     _draw_ground(ax, postures)
-    ax.set(xlabel="away from the camera, m", ylabel="height, m")
+    ax.set(xlabel="away from the camera, m", ylabel=_height_name(postures))
     ax.set_title("from the side", loc="left", fontsize=9)
     return ax
 
@@ -91,7 +91,7 @@ def plot_strip(ax: Axes, postures: Postures) -> Axes:
         draw_figure(ax, np.column_stack([across - np.nanmean(across) + _STRIP_STEP_M * place, joints[:, 2]]))
     _draw_ground(ax, postures)
     ax.set_xticks(_STRIP_STEP_M * np.arange(len(rows)), [f"{postures.times_s[row]:.2f}" for row in rows])
-    ax.set(xlabel="time, s", ylabel="height, m")
+    ax.set(xlabel="time, s", ylabel=_height_name(postures))
     ax.set_title(f"the motion from the side; to the right: {name}", loc="left", fontsize=9)
     ax.set_aspect("equal")
     return ax
@@ -119,6 +119,11 @@ def write_posture_plot(postures: Postures, path: str | PathLike[str], row: int |
     return path
 
 
+def _height_name(postures: Postures) -> str:
+    """The world of an assumed camera begins at the camera: its ground is unknown."""
+    return "height above the camera, m" if postures.camera_assumed else "height, m"
+
+
 def _headline(postures: Postures, row: int) -> str:
     survivors, drawn = int(postures.survivors[row]), len(postures.group_sizes[row])
     groups = counted(drawn, "group")
@@ -139,7 +144,7 @@ def _draw_choice(ax: Axes, postures: Postures, row: int, plane: Callable[[Array]
 
 def _draw_ground(ax: Axes, postures: Postures) -> None:
     """The line z = 0, if the person stands near it (some worlds have another origin)."""
-    if abs(np.nanmin(postures.smoothed_m[..., 2])) < _NEAR_GROUND_M:
+    if not postures.camera_assumed and abs(np.nanmin(postures.smoothed_m[..., 2])) < _NEAR_GROUND_M:
         ax.axhline(0, color=NEUTRAL, linewidth=0.6, linestyle=":")
 
 

@@ -331,6 +331,7 @@ def posture(
     `camera`: calibrated; without one, a level camera with the horizontal field of view `fov_deg` is assumed,
     and the keypoints must give the size of the picture (`read_keypoints(image_size=)`). The ground is then
     unknown, and distances are at least 18 % uncertain; figures relative to their necks depend little on it.
+    The default is across the width of the picture, or across its height if that is larger.
     `lengths`: the 17 segment lengths by name, metres, or a file for `read_lengths`; else `height_m`, crown
     to sole, refined by the frames; with neither they are estimated, with the ground as scale.
     `rules`: "physical", "walking" or "walking-general" (holds for any way of

@@ -11,7 +11,9 @@ use crate::result::result;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
 use memo_core::model::angles::JointAngles;
-use memo_core::model::{ASSUMED_FOCAL_SD, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, JOINT_COUNT};
+use memo_core::model::{
+    ASSUMED_FOCAL_SD, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, JOINT_COUNT, assumed_field_of_view_rad,
+};
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
 use memo_core::posture::link::Alternative;
@@ -224,7 +226,7 @@ pub fn posture(
     let camera = match (camera, size) {
         (Some(camera), None) if fov_deg.is_none() => camera.0.clone(),
         (None, Some(size)) => {
-            let fov_rad = fov_deg.map_or(DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, f64::to_radians);
+            let fov_rad = fov_deg.map_or_else(|| assumed_field_of_view_rad(size.into()), f64::to_radians);
             Camera::assumed(size.into(), fov_rad).map_err(value_error)?
         }
         _ => {

@@ -106,9 +106,9 @@ impl PartAngles {
 
 /// Angles at the joints of one side in the sense of gait analysis, radians; NaN where a joint they need is unknown.
 ///
-/// Thigh and upper arm: R_z(flexion) R_x(adduction) as in OpenSim's models, z along the line of the hips or of
-/// the shoulders and y along the trunk, made perpendicular to z. So flexion is that of the projection
-/// onto the plane across the line of the joints, and adduction is how far the limb is turned out of this plane.
+/// Thigh and upper arm: R_z(flexion) R_x(adduction) as in OpenSim's models, z along the line of the hips or of the
+/// shoulders and y along the trunk, made perpendicular to z. So flexion is in the plane across the line of the joints,
+/// and adduction is how far the limb is turned out of this plane. [`swing_rad`] and [`abduction_rad`] are the paper's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointAngles {
     /// Thigh against the trunk, to the front positive.

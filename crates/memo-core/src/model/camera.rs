@@ -21,6 +21,13 @@ use super::distortion::Distortion;
 /// landscape video. In portrait orientation the same camera covers about 37 degrees.
 pub const DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD: f64 = 62.0 * PI / 180.0;
 
+/// Horizontal field of view assumed without calibration for pictures of a size, radians:
+/// [`DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD`] across the longer side.
+pub fn assumed_field_of_view_rad([width, height]: [u32; 2]) -> f64 {
+    let share = f64::from(width) / f64::from(width.max(height).max(1));
+    2.0 * (share * (0.5 * DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD).tan()).atan()
+}
+
 /// Relative standard deviation of an assumed focal length: fields of view from 45 to 75 degrees, equally likely, when
 /// one in the middle is assumed.
 pub const ASSUMED_FOCAL_SD: f64 = 0.18;
@@ -522,6 +529,20 @@ mod tests {
         ([-1.3, 0.9, -0.6], [459.879847804, 434.657287113], [463.086993138, 433.298510466]),
         ([1.5, 1.4, 0.3], [708.719975386, 296.526604396], [708.548232150, 296.694011437]),
     ];
+
+    /// The fields of view in the comment at the default: 60 to 65 degrees, upright about 37.
+    #[test]
+    fn an_upright_picture_is_that_of_the_same_camera_turned() {
+        for size in [[1920, 1080], [640, 480], [99, 99]] {
+            let field_rad = assumed_field_of_view_rad(size);
+            assert!((field_rad - DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD).abs() < 1e-12, "{size:?}");
+        }
+        let [flat, upright] = [[1920, 1080], [1080, 1920]]
+            .map(|size| Camera::assumed(size, assumed_field_of_view_rad(size)).unwrap());
+        assert!((flat.focal_px - upright.focal_px).length() < 1e-9);
+        assert!((assumed_field_of_view_rad([1080, 1920]).to_degrees() - 37.3).abs() < 0.5);
+        assert_eq!((flat.position(), flat.camera_from_world(DVec3::Y)), (DVec3::ZERO, DVec3::Z));
+    }
 
     #[test]
     fn projection_agrees_with_opencv() {

@@ -20,6 +20,7 @@ pub(crate) mod visibility;
 pub use body::{BodyError, PART_COUNT, Part, PosedBody, Proportions, SideJoints};
 pub use camera::{
     ASSUMED_FOCAL_SD, CameraError, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, MAX_DISTANCE_M, TsaiParameters,
+    assumed_field_of_view_rad,
 };
 pub use camera_file::{CameraFileError, CameraFileOptions, FileFormat, LengthUnit, NearestLens, Place};
 pub use cylinder::EllipticCylinder;

@@ -466,7 +466,7 @@ pub(super) mod tests {
         }
     }
 
-    /// What the model does not find of somebody behind others says nothing.
+    /// Frames in which others hide the person do not end a walk.
     #[test]
     fn hidden_frames_end_no_walk() {
         let behind = |visible: f32| {
