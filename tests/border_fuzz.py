@@ -1061,11 +1061,11 @@ def _(d):
     return _memo.side_pairs(layout_or_names(d)[0])
 
 
-@case("follow_person")
+@case("follow_everyone")
 def _(d):
     people, count = d.size(31), d.size(17)
     frames = np.sort(d.random.integers(0, d.one([1, 8, 2**62]), people, endpoint=True)).tolist()
-    return _memo.follow_person(
+    return _memo.follow_everyone(
         d.choice(frames, frames), d.numbers(0, 600, people, count, 2), d.numbers(0, 1, people, count)
     )
 

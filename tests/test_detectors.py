@@ -95,8 +95,11 @@ def test_variants_of_yolo_sleap_and_deeplabcut(tmp_path):
     read = memo.read_keypoints(tmp_path / "n.json", fps=30, image_size=made.SIZE)
     assert np.allclose(read.points[0], points[0], atol=0.02)
     points, _ = made.deeplabcut(tmp_path / "two.csv", individuals=("anna", "ben"))
-    read = memo.read_keypoints(tmp_path / "two.csv", fps=30, person=1)
+    read = memo.read_keypoints(tmp_path / "two.csv", fps=30, person="ben")
     assert np.allclose(read.points, points + 300) and read.people.tolist() == [2] * made.FRAMES
+    assert {someone.name for someone in read.everyone} == {"anna", "ben"}
+    with pytest.raises(memo.keypoints.KeypointsError, match="no person 1: the file names anna, ben"):
+        memo.read_keypoints(tmp_path / "two.csv", fps=30, person=1)
     pytest.importorskip("h5py")
     points, scores = made.sleap_h5(tmp_path / "s.h5", dims=("frame", "track", "node", "xy"))
     read = memo.read_keypoints(tmp_path / "s.h5", fps=30)

@@ -409,7 +409,7 @@ def test_exchanged_sides_are_put_right_first(scene, tmp_path):
         (["walk.csv", "--frame", "40"], "--frame 40 is not among the frames 0 to 39"),
         (["walk.csv", "--fps", "0"], "frame rate must be positive"),
         (["walk.csv", "--layout", "BODY_25"], "leave the layout BODY_25 out"),
-        (["walk.csv", "--person", "3"], "no frame has a person 3"),
+        (["walk.csv", "--person", "3"], "no person 3: there is 1 person, and the first is 0"),
         (["walk.csv", "--out", "walk.csv"], "cannot be written to"),
         (["upside.csv"], "from the extent: the figure is upside down in this camera"),
         (["upside.csv"], "from the trunk: no distance fits"),
@@ -602,7 +602,10 @@ def test_it_is_told_that_one_of_several_people_was_followed(scene, tmp_path, mem
     arguments = [tmp_path / "crowd.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--no-plots"]
     arguments += ["--lengths", folder / "lengths.csv", "--out", tmp_path / "out"]
     _, said, _ = memo_posture(*arguments)
-    assert "Up to 2 people in 7 of 40 frames: one was followed; --person selects another." in said
+    assert (
+        "2 people in the file: 0 (40 frames of frames 0 to 39, 320 px); 1 (7 frames of frames 0 to 6, 0 px). "
+        "The most prominent one was taken; --person selects another."
+    ) in said
     assert "people" not in memo_posture(*arguments, "--person", 0)[1]
 
 

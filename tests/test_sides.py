@@ -123,7 +123,7 @@ def test_the_command_writes_the_table_and_every_change(confused, tmp_path, memo_
         (["nowhere", "--fps", "25"], "no such file"),
         (["walk.csv", "--fps", "-1"], "frame rate must be positive"),
         (["walk.csv", "--fps", "25", "--layout", "BODY_25"], "leave the layout BODY_25 out"),
-        (["walk.csv", "--fps", "25", "--person", "3"], "no frame has a person 3"),
+        (["walk.csv", "--fps", "25", "--person", "3"], "no person 3: there is 1 person, and the first is 0"),
         (["walk.csv", "--fps", "25", "--out", "."], "write to another place"),
         (["walk.csv", "--fps", "25", "--out", "walk.csv"], "cannot be written to"),
     ],

@@ -63,7 +63,7 @@ __all__ = [
     "defaults",
     "edge_segments",
     "euler_angles",
-    "follow_person",
+    "follow_everyone",
     "foot_points",
     "gait_curves",
     "guess_layout",
@@ -876,9 +876,9 @@ def head_points(
     scores: npt.NDArray[np.float64],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
 def side_pairs(layout_or_names: str | Sequence[str]) -> list[tuple[str, str, int, int]]: ...
-def follow_person(
+def follow_everyone(
     frames: Sequence[int], points: npt.NDArray[np.float64], scores: npt.NDArray[np.float64]
-) -> list[bool]: ...
+) -> tuple[list[int | None], list[tuple[int, int, int, float]]]: ...
 
 @final
 class LimbSides:

@@ -319,7 +319,7 @@ def posture(
     max_groups: int | None = None,
     fps: float | None = None,
     layout: str | None = None,
-    person: int | None = None,
+    person: int | str | tuple[float, float, int] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Postures:
     """All postures of a person that one view allows, and the most probable motion.
@@ -374,7 +374,7 @@ def posture(
         lengths = _checked_lengths("lengths", lengths)
     if not isinstance(keypoints, Keypoints):
         keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
-    elif not fps is layout is person is None:
+    elif (fps, layout, person) != (None, None, None):
         raise ValueError("fps, layout and person apply to keypoints read from a file only")
     _check_joints_there(keypoints)
     keypoints.check_pixels()
@@ -595,7 +595,7 @@ def _named(
             p=second.p,
         ),
         heading_source=found.heading_source,
-        warnings=(*_head_down(found.linked_m), *found.warnings),
+        warnings=(*keypoints.doubts, *_head_down(found.linked_m), *found.warnings),
         repair=repair,
     )
 

@@ -75,7 +75,7 @@ def unswap(
     *,
     fps: float | None = None,
     layout: str | None = None,
-    person: int | None = None,
+    person: int | str | tuple[float, float, int] | None = None,
 ) -> SideRepair:
     """Exchanges right and left, separately in legs and arms, where the motion shows that they were confused.
 
@@ -88,7 +88,7 @@ def unswap(
         raise ValueError(f"groups must be a list of {' and '.join(_LEVELS)}, got {groups!r}")
     if not isinstance(keypoints, Keypoints):
         keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
-    elif not fps is layout is person is None:
+    elif (fps, layout, person) != (None, None, None):
         raise ValueError("fps, layout and person apply to keypoints read from a file only")
     pairs = {group: levels for group in groups if (levels := _levels(keypoints.names, group))}
     if not pairs:

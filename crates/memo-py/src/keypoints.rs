@@ -3,7 +3,7 @@
 use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
 use crate::error::value_error;
 use glam::DVec2;
-use memo_core::keypoints::person::{FollowOptions, follow_person as core_follow_person};
+use memo_core::keypoints::people::{FollowOptions, follow_everyone as core_follow_everyone};
 use memo_core::keypoints::{DetectorError, LAYOUTS, WeightedPoints, joint_name as core_joint_name};
 use memo_core::{Detector, Layout};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
@@ -129,17 +129,25 @@ pub fn side_pairs(
     Ok(pairs.into_iter().map(|pair| (pair.group.name(), pair.part, pair.right, pair.left)).collect())
 }
 
-/// True for detections of the most prominent person: frames (N,) in order, points (N, K, 2), scores (N, K).
+/// The number of the person of each detection, and where two people may be exchanged.
+type NumbersAndDoubts = (Vec<Option<usize>>, Vec<(usize, usize, i64, f64)>);
+
+/// Everyone in detections: frames (N,) in order, points (N, K, 2), scores (N, K). Returns the number of each detection's
+/// person, the most prominent first, `None` for a second detection; and doubts: two people who may be exchanged, from
+/// which frame on, and the probability.
 #[pyfunction]
-pub fn follow_person(
+pub fn follow_everyone(
     py: Python<'_>,
     frames: Vec<i64>,
     points: &Bound<'_, PyAny>,
     scores: &Bound<'_, PyAny>,
-) -> PyResult<Vec<bool>> {
+) -> PyResult<NumbersAndDoubts> {
     let people = track_from_numpy(points)?;
     let scores = scores_from_numpy(scores, &people)?;
     let options = FollowOptions::default();
-    py.detach(|| core_follow_person(&frames, people.joints, &people.points_px, &scores, &options))
-        .map_err(value_error)
+    let found = py
+        .detach(|| core_follow_everyone(&frames, people.joints, &people.points_px, &scores, &options))
+        .map_err(value_error)?;
+    let doubts = found.doubts.iter().map(|d| (d.people[0], d.people[1], d.frame, d.probability)).collect();
+    Ok((found.person, doubts))
 }

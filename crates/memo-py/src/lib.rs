@@ -54,8 +54,8 @@ mod _memo {
     use super::image::{change_mask, edge_segments, moving_regions, shrunk, silhouettes, velocity_field};
     #[pymodule_export]
     use super::keypoints::{
-        follow_person, foot_points, guess_layout, head_points, joint_name, keypoint_layout, keypoint_layouts,
-        side_pairs, stick_joints,
+        follow_everyone, foot_points, guess_layout, head_points, joint_name, keypoint_layout,
+        keypoint_layouts, side_pairs, stick_joints,
     };
     #[pymodule_export]
     use super::planar::{

@@ -56,7 +56,7 @@ def add_calibrate(app: "typer.Typer") -> None:
     import typer
 
     from memo.cli.camera_options import FovDeg, Lens, Picture, Size
-    from memo.cli.keypoint_options import LayoutName, Person
+    from memo.cli.keypoint_options import LayoutName, Person, person_of
 
     ways = typer.Typer(
         no_args_is_help=True, help="Finds the position, the orientation and the lens of a camera."
@@ -113,7 +113,7 @@ def add_calibrate(app: "typer.Typer") -> None:
         def work() -> Exit:
             checked_height(height)
             check_apart([source, picture, lens], _written(delivery))
-            reading = {"fps": fps, "layout": layout, "person": person}
+            reading = {"fps": fps, "layout": layout, "person": person_of(person)}
             return _walker(source, height, reading, (size, picture, fov_deg, lens), delivery)
 
         raise typer.Exit(guarded(work))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from memo.given import InputError
+from memo.given import InputError, point_in_frame
 
 KeypointsPath = Annotated[
     Path,
@@ -31,9 +31,20 @@ ImageSize = Annotated[
     ),
 ]
 Person = Annotated[
-    int | None,
-    typer.Option(help="Index of the person in each frame's list; default: one is followed.", min=0),
+    str | None,
+    typer.Option(
+        help="Which of several people: the number, 0 being the most prominent; the name in the file; or a "
+        "place as in 320,240@50, pixels and frame. Default: 0.",
+        metavar="NUMBER|NAME|X,Y@F",
+    ),
 ]
+
+
+def person_of(text: str | None) -> int | str | tuple[float, float, int] | None:
+    """A person chosen by number, name or place."""
+    if text is None or "@" in text:
+        return None if text is None else point_in_frame(text, "--person")
+    return int(text) if text.isascii() and text.isdecimal() else text
 
 
 def size_of(text: str | None) -> tuple[int, int] | None:

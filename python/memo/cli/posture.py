@@ -82,7 +82,7 @@ def add_posture(app: "typer.Typer") -> None:
     import typer
 
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
-    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, person_of
 
     usual = memo._memo.defaults("posture")
     usual_rules, usual_strength = Rules(usual["rules"]), Strength(usual["strength"])
@@ -145,7 +145,7 @@ def add_posture(app: "typer.Typer") -> None:
         """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
-        reading = {"fps": fps, "layout": layout, "person": person, "image_size": image_size}
+        reading = {"fps": fps, "layout": layout, "person": person_of(person), "image_size": image_size}
         options: dict[str, Any] = {"rules": rules.value, "strength": strength.value, "anchor": anchor.value}
         options |= {"unswap": unswap, "noise_px": noise_px}
 
@@ -185,7 +185,7 @@ def _posture(
 
             written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
     first, *others = _lines(postures)
-    lines = [first + one_of_several(keypoints, reading["person"]), *others]
+    lines = [first + one_of_several(keypoints, reading["person"] is None), *others]
     alarm = None if postures.is_possible else _impossible(postures, options["rules"])
     delivery.tell(postures.summary, lines, written, alarm=alarm)
     if not (postures.survivors > 0).any():

@@ -12,7 +12,7 @@ from memo.cli.delivery import Delivery, guarded, with_elapsed
 from memo.exits import Exit
 from memo.files import write_flips_csv
 from memo.given import InputError, check_apart, check_writable
-from memo.keypoints import write_keypoints
+from memo.keypoints import Someone, write_keypoints
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -35,13 +35,14 @@ class Written(StrEnum):
     CSV = "csv"
 
 
+_MOST_SHOWN = 4
 _ENDS = {Written.OPENPOSE: "_json", Written.COCO: ".json", Written.CSV: ".csv"}
 
 
 def add_unswap(app: "typer.Typer") -> None:
     import typer
 
-    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, person_of
 
     @app.command(epilog=EPILOG)
     def unswap(
@@ -69,7 +70,7 @@ def add_unswap(app: "typer.Typer") -> None:
         Labels that are exchanged in all frames, or in most, cannot be detected.
         """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
-        options = {"fps": fps, "layout": layout, "person": person, "image_size": image_size}
+        options = {"fps": fps, "layout": layout, "person": person_of(person), "image_size": image_size}
         raise typer.Exit(guarded(lambda: _unswap(keypoints, options, written, delivery)))
 
 
@@ -106,25 +107,36 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
         "undecided": repair.undecided,
         "p_global": repair.p_global,
         "left_out": left_out,
+        "doubts": keypoints.doubts,
     }
     lines = [
         f"Right and left exchanged, of {counted(frames, 'frame')}: {exchanges(repair)}; {_majority(repair)}."
     ]
-    lines[0] += one_of_several(keypoints, options["person"])
+    lines[0] += one_of_several(keypoints, options["person"] is None)
+    lines += [f"Warning: {doubt}." for doubt in keypoints.doubts]
     if left_out:
         lines.append(f"{as_format.value} cannot store {', '.join(left_out)}.")
     delivery.tell(summary, lines, written)
     return Exit.DONE
 
 
-def one_of_several(keypoints: memo.Keypoints, person: int | None) -> str:
-    """A sentence to append if it was not given which of several people is meant."""
-    crowded = int((keypoints.people > 1).sum())
-    if person is not None or not crowded:
+def one_of_several(keypoints: memo.Keypoints, is_open: bool) -> str:
+    """A sentence to append on who is in the file, if it was open which of several people is meant."""
+    everyone = keypoints.everyone
+    if not is_open or len(everyone) < 2:
         return ""
-    frames = f"{crowded} of {counted(len(keypoints.frames), 'frame')}"
-    people = counted(keypoints.people.max(), "person", "people")
-    return f" Up to {people} in {frames}: one was followed; --person selects another."
+    shown = [_shown(someone) for someone in everyone[:_MOST_SHOWN]]
+    if len(everyone) > _MOST_SHOWN:
+        shown.append(counted(len(everyone) - _MOST_SHOWN, "other"))
+    return (
+        f" {len(everyone)} people in the file: {'; '.join(shown)}. The most prominent one was taken; "
+        "--person selects another."
+    )
+
+
+def _shown(someone: Someone) -> str:
+    frames = f"frames {someone.first_frame} to {someone.last_frame}"
+    return f"{someone.name} ({counted(someone.frames, 'frame')} of {frames}, {someone.size_px:.0f} px)"
 
 
 def exchanges(repair: memo.SideRepair) -> str:

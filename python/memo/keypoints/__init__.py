@@ -22,12 +22,12 @@ missing points. Toes, heels and points of the face are kept where the layout has
 changes the points that differ from the input, and nothing else in the file; `write_openpose`, `write_coco`,
 `write_csv` write only this person and what the format can store.
 
-Limits: it does not follow a person through a crowd (see `read_keypoints`), read 3D points or guess a rate.
+Limits: it knows people by their places alone (see `read_keypoints`), reads no 3D points and guesses no rate.
 """
 
 from memo.keypoints.coco import write_coco
 from memo.keypoints.openpose import write_openpose
-from memo.keypoints.points import Keypoints, KeypointsError, layouts
+from memo.keypoints.points import Keypoints, KeypointsError, Someone, layouts
 from memo.keypoints.reading import read_keypoints
 from memo.keypoints.table import write_csv
 from memo.keypoints.track import keypoints_of_track
@@ -37,6 +37,7 @@ __all__ = [
     "WRITERS",
     "Keypoints",
     "KeypointsError",
+    "Someone",
     "keypoints_of_track",
     "layouts",
     "read_keypoints",

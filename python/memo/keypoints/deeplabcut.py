@@ -168,7 +168,8 @@ def _people(
                     own[:, index, axis] = 1.0  # labels have no likelihood
         for frame, one in zip(frames, own, strict=True):
             if np.isfinite(one[:, :2]).any():
-                people.append(Person(frame, with_missing(one, f"{path}: frame {frame}"), None))
+                values_of = with_missing(one, f"{path}: frame {frame}")
+                people.append(Person(frame, values_of, None, individual or None))
     return Found(Source(path, None), people, names=tuple(joints.values()), frames=tuple(frames))
 
 

@@ -23,6 +23,8 @@ class Person:
     frame: int
     values: Array  # (K, 3): x, y, score
     place: Any
+    #: The person's name in the file, if it names people reliably.
+    name: str | None = None
 
 
 @dataclass(frozen=True)

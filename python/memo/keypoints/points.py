@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["Array", "Keypoints", "KeypointsError", "Source", "layouts"]
+__all__ = ["Array", "Keypoints", "KeypointsError", "Someone", "Source", "layouts"]
 
 Array = npt.NDArray[np.float64]
 
@@ -46,6 +46,19 @@ class KeypointsError(ValueError):
 def layouts() -> dict[str, tuple[str, ...]]:
     """The known orders of points: the names of the joints of each layout."""
     return {name: tuple(_memo.keypoint_layout(name)[1]) for name in _memo.keypoint_layouts()}
+
+
+class Someone(NamedTuple):
+    """One of the people in a file."""
+
+    name: str
+    """As in the file; if it does not name people, their number, the most prominent person first."""
+    frames: int
+    """Number of frames in which the person was detected."""
+    first_frame: int
+    last_frame: int
+    size_px: float
+    """Median diagonal of the bounding box of the points, pixels."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +96,10 @@ class Keypoints:
     """(T,) number of people in the file in each frame."""
     source: Source
     """What is needed to write back."""
+    everyone: tuple[Someone, ...] = ()
+    """The people in the file, the most prominent first, by size times score in all frames."""
+    doubts: tuple[str, ...] = ()
+    """Where the person may have been exchanged with another, in sentences."""
 
     @classmethod
     def from_arrays(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 from memo import _memo
 from memo.given import nothing_at
 from memo.keypoints.found import MAX_COORDINATE_PX, Found, Person
-from memo.keypoints.points import Array, Keypoints, KeypointsError, frame_range
+from memo.keypoints.points import Array, Keypoints, KeypointsError, Someone, frame_range
 from memo.keypoints.recognising import everybody_in
 from memo.pixels import of_video, shrink_of_table
 from memo.wording import counted
@@ -28,28 +28,29 @@ _OF_A_TRACK = ("track.csv", "track.parquet")
 def read_keypoints(
     path: str | PathLike[str],
     *,
-    person: int | None = None,
+    person: int | str | tuple[float, float, int] | None = None,
     fps: float | None = None,
     layout: str | None = None,
     image_size: tuple[int, int] | None = None,
 ) -> Keypoints:
     """Reads one person's keypoints; the format is recognised by the content.
 
-    `person` is the index in each frame's list of people. Without it, if a frame has several people: the
-    person with the greatest product of size and mean score over all frames, and from there, forwards and
-    backwards, the nearest in each next frame, if within 0.3 of the person's size (more after a gap). `fps` is
-    needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the file does
-    not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether the
-    points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels, is
-    needed if coordinates are fractions of the picture (MediaPipe, labels of YOLO), and for postures without a
-    camera. For a run of `memo track` (a folder with `track.csv` or `track.parquet`) the projected joints are
-    read.
+    `person` chooses one of several people: the number, 0 being the most prominent (size times mean score,
+    summed over all frames); the name, if a table, DeepLabCut or SLEAP names people; or a place
+    `(u_px, v_px, frame)` where the person is. Everyone is followed from frame to frame, whatever the order of
+    the detector's lists; who is not found for a while is expected on their way. By default the most
+    prominent person is chosen. `Keypoints.everyone` lists all, `doubts` says where two may be exchanged.
+    `fps` is needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the
+    file does not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether
+    the points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels,
+    is needed if coordinates are fractions of the picture (MediaPipe, labels of YOLO), and for postures
+    without a camera. For a run of `memo track` (a folder with `track.csv` or `track.parquet`) the projected
+    joints are read.
     """
     path = Path(path)
     if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
         raise KeypointsError(f"the frame rate must be positive, got {fps}")
-    if person is not None and (isinstance(person, bool) or not isinstance(person, int) or person < 0):
-        raise KeypointsError(f"person {person!r} is not an index in the list of people: 0, 1, ...")
+    _check_person(person)
     if image_size is not None and not _is_size(image_size):
         raise KeypointsError(f"image_size {image_size!r}: wanted width and height in whole pixels")
     try:
@@ -85,7 +86,24 @@ def _is_size(size: Any) -> bool:
     )
 
 
-def _assembled(found: Found, person: int | None, fps: float | None, layout: str | None) -> Keypoints:
+def _check_person(person: Any) -> None:
+    if isinstance(person, tuple | list):
+        is_place = (
+            len(person) == 3
+            and all(isinstance(number, int | float) and math.isfinite(number) for number in person)
+            and person[2] == int(person[2])
+        )
+    else:
+        is_place = isinstance(person, str) or (type(person) is int and person >= 0)
+    if person is not None and not is_place:
+        raise KeypointsError(
+            f"person {person!r} is no number (0, 1, ...), name, or place of a person: (u_px, v_px, frame)"
+        )
+
+
+def _assembled(
+    found: Found, person: int | str | tuple[float, float, int] | None, fps: float | None, layout: str | None
+) -> Keypoints:
     path = found.source.path
     people = sorted(found.people, key=lambda one: one.frame)
     if not people:
@@ -97,7 +115,10 @@ def _assembled(found: Found, person: int | None, fps: float | None, layout: str 
     values = np.stack([one.values for one in people])
     all_points, all_scores = np.ascontiguousarray(values[..., :2]), np.ascontiguousarray(values[..., 2])
     name, names = _layout(found, layout, all_points)
-    chosen = _chosen(path, people, person, all_points, all_scores)
+    numbers, met = _memo.follow_everyone([one.frame for one in people], all_points, all_scores)
+    everyone = _everyone(people, _names(people, numbers), all_points, all_scores)
+    who = _chosen(path, people, person, numbers, all_points)
+    chosen = [name == who for name in (_names(people, numbers) if isinstance(who, str) else numbers)]
 
     count = len(frames)
     points = np.full((count, len(names), 2), np.nan)
@@ -119,6 +140,8 @@ def _assembled(found: Found, person: int | None, fps: float | None, layout: str 
         image_size=found.image_size,
         people=seen,
         source=replace(found.source, places=tuple(places)),
+        everyone=everyone,
+        doubts=() if isinstance(who, str) else tuple(_doubts(who, met)),
     )
 
 
@@ -139,19 +162,98 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
     return name, tuple(names)
 
 
+def _names(people: Sequence[Person], numbers: Sequence[int | None]) -> list[str | None]:
+    """The name of each detection's person: as in the file, else the number."""
+    if any(one.name is not None for one in people):
+        return [one.name for one in people]
+    return [None if number is None else str(number) for number in numbers]
+
+
+def _everyone(
+    people: Sequence[Person], names: Sequence[str | None], points: Array, scores: Array
+) -> tuple[Someone, ...]:
+    own: dict[str, list[int]] = {}
+    for index, name in enumerate(names):
+        if name is not None:
+            own.setdefault(name, []).append(index)
+    low, high = (extreme(points, axis=1) for extreme in (_least, _greatest))
+    sizes_px = np.hypot(*(high - low).T)
+    seen = np.isfinite(points).all(axis=2)
+    prominence = sizes_px * np.where(seen, scores, 0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    ordered = sorted(own.items(), key=lambda item: -float(np.sum(prominence[item[1]])))
+    return tuple(
+        Someone(
+            name,
+            len(indices),
+            people[indices[0]].frame,
+            people[indices[-1]].frame,
+            float(np.median(sizes_px[indices])),
+        )
+        for name, indices in ordered
+    )
+
+
+def _least(points: Array, axis: int) -> Array:
+    least: Array = np.where(np.isfinite(points), points, np.inf).min(axis=axis, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0)
+
+
+def _greatest(points: Array, axis: int) -> Array:
+    return -_least(-points, axis)
+
+
 def _chosen(
-    path: Path, people: Sequence[Person], person: int | None, points: Array, scores: Array
-) -> Sequence[bool]:
+    path: Path,
+    people: Sequence[Person],
+    person: int | str | tuple[float, float, int] | None,
+    numbers: Sequence[int | None],
+    points: Array,
+) -> int | str:
+    """The number of the person meant, or the name, if people are chosen by the file's names."""
     if person is None:
-        return _memo.follow_person([one.frame for one in people], points, scores)
-    chosen = [
-        place == person
-        for _, same_frame in groupby(people, key=lambda one: one.frame)
-        for place, _ in enumerate(same_frame)
+        return 0
+    if isinstance(person, tuple | list):
+        return _at(path, people, (float(person[0]), float(person[1]), int(person[2])), numbers, points)
+    names = {one.name for one in people} - {None}
+    if names or isinstance(person, str):
+        if str(person) not in names:
+            known = f"names {', '.join(sorted(filter(None, names)))}" if names else "does not name people"
+            raise KeypointsError(f"{path}: no person {person}: the file {known}")
+        return str(person)
+    count = max((number for number in numbers if number is not None), default=-1) + 1
+    if person >= count:
+        there = f"there {'is' if count == 1 else 'are'} {counted(count, 'person', 'people')}"
+        raise KeypointsError(f"{path}: no person {person}: {there}, and the first is 0")
+    return person
+
+
+def _at(
+    path: Path,
+    people: Sequence[Person],
+    place: tuple[float, float, int],
+    numbers: Sequence[int | None],
+    points: Array,
+) -> int:
+    """The person whose points are nearest to a place of the picture in a frame."""
+    u_px, v_px, frame = place
+    there = [
+        (float(np.hypot(*(seen - (u_px, v_px)).T).min()), number)
+        for one, number, own in zip(people, numbers, points, strict=True)
+        if one.frame == frame and number is not None and len(seen := own[np.isfinite(own).all(axis=1)])
     ]
-    if not any(chosen):
-        raise KeypointsError(f"{path}: no frame has a person {person} (the first is 0)")
-    return chosen
+    if not there:
+        raise KeypointsError(f"{path}: nobody is seen in frame {frame}")
+    return min(there)[1]
+
+
+def _doubts(person: int, met: Iterable[tuple[int, int, int, float]]) -> Iterable[str]:
+    for one, other, frame, probability in met:
+        if person in (one, other):
+            second = other if person == one else one
+            yield (
+                f"from frame {frame} on, person {person} may be person {second}: "
+                f"they meet there (probability {probability:.2f})"
+            )
 
 
 def _times_s(path: Path, frames: range, times_s: dict[int, float] | None, fps: float | None) -> Array:

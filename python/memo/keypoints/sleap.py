@@ -66,7 +66,8 @@ def read_sleap(path: Path, content: str) -> Found:
             )
         values = np.array([[value(f"{node}.{end}") for end in ("x", "y", "score")] for node in joints])
         if np.isfinite(values[:, :2]).any():
-            people.append(Person(int(frame), with_missing(values, where), None))
+            track = row[places["track"]].strip() if "track" in places else ""
+            people.append(Person(int(frame), with_missing(values, where), None, track or None))
     return Found(Source(path, None), people, names=tuple(joints.values()))
 
 
@@ -80,6 +81,7 @@ def read_sleap_h5(path: Path) -> Found:
         tracks = _ordered(path, file["tracks"], _TRACKS)
         names = [_text(name) for name in np.ravel(file["node_names"][()]).tolist()]
         scores = np.ones(tracks.shape[:1] + tracks.shape[2:])
+        named = np.ravel(file["track_names"][()]).tolist() if "track_names" in file else []
         if "point_scores" in file and file["point_scores"].size:
             scores = _ordered(path, file["point_scores"], _SCORES)
     count, _, nodes, frames = tracks.shape
@@ -89,12 +91,13 @@ def read_sleap_h5(path: Path) -> Found:
             f"{len(names)} node_names and point_scores {scores.shape}"
         )
     joints = known_joints(path, names)
+    track_names = [_text(name) for name in named] if len(named) == count else [None] * count
     nodes_kept = [names.index(node) for node in joints]
     values = np.concatenate([tracks, scores[:, None]], axis=1)[:, :, nodes_kept].transpose(3, 0, 2, 1)
     people = [
-        Person(frame, with_missing(one.copy(), f"{path}: frame {frame}"), None)
+        Person(frame, with_missing(one.copy(), f"{path}: frame {frame}"), None, track)
         for frame, of_frame in enumerate(values)
-        for one in of_frame
+        for one, track in zip(of_frame, track_names, strict=True)
         if np.isfinite(one[:, :2]).any()
     ]
     return Found(Source(path, None), people, names=tuple(joints.values()), frames=tuple(range(frames)))

@@ -205,9 +205,19 @@ def row_frames(
 
 def wide_people(path: Path, rows: list[list[str]], columns: Columns, frames: dict[int, int]) -> list[Person]:
     return [
-        Person(frame, _cells(path, [(line, rows[line], own) for own in columns.values]), line)
+        Person(
+            frame,
+            _cells(path, [(line, rows[line], own) for own in columns.values]),
+            line,
+            _name(rows[line], columns) or None,
+        )
         for line, frame in frames.items()
     ]
+
+
+def _name(row: list[str], columns: Columns) -> str:
+    """The name of the person of a row; empty in a table of one person."""
+    return "" if columns.person is None else row[columns.person].strip()
 
 
 def _long_people(path: Path, rows: list[list[str]], columns: Columns, frames: dict[int, int]) -> list[Person]:
@@ -218,17 +228,17 @@ def _long_people(path: Path, rows: list[list[str]], columns: Columns, frames: di
         name = joint_of(path, rows[line][columns.joint])
         if name is None:
             continue
-        who = "" if columns.person is None else rows[line][columns.person].strip()
+        who = _name(rows[line], columns)
         joints = lines.setdefault((frame, who), {})
         if numbers[name] in joints:
             raise KeypointsError(f"{path}: row {line + 1}: {name} appears twice in frame {frame}")
         joints[numbers[name]] = line
     people = []
-    for (frame, _), joints in lines.items():
+    for (frame, who), joints in lines.items():
         values = np.full((len(numbers), 3), (np.nan, np.nan, 0.0))
         own = _cells(path, [(line, rows[line], columns.values[0]) for line in joints.values()])
         values[list(joints)] = own
-        people.append(Person(frame, values, joints))
+        people.append(Person(frame, values, joints, who or None))
     return people
 
 

@@ -4,7 +4,7 @@
 pub(crate) mod detector;
 pub(crate) mod layouts;
 pub(crate) mod names;
-pub mod person;
+pub mod people;
 pub(crate) mod unswap;
 
 pub use detector::{FOOT_POINTS, HEAD_POINTS, SidePair, WeightedPoints};

@@ -270,7 +270,6 @@ impl Active {
         if self.frontal.is_some() {
             return Some(Err(FitError::Frontal));
         }
-        let walker = &self.walk.walker;
         let steps = &self.walk.twins[self.walk.best()].steps;
         let first = steps.first().map_or(usize::MAX, |step| step.frame);
         let last = steps.last().map_or(0, |step| step.frame);
@@ -279,17 +278,10 @@ impl Active {
             true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
             false => backdrop.views(pieces),
         };
-        let half_torso_m = 0.5 * walker.body.torso_length_m();
-        let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
-            let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
-            FitFrame { time_s: step.time_s, view, start: Hypothesis { height_m, ..place } }
-        };
-        let places = smoothed_hypotheses(steps, &options.walk.filter);
-        let mut frames: Vec<FitFrame> = steps.iter().zip(places).zip(views).map(frame).collect();
+        let mut frames = self.fit_frames(views, options);
         let route = &fitted_route(&self.camera, &self.average, &self.walk.route, &mut frames, fit);
         let problem = |route| {
-            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit)
-                .of_visible_share(self.walk.visible_share());
+            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit);
             match (&options.camera, self.height.source) {
                 (None, _) => problem.of_assumed_camera(),
                 (Some(_), HeightSource::Given) => problem,
@@ -302,6 +294,20 @@ impl Active {
         let mirrored = mirrored(&route.at(0.0), &self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
         Some(fit_on_the_spot(&here, &there, p_swapped))
+    }
+
+    /// The frames to be fitted, in their views, from where the smoothed track has the person.
+    fn fit_frames(&self, views: Vec<View>, options: &TrackerOptions) -> Vec<FitFrame> {
+        let walker = &self.walk.walker;
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let half_torso_m = 0.5 * walker.body.torso_length_m();
+        let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
+            let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
+            let start = Hypothesis { height_m, ..place };
+            FitFrame { time_s: step.time_s, view, visible: step.visible.into(), start }
+        };
+        let places = smoothed_hypotheses(steps, &options.walk.filter);
+        steps.iter().zip(places).zip(views).map(frame).collect()
     }
 
     /// True unless the fitted feet of a person on the spot take steps that no legs of that height take.
@@ -385,7 +391,7 @@ pub(super) mod tests {
     use super::super::walk::{Look, State, Step};
     use super::*;
     use crate::estimate::kalman::ConstantVelocity;
-    use crate::image::Rectangle;
+    use crate::image::{Image, Rectangle};
     use glam::DVec2;
 
     pub const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
@@ -475,6 +481,19 @@ pub(super) mod tests {
             walk.is_over()
         };
         assert!(behind(1.0) && behind(0.5) && !behind(0.4) && !behind(0.0));
+    }
+
+    #[test]
+    fn the_fit_is_told_how_much_of_the_person_each_frame_shows() {
+        let mut walk = ending(40, 1.2, 0.9, 0.5);
+        walk.walk.twins[0].steps.iter_mut().for_each(|step| step.visible = step.frame as f32 / 64.0);
+        let view =
+            View { corner: [0, 0], grey: Image::filled(1, 1, 0), background: None, others: Vec::new() };
+        let frames = walk.fit_frames(vec![view; 40], &options());
+        assert_eq!(frames.len(), 40);
+        for (k, frame) in frames.iter().enumerate() {
+            assert_eq!(frame.visible, k as f64 / 64.0);
+        }
     }
 
     #[test]

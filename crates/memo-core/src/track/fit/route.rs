@@ -70,9 +70,8 @@ impl Problem<'_> {
             normal += of_frame;
             right += right_of_frame;
         }
-        normal += prior(length_m);
         // 2. The route moved by them.
-        let coefficients = normal.cholesky()?.solve(&right);
+        let coefficients = most_probable(normal, &right, length_m)?;
         let count = (length_m.abs() / POINTS_M).ceil() as usize;
         let point = |k: usize| {
             let along_m = ends[0] + length_m * k as f64 / count as f64;
@@ -111,6 +110,11 @@ fn figure_slopes(figure: &Figure, [moved, turned, _]: [f64; 3]) -> [(usize, f64)
     let from_origin = figure.pelvis.truncate() - figure.origin;
     let [ahead_m, left_m] = [figure.ahead, figure.ahead.perp()].map(|axis| from_origin.dot(axis));
     [(ACROSS, moved - ahead_m * turned), (ALONG, left_m * turned), (HEADING, turned)]
+}
+
+/// The coefficients after a step, from what the contours say and the prior.
+fn most_probable(contours: DMatrix<f64>, right: &DVector<f64>, length_m: f64) -> Option<DVector<f64>> {
+    Some((contours + prior(length_m)).cholesky()?.solve(right))
 }
 
 /// The precision of the coefficients before the contours are seen.
@@ -187,6 +191,25 @@ mod tests {
         coefficients[0] = PLACE_SD_M;
         let cost = (coefficients.transpose() * prior(length_m) * &coefficients)[(0, 0)];
         assert!((cost - 1.0).abs() < 1e-9, "{cost}");
+    }
+
+    /// Contours that show the place of the first half metre alone, 2 cm to the left to a centimetre.
+    #[test]
+    fn a_route_of_which_the_contours_show_the_beginning_goes_on_as_it_did() {
+        let length_m = 5.0;
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(COUNT, COUNT), DVector::<f64>::zeros(COUNT));
+        for k in 0..10 {
+            let at =
+                DVector::from_iterator(COUNT, sideways(0.05 * k as f64, [0.0, length_m]).map(|of| of[0]));
+            normal += &at * at.transpose() / 0.01f64.powi(2);
+            right += 0.02 * at / 0.01f64.powi(2);
+        }
+        let found = most_probable(normal, &right, length_m).unwrap();
+        let at = |along_m: f64, n: usize| -> f64 {
+            sideways(along_m, [0.0, length_m]).iter().zip(&found).map(|(of, c)| of[n] * c).sum()
+        };
+        assert!((at(0.25, 0) - 0.02).abs() < 0.005, "{}", at(0.25, 0));
+        assert!(at(4.9, 0).abs() < 0.3 && at(4.9, 1).abs() < 0.1, "{} {}", at(4.9, 0), at(4.9, 1));
     }
 
     #[test]
