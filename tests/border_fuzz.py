@@ -1129,6 +1129,7 @@ def posture_options(d, frames):
         moving_direction=lambda: d.triple(-1, 1),
         group_m=lambda: d.number(0.01, 0.5),
         max_groups=lambda: d.whole(0, 100),
+        keep_all=lambda: d.one([False, True]),
         progress=d.called_back,
     )
 

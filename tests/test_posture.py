@@ -4,6 +4,7 @@ are told in one line."""
 import csv
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -607,6 +608,40 @@ def test_it_is_told_that_one_of_several_people_was_followed(scene, tmp_path, mem
         "The most prominent one was taken; --person selects another."
     ) in said
     assert "people" not in memo_posture(*arguments, "--person", 0)[1]
+
+
+def test_every_posture_is_kept_with_what_cut_the_others(found, scene, tmp_path, memo_posture):
+    folder, _ = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    known = {"fps": RATE_HZ, "noise_px": NOISE_PX, "keep_all": True}
+    kept = memo.posture(folder / "walk.csv", camera, folder / "lengths.csv", **known)
+    assert found.interpretations is None and len(kept.interpretations) == len(kept)
+    for row, (survivors_m, cut_m, cut_by) in enumerate(kept.interpretations):
+        assert survivors_m.shape == (kept.survivors[row], 14, 3)
+        # As many branches of each constraint as were counted.
+        counted = {reason.constraint: reason.branches for reason in kept.reasons[row]}
+        assert Counter(cut_by) == counted and len(cut_m) == len(cut_by)
+        # Every joint lies on its line of sight, but for noise where a segment is too short to reach it.
+        for figures_m in (survivors_m, cut_m):
+            px = camera.project(figures_m.reshape(-1, 3)).reshape(*figures_m.shape[:2], 2)
+            off_px = np.hypot(*np.moveaxis(px - kept.points_px[row], -1, 0))
+            assert np.nanmedian(off_px) < 0.5 and np.nanquantile(off_px, 0.99) < 12
+        assert np.isfinite(survivors_m).all() and np.isnan(cut_m).any() and np.isfinite(cut_m[:, 0]).all()
+        # The groups stand for the survivors.
+        for figure_m in kept.groups_m[row]:
+            assert np.isclose(survivors_m, figure_m, atol=1e-9).all(axis=(1, 2)).any()
+    np.testing.assert_array_equal(kept.smoothed_m, found.smoothed_m)
+    arguments = [folder / "walk.csv", "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--no-plots"]
+    arguments += ["--lengths", folder / "lengths.csv", "--noise-px", NOISE_PX]
+    arguments += ["--out", tmp_path / "out", "--keep-all"]
+    assert "interpretations.npz" in memo_posture(*arguments)[1]
+    with np.load(tmp_path / "out" / "interpretations.npz") as arrays:
+        left = arrays["frame"][arrays["cut_by"] == ""]
+        assert np.bincount(left).tolist() == kept.survivors.tolist()
+        assert arrays["posture_m"].shape == (len(arrays["frame"]), 14, 3)
+        assert tuple(arrays["joints"]) == kept.joints
+    memo_posture(*arguments[:-1])
+    assert not (tmp_path / "out" / "interpretations.npz").exists(), "not beside tables of another run"
 
 
 def test_one_frame_has_no_way(scene, tmp_path):

@@ -33,8 +33,9 @@ from memo._memo import (
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints, write_keypoints
 from memo.linkage import PlanarFigure, planar
-from memo.postures import Postures, posture, read_lengths
+from memo.postures import Postures, posture
 from memo.scene import DemoScene, demo_scene
+from memo.segment_lengths import read_lengths
 from memo.sides import SideRepair, unswap
 from memo.tracking import Track, Tracker, track
 

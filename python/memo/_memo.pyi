@@ -931,6 +931,7 @@ class PostureSequence:
     reason_totals: Final[list[tuple[str, str, str, int, int, str]]]
     survivors: Final[npt.NDArray[np.int64]]
     groups_m: Final[list[npt.NDArray[np.float64]]]
+    interpretations: Final[list[tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], list[str]]]]
     group_sizes: Final[list[npt.NDArray[np.int64]]]
     group_counts: Final[list[int | None]]
     cut_all: Final[list[list[str] | None]]
@@ -968,6 +969,7 @@ def posture(
     foot_points: npt.NDArray[np.float64] | None = None,
     group_m: float | None = None,
     max_groups: int | None = None,
+    keep_all: bool = False,
     progress: Callable[[int, int], object] | None = None,
 ) -> PostureSequence: ...
 def posture_tree(

@@ -1,7 +1,7 @@
 """Postures from one view: from keypoints and a camera, all possible postures and the most probable motion.
 
 The postures are computed by the core (Lee and Chen 1985, with additions for a detector's points). This module
-passes the keypoints on as 14 joints, names the results, and writes them.
+passes the keypoints on as 14 joints and names the results.
 
 Limits: sizes need a scale; without lengths, height, ground or distance, the height of an average adult is
 assumed. Without a camera, a level one is assumed: if it was tilted, the postures are tilted.
@@ -9,25 +9,20 @@ assumed. Without a camera, a level one is assumed: if it was tilted, the posture
 
 from __future__ import annotations
 
-import io
-import json
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from memo import _memo, sides
-from memo.files import write_columns_csv, write_json
-from memo.given import nothing_at
 from memo.keypoints import Keypoints, KeypointsError, read_keypoints
 from memo.notebook import Shown
-from memo.spreadsheet import CsvRows, Error
+from memo.segment_lengths import checked_lengths, read_lengths
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -35,15 +30,13 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["Postures", "Reason", "ReasonTotal", "SecondBest", "posture", "read_lengths", "write_postures"]
+__all__ = ["Interpretations", "Postures", "Reason", "ReasonTotal", "SecondBest", "posture"]
 
 _log = logging.getLogger(__name__)
 
 RULES = ("physical", "walking", "walking-general")
 STRENGTHS = ("measured", "paper")
 ANCHORS = ("auto", "ground", "trunk", "extent", "head", "combined")
-
-_MAX_LENGTHS_FILE_BYTES = 64 << 20
 
 _LIMB_ENDS = ("elbow", "wrist", "knee", "ankle")
 
@@ -79,6 +72,18 @@ class ReasonTotal(NamedTuple):
     """Number of frames in which it cut a branch."""
     sentence: str
     """Description of the constraint."""
+
+
+class Interpretations(NamedTuple):
+    """All postures of one frame, kept or cut. World, metres."""
+
+    survivors_m: Array
+    """(K, 14, 3) the postures left, in the order of the tree."""
+    cut_m: Array
+    """(C, 14, 3) the branches cut; joints below the level at which the branch was cut are NaN, because they
+    may be at any of their places."""
+    cut_by: tuple[str, ...]
+    """(C,) the constraint that cut each branch, as in `Reason`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,6 +162,8 @@ class Postures(Shown):
     """(T,) total number of groups; None if more than 1024 postures are left."""
     cut_all: tuple[tuple[str, ...] | None, ...]
     """(T,) if no posture is left: what the least violating posture violates, as sentences; else None."""
+    interpretations: tuple[Interpretations, ...] | None
+    """(T,) every posture of each frame with its reason; None without `keep_all`."""
     problems: tuple[str | None, ...]
     """(T,) why a frame cannot be used, such as a neck that is not visible; else None."""
     linked_m: Array
@@ -242,7 +249,9 @@ class Postures(Shown):
 
     def to_pandas(self) -> pandas.DataFrame:
         """The columns of `postures.csv` as a `pandas.DataFrame`, one row per frame."""
-        return data_frame(_posture_columns(self))
+        from memo.posture_files import posture_columns
+
+        return data_frame(posture_columns(self))
 
     def plot(self, row: int | None = None, ax: Axes | None = None) -> Axes:
         """Draws into `ax`, or new Axes, and returns them: the motion as a strip of stick figures, or
@@ -317,6 +326,7 @@ def posture(
     noise_px: float | None = None,
     group_m: float | None = None,
     max_groups: int | None = None,
+    keep_all: bool = False,
     fps: float | None = None,
     layout: str | None = None,
     person: int | str | tuple[float, float, int] | None = None,
@@ -344,6 +354,8 @@ def posture(
     `unswap`: first exchange right and left where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures form one group if no joint differs by
     more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
+    `keep_all`: return every posture of every frame with what cut it (`interpretations`), up to 8192 of 336
+    bytes each.
     `progress` is called at intervals with the work done and the total.
 
     Defaults: `fov_deg` 62, `rules` "walking", `strength` "measured", `anchor` "auto", `distance_sd_m` 0.05,
@@ -371,7 +383,7 @@ def posture(
     if isinstance(lengths, str | PathLike):
         lengths = read_lengths(lengths)
     elif lengths is not None:
-        lengths = _checked_lengths("lengths", lengths)
+        lengths = checked_lengths("lengths", lengths)
     if not isinstance(keypoints, Keypoints):
         keypoints = read_keypoints(keypoints, fps=fps, layout=layout, person=person)
     elif (fps, layout, person) != (None, None, None):
@@ -402,9 +414,10 @@ def posture(
         foot_points=_points_seen(_memo.foot_points, used, 0),
         group_m=group_m,
         max_groups=max_groups,
+        keep_all=keep_all,
         progress=progress,
     )
-    postures = _named(found, used, camera is None, points_px, weights, repair)
+    postures = _named(found, used, camera is None, points_px, weights, repair, keep_all)
     for warning in postures.warnings:
         _log.warning("%s", warning)
     return postures
@@ -547,6 +560,7 @@ def _named(
     points_px: Array,
     weights: Array,
     repair: sides.SideRepair | None,
+    keep_all: bool,
 ) -> Postures:
     second = found.second
     return Postures(
@@ -574,6 +588,12 @@ def _named(
         groups_m=tuple(found.groups_m),
         group_sizes=tuple(found.group_sizes),
         group_counts=tuple(found.group_counts),
+        interpretations=tuple(
+            Interpretations(survivors_m, cut_m, tuple(cut_by))
+            for survivors_m, cut_m, cut_by in found.interpretations
+        )
+        if keep_all
+        else None,
         problems=tuple(found.problems),
         cut_all=tuple(None if why is None else tuple(why) for why in found.cut_all),
         linked_m=found.linked_m,
@@ -598,206 +618,3 @@ def _named(
         warnings=(*keypoints.doubts, *_head_down(found.linked_m), *found.warnings),
         repair=repair,
     )
-
-
-# Lengths.
-
-
-def read_lengths(path: str | PathLike[str]) -> dict[str, float]:
-    """The 17 segment lengths of a file, metres, by name, such as `right_hip_to_right_knee`.
-
-    A table (CSV) with a name and a length in each row, or JSON `{name: length}`; also a `postures.json`,
-    whose lengths can be used for other sequences of the same person.
-    """
-    path = Path(path)
-    try:
-        if path.is_file() and path.stat().st_size > _MAX_LENGTHS_FILE_BYTES:
-            raise ValueError(f"{path}: too large for a file of lengths")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: not a text file") from None
-    except FileNotFoundError:
-        raise ValueError(nothing_at(path)) from None
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
-    named = _json_lengths(path, text) if text.lstrip()[:1] == "{" else _csv_lengths(path, text)
-    return _checked_lengths(str(path), named)
-
-
-def _json_lengths(path: Path, text: str) -> dict[str, Any]:
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: not JSON: {error}") from None
-    lengths = data.get("lengths", data)
-    if not isinstance(lengths, dict):
-        raise ValueError(f"{path}: `lengths` is not an object of names and lengths")
-    return {
-        name: value.get("length_m") if isinstance(value, dict) else value for name, value in lengths.items()
-    }
-
-
-def _csv_lengths(path: Path, text: str) -> dict[str, Any]:
-    named: dict[str, Any] = {}
-    known = set(_memo.segment_names())
-    try:
-        rows = list(CsvRows(io.StringIO(text, newline=""), strip=True))
-    except Error as error:
-        raise ValueError(f"{path}: not a table: {error}") from None
-    for line, cells in enumerate(rows, start=1):
-        if not any(cells) or (line == 1 and cells[0] not in known):  # blank, or the header
-            continue
-        if len(cells) < 2:
-            raise ValueError(f"{path}: row {line} has no length beside the name")
-        if cells[0] in named:
-            raise ValueError(f"{path}: row {line}: {cells[0]} appears twice")
-        named[cells[0]] = cells[1]
-    return named
-
-
-def _checked_lengths(where: str, lengths: Mapping[str, Any]) -> dict[str, float]:
-    names = _memo.segment_names()
-    absent = [name for name in names if name not in lengths]
-    unknown = [str(name)[:60] for name in lengths if name not in names]
-    if unknown:
-        raise ValueError(f"{where}: no segment {', '.join(unknown[:3])}; the names are {', '.join(names)}")
-    if absent:
-        raise ValueError(f"{where}: {len(absent)} of 17 lengths missing: {', '.join(absent)}")
-    return {name: _length_m(where, name, lengths[name]) for name in names}
-
-
-def _length_m(where: str, name: str, value: Any) -> float:
-    try:
-        length_m = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
-        length_m = math.nan
-    if not 0 < length_m < math.inf:
-        raise ValueError(f"{where}: {name} is {str(value)[:60]}, not a length in metres")
-    return length_m
-
-
-# Files written.
-
-_TENTH_MM = 4
-"""Digits of metres in postures.json."""
-
-
-#: The files of `write_postures`.
-WRITTEN = ("postures.csv", "postures_camera.csv", "levels.csv", "reasons.csv", "postures.json")
-
-
-def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
-    """Writes postures.csv, postures_camera.csv, levels.csv, reasons.csv and postures.json into a folder."""
-    out = Path(out)
-    tables: dict[str, Callable[[Postures], dict[str, npt.ArrayLike]]] = {
-        "postures.csv": _posture_columns,
-        "postures_camera.csv": _camera_columns,
-        "levels.csv": _level_columns,
-        "reasons.csv": _reason_columns,
-    }
-    for name, columns in tables.items():
-        write_columns_csv(out / name, columns(postures))
-    write_json(out / "postures.json", _document(postures))
-    return [*(out / name for name in tables), out / "postures.json"]
-
-
-def _posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """One row per frame: the smoothed motion in the world and its uncertainty; `groups` empty if unknown."""
-    columns: dict[str, npt.ArrayLike] = {
-        "frame": postures.frames,
-        "time_s": postures.times_s,
-        "survivors": postures.survivors,
-        "groups": np.array(["" if n is None else n for n in postures.group_counts], dtype=object),
-        "groups_given": np.array([len(sizes) for sizes in postures.group_sizes], np.int64),
-        "margin_nats": postures.margin_nats,
-        "anchor_m": postures.anchor_m,
-        "anchor_sd_m": postures.anchor_sd_m,
-    }
-    for k, joint in enumerate(postures.joints):
-        columns |= {f"{joint}_{axis}_m": postures.smoothed_m[:, k, i] for i, axis in enumerate("xyz")}
-        columns[f"{joint}_sd_m"] = postures.sd_m[:, k]
-        columns[f"{joint}_p_mirrored"] = postures.p_mirrored[:, k]
-    return columns | {f"{name}_deg": values for name, values in postures.angles_deg.items()}
-
-
-def _camera_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """One row per frame: the smoothed motion in the camera's axes (x right, y down, z forward)."""
-    in_camera = postures.in_camera(postures.smoothed_m)
-    columns: dict[str, npt.ArrayLike] = {"frame": postures.frames, "time_s": postures.times_s}
-    for k, joint in enumerate(postures.joints):
-        columns |= {f"{joint}_{axis}_m": in_camera[:, k, i] for i, axis in enumerate("xyz")}
-    return columns
-
-
-def _level_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """One row per frame and level of the tree."""
-    count = len(postures.joints)
-    return {
-        "frame": np.repeat(postures.frames, count),
-        "time_s": np.repeat(postures.times_s, count),
-        "level": np.tile(np.arange(count), len(postures.frames)),
-        "joint": np.tile(postures.joints, len(postures.frames)),
-        "reached": postures.level_reached.ravel(),
-        "survived": postures.level_survived.ravel(),
-        "without_root": postures.level_without_root.ravel(),
-    }
-
-
-def _reason_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """One row per constraint, the one that cut most first."""
-    totals = sorted(postures.reason_totals, key=lambda total: -total.branches)
-    columns = {name: [getattr(total, name) for total in totals] for name in ReasonTotal._fields}
-    return {name: np.array(values, dtype=object) for name, values in columns.items()}
-
-
-def _document(postures: Postures) -> dict[str, Any]:
-    """All results, as in postures.json."""
-    second = postures.second
-    return {
-        **postures.summary,
-        "joints": postures.joints,
-        "lengths": {
-            name: {
-                "length_m": length_m,
-                "sd_m": postures.length_sd_m.get(name),
-                "basis": postures.length_basis.get(name),
-            }
-            for name, length_m in postures.lengths_m.items()
-        },
-        "anchor_conflicts": postures.anchor_conflicts,
-        "reason_totals": [total._asdict() for total in postures.reason_totals],
-        "second": None
-        if second is None
-        else {**postures.summary["second"], "postures_m": np.round(second.postures_m, _TENTH_MM)},
-        "flips": [] if postures.repair is None else postures.repair.flips,
-        "per_frame": [_frame_document(postures, row) for row in range(len(postures.frames))],
-    }
-
-
-def _frame_document(postures: Postures, row: int) -> dict[str, Any]:
-    return {
-        "frame": postures.frames[row],
-        "time_s": postures.times_s[row],
-        "points_px": np.round(postures.points_px[row], 2),
-        "weights": np.round(postures.weights[row], 3),
-        "anchor_m": postures.anchor_m[row],
-        "anchor_sd_m": postures.anchor_sd_m[row],
-        "anchor_source": postures.anchor_source[row],
-        "level_reached": postures.level_reached[row],
-        "level_survived": postures.level_survived[row],
-        "level_without_root": postures.level_without_root[row],
-        "reasons": [reason._asdict() for reason in postures.reasons[row]],
-        "survivors": postures.survivors[row],
-        "group_count": postures.group_counts[row],
-        "group_sizes": postures.group_sizes[row],
-        "groups_m": np.round(postures.groups_m[row], _TENTH_MM),
-        "cut_all": postures.cut_all[row],
-        "problem": postures.problems[row],
-        "linked_breaks": postures.linked_breaks[row],
-        "margin_nats": postures.margin_nats[row],
-        "linked_m": np.round(postures.linked_m[row], _TENTH_MM),
-        "smoothed_m": np.round(postures.smoothed_m[row], _TENTH_MM),
-        "sd_m": np.round(postures.sd_m[row], _TENTH_MM),
-        "gap_m": np.round(postures.gap_m[row], _TENTH_MM),
-        "p_mirrored": np.round(postures.p_mirrored[row], 4),
-    }

@@ -34,8 +34,8 @@ use std::collections::HashMap;
 
 result! {
     /// What `memo.Postures` is made of; its fields have the same names.
-    PostureSequence |py, found: memo_core::PostureSequence, camera: PyCamera| {
-        camera: PyCamera = camera,
+    PostureSequence |py, found: memo_core::PostureSequence, camera: PyCamera, kept_all: bool| {
+        camera: PyCamera = PyCamera(camera.0.clone()),
         lengths_m: Py<PyDict> = found.lengths.lengths.named().into_py_dict(py)?,
         length_sd_m: Py<PyDict> = names(&found).zip(&found.lengths.sd_m).into_py_dict(py)?,
         length_basis: Py<PyDict> =
@@ -55,6 +55,11 @@ result! {
         groups_m: Vec<Py<PyArray3<f64>>> = {
             let figures = each(&found.frames, |f| f.groups.iter().map(|g| g.figure).collect::<Vec<_>>());
             figures.iter().map(|of| Ok(numpy_from_figures(py, of)?.unbind())).collect::<PyResult<Vec<_>>>()?
+        },
+        interpretations: Vec<Interpretations> = if kept_all {
+            found.frames.iter().map(|frame| interpretations(py, frame, &camera.0)).collect::<PyResult<Vec<_>>>()?
+        } else {
+            Vec::new()
         },
         group_sizes: Vec<Py<PyArray1<i64>>> = {
             let sizes = each(&found.frames, |frame| frame.groups.iter().map(|g| g.size as i64).collect());
@@ -137,6 +142,21 @@ fn angles<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, 
     Ok(named)
 }
 
+/// The fields of `memo.postures.Interpretations`.
+type Interpretations = (Py<PyArray3<f64>>, Py<PyArray3<f64>>, Vec<String>);
+
+fn interpretations(
+    py: Python<'_>,
+    frame: &Result<FrameReading, FrameProblem>,
+    camera: &Camera,
+) -> PyResult<Interpretations> {
+    let survivors = frame.as_ref().map(|frame| frame.survivor_figures(camera)).unwrap_or_default();
+    let cuts = frame.as_ref().map(|frame| frame.cut_figures(camera)).unwrap_or_default();
+    let (cut, by): (Vec<StickFigure>, Vec<String>) =
+        cuts.into_iter().map(|(figure, constraint)| (figure, constraint.name())).unzip();
+    Ok((numpy_from_figures(py, &survivors)?.unbind(), numpy_from_figures(py, &cut)?.unbind(), by))
+}
+
 fn texts(items: impl IntoIterator<Item: ToString>) -> Vec<String> {
     items.into_iter().map(|item| item.to_string()).collect()
 }
@@ -173,7 +193,7 @@ pub enum Distances {
 #[pyo3(signature = (
     times_s, points, weights, camera=None, *, size=None, fov_deg=None, lengths=None, height_m=None, noise_px=None, rules=None,
     strength=None, anchor=None, distance_m=None, distance_sd_m=None, moving_direction=None,
-    head_points=None, foot_points=None, group_m=None, max_groups=None, progress=None
+    head_points=None, foot_points=None, group_m=None, max_groups=None, keep_all=false, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn posture(
@@ -197,6 +217,7 @@ pub fn posture(
     foot_points: Option<&Bound<'_, PyAny>>,
     group_m: Option<f64>,
     max_groups: Option<usize>,
+    keep_all: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PostureSequence> {
     let times_s = times_from_numpy(times_s)?;
@@ -221,6 +242,7 @@ pub fn posture(
         moving_direction: moving_direction.map(DVec3::from),
         group_m: group_m.unwrap_or(usual.group_m),
         max_groups: max_groups.unwrap_or(usual.max_groups),
+        keep_cuts: keep_all,
         ..usual
     };
     let camera = match (camera, size) {
@@ -246,7 +268,7 @@ pub fn posture(
         postures_with_progress(&sequence, &camera, &options, progress)
     };
     let found = watched(py, progress, interpret)?.map_err(value_error)?;
-    PostureSequence::of(py, found, used)
+    PostureSequence::of(py, found, used, keep_all)
 }
 
 /// All postures that one view allows. `rays` (14, 3) are unit vectors in camera axes with NaN for joints that are

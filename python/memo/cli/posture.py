@@ -15,7 +15,7 @@ from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import exchanges, one_of_several
 from memo.exits import Exit
 from memo.given import InputError, check_apart, check_writable, checked_height, given_camera
-from memo.postures import WRITTEN, write_postures
+from memo.posture_files import WRITTEN, write_postures
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -132,6 +132,10 @@ def add_posture(app: "typer.Typer") -> None:
         frame: Annotated[
             int | None, typer.Option(help="Frame to draw; default: one with a typical number of postures.")
         ] = None,
+        keep_all: Annotated[
+            bool,
+            typer.Option("--keep-all", help="Write every posture of every frame, kept or cut, as arrays."),
+        ] = False,
         out: Annotated[
             Path | None, typer.Option(help="Folder for the results; default: memo-out/KEYPOINTS.")
         ] = None,
@@ -147,7 +151,7 @@ def add_posture(app: "typer.Typer") -> None:
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
         reading = {"fps": fps, "layout": layout, "person": person_of(person), "image_size": image_size}
         options: dict[str, Any] = {"rules": rules.value, "strength": strength.value, "anchor": anchor.value}
-        options |= {"unswap": unswap, "noise_px": noise_px}
+        options |= {"unswap": unswap, "noise_px": noise_px, "keep_all": keep_all}
 
         def work() -> Exit:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}

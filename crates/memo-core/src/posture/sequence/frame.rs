@@ -5,10 +5,11 @@ use thiserror::Error;
 
 use super::figure_in_world;
 use super::neck::{NeckTrack, Scene};
+use crate::model::camera::Camera;
 use crate::model::skeleton::{Joint, StickFigure};
 use crate::posture::constraint::Constraint;
 use crate::posture::group::group;
-use crate::posture::tree::{Interpretations, TreeError, TreeOptions, View};
+use crate::posture::tree::{Cut, Interpretations, TreeError, TreeOptions, View};
 
 /// Why a frame is not used.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -64,6 +65,25 @@ impl FrameReading {
     /// Number of surviving postures.
     pub fn survivors(&self) -> usize {
         self.tree.survivors.len()
+    }
+
+    /// The surviving postures, world axes, metres, in the order of the tree.
+    pub fn survivor_figures(&self, camera: &Camera) -> Vec<StickFigure> {
+        self.tree.figures().iter().map(|figure| figure_in_world(figure, camera)).collect()
+    }
+
+    /// Every cut branch with the constraint that cut it, if [`SequenceOptions::keep_cuts`](super::SequenceOptions) asked
+    /// for them: its joints down to the level of the constraint, world axes, metres, and NaN below. The postures of a
+    /// view are the survivors and all that hang on cut branches.
+    pub fn cut_figures(&self, camera: &Camera) -> Vec<(StickFigure, Constraint)> {
+        let branch = |cut: &Cut| {
+            let constraint = cut.violation.constraint;
+            let mut figure = self.tree.view.interpretation(cut.path).figure;
+            let below = |joint: &&Joint| **joint as usize > constraint.level() as usize;
+            Joint::ALL.iter().filter(below).for_each(|&joint| figure[joint] = DVec3::NAN);
+            (figure_in_world(&figure, camera), constraint)
+        };
+        self.tree.cuts.iter().map(branch).collect()
     }
 
     /// If nothing survives, the violations of the least violating posture, one sentence each.
@@ -160,6 +180,7 @@ mod tests {
     use super::*;
     use crate::posture::sequence::example::{walk, with_lengths};
     use crate::posture::sequence::{Motion, SequenceOptions};
+    use crate::posture::tree::TreePath;
 
     /// Seen from the front with much noise, thousands of postures are possible, too many to compare all.
     #[test]
@@ -190,6 +211,47 @@ mod tests {
             let view = &frame.as_ref().unwrap().tree.view;
             assert_eq!((view.neck_sd_m, view.length_sd_m), (found.neck.sd_m[t], found.lengths.own_sd_m));
             assert_eq!(view.lengths, found.lengths.lengths);
+        }
+    }
+
+    /// Survivors and cut branches together are all postures of a view; every branch breaks its constraint in all of them.
+    #[test]
+    fn every_posture_of_a_view_survives_or_hangs_on_one_cut_branch() {
+        let walk = walk(60.0, 3, 0.5);
+        let options = SequenceOptions { keep_cuts: true, ..with_lengths() };
+        let camera = &walk.camera;
+        let found = walk.postures(&options).unwrap();
+        for frame in found.frames.iter().flatten() {
+            let (survivors, cuts) = (frame.survivor_figures(camera), frame.cut_figures(camera));
+            assert_eq!(survivors.len(), frame.survivors());
+            let mut counts = std::collections::HashMap::new();
+            let key = |figure: &StickFigure, level: usize| {
+                figure.0[..=level]
+                    .iter()
+                    .map(|p| p.to_array().map(|x| (x * 1e7).round() as i64))
+                    .collect::<Vec<_>>()
+            };
+            // All 8192 paths of 13 segments with two roots each, less those of segments with one.
+            let mut all = std::collections::HashMap::new();
+            for bits in 0..1 << 13 {
+                let figure = frame.tree.view.interpretation(TreePath(bits << 1)).figure;
+                let figure = figure_in_world(&figure, camera);
+                all.insert(key(&figure, 13), figure);
+            }
+            for figure in &survivors {
+                *counts.entry(key(figure, 13)).or_insert(0) += 1;
+            }
+            for (branch, constraint) in &cuts {
+                let level = constraint.level() as usize;
+                assert!(branch.0[..=level].iter().all(|p| p.is_finite()));
+                assert!(branch.0[level + 1..].iter().all(|p| p.is_nan()));
+                let prefix = key(branch, level);
+                for figure in all.values().filter(|figure| key(figure, level) == prefix) {
+                    *counts.entry(key(figure, 13)).or_insert(0) += 1;
+                }
+            }
+            assert_eq!(counts.len(), all.len(), "each posture once");
+            assert!(counts.values().all(|&count| count == 1));
         }
     }
 

@@ -204,7 +204,7 @@ pub fn postures_with_progress(
     // 4. The moving direction.
     let heading = heading::find(&scene, &necks, &neck, &heads, &mut warnings);
     // 5. The postures that every frame allows.
-    let tree = options.motion.tree(options.strength);
+    let tree = TreeOptions { keep_cuts: options.keep_cuts, ..options.motion.tree(options.strength) };
     let trees: Vec<TreeOptions> = heads
         .iter()
         .map(|head| tree.clone().with_bearings(scene.bearings(heading.direction, head.as_ref())))

@@ -165,6 +165,8 @@ pub struct SequenceOptions {
     pub group_m: f64,
     /// Maximum number of groups per frame, largest first. Default 64: more cannot be distinguished by eye.
     pub max_groups: usize,
+    /// True to keep every cut branch of every frame, for [`FrameReading::cut_figures`](super::FrameReading::cut_figures).
+    pub keep_cuts: bool,
     /// Assumptions of the sources of the neck's distance, see [`AnchorOptions`].
     pub anchor_options: AnchorOptions,
     /// Options of smoothing the distances.
@@ -186,6 +188,7 @@ impl Default for SequenceOptions {
             min_travel_m: 0.5,
             group_m: DEFAULT_GROUP_M,
             max_groups: 64,
+            keep_cuts: false,
             anchor_options: AnchorOptions::default(),
             smooth_options: SmoothOptions::default(),
         }
