@@ -180,7 +180,7 @@ fn an_empty_scene_has_nobody_and_misuse_is_refused() {
     assert!(matches!(tracker.update(&small.as_frame(), 1.0), Err(TrackError::CameraSize { .. })));
     tracker.finish().unwrap();
     assert!(matches!(tracker.update(&frame.as_frame(), 2.0), Err(TrackError::Finished)));
-    let narrow = TrackerOptions { field_of_view_rad: f64::NAN, ..options_for(&scene) };
+    let narrow = TrackerOptions { field_of_view_rad: Some(f64::NAN), ..options_for(&scene) };
     assert!(matches!(Tracker::new(narrow), Err(TrackError::Option { .. })));
     assert!(Tracker::new(TrackerOptions::for_height(0.0)).is_err());
 }

@@ -50,7 +50,8 @@ class Tracker:
     people beyond such a list are measured. None measures it in the image of `camera`; without a camera
     either, that of the population is assumed, and standard deviations and intervals of all lengths contain
     its spread. Without `camera`, one is assumed from the image size, the horizontal field of view
-    `fov_deg` and the height. The results lag one frame behind the input.
+    `fov_deg` and the height; the default is across the width of the image, or across its height if that is
+    larger. The results lag one frame behind the input.
 
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
     `adapt=False` does not fit the person: angles are those of the average gait, moved by the tracked phase.

@@ -6,7 +6,6 @@ use crate::error::value_error;
 use crate::result::{objects, result};
 use crate::wait::pooled;
 use memo_core::OptionError;
-use memo_core::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD;
 use memo_core::track::steady::{CameraMotion, Loss, Steadied, Steadier, SteadyOptions};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -70,16 +69,14 @@ impl PySteadier {
     #[new]
     #[pyo3(signature = (camera=None, *, fov_deg=None, still_px=None))]
     fn new(camera: Option<PyCamera>, fov_deg: Option<f64>, still_px: Option<f64>) -> PyResult<Self> {
-        let field_of_view_rad = fov_deg.map_or(DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, f64::to_radians);
-        let fov_deg = field_of_view_rad.to_degrees();
-        if !(5.0..=170.0).contains(&fov_deg) {
+        if let Some(got) = fov_deg.filter(|fov_deg| !(5.0..=170.0).contains(fov_deg)) {
             let wanted = "between 5 and 170 degrees";
-            return Err(value_error(OptionError { name: "field of view", wanted, got: fov_deg }));
+            return Err(value_error(OptionError { name: "field of view", wanted, got }));
         }
         let mut options = SteadyOptions::default();
         options.still_px = still_px.unwrap_or(options.still_px);
         options.check().map_err(value_error)?;
-        Ok(Self(Steadier::new(options, camera.map(|c| c.0).as_ref(), field_of_view_rad)))
+        Ok(Self(Steadier::new(options, camera.map(|c| c.0).as_ref(), fov_deg.map(f64::to_radians))))
     }
 
     /// Takes the next frame, (H, W) uint8.

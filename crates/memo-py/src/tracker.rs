@@ -9,6 +9,7 @@ use crate::steady::{FrameMotion, LostView};
 use crate::wait::{LOOK, watched};
 use crate::walk::Walk;
 use memo_core::image::{BackgroundOptions, FlowOptions};
+use memo_core::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD;
 use memo_core::track::fit::FitOptions;
 use memo_core::track::height::{POPULATION_HEIGHT_M, POPULATION_SD_M};
 use memo_core::track::score::Measure;
@@ -206,9 +207,7 @@ impl PyTracker {
             None => {}
         }
         options.camera = camera.map(|camera| camera.0);
-        if let Some(degrees) = fov_deg {
-            options.field_of_view_rad = degrees.to_radians();
-        }
+        options.field_of_view_rad = fov_deg.map(f64::to_radians);
         if let Some(gait) = gait {
             let known = [GaitChoice::Dense, GaitChoice::Sampled10, GaitChoice::Boulic];
             let found = known.into_iter().find(|known| gait_name(*known) == gait);
@@ -281,7 +280,7 @@ impl PyTracker {
 pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let options = TrackerOptions::default();
     dict!(py, {
-        fov_deg: options.field_of_view_rad.to_degrees(),
+        fov_deg: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD.to_degrees(),
         gait: gait_name(options.gait),
         adapt: options.fit.is_some(),
         start_frames: options.start_frames,

@@ -51,7 +51,10 @@ def add_track(app: "typer.Typer") -> None:
             ),
         ] = None,
         fov_deg: Annotated[
-            float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
+            float | None,
+            typer.Option(
+                help="Horizontal field of view without --camera, degrees; default: 62 across the longer side."
+            ),
         ] = None,
         steady: Annotated[
             bool,

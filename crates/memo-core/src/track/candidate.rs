@@ -10,7 +10,7 @@ use super::options::start_height;
 use super::start::{StartReport, start};
 use super::walk::{FrameEdges, Walk};
 use crate::image::Rectangle;
-use crate::model::{Camera, GaitStyle, Walker};
+use crate::model::{Camera, GaitStyle, Walker, assumed_field_of_view_rad};
 
 /// A candidate is dropped after this many consecutive frames without it.
 pub(super) const MISSED_FRAMES: usize = 3;
@@ -157,7 +157,8 @@ pub(super) fn course(
     let Some(camera) = given.camera else {
         // The assumed camera has the scale of the height, so in it the height is known. Its error moves the walk
         // nearer or farther with all its lengths.
-        let field_of_view_rad = given.options.field_of_view_rad;
+        let field_of_view_rad =
+            given.options.field_of_view_rad.unwrap_or_else(|| assumed_field_of_view_rad(given.size));
         let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m)?;
         let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
         let course = locate(sightings, &camera, &crown)?;
@@ -259,6 +260,24 @@ mod tests {
         let camera = options.camera.as_ref();
         let given = Given { options: &options, camera, height_m: Some(1.75), size: [640, 480] };
         Candidate { seen, missed: 0 }.begin(&given)
+    }
+
+    /// A phone held upright sees the same as one held level, turned.
+    #[test]
+    fn the_assumed_camera_has_its_field_of_view_across_the_longer_side() {
+        let sightings: Vec<Sighting> = (0..5)
+            .map(|k| Sighting { time_s: 0.1 * k as f64, rectangle: boxed(100 + 10 * k, 399, 80, 200) })
+            .collect();
+        let focal_px = |size: [u32; 2], field_of_view_rad: Option<f64>| {
+            let options = TrackerOptions { field_of_view_rad, ..TrackerOptions::default() };
+            let given = Given { options: &options, camera: None, height_m: Some(1.75), size };
+            course(&sightings, &given, 1.75, &BodyHeight::given(1.75)).unwrap().0.focal_px.x
+        };
+        assert!((focal_px([640, 480], None) - focal_px([480, 640], None)).abs() < 1e-9);
+        assert!(
+            (focal_px([480, 640], Some(1.0)) - 240.0 / 0.5f64.tan()).abs() < 1e-9,
+            "a given one is of the width"
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::steady::{Steadier, SteadyOptions};
 use super::walk::WalkOptions;
 use crate::OptionError;
 use crate::model::body::BodyError;
-use crate::model::{Body, Camera, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, Gait, GaitStyle, Walker};
+use crate::model::{Body, Camera, Gait, GaitStyle, Walker};
 
 /// Which average gait the model uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,8 +49,10 @@ pub struct TrackerOptions {
     pub further_heights_m: Vec<f64>,
     /// The camera; `None` assumes one from field of view and body height.
     pub camera: Option<Camera>,
-    /// Horizontal field of view of an assumed camera, radians.
-    pub field_of_view_rad: f64,
+    /// Horizontal field of view of an assumed camera, radians. `None` assumes
+    /// [`DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD`](crate::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD) across the longer
+    /// side of the frames.
+    pub field_of_view_rad: Option<f64>,
     /// Average gait.
     pub gait: GaitChoice,
     /// Number of frames of the starting phase. The paper uses images 2 to 14.
@@ -79,7 +81,7 @@ impl Default for TrackerOptions {
             height_m: None,
             further_heights_m: Vec::new(),
             camera: None,
-            field_of_view_rad: DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD,
+            field_of_view_rad: None,
             gait: GaitChoice::default(),
             start_frames: 13,
             fit: Some(FitOptions::default()),
@@ -101,9 +103,10 @@ impl TrackerOptions {
 
     /// Refuses options outside their ranges; [`Tracker::new`](super::tracker::Tracker::new) asks it first.
     pub fn check(&self) -> Result<(), OptionError> {
-        let fov_deg = self.field_of_view_rad.to_degrees();
-        let is_seen = (5.0..=170.0).contains(&fov_deg);
-        OptionError::unless(is_seen, "field of view", "between 5 and 170 degrees", fov_deg)?;
+        if let Some(fov_deg) = self.field_of_view_rad.map(f64::to_degrees) {
+            let is_seen = (5.0..=170.0).contains(&fov_deg);
+            OptionError::unless(is_seen, "field of view", "between 5 and 170 degrees", fov_deg)?;
+        }
         let is_enough = (5..=100).contains(&self.start_frames);
         OptionError::unless(is_enough, "start_frames", "between 5 and 100", self.start_frames as f64)?;
         self.fit.map_or(Ok(()), |fit| fit.check())?;

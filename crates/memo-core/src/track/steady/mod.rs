@@ -23,7 +23,7 @@ mod warp;
 
 use crate::OptionError;
 use crate::image::{Frame, FrameError, Image, Mask};
-use crate::model::Camera;
+use crate::model::{Camera, assumed_field_of_view_rad};
 use crate::wording::counted;
 use estimate::{Comparison, Estimate};
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -251,7 +251,7 @@ struct Other {
 pub struct Steadier {
     options: SteadyOptions,
     given: Option<Camera>,
-    field_of_view_rad: f64,
+    field_of_view_rad: Option<f64>,
     view: Option<View>,
     keys: Vec<Key>,
     last: Turned,
@@ -271,8 +271,9 @@ pub struct Steadier {
 }
 
 impl Steadier {
-    /// A steadier for a new stream; without a camera, one of this horizontal field of view is assumed.
-    pub fn new(options: SteadyOptions, camera: Option<&Camera>, field_of_view_rad: f64) -> Self {
+    /// A steadier for a new stream; without a camera, one of this horizontal field of view is assumed, or of the usual one
+    /// across the longer side ([`assumed_field_of_view_rad`]).
+    pub fn new(options: SteadyOptions, camera: Option<&Camera>, field_of_view_rad: Option<f64>) -> Self {
         Self {
             options,
             given: camera.cloned(),
@@ -345,7 +346,8 @@ impl Steadier {
     /// Makes a frame the first one of a view if it shows enough.
     fn open(&mut self, frame: &Frame<'_>, pyramid: &Pyramid<'_>) {
         let size = [frame.width() as u32, frame.height() as u32];
-        let assumed = || Camera::level(size, self.field_of_view_rad, 1.0, 1.0).ok();
+        let field_of_view_rad = self.field_of_view_rad.unwrap_or_else(|| assumed_field_of_view_rad(size));
+        let assumed = || Camera::level(size, field_of_view_rad, 1.0, 1.0).ok();
         let Some(camera) = self.given.clone().or_else(assumed).filter(|c| c.size == size) else { return };
         let Ok(template) = Template::new(pyramid, &camera) else { return };
         let key = Key { template, turned: DMat3::IDENTITY, zoom: 0.0 };

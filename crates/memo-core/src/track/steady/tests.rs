@@ -66,7 +66,7 @@ impl Shot<'_> {
 }
 
 fn steadier(camera: Option<&Camera>) -> Steadier {
-    Steadier::new(SteadyOptions::default(), camera, 0.9)
+    Steadier::new(SteadyOptions::default(), camera, Some(0.9))
 }
 
 fn pushed(steadier: &mut Steadier, image: &Image<u8>) -> (Steadied, CameraMotion) {

@@ -155,9 +155,9 @@ fn options_out_of_range_are_refused_by_name() {
     };
     assert_eq!(refused(|o| o.start_frames = 4), Some("start_frames"));
     assert_eq!(refused(|o| o.start_frames = 101), Some("start_frames"));
-    assert_eq!(refused(|o| o.field_of_view_rad = 4f64.to_radians()), Some("field of view"));
-    assert_eq!(refused(|o| o.field_of_view_rad = 171f64.to_radians()), Some("field of view"));
-    assert_eq!(refused(|o| (o.start_frames, o.field_of_view_rad) = (5, 0.1)), None);
+    assert_eq!(refused(|o| o.field_of_view_rad = Some(4f64.to_radians())), Some("field of view"));
+    assert_eq!(refused(|o| o.field_of_view_rad = Some(171f64.to_radians())), Some("field of view"));
+    assert_eq!(refused(|o| (o.start_frames, o.field_of_view_rad) = (5, Some(0.1))), None);
     for (change, name) in every_wrong_option() {
         assert_eq!(refused(change), Some(name));
     }
