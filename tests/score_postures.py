@@ -1,14 +1,14 @@
 """Finds postures of motion-captured people through `memo.posture` and tables their errors.
 
-    python tests/score_postures.py [--only PATTERN] [--rows lengths,height,bare] [--out NOW.json]
+    python tests/score_postures.py [--only PATTERN] [--rows lengths,height,bare] [--rules R] [--out NOW.json]
 
 A person about 290 px tall is seen at 30 fps from 6 m, from the front, at 45 degrees and from the side, up to
 5 s per motion, with independent noise in every coordinate of a keypoint and right and left as they are. Rows
 are pooled over the motions of people for tuning and of the others:
 
 * walks and hard walks (crouched, stiff, limping, brisk; altered recordings), rules "walking";
-* other motions (jumps, playground, bending, fencing, ...), rules "physical". Their two groups of people swap
-  their parts: what is tuned on one is reported on the other.
+* other motions (jumps, playground, bending, fencing, ...), rules "physical" unless `--rules` names others.
+  Their two groups of people swap their parts: what is tuned on one is reported on the other.
 
 Kinds of rows: `lengths`, with the true lengths and toes; `bare`, the same without toes; `height`, with the
 body height alone; `assumed`, with the body height and without the camera, whose field of view is drawn from
@@ -102,6 +102,8 @@ class Job:
     row: str
     azimuth_deg: float
     noise_px: float
+    rules: str | None = None
+    """None: those of the kind."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +256,7 @@ def found(job: Job) -> Score:
         keypoints,
         None if job.row == "assumed" else camera,
         **body,
-        rules=KINDS[job.kind][1],
+        rules=job.rules or KINDS[job.kind][1],
         noise_px=max(job.noise_px, 0.5),
         unswap=False,
         max_groups=1,
@@ -400,10 +402,10 @@ def report(scores: Sequence[Score]) -> str:
 # The command
 
 
-def jobs(rows: Sequence[str], only: str, noises_px: Sequence[float]) -> list[Job]:
+def jobs(rows: Sequence[str], only: str, noises_px: Sequence[float], rules: str | None) -> list[Job]:
     """All calls; the body height alone is tried with the second noise only."""
     return [
-        Job(kind, people, name, row, azimuth_deg, noise_px)
+        Job(kind, people, name, row, azimuth_deg, noise_px, rules)
         for row in rows
         for kind, (groups, _) in KINDS.items()
         for people, names in groups.items()
@@ -421,10 +423,13 @@ def main() -> int:
     parser.add_argument("--only", metavar="PATTERN", default="", help="motions whose name has this (regex)")
     parser.add_argument("--rows", default="lengths,bare,height,assumed", help="kinds of rows, with commas")
     parser.add_argument("--noise", default="0,2,5", help="standard deviations of the noise, pixels")
+    parser.add_argument("--rules", help="rules of all motions, whatever their kind")
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="stores the figures of every call")
     parser.add_argument("--workers", type=int, default=2)
     args = parser.parse_args()
-    every = jobs(args.rows.split(","), args.only, [float(noise) for noise in args.noise.split(",")])
+    every = jobs(
+        args.rows.split(","), args.only, [float(noise) for noise in args.noise.split(",")], args.rules
+    )
     done: dict[Job, Score] = {}
     failed = False
     # The core has threads of its own: a forked copy of them would wait for ever.

@@ -946,6 +946,8 @@ class PostureSequence:
     p_mirrored: Final[npt.NDArray[np.float64]]
     second: Final[SecondMotion | None]
     heading_source: Final[str]
+    rules: Final[str]
+    prior: Final[str]
     warnings: Final[list[str]]
 
 def posture(

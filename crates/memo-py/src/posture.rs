@@ -87,6 +87,8 @@ result! {
             None => None,
         },
         heading_source: String = found.heading.from.name(),
+        rules: String = found.rules.name(),
+        prior: String = found.prior.name(),
         warnings: Vec<String> = texts(&found.warnings),
     }
     |own| counted(own.problems.len(), "frame")

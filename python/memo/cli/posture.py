@@ -103,7 +103,10 @@ def add_posture(app: "typer.Typer") -> None:
         camera_size: CameraSize = None,
         camera_v_up: CameraVUp = None,
         fov_deg: Annotated[
-            float | None, typer.Option(help="Horizontal field of view without --camera, degrees.")
+            float | None,
+            typer.Option(
+                help="Horizontal field of view without --camera, degrees; default: 62 across the longer side."
+            ),
         ] = None,
         lengths: Annotated[
             Path | None, typer.Option(help="The 17 segment lengths, metres: CSV, JSON or a postures.json.")
@@ -190,7 +193,7 @@ def _posture(
             written.append(write_posture_plot(postures, delivery.out / _DRAWN, row))
     first, *others = _lines(postures)
     lines = [first + one_of_several(keypoints, reading["person"] is None), *others]
-    alarm = None if postures.is_possible else _impossible(postures, options["rules"])
+    alarm = None if postures.is_possible else _impossible(postures)
     delivery.tell(postures.summary, lines, written, alarm=alarm)
     if not (postures.survivors > 0).any():
         return Exit.NOBODY
@@ -224,7 +227,7 @@ def _row(keypoints: memo.Keypoints, frame: int) -> int:
 # What is printed.
 
 
-def _impossible(postures: memo.Postures, rules: str) -> str | None:
+def _impossible(postures: memo.Postures) -> str | None:
     """States that the motion is impossible, and what it breaks most; None if there is no motion."""
     breaks = Counter(name for names in postures.linked_breaks for name in names)
     if not breaks:
@@ -233,8 +236,8 @@ def _impossible(postures: memo.Postures, rules: str) -> str | None:
     most = ", ".join(f"{name} in {count}" for name, count in often)
     frames = counted(postures.found.sum(), "frame")
     return (
-        f"No possible sequence (--rules {rules}): in every frame of the motion, {frames}, the posture breaks "
-        f"a constraint; most often {most}."
+        f"No possible sequence (--rules {postures.rules}): in every frame of the motion, {frames}, the "
+        f"posture breaks a constraint; most often {most}."
     )
 
 

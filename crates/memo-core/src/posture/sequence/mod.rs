@@ -151,6 +151,12 @@ pub struct PostureSequence {
     /// Standard deviation of each joint's position in `linked.figures`, metres: from noise, lengths and the
     /// neck's distance. It does not contain the error of choosing the wrong root. NaN if the joint is unknown.
     pub sd_m: Vec<PerJoint<f64>>,
+    /// The rules of the postures that frames allow: those of the options' motion, or only the limits of bodies if these
+    /// rules do not fit ([`Warning::RulesDropped`]).
+    pub rules: Motion,
+    /// The motion whose habits chose the linked postures: that of the options, or none if they do not fit
+    /// ([`Warning::HabitsDropped`]).
+    pub prior: Motion,
     /// Reasons to doubt the results.
     pub warnings: Vec<Warning>,
 }
@@ -174,7 +180,7 @@ pub fn postures(
 }
 
 /// [`postures`] with progress and cancellation. Every frame is counted three times: for the neck, the tree and
-/// the link.
+/// the link; a tree that is grown again without rules is not counted.
 ///
 /// # Errors
 ///
@@ -201,21 +207,33 @@ pub fn postures_with_progress(
     let neck = neck::track(&scene, &heads, &warnings, progress)?;
     let necks = neck.places(&rays);
     lengths::impossible(&rays, &neck, &lengths, &mut warnings);
-    // 4. The moving direction.
-    let heading = heading::find(&scene, &necks, &neck, &heads, &mut warnings);
-    // 5. The postures that every frame allows.
-    let tree = TreeOptions { keep_cuts: options.keep_cuts, ..options.motion.tree(options.strength) };
-    let trees: Vec<TreeOptions> = heads
-        .iter()
-        .map(|head| tree.clone().with_bearings(scene.bearings(heading.direction, head.as_ref())))
-        .collect();
-    let read = |t: usize| {
-        progress.advance(1)?;
-        Ok(frame::read(&scene, &trees[t], &neck, necks[t], t))
+    // 4. The moving direction, and the postures that every frame allows.
+    let allow = |scene: &neck::Scene, counted| {
+        Allowed::find(scene, &heads, &neck, &necks, |frames| progress.advance(frames * counted))
     };
-    let frames = (0..rays.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
-    // 6. One posture per frame.
-    let linked = link_frames(&scene, &heading, &necks, &frames, progress)?;
+    let mut allowed = allow(&scene, 1)?;
+    // 5. One posture per frame.
+    let mut linked = link_frames(&scene, &allowed.heading, &necks, &allowed.frames, progress)?;
+    let mut linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
+    warnings.extend(warning::backwards(&scene, &allowed.heading, &linked));
+    // 6. If the rules or the habits of the motion do not fit, the same without them.
+    let without_rules = SequenceOptions { motion: Motion::Physical, ..options.clone() };
+    let free = neck::Scene { options: &without_rules, ..scene };
+    let dropped = warning::misfit(&scene, &allowed, &linked_breaks);
+    let (mut rules, mut prior) = (options.motion, options.motion);
+    if let Some(misfit) = dropped {
+        allowed = allow(&free, 0)?;
+        rules = Motion::Physical;
+        if misfit.is_of_habits() {
+            linked = link_frames(&free, &allowed.heading, &necks, &allowed.frames, &Progress::new())?;
+            prior = Motion::Physical;
+        }
+        linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
+        warnings.push(misfit);
+    }
+    let scene = if prior == options.motion { scene } else { free };
+    let Allowed { heading, trees, frames, warnings: noticed } = allowed;
+    warnings.extend(noticed);
     // A wrong focal length scales all distances, and hardly changes a figure relative to its neck.
     let neck = if matches!(options.anchor, AnchorChoice::Given { .. }) {
         neck
@@ -224,18 +242,60 @@ pub fn postures_with_progress(
     };
     let sd_m = uncertainty(&scene, &neck, &linked);
     // 7. Reasons to doubt the results.
-    let linked_breaks = broken(&trees, &frames, &linked);
     let found = warning::Found {
         trees: &trees,
         frames: &frames,
         linked: &linked,
         linked_breaks: &linked_breaks,
         neck: &neck,
-        heading: &heading,
     };
     warning::judge(&scene, &found, &mut warnings);
     let linked = to_world(linked, &camera);
-    Ok(PostureSequence { lengths, neck, heading, frames, linked, linked_breaks, sd_m, warnings })
+    Ok(PostureSequence {
+        lengths,
+        neck,
+        heading,
+        frames,
+        linked,
+        linked_breaks,
+        sd_m,
+        rules,
+        prior,
+        warnings,
+    })
+}
+
+/// The postures that every frame allows, with the constraints used.
+struct Allowed {
+    heading: Heading,
+    trees: Vec<TreeOptions>,
+    frames: Vec<Result<FrameReading, FrameProblem>>,
+    warnings: Vec<Warning>,
+}
+
+impl Allowed {
+    fn find(
+        scene: &neck::Scene,
+        heads: &[Option<neck::Head>],
+        neck: &NeckTrack,
+        necks: &[DVec3],
+        advance: impl Fn(usize) -> Result<(), Stopped> + Sync,
+    ) -> Result<Self, Stopped> {
+        let mut warnings = Vec::new();
+        let heading = heading::find(scene, necks, neck, heads, &mut warnings);
+        let SequenceOptions { motion, strength, keep_cuts, .. } = *scene.options;
+        let tree = TreeOptions { keep_cuts, ..motion.tree(strength) };
+        let trees: Vec<TreeOptions> = heads
+            .iter()
+            .map(|head| tree.clone().with_bearings(scene.bearings(heading.direction, head.as_ref())))
+            .collect();
+        let read = |t: usize| {
+            advance(1)?;
+            Ok(frame::read(scene, &trees[t], neck, necks[t], t))
+        };
+        let frames = (0..necks.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
+        Ok(Self { heading, trees, frames, warnings })
+    }
 }
 
 /// Constraints that the linked posture of each frame breaks; figures in camera axes.

@@ -378,3 +378,52 @@ fn deviations_are_those_of_their_causes() {
         }
     }
 }
+
+/// Walkers whose left arm and leg go with the right ones: no walk, and no posture that walking forbids in every frame.
+fn hopping(azimuth_deg: f64, frames: usize) -> Walk {
+    let mut walk = walk(azimuth_deg, frames, 0.5);
+    let joined = [
+        (Joint::LeftHip, Joint::RightHip, [Joint::LeftKnee, Joint::LeftAnkle]),
+        (Joint::LeftShoulder, Joint::RightShoulder, [Joint::LeftElbow, Joint::LeftWrist]),
+    ];
+    for (figure, points_px) in walk.truth.iter_mut().zip(&mut walk.points_px) {
+        for (left, right, ends) in joined {
+            for end in ends {
+                figure[end] = figure[end.mirrored()] + figure[left] - figure[right];
+                points_px[end] = walk.camera.project(figure[end]).unwrap();
+            }
+        }
+    }
+    walk
+}
+
+/// The largest distance of a joint of the nearest survivor from where it is, the worst frame, metres.
+fn nearest_survivor_m(found: &PostureSequence, walk: &Walk) -> f64 {
+    let of_frame = |(frame, truth): (&Result<FrameReading, FrameProblem>, &StickFigure)| {
+        let survivors = frame.as_ref().unwrap().survivor_figures(&walk.camera);
+        let off = |figure: &StickFigure| {
+            Joint::ALL.iter().map(|&j| figure[j].distance(truth[j])).fold(0.0, f64::max)
+        };
+        survivors.iter().map(off).fold(f64::INFINITY, f64::min)
+    };
+    found.frames.iter().zip(&walk.truth).map(of_frame).fold(0.0, f64::max)
+}
+
+#[test]
+fn rules_that_do_not_fit_the_motion_are_dropped() {
+    let walk = hopping(90.0, 40);
+    let found = walk.postures(&with_lengths()).unwrap();
+    println!("{:?} {:?} {:?}", found.rules, found.prior, found.warnings);
+    assert_eq!(found.rules, Motion::Physical);
+    assert!(nearest_survivor_m(&found, &walk) < 0.15, "the true posture survives");
+    let free = walk.postures(&SequenceOptions { motion: Motion::Physical, ..with_lengths() }).unwrap();
+    let survivors = |found: &PostureSequence| {
+        found.frames.iter().flatten().map(FrameReading::survivors).collect::<Vec<_>>()
+    };
+    assert_eq!(survivors(&found), survivors(&free));
+    // The printed rules are kept, as they were asked for; and so are rules that fit.
+    let printed = walk.postures(&SequenceOptions { strength: Strength::Paper, ..with_lengths() }).unwrap();
+    assert_eq!((printed.rules, printed.prior), (Motion::Walking, Motion::Walking));
+    let fitting = super::example::walk(60.0, 30, 0.5).postures(&with_lengths()).unwrap();
+    assert_eq!((fitting.rules, fitting.prior, fitting.warnings), (Motion::Walking, Motion::Walking, vec![]));
+}

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::frame::{FrameProblem, FrameReading};
 use super::heading::{Heading, HeadingFrom};
 use super::neck::{NeckTrack, Scene, SourceConflict};
-use super::{AnchorChoice, Motion, Strength};
+use super::{Allowed, AnchorChoice, Motion, SequenceOptions, Strength};
 use crate::model::angles::trunk_axes;
 use crate::model::skeleton::{Joint, PerJoint};
 use crate::posture::constraint::{Constraint, ConstraintKind};
@@ -129,6 +129,25 @@ pub enum Warning {
         /// Number of all frames.
         of: usize,
     },
+    /// With the habits of the motion, the most probable postures break limits of the body, so its habits and rules were
+    /// not used.
+    HabitsDropped {
+        /// The motion.
+        motion: Motion,
+        /// Number of frames whose posture broke a limit of the body, or whose limbs swung against themselves.
+        frames: usize,
+        /// Number of frames.
+        of: usize,
+    },
+    /// The rules of the motion leave no posture in many frames: the postures left are those of the physical limits.
+    RulesDropped {
+        /// The motion.
+        motion: Motion,
+        /// Number of frames in which its rules leave no posture.
+        frames: usize,
+        /// Number of frames in which the physical limits leave a posture.
+        of: usize,
+    },
     /// The rules of the motion leave no posture in frames in which the physical limits do.
     AgainstRules {
         /// The motion.
@@ -142,6 +161,13 @@ pub enum Warning {
         /// Share of linked postures that break a rule.
         linked: f64,
     },
+}
+
+impl Warning {
+    /// True if it says that the habits of the motion are dropped, and not only its rules.
+    pub(super) fn is_of_habits(&self) -> bool {
+        matches!(self, Self::HabitsDropped { .. })
+    }
 }
 
 /// Largest share of segments without real root that noise explains: 36 % at 8 px, measured on walks.
@@ -158,7 +184,6 @@ pub(super) struct Found<'a> {
     /// Constraints that the linked postures break.
     pub linked_breaks: &'a [Vec<Constraint>],
     pub neck: &'a NeckTrack,
-    pub heading: &'a Heading,
 }
 
 /// Adds the warnings about all results.
@@ -172,16 +197,15 @@ pub(super) fn judge(scene: &Scene, found: &Found, warnings: &mut Vec<Warning>) {
     }
     warnings.extend(without_root(&linked.gap_m));
     warnings.extend(noisy(scene));
-    warnings.extend(backwards(scene, found));
     warnings.extend(rejected(scene, found));
 }
 
 /// Warns if the linked trunk faces against the displacement in most frames, and rules or prior are for forward
 /// motion.
-fn backwards(scene: &Scene, found: &Found) -> Option<Warning> {
-    let heading = found.heading.direction.filter(|_| scene.options.motion.needs_heading())?;
+pub(super) fn backwards(scene: &Scene, heading: &Heading, linked: &LinkedPath) -> Option<Warning> {
+    let heading = heading.direction.filter(|_| scene.options.motion.needs_heading())?;
     let in_camera = scene.camera.rotation * heading;
-    let trunks = found.linked.figures.iter().filter_map(trunk_axes);
+    let trunks = linked.figures.iter().filter_map(trunk_axes);
     let ahead: Vec<f64> = trunks.map(|axes| axes.x_axis.dot(in_camera)).collect();
     let frames = ahead.iter().filter(|ahead| **ahead < 0.0).count();
     (2 * frames > ahead.len()).then_some(Warning::Backwards { frames, of: ahead.len() })
@@ -220,18 +244,70 @@ fn noisy(scene: &Scene) -> Option<Warning> {
     (seen_px > 2.0 * stated_px + 0.5).then_some(Warning::Noisy { seen_px, stated_px })
 }
 
+/// Rules that leave no posture in this share of the frames in which the body allows one are dropped: then they also cut
+/// true postures. Of upright motion-captured walks they leave none in at most WALKS %, of crouched ones up to 55 %.
+const MISFIT: f64 = 0.32;
+/// The habits of a motion are dropped if the linked posture breaks limits of the body, or rule 3, in this share of the
+/// frames: of motion-captured walks, crouched and limping ones too, in at most 21 %; of other motions, habits of walking
+/// have larger errors than none where the share is above 30 %, and mostly smaller ones below.
+const BROKEN_BODIES: f64 = 0.3;
+
+/// True of limits of the body, and of rule 3, by which the segments of one limb swing together: walkers of all kinds keep
+/// them, unlike the other rules.
+fn is_of_any_walk(constraint: &Constraint) -> bool {
+    use Constraint::{ElbowWrist, HipKnee, KneeAnkle, ShoulderElbow};
+    let is_rule_3 = matches!(constraint, ShoulderElbow(_) | ElbowWrist(_) | HipKnee(_) | KneeAnkle(_));
+    is_rule_3 || constraint.kind() != ConstraintKind::Rule
+}
+
+/// A warning that rules or habits of the motion are dropped, if they do not fit. The printed rules, which fit hardly any
+/// real walk, are kept.
+pub(super) fn misfit(scene: &Scene, allowed: &Allowed, linked_breaks: &[Vec<Constraint>]) -> Option<Warning> {
+    let SequenceOptions { motion, strength, .. } = *scene.options;
+    if motion == Motion::Physical || strength == Strength::Paper {
+        return None;
+    }
+    let frames = allowed.frames.iter().flatten().count();
+    let broken = linked_breaks.iter().filter(|broken| broken.iter().any(is_of_any_walk)).count();
+    if broken as f64 > BROKEN_BODIES * frames as f64 {
+        return Some(Warning::HabitsDropped { motion, frames: broken, of: frames });
+    }
+    let Rejected { of, empty, impossible } = Rejected::count(scene, &allowed.frames, &allowed.trees);
+    let (frames, of) = (empty - impossible, of - impossible);
+    let is_misfit = frames as f64 > MISFIT * of as f64;
+    is_misfit.then_some(Warning::RulesDropped { motion, frames, of })
+}
+
+/// Number of frames with a tree, of those without a posture left, and of those in which the body alone allows none.
+struct Rejected {
+    of: usize,
+    empty: usize,
+    impossible: usize,
+}
+
+impl Rejected {
+    fn count(scene: &Scene, frames: &[Result<FrameReading, FrameProblem>], trees: &[TreeOptions]) -> Self {
+        let of = frames.iter().flatten().count();
+        let is_empty = |frame: &FrameReading| frame.survivors() == 0;
+        let empty: Vec<(usize, &FrameReading)> = frames
+            .iter()
+            .enumerate()
+            .filter_map(|(t, frame)| Some((t, frame.as_ref().ok().filter(|frame| is_empty(frame))?)))
+            .collect();
+        let has_rules = scene.options.motion != Motion::Physical;
+        let is_impossible = |&&(t, frame): &&(usize, &FrameReading)| {
+            let body = TreeOptions { motion: None, keep_cuts: false, ..trees[t].clone() };
+            !has_rules || frame.tree.view.interpret(&body).is_ok_and(|tree| tree.survivors.is_empty())
+        };
+        let impossible = empty.par_iter().filter(is_impossible).count();
+        Self { of, empty: empty.len(), impossible }
+    }
+}
+
 /// Warns if limits or rules reject most frames.
 fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
-    let frames: Vec<(usize, &FrameReading)> =
-        found.frames.iter().enumerate().filter_map(|(t, frame)| Some((t, frame.as_ref().ok()?))).collect();
-    let of = frames.len();
-    let empty: Vec<_> = frames.iter().filter(|(_, frame)| frame.survivors() == 0).collect();
+    let Rejected { of, empty, impossible } = Rejected::count(scene, found.frames, found.trees);
     let has_rules = scene.options.motion != Motion::Physical;
-    let is_impossible = |&&&(t, frame): &&&(usize, &FrameReading)| {
-        let body = TreeOptions { motion: None, ..found.trees[t].clone() };
-        !has_rules || frame.tree.view.interpret(&body).is_ok_and(|tree| tree.survivors.is_empty())
-    };
-    let impossible = empty.par_iter().filter(is_impossible).count();
     let mut warnings = Vec::new();
     if 2 * impossible > of {
         warnings.push(Warning::NothingPossible { frames: impossible, of });
@@ -248,7 +324,7 @@ fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
         return warnings;
     }
     let linked = breaking(true) as f64 / of.max(1) as f64;
-    let (against, possible) = (empty.len() - impossible, of - impossible);
+    let (against, possible) = (empty - impossible, of - impossible);
     if 2 * against > possible || linked > 0.5 {
         let (motion, strength) = (scene.options.motion, scene.options.strength);
         warnings.push(Warning::AgainstRules { motion, strength, frames: against, of: possible, linked });
@@ -275,7 +351,7 @@ pub(super) fn of_scale(scene: &Scene) -> Vec<Warning> {
 mod tests {
     use super::*;
     use crate::model::camera::Camera;
-    use crate::model::skeleton::JOINT_COUNT;
+    use crate::model::skeleton::{JOINT_COUNT, Side};
     use crate::posture::anchor::{AnchorSource, Ground};
     use crate::posture::lift::JointRays;
     use crate::posture::sequence::example::{Walk, walk, with_lengths};
@@ -385,7 +461,6 @@ mod tests {
             linked: &found.linked,
             linked_breaks: &linked_breaks,
             neck: &found.neck,
-            heading: &found.heading,
         };
         rejected(&scene, &of)
     }
@@ -412,6 +487,42 @@ mod tests {
         assert_eq!(judge(Motion::Walking, 0, &limits), [Warning::LinkedBreaks { frames: 6, of: 10 }]);
         // If no posture is possible, there is no second warning about linked postures.
         assert_eq!(judge(Motion::Physical, 6, &limits), [Warning::NothingPossible { frames: 6, of: 10 }]);
+    }
+
+    /// Rules are dropped from a third of the frames on, habits from three tenths on, never the printed ones.
+    #[test]
+    fn rules_and_habits_are_dropped_where_too_many_frames_speak_against_them() {
+        let walk = walk(60.0, 10, 0.5);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let rays: Vec<JointRays> = found.frames.iter().map(|f| f.as_ref().unwrap().tree.view.rays).collect();
+        let (sequence, lengths) = (walk.sequence(), &found.lengths);
+        let judge =
+            |motion: Motion, strength: Strength, empty: usize, broken: &[Constraint], count: usize| {
+                let mut frames = found.frames.clone();
+                for frame in frames.iter_mut().take(empty) {
+                    frame.as_mut().unwrap().tree.survivors.clear();
+                }
+                let breaks: Vec<Vec<Constraint>> =
+                    (0..10).map(|t| if t < count { broken.to_vec() } else { vec![] }).collect();
+                let options = SequenceOptions { motion, strength, ..with_lengths() };
+                let trees = vec![motion.tree(strength); 10];
+                let allowed = Allowed { heading: found.heading, trees, frames, warnings: Vec::new() };
+                let (camera, rays, options) = (&walk.camera, &rays, &options);
+                let scene = Scene { sequence: &sequence, camera, ground: None, rays, lengths, options };
+                misfit(&scene, &allowed, &breaks)
+            };
+        let (measured, knee, rule) =
+            (Strength::Measured, [Constraint::NeckFlexion], [Constraint::ArmsOpposed]);
+        for motion in [Motion::Walking, Motion::WalkingGeneral] {
+            assert_eq!(judge(motion, measured, 3, &knee, 3), None);
+            let rules = Warning::RulesDropped { motion, frames: 4, of: 10 };
+            assert_eq!(judge(motion, measured, 4, &rule, 10), Some(rules));
+            let habits = Warning::HabitsDropped { motion, frames: 4, of: 10 };
+            assert_eq!(judge(motion, measured, 10, &knee, 4), Some(habits.clone()));
+            assert_eq!(judge(motion, measured, 0, &[Constraint::HipKnee(Side::Left)], 4), Some(habits));
+            assert_eq!(judge(motion, Strength::Paper, 10, &knee, 10), None);
+        }
+        assert_eq!(judge(Motion::Physical, measured, 10, &knee, 10), None);
     }
 
     /// Frames in which no body posture is possible do not count against the rules.
@@ -442,7 +553,6 @@ mod tests {
             linked: &found.linked,
             linked_breaks: &vec![vec![]; 10],
             neck: &found.neck,
-            heading: &found.heading,
         };
         assert_eq!(rejected(&scene, &of), [Warning::NothingPossible { frames: 10, of: 10 }]);
         // Conflicts give a warning if they occur in more than one frame in ten.

@@ -61,6 +61,22 @@ impl fmt::Display for Warning {
                 let share = share_of(*frames, *of, "frame");
                 write!(f, "in {share} the linked posture breaks a limit of bodies")
             }
+            Self::HabitsDropped { motion, frames, of } => write!(
+                f,
+                "as {}, the person would break a limit of the body, or swing the segments of a limb against each \
+                 other, in {frames} of {}: neither the rules nor the \
+                 habits of {} were used, as with \"physical\"",
+                motion.noun(),
+                counted(*of, "frame"),
+                motion.name().replace('_', "-"),
+            ),
+            Self::RulesDropped { motion, frames, of } => write!(
+                f,
+                "the rules of {} leave no posture in {frames} of {}, so the postures left are those of the limits of \
+                 bodies, as with \"physical\"",
+                motion.name().replace('_', "-"),
+                counted(*of, "frame"),
+            ),
             Self::AgainstRules { motion, strength, frames, of, linked } => {
                 let none_left = format!("{frames} of {}", counted(*of, "frame"));
                 against_rules(f, *motion, *strength, &none_left, 100.0 * linked)
