@@ -30,6 +30,8 @@ pub struct FollowOptions {
     pub reach_per_frame: f64,
     /// Upper bound, however long the person was not found. Default 1.
     pub farthest: f64,
+    /// Who is not found in this many frames is somebody new afterwards. Default 300: ten seconds at 30 frames per second.
+    pub longest_gap: u64,
     /// Detections that are nearer to each other than this share of their size are one person. Default 0.05.
     pub same: f64,
     /// Standard deviation of the distance from where somebody is expected, as a share of the reach, with which the
@@ -41,7 +43,15 @@ pub struct FollowOptions {
 
 impl Default for FollowOptions {
     fn default() -> Self {
-        Self { reach: 0.3, reach_per_frame: 0.1, farthest: 1.0, same: 0.05, sd: 0.18, doubt: 0.1 }
+        Self {
+            reach: 0.3,
+            reach_per_frame: 0.1,
+            farthest: 1.0,
+            longest_gap: 300,
+            same: 0.05,
+            sd: 0.18,
+            doubt: 0.1,
+        }
     }
 }
 
@@ -200,13 +210,21 @@ impl Crowd<'_> {
 
     /// Steps 2 to 4.
     fn add_frame(&mut self, detections: &[usize]) {
-        let found = assignment(self.people.len(), detections.len(), 1.0, |person, column| {
-            self.cost(&self.people[person], detections[column]).unwrap_or(f64::INFINITY)
-        });
-        let pairs: Vec<(usize, usize)> = found
+        let frame = self.detections[detections[0]].frame;
+        // Only people whom somebody in this frame can be: false detections make many who are never seen again.
+        let costs: Vec<(usize, Vec<f64>)> = (0..self.people.len())
+            .filter(|&person| frame.abs_diff(self.people[person].frame) <= self.options.longest_gap)
+            .map(|person| {
+                let cost = |&i: &usize| self.cost(&self.people[person], i).unwrap_or(f64::INFINITY);
+                (person, detections.iter().map(cost).collect())
+            })
+            .filter(|(_, costs): &(usize, Vec<f64>)| costs.iter().any(|cost| cost.is_finite()))
+            .collect();
+        let found = assignment(costs.len(), detections.len(), 1.0, |row, column| costs[row].1[column]);
+        let pairs: Vec<(usize, usize)> = costs
             .iter()
-            .enumerate()
-            .filter_map(|(person, column)| Some((person, detections[(*column)?])))
+            .zip(&found)
+            .filter_map(|((person, _), column)| Some((*person, detections[(*column)?])))
             .collect();
         self.note_doubts(&pairs);
         for &(person, detection) in &pairs {
@@ -416,7 +434,7 @@ mod tests {
     #[test]
     fn somebody_is_found_within_reach() {
         for (frame, size, reach_px) in
-            [(1, 100.0, 30.0), (1, 50.0, 30.0), (2, 100.0, 40.0), (4, 100.0, 60.0), (100, 100.0, 100.0)]
+            [(1, 100.0, 30.0), (1, 50.0, 30.0), (2, 100.0, 40.0), (4, 100.0, 60.0), (300, 100.0, 100.0)]
         {
             for beyond in [-1.0, 1.0] {
                 // A second person far away makes a choice necessary.
@@ -426,6 +444,13 @@ mod tests {
                 assert_eq!(found.count, 2 + usize::from(beyond > 0.0), "{frame} {size} {beyond}");
             }
         }
+    }
+
+    #[test]
+    fn who_is_away_for_long_comes_back_as_somebody_new() {
+        let after =
+            |frame| of_three_points(&[(0, 0.0, 100.0, 0.9), (0, 500.0, 90.0, 0.9), (frame, 0.0, 100.0, 0.9)]);
+        assert_eq!([300, 301].map(|frame| after(frame).count), [2, 3]);
     }
 
     /// Greedy pairs would give the nearer detection to the wrong person.
