@@ -144,12 +144,6 @@ def write_json(path: str | PathLike[str], value: Any) -> None:
         json.dump(plain(value), file, separators=(",", ":"))
 
 
-def write_arrays(path: str | PathLike[str], arrays: Mapping[str, npt.ArrayLike]) -> None:
-    """Writes named arrays, compressed, for `numpy.load`."""
-    with complete_file(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, **{name: np.asarray(a) for name, a in arrays.items()})
-
-
 def plain(value: Any) -> Any:
     """The value in JSON types: no numpy types, and null for values that are not finite."""
     if isinstance(value, dict):

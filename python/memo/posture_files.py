@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from memo.files import write_arrays, write_columns_csv, write_json
+from memo.files import write_columns_csv, write_json
 from memo.postures import Postures, ReasonTotal
+from memo.unfinished import complete_file
 
 __all__ = ["EVERY_POSTURE", "WRITTEN", "posture_columns", "write_postures"]
 
@@ -50,23 +51,25 @@ def write_postures(postures: Postures, out: str | PathLike[str]) -> list[Path]:
     # From an earlier run: it would not match the new tables.
     (out / EVERY_POSTURE).unlink(missing_ok=True)
     if postures.interpretations is not None:
-        write_arrays(out / EVERY_POSTURE, _every_posture(postures))
+        _write_every_posture(out / EVERY_POSTURE, postures)
         written.append(out / EVERY_POSTURE)
     return written
 
 
-def _every_posture(postures: Postures) -> dict[str, npt.ArrayLike]:
-    """All frames one after the other, of each frame first the survivors."""
+def _write_every_posture(path: Path, postures: Postures) -> None:
+    """All frames one after the other, of each frame first the survivors, for `numpy.load`."""
     every = postures.interpretations or ()
     counts = [len(one.survivors_m) + len(one.cut_m) for one in every]
     figures = [figures_m for one in every for figures_m in (one.survivors_m, one.cut_m)]
     cut_by = [by for one in every for by in (*[""] * len(one.survivors_m), *one.cut_by)]
-    return {
-        "frame": np.repeat(postures.frames, counts),
-        "posture_m": np.concatenate([np.zeros((0, len(postures.joints), 3)), *figures]),
-        "cut_by": np.array(cut_by, dtype=str),
-        "joints": np.array(postures.joints),
-    }
+    with complete_file(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(
+            file,
+            frame=np.repeat(postures.frames, counts),
+            posture_m=np.concatenate([np.zeros((0, len(postures.joints), 3)), *figures]),
+            cut_by=np.array(cut_by, dtype=str),
+            joints=np.array(postures.joints),
+        )
 
 
 def posture_columns(postures: Postures) -> dict[str, npt.ArrayLike]:
