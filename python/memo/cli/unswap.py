@@ -129,7 +129,8 @@ def one_of_several(keypoints: memo.Keypoints, is_open: bool) -> str:
     if len(everyone) > _MOST_SHOWN:
         shown.append(counted(len(everyone) - _MOST_SHOWN, "other"))
     return (
-        f" {len(everyone)} people in the file: {'; '.join(shown)}. The most prominent one was taken; "
+        f" {counted(len(everyone), 'person', 'people')} in the file: {'; '.join(shown)}. "
+        "The most prominent one was taken; "
         "--person selects another."
     )
 
