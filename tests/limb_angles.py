@@ -12,6 +12,25 @@ def angles_of(figures):
     return _of_side(figures, "right") | _of_side(figures, "left")
 
 
+def ankles_of(figures, toes):
+    """Degrees (T,) of the ankles of (T, 14, 3) figures with toes (T, 2, 3), as in `Postures.angles_deg`: by
+    how much a foot is turned, about the line of the hips, from where it is when a person stands upright."""
+    return {f"{side}_ankle": _ankle(figures, toes[:, k], side) for k, side in enumerate(("right", "left"))}
+
+
+def _ankle(figures, toe, side):
+    shank, foot = _segment(figures, f"{side}_ankle", f"{side}_knee"), toe - figures[:, PLACE[f"{side}_ankle"]]
+    up, to_right = _unit(shank), _segment(figures, "left_hip", "right_hip")
+    to_right = _unit(to_right - np.sum(to_right * up, axis=1, keepdims=True) * up)
+    # In standing the ankle is 0.17, the tip of the toe 0.05 of the shank's length above the ground.
+    lower = np.arcsin(0.12 * np.linalg.norm(shank, axis=1) / np.linalg.norm(foot, axis=1))
+    standing = np.cos(lower)[:, None] * np.cross(up, to_right) - np.sin(lower)[:, None] * up
+    flat = _unit(foot - np.sum(foot * to_right, axis=1, keepdims=True) * to_right)
+    return np.degrees(
+        np.arctan2(np.sum(to_right * np.cross(standing, flat), axis=1), np.sum(standing * flat, axis=1))
+    )
+
+
 def _of_side(figures, side):
     hip, hip_adduction = _turn(figures, side, "hip", "knee")
     shoulder, shoulder_adduction = _turn(figures, side, "shoulder", "elbow")

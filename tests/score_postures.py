@@ -22,8 +22,8 @@ degrees, `lean` that of frames whose trunk's axis is off by more than 30 degrees
 segments mirrored in depth in the smoothed motion, of those whose mirror image is more than 10 cm away. `ece`
 is the expected calibration error of `p_mirrored` on the same segments; `undec` is the share of these that are
 undecided, `ratio` how many times as often they are mirrored as the others. `bias`, `rms` and `sd` are of the
-neck's distance: mean error, its RMS over clips, and the stated standard deviation. `hip`, `knee`, `shldr` and
-`elbow` are RMS errors of the flexion of both sides, degrees.
+neck's distance: mean error, its RMS over clips, and the stated standard deviation. `hip`, `knee`, `ankle`,
+`shldr` and `elbow` are RMS errors of the flexion of both sides, degrees; ankles only with toes.
 
 Cannot do: real detections, occlusion, cameras with distortion.
 """
@@ -47,7 +47,7 @@ from typing import Any
 import memo
 import numpy as np
 from conftest import SHARED_DATA
-from limb_angles import angles_of
+from limb_angles import angles_of, ankles_of
 from memo.keypoints import Keypoints
 
 WALKS = {
@@ -79,7 +79,7 @@ DISTANCE_M, CAMERA_HEIGHT_M, FOCAL_PX, SIZE = 6.0, 1.3, 1000.0, (1280, 960)
 #: Fields of view and heights of cameras that are not told.
 FOV_DEG, CAMERA_HEIGHTS_M = (45.0, 75.0), (0.9, 2.2)
 #: Angles that are compared.
-ANGLES = ("hip", "knee", "shoulder", "elbow")
+ANGLES = ("hip", "knee", "ankle", "shoulder", "elbow")
 #: Share of the pelvis between the middles of shoulders and hips, as `memo` places it in the image.
 PELVIS_FROM_SHOULDERS = 45.98 / (45.98 + 10.09)
 #: Heights of the shoulders and of the ankles over the body height (Drillis and Contini 1966).
@@ -261,11 +261,18 @@ def found(job: Job) -> Score:
         unswap=False,
         max_groups=1,
     )
-    return compare(job, postures, figures, camera, time.perf_counter() - started)
+    nothing = np.full((len(times_s), 3), np.nan)
+    toes = np.stack([points.get(f"{side}_big_toe", nothing) for side in ("right", "left")], axis=1)
+    return compare(job, postures, figures, toes, camera, time.perf_counter() - started)
 
 
 def compare(
-    job: Job, postures: memo.Postures, figures: np.ndarray, camera: memo.Camera, seconds: float
+    job: Job,
+    postures: memo.Postures,
+    figures: np.ndarray,
+    toes: np.ndarray,
+    camera: memo.Camera,
+    seconds: float,
 ) -> Score:
     """The figures of one call."""
     rows = np.flatnonzero(postures.found)
@@ -285,13 +292,14 @@ def compare(
     depth = np.asarray(camera.rotation)[2]
     flat = position + rays * ((rays[:, :1] @ depth) / (rays @ depth))[..., None]
     probabilities, mirrored, undecided = signs(postures, rows, smooth, true, rays)
-    truth = angles_of(true)
+    truth = angles_of(true) | ankles_of(true, toes[rows])
 
     def angle_rms(joint: str) -> float:
         errors = [
             postures.angles_deg[f"{s}_{joint}"][rows] - truth[f"{s}_{joint}"] for s in ("right", "left")
         ]
-        return float(np.sqrt(np.nanmean(np.square((np.array(errors) + 180) % 360 - 180))))
+        squares = np.square((np.array(errors) + 180) % 360 - 180)
+        return float(np.sqrt(np.nanmean(squares))) if np.isfinite(squares).any() else math.nan
 
     return Score(
         job,
@@ -352,7 +360,7 @@ def pooled(scores: Sequence[Score]) -> dict[str, float]:
         "sd": _mean([score.sd_cm for score in scores]),
         **{
             name: math.sqrt(_mean([score.angles_deg[k] ** 2 for score in scores]))
-            for k, name in enumerate(("hip", "knee", "shldr", "elbow"))
+            for k, name in enumerate(("hip", "knee", "ankle", "shldr", "elbow"))
         },
         "ms": 1000.0 * _mean([score.seconds for score in scores]),
     }

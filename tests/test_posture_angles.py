@@ -5,7 +5,7 @@ import math
 import memo
 import numpy as np
 import pytest
-from limb_angles import angles_of
+from limb_angles import PLACE, angles_of, ankles_of
 from memo.formats import read_motion
 from test_posture import (
     FOCAL_PX,
@@ -23,7 +23,7 @@ from test_posture import (
 
 def test_angles_are_those_of_the_smoothed_figures(found):  # noqa: F811
     expected = angles_of(found.smoothed_m)
-    assert set(found.angles_deg) == set(expected)
+    assert set(found.angles_deg) == set(expected) | {"right_ankle", "left_ankle"}
     for name, values in expected.items():
         own = found.angles_deg[name]
         # A knee that is hardly bent may bend to the front.
@@ -49,7 +49,39 @@ def test_missing_joints_have_no_angle(scene):  # noqa: F811
     camera = memo.Camera.from_toml(folder / "camera.toml")
     angles = memo.posture(keypoints, camera, folder / "lengths.csv").angles_deg
     unknown = {name for name, values in angles.items() if np.isnan(values).all()}
-    assert unknown == {"right_elbow", "left_knee"}
+    assert unknown == {"right_elbow", "left_knee", "right_ankle", "left_ankle"}
+
+
+def test_toes_give_the_ankles(scene):  # noqa: F811
+    """Feet that turn by 20 degrees, their toes outwards by 8, seen with and without noise."""
+    folder, truth = scene
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    rng = np.random.default_rng(4)
+    swing = np.radians(80 + 20 * np.sin(2 * math.pi * 0.9 * np.arange(len(truth)) / RATE_HZ))
+    toes = []
+    for side, outwards in (("right", 1), ("left", -1)):
+        ankle, knee = (truth[:, PLACE[f"{side}_{joint}"]] for joint in ("ankle", "knee"))
+        to_right = truth[:, PLACE["right_hip"]] - truth[:, PLACE["left_hip"]]
+        to_right /= np.linalg.norm(to_right, axis=1, keepdims=True)
+        down = (ankle - knee) / np.linalg.norm(ankle - knee, axis=1, keepdims=True)
+        ahead = np.cross(to_right, down)
+        foot = np.cos(swing)[:, None] * down + np.sin(swing)[:, None] * ahead
+        toes.append(ankle + 0.17 * (foot + outwards * math.tan(math.radians(8)) * to_right))
+    toes = np.stack(toes, axis=1)
+    true = ankles_of(truth, toes)
+    points = np.concatenate([truth, toes], axis=1)
+    names = [*PLACE, "right_big_toe", "left_big_toe"]
+    pixels = camera.project(points.reshape(-1, 3)).reshape(*points.shape[:2], 2)
+    times_s = np.arange(len(truth)) / RATE_HZ
+    for noise_px, most_deg in ((0.0, 6), (NOISE_PX, 9)):
+        noisy = pixels + rng.normal(0, noise_px, pixels.shape)
+        keypoints = memo.keypoints.Keypoints.from_arrays(noisy, names=names, times_s=times_s)
+        found = memo.posture(keypoints, camera, folder / "lengths.csv", noise_px=max(noise_px, 0.5))  # noqa: F811
+        own = ankles_of(found.smoothed_m, found.toes_m)
+        for name, values in own.items():
+            assert np.allclose(found.angles_deg[name], values, atol=1e-5), name
+            rms_deg = np.sqrt(np.mean(np.square(values - true[name])))
+            assert rms_deg < most_deg, (name, noise_px, rms_deg)
 
 
 def test_the_table_has_them_and_opensim_gets_them(scene, tmp_path, memo_posture, memo_command):  # noqa: F811

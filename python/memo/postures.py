@@ -174,10 +174,13 @@ class Postures(Shown):
     smoothed_m: Array
     """(T, 14, 3) metres: the same, smoothed in space: close to the image points, with constant lengths."""
     angles_deg: dict[str, Array]
+    toes_m: Array
+    """(T, 2, 3) metres: tips of the right and the left big toe; NaN without keypoints of toes."""
     """(T,) each: angles of the smoothed motion in degrees, NaN where unknown. `right_hip` is the flexion of
-    the thigh against the trunk, `right_knee` of the shank against the thigh, `right_shoulder` of the upper
-    arm against the trunk, `right_elbow` of the forearm against the upper arm; `right_hip_adduction` and
-    `right_shoulder_adduction` are towards the body. Signs are those of OpenSim's models."""
+    the thigh against the trunk, `right_knee` of the shank against the thigh, `right_ankle` of the foot
+    against the shank (0 in standing, to the front positive; needs keypoints of toes), `right_shoulder` of the
+    upper arm against the trunk, `right_elbow` of the forearm against the upper arm; `right_hip_adduction`
+    and `right_shoulder_adduction` are towards the body. Signs are those of OpenSim's models."""
     sd_m: Array
     """(T, 14) standard deviation of each joint of the smoothed motion, metres."""
     gap_m: Array

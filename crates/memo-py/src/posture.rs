@@ -10,13 +10,13 @@ use crate::error::value_error;
 use crate::result::result;
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
-use memo_core::model::angles::JointAngles;
+use memo_core::model::angles::{JointAngles, ankle_flexion_rad};
 use memo_core::model::{
     ASSUMED_FOCAL_SD, DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD, JOINT_COUNT, assumed_field_of_view_rad,
 };
 use memo_core::posture::anchor::AnchorSource;
 use memo_core::posture::lift::JointRays;
-use memo_core::posture::link::Alternative;
+use memo_core::posture::link::{Alternative, LinkedPath};
 use memo_core::posture::tree::{CutCount, LevelCount, View};
 use memo_core::posture::{
     AnchorChoice, DEFAULT_DISTANCE_SD_M, FrameProblem, FrameReading, Motion, ReasonTotal, Strength,
@@ -26,7 +26,7 @@ use memo_core::wording::counted;
 use memo_core::{
     Camera, Joint, KeypointSequence, PerJoint, Progress, SegmentLengths, SequenceOptions, Side, StickFigure,
 };
-use numpy::{PyArray1, PyArray2, PyArray3};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
@@ -74,7 +74,11 @@ result! {
         linked_breaks: Vec<Vec<String>> =
             found.linked_breaks.iter().map(|c| texts(c.iter().map(|c| c.name()))).collect::<Vec<_>>(),
         smoothed_m: Py<PyArray3<f64>> = numpy_from_figures(py, &found.linked.smoothed)?,
-        angles_deg: Py<PyDict> = angles(py, &found.linked.smoothed)?,
+        toes_m: Py<PyArray3<f64>> = {
+            let flat: Vec<f64> = found.linked.toes.iter().flatten().flat_map(|toe| toe.to_array()).collect();
+            flat.into_pyarray(py).reshape([found.linked.toes.len(), 2, 3])?
+        },
+        angles_deg: Py<PyDict> = angles(py, &found.linked)?,
         sd_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.sd_m.iter().map(|row| row.0).collect())?,
         gap_m: Py<PyArray2<f64>> = numpy_from_rows(py, found.linked.gap_m.iter().map(|row| row.0).collect())?,
         margin_nats: Py<PyArray1<f64>> = numpy_from_column(py, found.linked.margin.clone()),
@@ -126,10 +130,11 @@ fn names(found: &memo_core::PostureSequence) -> impl Iterator<Item = String> {
 }
 
 /// The angle of each name, such as `right_knee`, in all frames, degrees.
-fn angles<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, PyDict>> {
+fn angles<'py>(py: Python<'py>, motion: &LinkedPath) -> PyResult<Bound<'py, PyDict>> {
     let named = PyDict::new(py);
     for side in Side::BOTH {
-        let frames: Vec<JointAngles> = figures.iter().map(|figure| JointAngles::of(figure, side)).collect();
+        let frames: Vec<JointAngles> =
+            motion.smoothed.iter().map(|figure| JointAngles::of(figure, side)).collect();
         let name = |joint: &str, angle: fn(&JointAngles) -> f64| {
             let column = frames.iter().map(|angles| angle(angles).to_degrees()).collect();
             named.set_item(format!("{}_{joint}", side.name()), numpy_from_column(py, column))
@@ -140,6 +145,10 @@ fn angles<'py>(py: Python<'py>, figures: &[StickFigure]) -> PyResult<Bound<'py, 
         name("shoulder", |angles| angles.shoulder_flexion_rad)?;
         name("shoulder_adduction", |angles| angles.shoulder_adduction_rad)?;
         name("elbow", |angles| angles.elbow_flexion_rad)?;
+        let feet = motion.smoothed.iter().zip(&motion.toes);
+        let ankle =
+            feet.map(|(figure, toes)| ankle_flexion_rad(figure, toes[side as usize], side).to_degrees());
+        named.set_item(format!("{}_ankle", side.name()), numpy_from_column(py, ankle.collect()))?;
     }
     Ok(named)
 }

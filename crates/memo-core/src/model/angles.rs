@@ -32,6 +32,11 @@ fn axes(down: DVec3, across: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, x.cross(y)))
 }
 
+/// The axes of a leg below the knee, in the same sense: y from the knee to the ankle, z from the right hip to the left.
+pub fn leg_axes(figure: &StickFigure, side: Side) -> Option<DMat3> {
+    axes(figure.segment(side.ankle()), figure[Joint::LeftHip] - figure[Joint::RightHip])
+}
+
 /// Flexion (+) or extension (-) of a limb of direction `u`, radians: θ, the angle from y to u in the xy
 /// plane.
 pub fn swing_rad(axes: &DMat3, u: DVec3) -> f64 {
@@ -150,6 +155,20 @@ impl JointAngles {
     }
 }
 
+/// Height of the ankle over the tip of the big toe when a foot stands, as a share of the shank's length: an ankle is
+/// 0.17 of it above the ground, the tip of the toe 0.05.
+const ANKLE_OVER_TOE: f64 = 0.12;
+
+/// Dorsiflexion (+) or plantar flexion (-) of a foot, radians: the angle in the plane of [`leg_axes`] between the shank
+/// and the line from the ankle to the tip of the big toe, 0 if the sole is perpendicular to the shank. NaN if a joint is
+/// unknown.
+pub fn ankle_flexion_rad(figure: &StickFigure, toe: DVec3, side: Side) -> f64 {
+    let foot = toe - figure[side.ankle()];
+    let standing_rad = (ANKLE_OVER_TOE * figure.segment(side.ankle()).length() / foot.length()).asin();
+    leg_axes(figure, side)
+        .map_or(f64::NAN, |axes| swing_rad(&axes, foot) - std::f64::consts::FRAC_PI_2 + standing_rad)
+}
+
 /// Axes in the sense of [`trunk_axes`], but with z exactly from right to left; NaN if unknown.
 fn across(down: DVec3, left: DVec3) -> DMat3 {
     let z = left.normalize();
@@ -211,6 +230,29 @@ mod tests {
         assert!((knee_rad(&axes, down, forward) + quarter).abs() < 1e-12);
         assert_eq!(elbow_rad(&axes, down, down), 0.0);
         assert_eq!(knee_rad(&axes, down, down), 0.0);
+    }
+
+    /// A sole on the ground under an upright shank is at 0, whichever way the person faces; a foot turned up by 0.3 is
+    /// at 0.3, also when its toes point outwards.
+    #[test]
+    fn ankles_flex_to_the_front() {
+        let mut figure = upright();
+        for (side, y) in [(Side::Right, -0.1), (Side::Left, 0.1)] {
+            figure[side.knee()] = DVec3::new(0.0, y, 0.47);
+            figure[side.ankle()] = DVec3::new(0.0, y, 0.07);
+            let forward = (0.18f64.powi(2) - 0.048f64.powi(2)).sqrt();
+            let standing = DVec3::new(forward, 0.0, -0.048);
+            for raised_rad in [0.0, 0.3, -0.7] {
+                // Turned about the right-to-left axis, up at the front.
+                let foot = DMat3::from_rotation_y(-raised_rad) * standing;
+                let toe = figure[side.ankle()] + foot;
+                assert!((ankle_flexion_rad(&figure, toe, side) - raised_rad).abs() < 1e-9, "{raised_rad}");
+            }
+            let outwards = DMat3::from_rotation_z(y.signum() * 0.2) * standing;
+            assert!(ankle_flexion_rad(&figure, figure[side.ankle()] + outwards, side).abs() < 0.01);
+            assert!(ankle_flexion_rad(&figure, DVec3::NAN, side).is_nan());
+        }
+        assert!(ankle_flexion_rad(&upright(), DVec3::ZERO, Side::Right).is_nan());
     }
 
     #[test]

@@ -44,20 +44,32 @@ pub(super) fn denoised(frames: &[LinkFrame]) -> Vec<LinkFrame> {
 
 /// The ray of a joint in every frame and its standard deviation, radians; NaN if it is not seen.
 fn denoised_track(frames: &[LinkFrame], joint: Joint) -> Vec<(DVec3, f64)> {
+    let ray = |frame: &LinkFrame| frame.rays.sees(joint).then_some(frame.rays.ray[joint]);
+    denoised_rays(frames, &frames.iter().map(ray).collect::<Vec<_>>(), acceleration_mps2(joint))
+}
+
+/// The rays to a point that accelerates by about `acceleration_mps2`, `None` where it is not seen, with their noise
+/// reduced; and their standard deviation, radians. NaN if it is not seen.
+pub(super) fn denoised_rays(
+    frames: &[LinkFrame],
+    rays: &[Option<DVec3>],
+    acceleration_mps2: f64,
+) -> Vec<(DVec3, f64)> {
     let mut clean = vec![(DVec3::NAN, f64::NAN); frames.len()];
-    let seen: Vec<usize> = (0..frames.len()).filter(|&t| frames[t].rays.sees(joint)).collect();
-    let ahead = seen.iter().all(|&t| frames[t].rays.ray[joint].z > 0.1);
-    if seen.len() < 3 || !ahead {
-        for t in seen {
-            clean[t] = (frames[t].rays.ray[joint], frames[t].rays.noise_rad);
+    let seen: Vec<(usize, DVec3)> =
+        rays.iter().enumerate().filter_map(|(t, ray)| Some((t, (*ray)?))).collect();
+    if seen.len() < 3 || seen.iter().any(|(_, ray)| ray.z <= 0.1) {
+        for (t, ray) in seen {
+            clean[t] = (ray, frames[t].rays.noise_rad);
         }
         return clean;
     }
-    let points: Vec<DVec2> = seen.iter().map(|&t| image_point(frames[t].rays.ray[joint])).collect();
-    let times_s: Vec<f64> = seen.iter().map(|&t| frames[t].time_s).collect();
-    let kept = kept(frames, &seen, &points, &times_s);
-    let depth_m = seen.iter().map(|&t| frames[t].neck.z).fold(0.0, |a, b| a + b) / seen.len() as f64;
-    let acceleration = acceleration_mps2(joint) / depth_m;
+    let (at, rays): (Vec<usize>, Vec<DVec3>) = seen.into_iter().unzip();
+    let points: Vec<DVec2> = rays.iter().map(|&ray| image_point(ray)).collect();
+    let times_s: Vec<f64> = at.iter().map(|&t| frames[t].time_s).collect();
+    let kept = kept(frames, &at, &points, &times_s);
+    let depth_m = at.iter().map(|&t| frames[t].neck.z).fold(0.0, |a, b| a + b) / at.len() as f64;
+    let acceleration = acceleration_mps2 / depth_m;
     let axes = [0, 1].map(|axis| {
         let measure = |(k, &t): (usize, &usize)| {
             if kept[k] {
@@ -66,15 +78,15 @@ fn denoised_track(frames: &[LinkFrame], joint: Joint) -> Vec<(DVec3, f64)> {
                 Measured::NOTHING
             }
         };
-        let measured: Vec<Measured> = seen.iter().enumerate().map(measure).collect();
+        let measured: Vec<Measured> = at.iter().enumerate().map(measure).collect();
         smooth_track(&times_s, &measured, acceleration)
     });
-    for (k, &t) in seen.iter().enumerate() {
+    for (k, &t) in at.iter().enumerate() {
         let [u, v] = [axes[0][k], axes[1][k]];
         if u.value.is_finite() && v.value.is_finite() {
             clean[t] = (DVec3::new(u.value, v.value, 1.0).normalize(), u.sd);
         } else {
-            clean[t] = (frames[t].rays.ray[joint], frames[t].rays.noise_rad);
+            clean[t] = (rays[k], frames[t].rays.noise_rad);
         }
     }
     clean

@@ -7,7 +7,7 @@
 //! are negative log likelihoods, in nats. Limits of the body and habits of walking are soft ([`MotionPrior`]).
 //!
 //! Before linking, noise in the image is reduced (`denoise`); the cost of a trunk contains which way it faces in the
-//! image (`front`); afterwards the motion is smoothed in space (`motion`).
+//! image (`front`); afterwards the motion is smoothed in space (`motion`), and feet are put to its ankles (`toes`).
 //!
 //! Candidates are all roots, not only the survivors of the tree: a hard limit exceeded by one degree of noise
 //! would break the chain. Short gaps in a joint's track are interpolated for the decision only; the figures
@@ -18,6 +18,7 @@ mod flip;
 mod front;
 mod limbs;
 mod motion;
+mod toes;
 mod trunk;
 
 use glam::{DMat3, DVec3};
@@ -152,6 +153,8 @@ pub struct LinkedPath {
     pub figures: Vec<StickFigure>,
     /// The postures smoothed in space: near the image points, with constant lengths and small accelerations.
     pub smoothed: Vec<StickFigure>,
+    /// Tips of the right and the left big toe of the smoothed postures; NaN if the toe, its ankle or knee was not seen.
+    pub toes: Vec<[DVec3; 2]>,
     /// Standard deviation of each joint along its ray, relative to its starting joint, from the frames around it,
     /// metres.
     pub sd_m: Vec<PerJoint<f64>>,
@@ -231,7 +234,7 @@ pub(super) fn link_with_progress(
             delta: cost - best,
         })
         .collect();
-    // 3. The motion smoothed in space, leaves of the tree, the second-best reading and margins.
+    // 3. The motion smoothed in space with its feet, leaves of the tree, the second-best reading and margins.
     let smoothed = motion::smoothed(&bridged, lengths, &limbs.smoothed);
     let path = problem.path(&seen, trunk, limbs, &turned, smoothed);
     Ok(path.spread(&known, frames.len()))
@@ -406,9 +409,12 @@ impl Problem<'_> {
         for (sd_m, frame) in sd_m.iter_mut().zip(seen) {
             unseen(frame).for_each(|joint| sd_m[joint] = f64::NAN);
         }
+        let p_mirrored = self.probabilities(&leaves, &smoothed, &mirror_margin);
+        let smoothed = only_seen(smoothed, seen);
         LinkedPath {
-            p_mirrored: self.probabilities(&leaves, &smoothed, &mirror_margin),
-            smoothed: only_seen(smoothed, seen),
+            p_mirrored,
+            toes: toes::toes(seen, self.lengths, &smoothed),
+            smoothed,
             sd_m,
             second,
             margin,
@@ -508,6 +514,7 @@ impl LinkedPath {
         Self {
             figures: at(self.figures, known, frames, StickFigure::UNKNOWN),
             smoothed: at(self.smoothed, known, frames, StickFigure::UNKNOWN),
+            toes: at(self.toes, known, frames, [DVec3::NAN; 2]),
             sd_m: at(self.sd_m, known, frames, nothing),
             gap_m: at(self.gap_m, known, frames, nothing),
             margin: at(self.margin, known, frames, f64::NAN),

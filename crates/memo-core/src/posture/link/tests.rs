@@ -182,12 +182,17 @@ fn somebody_stands_on_the_ground() {
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    let (_, frames, lengths, options) = sequence(0.3);
+    let (_, mut frames, lengths, options) = sequence(0.3);
+    for frame in &mut frames {
+        frame.front.toes[0] = (frame.rays.ray[Joint::RightAnkle] + 0.03 * DVec3::X).normalize();
+    }
     let [one, two] = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| link(&frames, &lengths, &options).unwrap())
     });
-    assert_eq!(one, two);
+    assert!(one.toes.iter().all(|[right, left]| right.is_finite() && left.is_nan()));
+    // Toes that are not seen are NaN, which equals nothing.
+    assert_eq!(format!("{one:?}"), format!("{two:?}"));
 }
 
 /// A problem of frames without joints, at these times.

@@ -489,9 +489,12 @@ pub fn figure_in_camera(figure_in_world: &StickFigure, camera: &Camera) -> Stick
 
 fn to_world(linked: LinkedPath, camera: &Camera) -> LinkedPath {
     let world = |figures: Vec<StickFigure>| figures.iter().map(|f| figure_in_world(f, camera)).collect();
+    let world_from_camera = camera.rotation.transpose();
+    let toe_in_world = |toe: DVec3| world_from_camera * (toe - camera.translation);
     LinkedPath {
         figures: world(linked.figures),
         smoothed: world(linked.smoothed),
+        toes: linked.toes.iter().map(|toes| toes.map(toe_in_world)).collect(),
         second: linked.second.map(|second| Alternative { figures: world(second.figures), ..second }),
         ..linked
     }
