@@ -44,7 +44,7 @@ def add_convert(app: "typer.Typer") -> None:
             typer.Argument(
                 metavar="SOURCE",
                 help="A folder of `memo track` or `memo posture`, or a motion file:"
-                " .c3d, .bvh, .trc, .mot, .sto, .csv, .parquet; for keypoints also a detector's files.",
+                " .c3d, .bvh, .amc, .trc, .mot, .sto, .csv, .parquet; for keypoints also a detector's files.",
             ),
         ],
         target: Annotated[

@@ -51,7 +51,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             typer.Argument(
                 metavar="MOTION...",
                 help="CSV of NAME_x, NAME_y, NAME_z in metres, a folder with track.csv, or a motion file"
-                " (.c3d, .bvh, .trc); several: one actor each; default: an average walker.",
+                " (.c3d, .bvh, .trc, .amc); several: one actor each; default: an average walker.",
             ),
         ] = None,
         markers: Annotated[

@@ -1,10 +1,10 @@
 """Motion files, read and written: TRC, MOT and STO, C3D, BVH and tables of joints (CSV, Parquet).
 
 `read_motion` and `write_motion` choose the format by the ending of the file's name; `READERS` and
-`WRITERS` hold the function for each ending, and a new format is one entry in each. Assumptions made in
-reading are in `Motion.notes`; `write_motion` returns what a format cannot store. A file appears complete
-or not at all, and any problem with a file is a `FormatError` that names the file and the line, byte or
-field.
+`WRITERS` hold the function for each ending, and a new format is one entry in each; AMC is only read.
+Assumptions made in reading are in `Motion.notes`; `write_motion` returns what a format cannot store. A file
+appears complete or not at all, and any problem with a file is a `FormatError` that names the file and the
+line, byte or field.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
+from memo.formats.amc import read_amc
 from memo.formats.bvh import read_bvh, write_bvh
 from memo.formats.c3d import read_c3d, write_c3d
 from memo.formats.mot import read_mot, write_mot
@@ -42,6 +43,7 @@ Writer = Callable[[Path, Motion, Up], list[str]]
 """Writes a whole file; returns what was left out, in sentences."""
 
 READERS: dict[str, Reader] = {
+    ".amc": read_amc,
     ".bvh": read_bvh,
     ".c3d": read_c3d,
     ".csv": read_table,
@@ -77,9 +79,9 @@ def read_motion(
 ) -> Motion:
     """Reads a motion file, or the folder of `memo track` or `memo posture`.
 
-    `up`: the file's up axis, in place of the one it names. `rate_hz`: frame rate of a table without times.
-    `unit_m`: metres in one unit of a BVH file, or of a table that names none. `walk`: one walk of a track,
-    from 0; all of them otherwise.
+    `up`: the file's up axis, in place of the one it names. `rate_hz`: frame rate of an AMC file, or of a
+    table without times. `unit_m`: metres in one unit of a BVH or AMC file, or of a table that names none.
+    `walk`: one walk of a track, from 0; all of them otherwise.
     """
     path = Path(path)
     check_up(up)

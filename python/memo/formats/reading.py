@@ -26,9 +26,9 @@ class Given:
     up: Up | None = None
     """Overrides the up axis of the file."""
     rate_hz: float | None = None
-    """Frame rate of a table without times."""
+    """Frame rate of an AMC file, or of a table without times."""
     unit_m: float | None = None
-    """Metres in one unit of length, for BVH and for tables that name none."""
+    """Metres in one unit of length, for BVH, AMC and tables that name none."""
 
     def check_used(self, *used: str) -> None:
         """Refuses values that the reader does not use."""
