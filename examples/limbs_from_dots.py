@@ -33,8 +33,9 @@ print([window.status for window in figure.windows])
 # The linkage, with the length of every link in pixels and how sure it is.
 
 names = [walker.names[k] for k in joints]
-for a, b, length, confidence, windows in figure.links():
-    print(f"{names[a]}-{names[b]}: {length:.0f} px, confidence {confidence:.2f}, in {windows} windows")
+for link in figure.links():
+    limb, sure = f"{names[link.a]}-{names[link.b]}", f"confidence {link.confidence:.2f}"
+    print(f"{limb}: {link.length_px:.0f} px, {sure}, {link.verdict}, in {link.windows} windows")
 
 fig, ax = plt.subplots(figsize=(5, 6), layout="constrained")
 plot_linkage(ax, Points(names, times_s, tracks), figure, 0)

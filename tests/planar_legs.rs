@@ -107,8 +107,9 @@ fn the_knee_is_the_pivot_of_a_mocap_leg() {
         println!(
             "{noise_px} px: of {count} legs the knee alone is the pivot in {knees}; ankle or hip pass in {others}"
         );
-        assert_eq!(others, 0);
-        assert!(knees as f64 >= 0.6 * count as f64);
+        // Twice as many other roles as legs are tested at a rate of 5 %.
+        assert!(others as f64 <= 0.02 * count as f64, "{others} of {count}");
+        assert!(knees as f64 >= 0.9 * count as f64, "{knees} of {count}");
     }
 }
 

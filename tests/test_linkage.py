@@ -134,17 +134,26 @@ def found_with(verdicts, status="interpreted", **more):
     return figure.PlanarFigure(windows, np.zeros((8, 2)), ["planar"] * 8)
 
 
-def test_chains_that_are_not_planar_are_left_out():
+def test_links_are_given_with_the_verdicts_on_their_chains():
     from memo.cli.planar import _about_links
 
     found = found_with(["not planar", "planar", "edge-on", "planar"])
-    assert found.links() == [(0, 1, 2.0, 0.9, 3)]
+    assert found.links() == [(0, 1, 1.5, 0.9, 4, "planar")]
     assert found.verdicts() == {(0, 1): {"planar": 2, "not planar": 1, "edge-on": 1}}
     assert _about_links(found, ["a", "b"]) == [
-        "  a - b: 2 px long, confidence 90%, planar in 2, edge-on in 1 of 4 windows",
-        "Left out because their motion is not planar: a - b (in 1 of 4 windows).",
+        "  a - b: 2 px long, confidence 90%, planar in 2, not planar in 1, edge-on in 1 of 4 windows",
+        '"not planar": the limb leaves its plane; its length and depth are less exact.',
     ]
-    assert found_with(["not planar"]).links() == []
+    guess = found_with(["not planar", "planar"], status="lost")
+    assert found.is_body and not guess.is_body
+    assert guess.links() == [(0, 1, 0.5, 0.9, 2, "not planar")]
+    assert repr(guess).startswith("PlanarFigure(no body; best guess: 1 link of 2 points, 0 of 2 windows")
+
+
+def test_links_of_windows_without_a_body_do_not_count_beside_one():
+    found = found_with(["planar", "planar"])
+    found.windows[1].status = "lost"
+    assert found.links() == [(0, 1, 0.0, 0.9, 1, "planar")]
 
 
 def test_closed_forms_lift_planted_rods_and_hinges():
@@ -307,7 +316,7 @@ def test_a_failure_promises_no_links_that_are_not_there():
     points = figure.Points(["a", "b"], np.arange(8) / 30, np.zeros((8, 2, 2)))
     assert _about_figure(found_with(["edge-on"], "still"), points, 0.5)[-1].endswith("is in links.csv.")
     nothing = found_with(["edge-on"], "still", chains=[])
-    assert _about_figure(nothing, points, 0.5)[-1].endswith("shows planar motion.")
+    assert _about_figure(nothing, points, 0.5)[-1].endswith("shows motion in planes.")
 
 
 def test_tracks_without_a_window_are_told(tmp_path):

@@ -669,7 +669,7 @@ def test_limbs_from_dots_have_a_page(limb_folder):
     written, data, report = page_of(limb_folder)
     assert report.kind == "memo planar" and report.contents["frames"] == len(data["frames"])
     planar = {frozenset((link["a"], link["b"])) for link in data["links"] if link["verdict"] == "planar"}
-    assert frozenset(("RHP", "RKN")) in planar and "8 links swing in planes" in written
+    assert frozenset(("RHP", "RKN")) in planar and "8 links in 1 of 1 window" in written
     knee = data["names"].index("RKN")
     assert any(frame["points"][knee][2] for frame in data["frames"])
 

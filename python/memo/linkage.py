@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
+    "FigureLink",
     "PlanarFigure",
     "Points",
     "planar",
@@ -42,9 +43,6 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Array = npt.NDArray[np.float64]
-
-REFUTED = "not planar"
-"""Verdict of a chain whose motion contradicts every plane."""
 
 _SHORT = {
     joint: joint[0].upper() + short
@@ -91,6 +89,24 @@ class Points:
         return replace(self, positions=self.positions / self.scales[:, None, None], scales=None)
 
 
+class FigureLink(NamedTuple):
+    """Two points at a constant distance in space, over the windows in which they are linked."""
+
+    a: int
+    """The first point."""
+    b: int
+    """The second point; its number is larger."""
+    length_px: float
+    """Mean length."""
+    confidence: float
+    """Mean share of the weight of all figures that contain the link, 0 to 1; NaN for a spanning tree."""
+    windows: int
+    """Number of windows."""
+    verdict: str
+    """The most frequent verdict on the motion of its chain: "planar", "not planar", "little motion",
+    "edge-on", "few views" or "unfalsifiable"."""
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class PlanarFigure(Shown):
     """The linkage found in tracks, window by window.
@@ -112,41 +128,41 @@ class PlanarFigure(Shown):
         """The windows that could be interpreted."""
         return [window for window in self.windows if window.status == "interpreted"]
 
-    def links(self) -> list[tuple[int, int, float, float, int]]:
-        """Links of the interpreted windows: two points, mean length, mean confidence, number of windows.
+    @property
+    def is_body(self) -> bool:
+        """Whether any window is interpreted: whether there is evidence that the points belong to a body."""
+        return bool(self.interpreted)
 
-        Links of chains whose motion is not planar are left out.
-        """
-        found: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    def links(self) -> list[FigureLink]:
+        """The linkage: the links of the interpreted windows. Without one, those of all windows: then they are
+        the best guess for points that need not belong together (`is_body`)."""
+        found: dict[tuple[int, int], list[tuple[float, float, str]]] = {}
         for link, verdict in self._judged():
-            if verdict != REFUTED:
-                found.setdefault(link.points, []).append((link.length, link.confidence))
-        rows = [(a, b, *np.mean(seen, axis=0), len(seen)) for (a, b), seen in found.items()]
-        return sorted((a, b, float(length), float(sure), count) for a, b, length, sure, count in rows)
+            found.setdefault(link.points, []).append((link.length, link.confidence, verdict))
+
+        def pooled(a: int, b: int) -> FigureLink:
+            lengths, sure, verdicts = zip(*found[a, b], strict=True)
+            usual = Counter(verdicts).most_common(1)[0][0]
+            return FigureLink(a, b, float(np.mean(lengths)), float(np.mean(sure)), len(lengths), usual)
+
+        return [pooled(*points) for points in sorted(found)]
 
     def verdicts(self) -> dict[tuple[int, int], dict[str, int]]:
-        """For each link in the interpreted windows, the number of windows with each verdict on its chain."""
+        """For each of the `links`, the number of windows with each verdict on its chain."""
         counts: dict[tuple[int, int], Counter[str]] = {}
         for link, verdict in self._judged():
             counts.setdefault(link.points, Counter())[verdict] += 1
         return {points: dict(counts[points].most_common()) for points in sorted(counts)}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The links as a `pandas.DataFrame`: the two points, `length_px`, `confidence` and `windows`, means
-        over the windows in which they were found."""
-        rows = self.links()
+        """The links as a `pandas.DataFrame`: names of the points `a` and `b`, `length_px`, `confidence`,
+        `windows` and `verdict`."""
+        links = self.links()
         names = [str(number) for number in range(self.depth.shape[1])]
         if self.points is not None:
             names = self.points.names
-        return data_frame(
-            {
-                "a": [names[row[0]] for row in rows],
-                "b": [names[row[1]] for row in rows],
-                "length_px": [row[2] for row in rows],
-                "confidence": [row[3] for row in rows],
-                "windows": [row[4] for row in rows],
-            }
-        )
+        columns = {name: [getattr(link, name) for link in links] for name in FigureLink._fields}
+        return data_frame(columns | {end: [names[point] for point in columns[end]] for end in ("a", "b")})
 
     def plot(self, window: int | None = None, ax: Axes | None = None) -> Axes:
         """Draws the linkage of a window, by default the first interpreted one, into `ax`, or new Axes,
@@ -163,15 +179,16 @@ class PlanarFigure(Shown):
         return plot_linkage(new_axes() if ax is None else ax, self.points, self, window)
 
     def __repr__(self) -> str:
+        guess = "" if self.is_body else "no body; best guess: "
         return (
-            f"PlanarFigure({counted(len(self.links()), 'link')} of "
+            f"PlanarFigure({guess}{counted(len(self.links()), 'link')} of "
             f"{counted(self.depth.shape[1], 'point')}, "
             f"{len(self.interpreted)} of {counted(len(self.windows), 'window')} interpreted)"
         )
 
     def _judged(self) -> list[tuple[_memo.PlanarLink, str]]:
-        """Links of the interpreted windows with the verdicts on their chains."""
-        chains = (chain for window in self.interpreted for chain in window.chains)
+        """Links of the interpreted windows, or of all, with the verdicts on their chains."""
+        chains = (chain for window in self.interpreted or self.windows for chain in window.chains)
         return [(link, chain.verdict) for chain in chains for link in chain.links]
 
 
@@ -280,7 +297,9 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
         start_s, end_s = (float(points.times_s[frame]) for frame in (window.start, window.end - 1))
         verdicts = [str(count) for count in (window.planar, window.refuted, window.undecided)]
         times = [f"{start_s:.3f}", f"{end_s:.3f}"]
-        windows.append([str(number), *times, window.status, window.method, *verdicts])
+        evidence = [window.evidence_nats, window.least_nats]
+        evidence_cells = _cells([np.nan if nats is None else nats for nats in evidence])
+        windows.append([str(number), *times, window.status, window.method, *verdicts, *evidence_cells])
         for chain in window.chains:
             label = "-".join(name(point) for point in chain.points)
             values = [chain.tilt_deg, chain.residual, chain.motion, chain.statistic, chain.threshold]
@@ -296,6 +315,7 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
                 links.append([*labels, *_cells(numbers)])
     written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
     window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]
+    window_header += ["evidence_nats", "least_nats"]
     write_table(written[0], window_header, windows)
     link_numbers = ["length_px", "length_sd_px", "margin_px", "confidence"]
     write_table(written[1], ["window", "status", "a", "b", "verdict", *link_numbers], links)

@@ -41,9 +41,11 @@ def main(out: Path) -> None:
     walk = memo.walker_motion(60, rate_hz=30.0)
     dots = memo.pointlight(walk.positions, walk.times_s, walk.names, azimuth_deg=30.0)
     figure = memo.planar(dots.positions_px, dots.times_s)
-    for a, b, length_px, confidence, windows in figure.links():
+    for a, b, length_px, confidence, windows, verdict in figure.links():
         print(
-            figure.points.names[a] if figure.points else a, b, f"{length_px:.0f} {confidence:.2f} {windows}"
+            figure.points.names[a] if figure.points else a,
+            b,
+            f"{length_px:.0f} {confidence:.2f} {windows} {verdict}",
         )
 
     layouts: dict[str, tuple[str, ...]] = memo.layouts()

@@ -84,6 +84,10 @@ result! {
         refuted: usize = window.chains[1],
         /// Number of chains without a verdict.
         undecided: usize = window.chains[2],
+        /// Log odds of a body against dots that do not belong together, nats; None for the method "forest".
+        evidence_nats: Option<f64> = window.evidence.map(|evidence| evidence.nats),
+        /// The least that counts as a body.
+        least_nats: Option<f64> = window.evidence.map(|evidence| evidence.least_nats),
         /// "cover", or "forest" if there are too many points to compare all links.
         method: String = if window.figure.method == Method::Cover { "cover" } else { "forest" },
         /// The chains of the best figure, also if the status is "lost".

@@ -22,7 +22,7 @@ EPILOG = """Examples:
   memo planar walk_json --fps 30 --noise-px 2 --names
 
 Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
-3 no window shows planar motion; 4 the app extra is not installed."""
+3 no window shows a body; 4 the app extra is not installed."""
 
 
 def add_planar(app: "typer.Typer") -> None:
@@ -114,18 +114,16 @@ def _planar(
         written.append(out / "turned.mp4")
     verdicts = figure.verdicts()
     links = [
-        {
-            "a": points.names[a],
-            "b": points.names[b],
-            "length_px": length,
-            "confidence": sure,
-            "windows": count,
-            "verdicts": verdicts[a, b],
-        }
-        for a, b, length, sure, count in figure.links()
+        link._asdict()
+        | {"a": points.names[link.a], "b": points.names[link.b], "verdicts": verdicts[link.a, link.b]}
+        for link in figure.links()
     ]
-    states = [window.status for window in figure.windows]
-    summary = {"windows": states, "links": links, "perspective_px": figure.perspective_px}
+    summary = {
+        "body": figure.is_body,
+        "windows": [window.status for window in figure.windows],
+        "links": links,
+        "perspective_px": figure.perspective_px,
+    }
     delivery.tell(summary, _about_figure(figure, points, noise_px), written)
     return Exit.DONE if figure.interpreted else Exit.NOBODY
 
@@ -151,7 +149,7 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
         )
     if not figure.interpreted:
         guess = " The best guess is in links.csv." if any(w.chains for w in figure.windows) else ""
-        return [*lines, f"memo found no limb: no stretch of frames shows planar motion.{guess}"]
+        return [*lines, f"memo found no limb: {_why_not(figure)}.{guess}"]
     lines += _about_links(figure, points.names)
     if figure.perspective_px is not None and figure.perspective_px > max(noise_px, 0.5):
         lines.append(
@@ -171,25 +169,25 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     return [*lines, "The depth of one chain relative to another is undetermined."]
 
 
-def _about_links(figure: Any, names: list[str]) -> list[str]:
-    """One line for each link, and one for the links of chains that are not planar."""
-    from memo.linkage import REFUTED
+def _why_not(figure: Any) -> str:
+    """Why no window is interpreted."""
+    if any(window.status == "lost" for window in figure.windows):
+        return "the points do not move like the joints of one body whose limbs swing in planes"
+    return "no stretch of frames shows motion in planes"
 
+
+def _about_links(figure: Any, names: list[str]) -> list[str]:
+    """One line for each link."""
     verdicts, windows, lines = figure.verdicts(), len(figure.interpreted), []
-    for a, b, length, confidence, count in figure.links():
-        sure = "" if math.isnan(confidence) else f", confidence {confidence:.0%}"
-        kept = {verdict: number for verdict, number in verdicts[a, b].items() if verdict != REFUTED}
-        if count == windows and len(kept) == 1:
-            judged = next(iter(kept))
+    for link in figure.links():
+        sure = "" if math.isnan(link.confidence) else f", confidence {link.confidence:.0%}"
+        counts = verdicts[link.a, link.b]
+        if link.windows == windows and len(counts) == 1:
+            judged = link.verdict
         else:
-            judged = ", ".join(f"{verdict} in {number}" for verdict, number in kept.items())
+            judged = ", ".join(f"{verdict} in {number}" for verdict, number in counts.items())
             judged += f" of {counted(windows, 'window')}"
-        lines.append(f"  {names[a]} - {names[b]}: {length:.0f} px long{sure}, {judged}")
-    refuted = [
-        f"{names[a]} - {names[b]} (in {counts[REFUTED]} of {counted(windows, 'window')})"
-        for (a, b), counts in verdicts.items()
-        if REFUTED in counts
-    ]
-    if refuted:
-        lines.append(f"Left out because their motion is not planar: {', '.join(refuted)}.")
+        lines.append(f"  {names[link.a]} - {names[link.b]}: {link.length_px:.0f} px long{sure}, {judged}")
+    if any("not planar" in counts for counts in verdicts.values()):
+        lines.append('"not planar": the limb leaves its plane; its length and depth are less exact.')
     return lines

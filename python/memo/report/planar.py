@@ -18,13 +18,16 @@ __all__ = ["planar_page"]
 
 _BYTES = 20_000_000
 _TABLES = {
-    "windows.csv": ("window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"),
+    "windows.csv": (
+        *("window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"),
+        *("evidence_nats", "least_nats"),
+    ),
     "links.csv": ("window", "a", "b", "verdict", "length_px", "length_sd_px", "confidence"),
     "chains.csv": ("window", "chain", "verdict", "tilt_deg", "residual_px", "motion_px"),
 }
 _NUMBERS = (
     *("start_s", "end_s", "length_px", "length_sd_px", "confidence", "tilt_deg", "residual_px", "motion_px"),
-    *("planar", "refuted", "undecided"),
+    *("planar", "refuted", "undecided", "evidence_nats", "least_nats"),
 )
 
 Row = dict[str, Any]
@@ -118,11 +121,11 @@ def _cell(path: Path, line: int, name: str, written: str, is_number: bool) -> An
 
 def _sentences(windows: list[Row], links: list[Row], interpreted: int) -> list[str]:
     if not interpreted:
-        return ["memo found no limb: no stretch of frames shows planar motion."]
-    found = {(link["a"], link["b"]) for link in links if link["verdict"] == "planar"}
+        return ["memo found no limb: no stretch of frames shows the joints of a body."]
+    read = {window["window"] for window in windows if window["status"] == "interpreted"}
+    found = {(link["a"], link["b"]) for link in links if link["window"] in read}
     return [
-        f"{counted(len(found), 'link swings', 'links swing')} in planes, in {interpreted} of "
-        f"{counted(len(windows), 'window')}.",
+        f"{counted(len(found), 'link')} in {interpreted} of {counted(len(windows), 'window')}.",
         "Each chain may also be its mirror image in depth; the depth of one chain relative to another is "
         "undetermined.",
     ]

@@ -165,6 +165,8 @@ pub struct HingeFit {
     pub residual_rms: f64,
     /// RMS distance of each rod's image vector from its mean.
     pub motion: [f64; 2],
+    /// RMS distance of each rod's vector in space from its mean.
+    pub motion_in_space: [f64; 2],
     /// Number of equations less unknowns; at 0 the views cannot contradict a plane.
     pub redundancy: usize,
     /// True if the plane has the largest tilt allowed: then lengths and depths are lower bounds at best.
@@ -202,6 +204,7 @@ pub fn fit_hinge(
         outliers: fit.outliers,
         residual_rms: fit.residual_rms,
         motion: fit.motion,
+        motion_in_space: fit.motion_in_space,
         redundancy: fit.redundancy,
         at_tilt_limit: fit.at_tilt_limit,
     })

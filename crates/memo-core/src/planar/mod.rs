@@ -27,8 +27,8 @@ pub use evidence::{
     link_three, rod_evidence,
 };
 pub use figure::{
-    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureInterpretation, FigureWindow, Link,
-    MOST_POINTS, MOST_TRACKS, Method, Status, interpret_with_progress, joint_of,
+    Chain, Contact, Costs, DepthSource, Figure, FigureError, FigureEvidence, FigureInterpretation,
+    FigureWindow, Link, MOST_POINTS, MOST_TRACKS, Method, Status, interpret_with_progress, joint_of,
 };
 pub use fit::{FitError, FitOptions};
 pub use group::{Pair, Triple, test_pairs, test_triples};

@@ -329,6 +329,8 @@ pub struct RodFit {
     pub residual_rms: f64,
     /// RMS distance of the image vector from its mean.
     pub motion: f64,
+    /// RMS distance of the vector in space from its mean.
+    pub motion_in_space: f64,
     /// Number of equations less unknowns; at 0 the views cannot contradict a plane.
     pub redundancy: usize,
     /// True if the plane has the largest tilt allowed: then length and depths are lower bounds at best.
@@ -360,6 +362,7 @@ pub fn fit_rod(pivot: &[DVec2], end: &[DVec2], options: &FitOptions) -> Result<R
         outliers: fit.outliers,
         residual_rms: fit.residual_rms,
         motion: fit.motion[0],
+        motion_in_space: fit.motion_in_space[0],
         redundancy: fit.redundancy,
         at_tilt_limit: fit.at_tilt_limit,
     })

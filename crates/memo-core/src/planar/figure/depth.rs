@@ -369,7 +369,7 @@ mod tests {
             size: 1.0,
         };
         let end = start + depths.len();
-        FigureWindow { start, end, status: Status::Interpreted, chains: [1, 0, 0], figure }
+        FigureWindow { start, end, status: Status::Interpreted, chains: [1, 0, 0], evidence: None, figure }
     }
 
     /// The overlap with the window before decides whether a window is reflected, and a reflected one affects the

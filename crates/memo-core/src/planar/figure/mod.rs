@@ -26,11 +26,13 @@ mod group;
 mod jump;
 mod linkage;
 mod reflection;
+mod verdict;
 
 pub use cover::MOST_POINTS;
 pub use depth::DepthSource;
 pub use linkage::{Chain, Contact, Figure, Link, Method};
 pub use reflection::joint_of;
+pub use verdict::FigureEvidence;
 
 use super::{FitOptions, PlanarEvidenceOptions, Verdict};
 use crate::model::skeleton::Joint;
@@ -183,9 +185,10 @@ impl Default for FigureOptions {
 /// Status of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// More chains move in planes than leave them.
+    /// The figure is that of a body, at the requested false-target rate; of a spanning tree, more chains move in
+    /// planes than leave them.
     Interpreted,
-    /// As many chains leave their planes as move in them, or more.
+    /// The evidence is not sufficient: dots that do not belong together, or a motion out of planes.
     Lost,
     /// Almost nothing moves: no chain is evidence for or against planes.
     Still,
@@ -204,6 +207,8 @@ pub struct FigureWindow {
     pub status: Status,
     /// Number of chains that move in their plane, that leave it, and without a verdict.
     pub chains: [usize; 3],
+    /// Evidence for the figure as a whole; `None` for a spanning tree.
+    pub evidence: Option<FigureEvidence>,
     /// The best figure, also if the status is lost.
     pub figure: Figure,
 }
@@ -279,7 +284,7 @@ pub fn interpret_with_progress(
         let part: Vec<&[DVec2]> = clean.iter().map(|track| &track[start..end]).collect();
         let figure = best_figure(&part, size, options);
         progress.advance(1)?;
-        Ok(FigureWindow::judged(start, end, figure))
+        Ok(FigureWindow::judged(start, end, figure, options))
     };
     let mut windows = ranges.into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
     // 3. Reflections from joint limits, and depths over time.
@@ -291,18 +296,22 @@ pub fn interpret_with_progress(
 }
 
 impl FigureWindow {
-    /// The window of a figure, with the status from its chains.
-    fn judged(start: usize, end: usize, figure: Figure) -> Self {
+    /// The window of a figure, with its status.
+    fn judged(start: usize, end: usize, figure: Figure, options: &FigureOptions) -> Self {
         let planar = figure.count(|v| v == Verdict::Planar);
         let refuted = figure.count(|v| v == Verdict::NotPlanar);
         let silent = figure.chains.len() - planar - refuted;
+        let linked: usize = figure.chains.iter().map(|chain| chain.points.len()).sum();
+        let evidence = (figure.method == Method::Cover)
+            .then(|| FigureEvidence::of(&figure, linked + figure.alone.len(), options));
+        let is_body = evidence.map_or(planar > refuted, |evidence| evidence.is_body());
         let status = match (planar, refuted, silent) {
             (0, 0, 0) => Status::Unseen,
             (0, 0, _) => Status::Still,
-            _ if planar > refuted => Status::Interpreted,
+            _ if is_body => Status::Interpreted,
             _ => Status::Lost,
         };
-        Self { start, end, status, chains: [planar, refuted, silent], figure }
+        Self { start, end, status, chains: [planar, refuted, silent], evidence, figure }
     }
 }
 
@@ -496,11 +505,13 @@ mod tests {
         }
     }
 
-    /// The status is different for more planar than refuted chains and for chains without evidence.
+    /// A spanning tree is read if more of its chains are planar than not, a cover by its evidence; chains without
+    /// evidence for or against planes are still.
     #[test]
-    fn a_window_is_judged_by_its_chains() {
+    fn a_window_is_judged_by_its_chains_or_by_its_figure() {
         let (tracks, times_s, _) = walker(66, |_| 0.0, 0.0);
-        let found = interpret_figure(&tracks, &times_s, &FigureOptions::default()).unwrap();
+        let options = FigureOptions::default();
+        let found = interpret_figure(&tracks, &times_s, &options).unwrap();
         let figure = &found.windows[0].figure;
         use Verdict::{NotPlanar, Planar, Unfalsifiable};
         for (verdicts, status, chains) in [
@@ -510,15 +521,23 @@ mod tests {
             ([NotPlanar, Unfalsifiable, Unfalsifiable, Unfalsifiable], Status::Lost, [0, 1, 3]),
             ([Unfalsifiable; 4], Status::Still, [0, 0, 4]),
         ] {
-            let mut figure = figure.clone();
-            for (chain, verdict) in figure.chains.iter_mut().zip(verdicts) {
+            let mut tree = Figure { method: Method::Forest, ..figure.clone() };
+            for (chain, verdict) in tree.chains.iter_mut().zip(verdicts) {
                 chain.evidence.verdict = verdict;
             }
-            let judged = FigureWindow::judged(0, 66, figure);
-            assert_eq!((judged.status, judged.chains), (status, chains));
+            let cover = Figure { method: Method::Cover, ..tree.clone() };
+            let judged = FigureWindow::judged(0, 66, tree, &options);
+            assert_eq!((judged.status, judged.chains, judged.evidence), (status, chains, None));
+            let judged = FigureWindow::judged(0, 66, cover.clone(), &options);
+            let of_body = if status == Status::Still { Status::Still } else { Status::Interpreted };
+            assert_eq!((judged.status, judged.chains), (of_body, chains));
+            let mut bad = cover;
+            bad.chains.iter_mut().for_each(|chain| chain.residual_rms = 0.4 * bad.size);
+            let judged = FigureWindow::judged(0, 66, bad, &options);
+            assert_eq!(judged.status, if status == Status::Still { Status::Still } else { Status::Lost });
         }
         let alone = Figure { chains: vec![], ..figure.clone() };
-        assert_eq!(FigureWindow::judged(0, 66, alone).status, Status::Unseen);
+        assert_eq!(FigureWindow::judged(0, 66, alone, &options).status, Status::Unseen);
     }
 
     /// Points at (±3, ±4) about a moving middle are at distance 5 from it; points not seen do not count.

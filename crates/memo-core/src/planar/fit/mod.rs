@@ -56,6 +56,7 @@ pub(super) struct Fit<const K: usize> {
     pub outliers: Vec<bool>,
     pub residual_rms: f64,
     pub motion: [f64; K],
+    pub motion_in_space: [f64; K],
     pub redundancy: usize,
     pub at_tilt_limit: bool,
 }
@@ -124,6 +125,18 @@ fn motion_of<const K: usize>(views: &[View<K>]) -> [f64; K] {
         let n = seen().count().max(1) as f64;
         let mean = seen().sum::<DVec2>() / n;
         (seen().map(|d| (d - mean).length_squared()).sum::<f64>() / n).sqrt()
+    })
+}
+
+/// RMS distance of each rod's vectors in space from their mean, for a slope and depths whose noise has the variance
+/// `noise_sq` |g|^2.
+fn motion_in_space<const K: usize>(views: &[View<K>], motion: [f64; K], g: DVec2, noise_sq: f64) -> [f64; K] {
+    std::array::from_fn(|k| {
+        let depths = || views.iter().map(|v| g.dot(v[k])).filter(|depth| !depth.is_nan());
+        let n = depths().count().max(1) as f64;
+        let mean = depths().sum::<f64>() / n;
+        let variance = depths().map(|depth| (depth - mean).powi(2)).sum::<f64>() / n;
+        (motion[k].powi(2) + (variance - noise_sq * g.length_squared()).max(0.0)).sqrt()
     })
 }
 
@@ -331,6 +344,7 @@ impl<'a, const K: usize> Problem<'a, K> {
             residuals,
             outliers,
             motion,
+            motion_in_space: motion_in_space(&kept, motion, s.g, self.noise_sq),
             redundancy,
             at_tilt_limit: s.g.length() >= AT_LIMIT * self.slope_limit,
         }
