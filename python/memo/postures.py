@@ -24,6 +24,7 @@ from memo.keypoints import Keypoints, KeypointsError, read_keypoints
 from memo.notebook import Shown
 from memo.segment_lengths import checked_lengths, read_lengths
 from memo.table import data_frame
+from memo.tracked_person import tracked_person
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -173,9 +174,9 @@ class Postures(Shown):
     """(T,) names of the constraints that the posture in the motion breaks."""
     smoothed_m: Array
     """(T, 14, 3) metres: the same, smoothed in space: close to the image points, with constant lengths."""
-    angles_deg: dict[str, Array]
     toes_m: Array
     """(T, 2, 3) metres: tips of the right and the left big toe; NaN without keypoints of toes."""
+    angles_deg: dict[str, Array]
     """(T,) each: angles of the smoothed motion in degrees, NaN where unknown. `right_hip` is the flexion of
     the thigh against the trunk, `right_knee` of the shank against the thigh, `right_ankle` of the foot
     against the shank (0 in standing, to the front positive; needs keypoints of toes), `right_shoulder` of the
@@ -333,6 +334,7 @@ def posture(
     distance_m: float | Sequence[float] | Array | None = None,
     distance_sd_m: float | None = None,
     moving_direction: Sequence[float] | None = None,
+    track: str | PathLike[str] | None = None,
     unswap: bool = True,
     noise_px: float | None = None,
     group_m: float | None = None,
@@ -363,6 +365,9 @@ def posture(
     deviation `distance_sd_m`.
     `moving_direction`: (3,) world, direction of walking; by default taken from the motion. With
     "physical", the direction that the person mostly faces; by default not used.
+    `track`: folder of `memo track` of the same video. The walk nearest to the keypoints gives the camera, the
+    distance of the neck and, unless they are given, the height and the moving direction. Frames more than
+    half a second from the walk have no postures.
     `unswap`: first exchange right and left where a detector confused them.
     `noise_px`: standard deviation of a keypoint. `group_m`: postures form one group if no joint differs by
     more; `max_groups`: number of groups returned per frame, the largest; `group_counts` counts them all.
@@ -402,6 +407,15 @@ def posture(
         raise ValueError("fps, layout and person apply to keypoints read from a file only")
     _check_joints_there(keypoints)
     keypoints.check_pixels()
+    if track is not None:
+        if camera is not None or distance_m is not None or anchor not in (None, "auto", "given"):
+            raise ValueError("the track has a camera and distances: leave camera, distance and anchor out")
+        tracked = tracked_person(track, keypoints)
+        camera = tracked.camera
+        distance_m, distance_sd_m = tracked.distance_m, tracked.distance_sd_m
+        if lengths is None and height_m is None:
+            height_m = tracked.height_m
+        moving_direction = moving_direction or tracked.moving_direction
     size = _size_of(keypoints, camera, fov_deg)
     repair = sides.unswap(keypoints) if unswap else None
     used = keypoints if repair is None else repair.keypoints
@@ -611,6 +625,7 @@ def _named(
         linked_m=found.linked_m,
         linked_breaks=tuple(map(tuple, found.linked_breaks)),
         smoothed_m=found.smoothed_m,
+        toes_m=found.toes_m,
         angles_deg=found.angles_deg,
         sd_m=found.sd_m,
         gap_m=found.gap_m,

@@ -122,6 +122,12 @@ def add_posture(app: "typer.Typer") -> None:
         distance: Annotated[
             float | None, typer.Option(help="Distance of the neck from the camera, metres, if known.")
         ] = None,
+        track: Annotated[
+            Path | None,
+            typer.Option(
+                help="Folder of memo track of the same video: its walk gives camera, height and distance."
+            ),
+        ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of a keypoint, pixels.", min=0)
         ] = usual["noise_px"],
@@ -160,7 +166,12 @@ def add_posture(app: "typer.Typer") -> None:
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
             check_apart([keypoints, camera, lengths], [delivery.out / name for name in (*WRITTEN, _DRAWN)])
             view = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
-            seen_by = given_camera(camera, view, fov_deg)
+            seen_by = {"track": track} if track is not None else {}
+            if track is not None and (camera is not None or fov_deg is not None or distance is not None):
+                raise InputError(
+                    "--track has a camera and distances: leave --camera, --fov-deg, --distance out"
+                )
+            seen_by |= given_camera(camera, view, fov_deg)
             return _posture(keypoints, reading, seen_by | scale | options, frame, delivery)
 
         raise typer.Exit(guarded(work))
@@ -180,7 +191,7 @@ def _posture(
     with with_count("finding postures", delivery) as progress:
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)
-        if "camera" not in options and keypoints.image_size is None:
+        if not {"camera", "track"} & options.keys() and keypoints.image_size is None:
             raise InputError("--camera is needed, or the size of the picture to assume one: --image-size")
         postures = memo.posture(keypoints, **options, progress=progress)
         (delivery.out / _DRAWN).unlink(
