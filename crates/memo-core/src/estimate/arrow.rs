@@ -5,7 +5,7 @@
 //! the whole solves (W - Yᵀ Y) x_w = b_w - Yᵀ L⁻¹ b_f, and L Lᵀ x_f = b_f - C x_w. Time and memory are linear in the
 //! number of frames.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 
 /// The change of velocity between two intervals, for motion whose velocity is a random walk: the factors of three
 /// successive values whose sum it is, and its variance if that of the walk is one per second.
@@ -55,22 +55,20 @@ impl Banded {
 
     /// Replaces the matrix by its Cholesky factor; `None` if it is not positive definite.
     fn factored(mut self, size: usize) -> Option<Self> {
+        // 1 / L_ii: a division takes as long as a third of the sum.
+        let mut inverse: Vec<f64> = Vec::with_capacity(size);
         for i in 0..size {
             let first = self.first(i);
             for j in first..=i {
                 let from = first.max(self.first(j));
                 let (a, b) = (self.index(i, from), self.index(j, from));
                 let count = j - from;
-                let dot: f64 = self.values[a..a + count]
-                    .iter()
-                    .zip(&self.values[b..b + count])
-                    .map(|(x, y)| x * y)
-                    .sum();
                 let at = self.index(i, j);
-                let left = self.values[at] - dot;
+                let left = self.values[at] - dot(&self.values[a..a + count], &self.values[b..b + count]);
                 self.values[at] = if j < i {
-                    left / self.values[self.index(j, j)]
+                    left * inverse[j]
                 } else if left > 0.0 {
+                    inverse.push(1.0 / left.sqrt());
                     left.sqrt()
                 } else {
                     return None;
@@ -79,6 +77,11 @@ impl Banded {
         }
         Some(self)
     }
+}
+
+/// Σ a b of two slices of the same length; nalgebra adds in eight sums at a time, which need not wait for each other.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    DVectorView::from_slice(a, a.len()).dot(&DVectorView::from_slice(b, b.len()))
 }
 
 impl Arrow {
@@ -218,8 +221,7 @@ impl Solution {
         for i in first..count {
             let row = self.factor.row(i);
             let before = &v[self.factor.first(i)..i];
-            let dot: f64 = row.iter().zip(before).map(|(l, x)| l * x).sum();
-            v[i] = (v[i] - dot) / row[row.len() - 1];
+            v[i] = (v[i] - dot(&row[..before.len()], before)) / row[row.len() - 1];
             sum_sq += v[i] * v[i];
             if v[i] != 0.0 {
                 left.axpy(-v[i], &self.coupling.column(i), 1.0);
