@@ -7,6 +7,7 @@
 //! Chosen on four walks of motion capture (two Plug-in-Gait walkers of BTKData, CMU 02_01 and 12_01). The spreads
 //! are two to three times those of one walker, to allow for differences between people.
 
+use crate::estimate::smooth::Measured;
 use crate::model::skeleton::Joint;
 
 /// Usual value and spread of an angle, radians.
@@ -66,6 +67,16 @@ pub struct SegmentPrior {
     pub length_sd: f64,
 }
 
+/// Swings over the gait cycle: how far those of a person are from the average curves of walking
+/// ([`Gait::dense`](crate::model::gait::Gait::dense)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CyclePrior {
+    /// Standard deviations of the swings of upper arm, forearm, thigh and shank from the curves, radians.
+    pub sd_rad: [f64; 4],
+    /// Cost of a limb that does not follow the curves at all, nats.
+    pub apart_nats: f64,
+}
+
 /// Prior of a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPrior {
@@ -73,10 +84,8 @@ pub struct MotionPrior {
     pub segments: [SegmentPrior; 4],
     /// Minimum flexion of elbow and knee, with the softness of the limit.
     pub least_bend: [Soft; 2],
-    /// Sum of the swings of both upper arms and of both thighs: they swing in opposition (Rule 1).
-    pub opposition: [Soft; 2],
-    /// Sum of the swings of arm and leg of a side in their standard deviations: also in opposition (Rule 2).
-    pub same_side: Soft,
+    /// Swings over the gait cycle; `None` if the motion has none.
+    pub cycle: Option<CyclePrior>,
     /// Angle of the trunk from the vertical, forward positive.
     pub trunk_lean: Soft,
     /// Angle of the trunk from the vertical, to the left positive.
@@ -166,8 +175,10 @@ impl MotionPrior {
                 segment((-15.0, 30.0), (-2.0, 5.0), 0.0, 15.0, 0.025),
             ],
             least_bend: [Soft::degrees(5.0, 8.0), Soft::degrees(0.0, 8.0)],
-            opposition: [Soft::degrees(-18.0, 20.0), Soft::degrees(10.0, 20.0)],
-            same_side: Soft { mean_rad: 0.0, sd_rad: 1.0 },
+            cycle: Some(CyclePrior {
+                sd_rad: [15.0, 20.0, 10.0, 12.0].map(f64::to_radians),
+                apart_nats: 3.0,
+            }),
             trunk_lean: Soft::degrees(0.0, 8.0),
             trunk_roll: Soft::degrees(0.0, 4.0),
             shoulder_turn: Soft::degrees(0.0, 8.0),
@@ -206,8 +217,7 @@ impl MotionPrior {
                 segment(Soft::FREE, Soft::FREE, 15.0),
             ],
             least_bend: [Soft::degrees(0.0, 15.0), Soft::degrees(0.0, 10.0)],
-            opposition: [Soft::FREE; 2],
-            same_side: Soft::FREE,
+            cycle: None,
             trunk_lean: Soft::degrees(8.0, 25.0),
             trunk_roll: Soft::degrees(0.0, 15.0),
             shoulder_turn: Soft::FREE,
@@ -215,6 +225,27 @@ impl MotionPrior {
             overconfidence: 12.0,
             mirrored: MirrorOdds { base: -0.2, per_m: 2.8, per_nat: 1.05 },
             ..Self::walking()
+        }
+    }
+
+    /// Twice the cost of the swings of inner and outer segment of a limb (pair 0 is the arms), with those that are
+    /// usual at the phase of the gait cycle: the smaller of following them and of swinging anyhow.
+    pub(crate) fn swing_cost(&self, pair: usize, swings: [Measured; 2], usual: Option<[f64; 2]>) -> f64 {
+        let mut anyhow = 0.0;
+        let mut following = 0.0;
+        for (i, Measured { value, sd }) in swings.into_iter().enumerate() {
+            let soft = self.segments[2 * pair + i].swing;
+            anyhow += soft.cost(value, sd);
+            if let (Some(cycle), Some(usual)) = (self.cycle, usual)
+                && !value.is_nan()
+            {
+                let own = Soft { mean_rad: usual[i], sd_rad: cycle.sd_rad[2 * pair + i] };
+                following += own.cost(value, sd) + 2.0 * (own.sd_rad.hypot(sd) / soft.sd_rad.hypot(sd)).ln();
+            }
+        }
+        match self.cycle.filter(|_| usual.is_some()) {
+            Some(cycle) => following.min(anyhow + 2.0 * cycle.apart_nats),
+            None => anyhow,
         }
     }
 
@@ -251,6 +282,34 @@ mod tests {
         assert_eq!([chi_sq(-2.0), chi_sq(9.0), capped(7.0), capped(f64::NAN)], [4.0, 25.0, 7.0, 0.0]);
     }
 
+    /// Swings near the curves cost their deviation, with the density of the narrower curve; others as much as anywhere
+    /// and what not following costs. Without curves, or in a motion that has none, only the usual range counts.
+    #[test]
+    fn a_limb_follows_the_cycle_or_swings_anyhow() {
+        let prior = MotionPrior::walking();
+        let cycle = prior.cycle.unwrap();
+        let [thigh, shank] = [prior.segments[2].swing, prior.segments[3].swing];
+        let swings = |thigh_deg: f64, shank_deg: f64| {
+            [thigh_deg, shank_deg].map(|deg| Measured { value: deg.to_radians(), sd: 0.0 })
+        };
+        let usual = [25.0, 20.0].map(f64::to_radians);
+        let cost = |swings| prior.swing_cost(1, swings, Some(usual));
+        let narrower = 2.0 * ((cycle.sd_rad[2] / thigh.sd_rad).ln() + (cycle.sd_rad[3] / shank.sd_rad).ln());
+        assert!((cost(swings(25.0, 20.0)) - narrower).abs() < 1e-12);
+        // One standard deviation of the thigh, two of the shank.
+        assert!((cost(swings(35.0, -4.0)) - (1.0 + 4.0 + narrower)).abs() < 1e-12);
+        // The mirror image of a thigh is far from the curve.
+        let apart = thigh.cost(-25f64.to_radians(), 0.0) + shank.cost(-20f64.to_radians(), 0.0);
+        assert!((cost(swings(-25.0, -20.0)) - (apart + 2.0 * cycle.apart_nats)).abs() < 1e-12);
+        assert!((prior.swing_cost(1, swings(-25.0, -20.0), None) - apart).abs() < 1e-12);
+        let any = MotionPrior::any();
+        let far = swings(-25.0, -20.0);
+        assert_eq!(any.swing_cost(1, far, Some(usual)), any.swing_cost(1, far, None));
+        // What is not seen costs nothing but that.
+        let unseen = [Measured { value: f64::NAN, sd: 0.0 }; 2];
+        assert_eq!(cost(unseen), 0.0);
+    }
+
     /// Over the measured cycle of [`Gait`] each segment swings about the prior's mean, well within its spread.
     #[test]
     fn a_measured_walk_is_usual() {
@@ -267,10 +326,6 @@ mod tests {
             assert!(off_deg.abs() < 6.0, "{off_deg}");
             let ratio = segment.swing.sd_rad / variance.sqrt();
             assert!((1.0..4.5).contains(&ratio), "{ratio}");
-        }
-        // The sum of both sides is about twice the mean of one; elbows bend a little more than knees.
-        for (both, inner) in prior.opposition.iter().zip([0, 2]) {
-            assert!((both.mean_rad - 2.0 * prior.segments[inner].swing.mean_rad).abs() < 1e-12);
         }
         // Arms hang away from the body, and come inwards in front of it.
         let [upper_arm, forearm, ..] = prior.segments;
@@ -300,7 +355,7 @@ mod tests {
             assert_eq!(soft.mean_rad, 0.0);
         }
         assert_eq!(any.shoulder_turn.cost(aside, 0.0), 0.0);
-        assert_eq!(any.same_side.cost(3.0, 0.0) + any.opposition[0].cost(3.0, 0.0), 0.0);
+        assert!(any.cycle.is_none());
         assert!(any.trunk_lean.cost(0.3, 0.0) < walking.trunk_lean.cost(0.3, 0.0));
     }
 

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::cycle::Cycle;
 use super::flip::{Chain, Flip};
 use super::trunk::Trunk;
 use super::{Problem, place};
@@ -32,18 +33,15 @@ const READINGS: usize = 1 << SEGMENTS;
 /// Sets of segments that may be mirrored together: one segment, a whole limb, both inner segments, all.
 const MASKS: [usize; 8] = [1, 2, 4, 8, 3, 12, 5, 15];
 
-/// Number of times arms and legs are linked again, given the other pair.
-const ROUNDS: usize = 4;
-
 /// One limb's four readings in a frame.
 #[derive(Clone, Copy)]
-struct LimbFrame {
+pub(super) struct LimbFrame {
     /// Signed extents of inner and outer segment.
     extents: [[Measured; 2]; 4],
-    /// Cost of the limb's attitude.
-    cost: [f64; 4],
-    /// Swing of the inner segment with its standard deviation, radians.
-    swing: [Measured; 4],
+    /// Cost of the limb's attitude but its swings, nats.
+    pub cost: [f64; 4],
+    /// Swings of inner and outer segment with their standard deviations, radians.
+    pub swing: [[Measured; 2]; 4],
     /// Height of the end above that of a supporting foot, metres; NaN for arms and if it is not known.
     lift_m: [f64; 4],
 }
@@ -54,9 +52,9 @@ fn limb_bits(state: usize, side: usize) -> usize {
 }
 
 /// The readings of one pair of limbs.
-struct Pair {
+pub(super) struct Pair {
     /// `[side][frame]`.
-    frames: [Vec<LimbFrame>; 2],
+    pub frames: [Vec<LimbFrame>; 2],
     /// Transition costs of one limb: `[side][frame][k * 16 + i * 4 + j]`.
     transitions: [Vec<[f64; 64]>; 2],
     acceleration_mps2: [f64; SEGMENTS],
@@ -75,34 +73,28 @@ pub(super) struct Limbs {
 
 impl Limbs {
     pub fn link(problem: &Problem, trunk: &Trunk) -> Self {
+        // 1. The roots of both pairs of limbs in every frame.
         let pairs = [0, 1].map(|pair| Pair::new(problem, trunk, pair));
-        let mut states: [Option<Vec<usize>>; 2] = [None, None];
-        // The legs first: knees bend in one direction only, which is more informative.
-        for _ in 0..ROUNDS {
-            let before = states.clone();
-            for pair in [1, 0] {
-                let cost = pair_costs(problem, &pairs, pair, states[1 - pair].as_deref());
-                states[pair] = Some(pairs[pair].path(&cost));
-            }
-            if before == states {
-                break;
-            }
-        }
-        let mut states = states.map(Option::unwrap_or_default);
+        // 2. The phase of the gait cycle, from all limbs together.
+        let cycle = Cycle::find(problem, &pairs);
+        // 3. Each pair's path, and its other readings.
         let times_s = problem.times_s();
-        let mut flips = [vec![], vec![]];
         let mut total = 0.0;
-        for last in [false, true] {
-            for pair in [1, 0] {
-                let cost = pair_costs(problem, &pairs, pair, Some(&states[1 - pair]));
-                let (paths, path_cost) = pairs[pair].refine(&times_s, &cost, &mut states[pair], last);
-                flips[pair] = paths;
-                total += if last { path_cost } else { 0.0 };
-            }
-        }
-        let mut limbs =
-            Self { smoothed: trunk.smoothed.clone(), sd_m: trunk.sd_m.clone(), cost: total, flips };
-        for (pair, states) in states.into_iter().enumerate() {
+        let linked = [0, 1].map(|pair| {
+            let cost = pair_costs(problem, &pairs[pair], pair, cycle.as_ref());
+            let mut states = pairs[pair].path(&cost);
+            let (flips, path_cost) = pairs[pair].refine(&times_s, &cost, &mut states);
+            total += path_cost;
+            (states, flips)
+        });
+        let [(arms, arm_flips), (legs, leg_flips)] = linked;
+        let mut limbs = Self {
+            smoothed: trunk.smoothed.clone(),
+            sd_m: trunk.sd_m.clone(),
+            cost: total,
+            flips: [arm_flips, leg_flips],
+        };
+        for (pair, states) in [arms, legs].into_iter().enumerate() {
             limbs.smooth(problem, pair, &pairs[pair], &states);
         }
         limbs
@@ -134,7 +126,7 @@ impl Limbs {
 }
 
 impl Pair {
-    fn new(problem: &Problem, trunk: &Trunk, pair: usize) -> Self {
+    pub fn new(problem: &Problem, trunk: &Trunk, pair: usize) -> Self {
         let frames = [0, 1].map(|side| {
             let limb = |t| problem.limb_frame(t, trunk, pair, side);
             (0..trunk.smoothed.len()).into_par_iter().map(limb).collect::<Vec<_>>()
@@ -166,15 +158,8 @@ impl Pair {
         )
     }
 
-    /// Applies the mirrorings of a path that reduce the cost. Returns the other mirrorings, if requested, and the
-    /// cost of the path.
-    fn refine(
-        &self,
-        times_s: &[f64],
-        cost: &[[f64; READINGS]],
-        states: &mut [usize],
-        rest: bool,
-    ) -> (Vec<Flip>, f64) {
+    /// Applies the mirrorings of a path that reduce the cost. Returns the other mirrorings and the cost of the path.
+    fn refine(&self, times_s: &[f64], cost: &[[f64; READINGS]], states: &mut [usize]) -> (Vec<Flip>, f64) {
         let chain = Chain {
             times_s,
             acceleration_mps2: &self.acceleration_mps2,
@@ -184,45 +169,27 @@ impl Pair {
             cost: &|t, state| cost[t][state],
         };
         chain.refine(states);
-        if rest { (chain.flips(states), chain.total(states)) } else { (vec![], 0.0) }
+        (chain.flips(states), chain.total(states))
     }
 }
 
-/// Costs of the readings of a pair in every frame, given the other pair's states if they are known.
-fn pair_costs(
-    problem: &Problem,
-    pairs: &[Pair; 2],
-    pair: usize,
-    other: Option<&[usize]>,
-) -> Vec<[f64; READINGS]> {
-    let prior = &problem.options.prior;
+/// Costs of the readings of a pair in every frame, nats.
+fn pair_costs(problem: &Problem, limbs: &Pair, pair: usize, cycle: Option<&Cycle>) -> Vec<[f64; READINGS]> {
     (0..problem.frames.len())
         .map(|t| {
             let weight = 0.5 * problem.weight(t);
-            let limbs = [0, 1].map(|side| &pairs[pair].frames[side][t]);
+            let limbs = [0, 1].map(|side| &limbs.frames[side][t]);
+            let own = [0, 1].map(|side| {
+                let usual = cycle.map(|cycle| cycle.swings(t, pair, side));
+                std::array::from_fn::<f64, 4, _>(|bits| {
+                    let swing = problem.options.prior.swing_cost(pair, limbs[side].swing[bits], usual);
+                    limbs[side].cost[bits] + weight * swing
+                })
+            });
             std::array::from_fn(|state| {
-                let mut cost = 0.0;
-                let swings = [0, 1].map(|side| {
-                    let bits = limb_bits(state, side);
-                    cost += limbs[side].cost[bits];
-                    limbs[side].swing[bits]
-                });
-                let lift_m = [0, 1].map(|side| limbs[side].lift_m[limb_bits(state, side)]);
-                cost += weight * problem.support_cost(lift_m);
-                let [right, left] = swings;
-                cost +=
-                    weight * prior.opposition[pair].cost(right.value + left.value, right.sd.hypot(left.sd));
-                if let Some(other) = other {
-                    for (side, swing) in swings.into_iter().enumerate() {
-                        let theirs = pairs[1 - pair].frames[side][t].swing[limb_bits(other[t], side)];
-                        let [a, b] = [(pair, swing), (1 - pair, theirs)].map(|(pair, swing)| {
-                            let usual = prior.segments[2 * pair].swing;
-                            ((swing.value - usual.mean_rad) / usual.sd_rad, swing.sd / usual.sd_rad)
-                        });
-                        cost += weight * prior.same_side.cost(a.0 + b.0, a.1.hypot(b.1));
-                    }
-                }
-                cost
+                let bits = [0, 1].map(|side| limb_bits(state, side));
+                let lift_m = [0, 1].map(|side| limbs[side].lift_m[bits[side]]);
+                own[0][bits[0]] + own[1][bits[1]] + weight * problem.support_cost(lift_m)
             })
         })
         .collect()
@@ -230,15 +197,14 @@ fn pair_costs(
 
 impl Problem<'_> {
     fn limb_frame(&self, t: usize, trunk: &Trunk, pair: usize, side: usize) -> LimbFrame {
-        let middle = PAIRS[pair][side][1];
         let reference = self.reference(&trunk.smoothed[t]);
         let mut limb = LimbFrame {
             extents: [[Measured::NOTHING; 2]; 4],
             cost: [0.0; 4],
-            swing: [Measured { value: f64::NAN, sd: 0.0 }; 4],
+            swing: [[Measured { value: f64::NAN, sd: 0.0 }; 2]; 4],
             lift_m: [f64::NAN; 4],
         };
-        let [hung, _, end] = PAIRS[pair][side];
+        let [hung, middle, end] = PAIRS[pair][side];
         for bits in 0..4 {
             let [(inner, u), (outer, v)] = self.limb_extents(t, trunk, pair, side, bits);
             limb.extents[bits] = [inner, outer];
@@ -246,8 +212,11 @@ impl Problem<'_> {
                 limb.lift_m[bits] = self.lift_m(end, trunk.smoothed[t][hung] + u + v);
             }
             if let Some(axes) = reference {
-                let noise = inner.sd * axes.x_axis.dot(self.ray(t, middle)).abs() / self.lengths.to[middle];
-                limb.swing[bits] = Measured { value: swing_rad(&axes, u), sd: noise };
+                limb.swing[bits] =
+                    [(middle, u, inner.sd), (end, v, outer.sd)].map(|(joint, vector, sd_m)| {
+                        let noise = sd_m * axes.x_axis.dot(self.ray(t, joint)).abs() / self.lengths.to[joint];
+                        Measured { value: swing_rad(&axes, vector), sd: noise }
+                    });
                 let cost = self.limb_cost(t, &axes, [u, v], [inner.sd, outer.sd], pair, side);
                 limb.cost[bits] = 0.5 * self.weight(t) * cost;
             }
@@ -281,7 +250,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Twice the cost of a limb's attitude: the prior, and the limits of its middle joint.
+    /// Twice the cost of a limb's attitude but its swings: tilts to the side, and the limits of its middle joint.
     fn limb_cost(
         &self,
         t: usize,
@@ -301,12 +270,10 @@ impl Problem<'_> {
         for (i, w) in segments.into_iter().enumerate() {
             let usual = &prior.segments[pair * 2 + i];
             let end = joints[i + 1];
-            let noise = |axis: DVec3| sd_m[i] * axis.dot(self.ray(t, end)).abs() / self.lengths.to[end];
-            let swing = swing_rad(axes, w);
-            cost += usual.swing.cost(swing, noise(axes.x_axis));
+            let noise = sd_m[i] * axes.z_axis.dot(self.ray(t, end)).abs() / self.lengths.to[end];
             let aside = outward.dot(w.normalize()).clamp(-1.0, 1.0).asin();
-            let drift = usual.outward_per_swing * swing.clamp(-1.5, 1.5);
-            cost += usual.outward.cost(aside - drift, noise(axes.z_axis));
+            let drift = usual.outward_per_swing * swing_rad(axes, w).clamp(-1.5, 1.5);
+            cost += usual.outward.cost(aside - drift, noise);
         }
         let [u, v] = segments;
         let bend = if pair == 0 { elbow_rad(axes, u, v) } else { knee_rad(axes, u, v) };
@@ -368,7 +335,7 @@ mod tests {
             let readings = Pair::new(&problem, trunk, pair);
             let cost = vec![[0.0; READINGS]; 10];
             let mut states = readings.path(&cost);
-            let (flips, total) = readings.refine(&problem.times_s(), &cost, &mut states, true);
+            let (flips, total) = readings.refine(&problem.times_s(), &cost, &mut states);
             let mut inner = 0;
             for flip in flips {
                 let mut mirrored = states.clone();

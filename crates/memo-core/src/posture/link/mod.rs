@@ -3,8 +3,8 @@
 //!
 //! When a limb becomes parallel to the image plane, it meets its mirror image. To first order in time "it
 //! crossed" and "it bounced" have the same cost, so the cost uses three frames: a change of velocity. The trunk
-//! is linked first, then both arms and both legs, each pair jointly, given the trunk and the other pair. Costs
-//! are negative log likelihoods, in nats. Limits of the body and habits of walking are soft ([`MotionPrior`]).
+//! is linked first, then both arms and both legs, each pair jointly, given the trunk and the phase of the gait cycle
+//! (`cycle`). Costs are negative log likelihoods, in nats. Limits of the body and habits of walking are soft ([`MotionPrior`]).
 //!
 //! Before linking, noise in the image is reduced (`denoise`); the cost of a trunk contains which way it faces in the
 //! image (`front`); afterwards the motion is smoothed in space (`motion`), and feet are put to its ankles (`toes`).
@@ -13,6 +13,7 @@
 //! would break the chain. Short gaps in a joint's track are interpolated for the decision only; the figures
 //! contain only what was seen.
 
+mod cycle;
 mod denoise;
 mod flip;
 mod front;

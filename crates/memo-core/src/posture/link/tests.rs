@@ -5,7 +5,7 @@ use glam::DQuat;
 const FRAMES: usize = 60;
 
 /// The truth in camera axes, 4 m away, and its sequence at 25 frames per second.
-fn sequence(yaw_rad: f64) -> (Vec<StickFigure>, Vec<LinkFrame>, SegmentLengths, LinkOptions) {
+pub(super) fn sequence(yaw_rad: f64) -> (Vec<StickFigure>, Vec<LinkFrame>, SegmentLengths, LinkOptions) {
     let walker = StickWalker::lee_chen();
     let turn = DQuat::from_rotation_y(yaw_rad);
     let camera_from_walker = |v: DVec3| turn * DVec3::new(-v.z, -v.y, -v.x);
