@@ -6,11 +6,16 @@ import math
 import memo
 import numpy as np
 import pytest
+import score_tracked
+import score_walks
 from memo.files import JOINTS as LIMB_JOINTS
 from memo.files import TRACK_COLUMNS, write_track_csv
 from memo.tracked_person import tracked_person
 from test_posture import AT, CAMERA_AT, RATE_HZ, errors_m, project, walker, write_camera, write_table
 
+needs_recordings = pytest.mark.skipif(
+    not (score_walks.SHARED_DATA / "walks").is_dir(), reason="no recordings (set MEMO_SHARED_DATA)"
+)
 HEADING_RAD = math.radians(25.0)
 
 
@@ -144,3 +149,19 @@ def test_the_command_takes_a_track(tmp_path, memo_command):
     assert "the height given" in said
     code, _, complaint = memo_command(*arguments, "--camera", folder / "camera.toml")
     assert code == 1 and "--track has a camera and distances: leave --camera" in complaint
+
+
+def test_biases_of_clips_do_not_cancel_when_pooled():
+    clip = score_walks.ClipScore("BMC2__plain", 1.0, 1, (1, 0, 0))
+    rows = [score_tracked.Row(clip, "track", (5.0, 4.0, bias, 6.0, 8.0)) for bias in (3.0, -4.0)]
+    assert score_tracked.pooled(rows) == pytest.approx((5.0, 4.0, math.sqrt(12.5), 6.0, 8.0))
+
+
+@needs_recordings
+def test_a_tracked_walk_corrects_the_distance_of_a_person_with_low_shoulders():
+    clip = next(clip for clip in score_walks.shared_clips() if clip.name == "BMC2__plain")
+    height, track = score_tracked.rows_of(clip)
+    assert (height.way, track.way) == score_tracked.WAYS
+    absolute, relative, bias = track.values[:3]
+    assert absolute < 0.5 * height.values[0] and relative < height.values[1]
+    assert abs(bias) < 2 * track.values[4]
