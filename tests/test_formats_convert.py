@@ -11,6 +11,7 @@ import pandas
 import pytest
 from memo.files import JOINTS, TRACK_COLUMNS, write_columns_csv, write_events_csv, write_track_csv
 from memo.formats import READERS, WRITERS, Motion, read_motion, write_motion
+from memo.formats.clinical import PELVIC_TILT_DEG
 from motions import shared_motion, stick_figure, walk
 
 FRAMES = np.r_[10:40, 50:75]
@@ -63,6 +64,80 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         f"walk.{ending}" for ending in ("c3d", "csv", "mot", "parquet", "sto", "trc")
     ]
+
+
+def test_joints_get_the_names_of_pose2sim_and_keep_their_places(tmp_path, memo_command):
+    points = write_track(tmp_path / "run")
+    target = tmp_path / "walk.trc"
+    assert memo_command("convert", tmp_path / "run", target, "--names", "pose2sim")[::2] == (0, "")
+    read = read_motion(target)
+    assert {"RShoulder", "LElbow", "RWrist", "LHip", "RKnee", "LAnkle"} < {*read.names}
+    right_hip = read.points[:30, read.names.index("RHip")]
+    np.testing.assert_allclose(right_hip, points[10:40, JOINTS.index("right_hip")], atol=1e-4)
+    # Back again, and points that are no joints of memo.
+    assert memo_command("convert", target, tmp_path / "back.csv", "--names", "memo")[0] == 0
+    assert {*read_motion(tmp_path / "back.csv").names} == {*JOINTS}
+    other = Motion(("LHip", "RHip", "Ball"), np.arange(3) / 25, np.zeros((3, 3, 3)))
+    notes = write_motion(tmp_path / "ball.csv", other, names="memo")
+    assert notes[0] == "Not joints of memo, so they keep their names: Ball."
+    assert read_motion(tmp_path / "ball.csv").names == ("left_hip", "right_hip", "Ball")
+
+
+def test_angles_for_gait2392_have_its_signs_and_no_arms(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    usual, target = tmp_path / "usual.mot", tmp_path / "walk.mot"
+    assert memo_command("convert", tmp_path / "run", usual)[0] == 0
+    code, out, _ = memo_command("convert", tmp_path / "run", target, "--names", "gait2392")
+    assert code == 0
+    arms = "right_shoulder, right_elbow, left_shoulder, left_elbow"
+    assert f"The model has no arms: {arms} left out." in out
+    rows = {path: np.genfromtxt(path, skip_header=7, names=True) for path in (usual, target)}
+    np.testing.assert_allclose(rows[target]["knee_angle_r"], -rows[usual]["knee_angle_r"])
+    np.testing.assert_allclose(rows[target]["hip_flexion_r"], rows[usual]["hip_flexion_r"])
+    assert "elbow_flex_r" not in rows[target].dtype.names
+    # The pelvis of the unscaled models begins 1.4 cm apart along the walk and 1.2 cm in height.
+    apart = [rows[target][f"pelvis_t{axis}"] - rows[usual][f"pelvis_t{axis}"] for axis in "xyz"]
+    np.testing.assert_allclose(
+        np.linalg.norm(apart, axis=0), np.hypot(0.0707 - 0.056276, 0.07849 - 0.0661), atol=1e-5
+    )
+    code, _, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc", "--names", "gait2392")
+    assert code == 1 and "markers on the skin" in err and "--names pose2sim" in err
+
+
+def test_clinical_hips_are_against_the_pelvis(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    target = tmp_path / "walk.mot"
+    code, out, _ = memo_command("convert", tmp_path / "run", target, "--clinical", "--walk", 0)
+    assert code == 0 and "the level of the hip curves is not measured" in out
+    plain, raised = read_motion(tmp_path / "run", walk=0), read_motion(target)
+    for name in ("right_hip", "left_hip"):
+        np.testing.assert_allclose(raised.angles[name], plain.angles[name] + 11.4)
+    np.testing.assert_allclose(raised.angles["right_knee"], plain.angles["right_knee"])
+    code, _, err = memo_command("convert", target, tmp_path / "b.mot", "--clinical")
+    assert code == 1 and "need a folder of `memo track`" in err
+
+
+def test_plug_in_gait_states_hips_against_the_pelvis():
+    """The equation of `memo.formats.clinical`, in the angles and joint centres of a clinical model."""
+    motion = read_motion(shared_motion("mocap", "formats", "PiG__PiG_Motion-FlatFoot-Hole.c3d"))
+    place = {name: motion.points[:, k] for k, name in enumerate(motion.names)}
+    pelvis = place["PELO"][np.isfinite(place["PELO"][:, 0])]
+    ahead = (pelvis[-1] - pelvis[0])[:2]
+    ahead /= np.linalg.norm(ahead)
+
+    def against_vertical(upper, lower):
+        limb = place[lower] - place[upper]
+        return np.degrees(np.arctan2(limb[:, :2] @ ahead, -limb[:, 2]))
+
+    for side in ("right", "left"):
+        letter = side[0].upper()
+        thigh = against_vertical(f"{letter}FEP", f"{letter}FEO")
+        shank = against_vertical(f"{letter}FEO", f"{letter}TIO")
+        hip = motion.angles[f"{side}_hip"] - thigh - motion.angles[f"{letter}PelvisAngles_x"]
+        assert abs(np.nanmean(hip)) < 0.6
+        assert abs(np.nanmean(motion.angles[f"{side}_knee"] - (thigh - shank))) < 0.15
+        level = np.nanmean(motion.angles[f"{side}_hip"] - thigh)
+        assert abs(level - PELVIC_TILT_DEG[0]) < 2 * PELVIC_TILT_DEG[1]
 
 
 def test_parquet_tells_its_up_axis(tmp_path, memo_command):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import typer
 
 EPILOG = """Examples:
-  memo convert memo-out/walk walk.trc
+  memo convert memo-out/walk walk.trc --names pose2sim
   memo convert memo-out/walk walk.bvh --walk 0
   memo convert walk.c3d walk.csv --rate 50
 
@@ -32,6 +32,12 @@ Exit codes: 0 TARGET was written; 1 the input cannot be used; 2 wrong usage; \
 class Axis(StrEnum):
     z = "z"
     y = "y"
+
+
+class Naming(StrEnum):
+    memo = "memo"
+    pose2sim = "pose2sim"
+    gait2392 = "gait2392"
 
 
 def add_convert(app: "typer.Typer") -> None:
@@ -69,6 +75,20 @@ def add_convert(app: "typer.Typer") -> None:
         fill: Annotated[
             float | None, typer.Option(help="Longest gap to interpolate linearly, seconds.")
         ] = None,
+        names: Annotated[
+            Naming | None,
+            typer.Option(
+                help="Names of the joints in TARGET: those of memo, of Pose2Sim's OpenSim models,"
+                " or the joint angles of OpenSim's gait2392 (.mot); default: as in SOURCE."
+            ),
+        ] = None,
+        is_clinical: Annotated[
+            bool,
+            typer.Option(
+                "--clinical",
+                help="Hip angles of a track against the pelvis, with its average tilt, not the vertical.",
+            ),
+        ] = False,
         walk: Annotated[
             int | None, typer.Option(help="One walk of a track, counted from 0; default: all.")
         ] = None,
@@ -89,8 +109,9 @@ def add_convert(app: "typer.Typer") -> None:
             changes = (_checked(rate, "--rate"), _checked(fill, "--fill"))
             if target.suffix.lower() in _IN_PICTURE:
                 asked = {"--from-up": from_up, "--rate": rate, "--fill": fill, "--walk": walk, "--unit": unit}
+                asked |= {"--names": names, "--clinical": is_clinical or None}
                 return _convert_picture(source, target, up, fps, asked, delivery)
-            return _convert(source, target, reading, up, *changes, delivery)
+            return _convert(source, target, reading, (up, names, is_clinical), *changes, delivery)
 
         raise typer.Exit(guarded(work))
 
@@ -99,12 +120,12 @@ def _convert(
     source: Path,
     target: Path,
     reading: dict[str, Any],
-    up: Axis | None,
+    writing: tuple[Axis | None, Naming | None, bool],
     rate_hz: float | None,
     fill_s: float | None,
     delivery: Delivery,
 ) -> Exit:
-    from memo.formats import WRITERS, read_motion, usual_up, write_motion
+    from memo.formats import WRITERS, clinical, read_motion, usual_up, write_motion
     from memo.formats.run_folder import sources
 
     if target.suffix.lower() not in WRITERS:
@@ -117,7 +138,10 @@ def _convert(
     check_writable(target.parent)
     check_apart(sources(source) if source.is_dir() else [source], [target])
     with with_elapsed("converting", delivery):
+        up, names, is_clinical = writing
         motion = read_motion(source, **reading)
+        if is_clinical:
+            motion = clinical(motion)
         notes = [*motion.notes]
         if fill_s is not None:
             motion, filled = motion.filled(fill_s)
@@ -125,7 +149,7 @@ def _convert(
         if rate_hz is not None:
             motion = motion.resampled(rate_hz)
         target_up = usual_up(target) if up is None else up.value
-        notes += write_motion(target, motion, target_up)
+        notes += write_motion(target, motion, target_up, names=None if names is None else names.value)
     summary = {
         "source": str(source),
         "target": str(target),

@@ -16,8 +16,10 @@ from pathlib import Path
 from memo.formats.amc import read_amc
 from memo.formats.bvh import read_bvh, write_bvh
 from memo.formats.c3d import read_c3d, write_c3d
-from memo.formats.mot import read_mot, write_mot
+from memo.formats.clinical import clinical
+from memo.formats.mot import GAIT2392, read_mot, write_mot
 from memo.formats.motion import FormatError, GaitEvent, Motion, Up
+from memo.formats.names import renamed
 from memo.formats.parquet import read_parquet_motion, write_parquet_motion
 from memo.formats.reading import Given
 from memo.formats.run_folder import read_run_folder
@@ -32,6 +34,7 @@ __all__ = [
     "GaitEvent",
     "Given",
     "Motion",
+    "clinical",
     "read_motion",
     "write_motion",
 ]
@@ -108,10 +111,14 @@ def read_motion(
         raise FormatError(f"{path}: does not fit in memory") from None
 
 
-def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None) -> list[str]:
+def write_motion(
+    path: str | PathLike[str], motion: Motion, up: Up | None = None, *, names: str | None = None
+) -> list[str]:
     """Writes a motion in the format of the ending; returns what the format cannot store, in sentences.
 
-    `up`: "z" or "y"; by default the format's usual one, Y for TRC, MOT, STO and BVH, else Z.
+    `up`: "z" or "y"; by default the format's usual one, Y for TRC, MOT, STO and BVH, else Z. `names`: "memo"
+    for memo's own joints, "pose2sim" for the markers of Pose2Sim's OpenSim models, "gait2392" for the joint
+    angles of OpenSim's models gait2392 and gait2354 (MOT, STO); by default, points keep their names.
     """
     path = Path(path)
     check_up(up)
@@ -121,7 +128,12 @@ def write_motion(path: str | PathLike[str], motion: Motion, up: Up | None = None
             f"{path}: cannot write a motion to {path.suffix or 'a file without ending'}: {endings(WRITERS)}"
         )
     try:
-        return writer(path, motion, up or usual_up(path))
+        if names == "gait2392" and writer is write_mot:
+            return write_mot(path, motion, up or usual_up(path), GAIT2392)
+        notes: list[str] = []
+        if names is not None:
+            motion, notes = renamed(motion, names)
+        return notes + writer(path, motion, up or usual_up(path))
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from None
 

@@ -4,19 +4,19 @@ A header of `key=value` lines up to `endheader`, a row of labels that begins wit
 instant; `nColumns` counts the time. Both endings have the same format here. The older header of SIMM
 (`datacolumns`, `datarows`) is read too.
 
-Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`, flexion positive as in
-the model of Rajagopal 2016; in gait2392 and gait2354 the knee has the other sign) and are written in
-degrees. If both hips, a knee and the flexion of that hip are known, the position of the pelvis is written
-too, Y up unless another axis is requested; the header names it. The pelvis of OpenSim has X forward, Y up, Z
-to the right, and
+Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`) and are written in degrees.
+Flexion is positive as in the model of Rajagopal 2016. For gait2392 and gait2354 (`GAIT2392`) the knee has the
+other sign, and arms are left out, since these models have none. If both hips, a knee and the flexion of that
+hip are known, the position of the pelvis is written too, Y up unless another axis is requested; the header
+names it. The pelvis of OpenSim has X forward, Y up, Z to the right, and
 
     R = R_z(pelvis_tilt) R_x(pelvis_list) R_y(pelvis_rotation).
 
 Its Z is the line from the left hip to the right one, and it is tilted such that the thigh, at its
-`hip_flexion`, points to the knee. So it is the trunk for `memo track`, whose trunk is upright, and for
-`memo posture`, whose hip angles are against the trunk. `pelvis_tx`, `pelvis_ty`, `pelvis_tz` are its origin,
-midway between the anterior superior iliac spines, as far from the hips as in the unscaled model of Rajagopal
-2016. Instants with a missing value are left out, since OpenSim stops reading there.
+`hip_flexion`, points to the knee. So it is the trunk for `memo track`, whose trunk is upright, and for `memo
+posture`, whose hip angles are against the trunk. `pelvis_tx`, `pelvis_ty`, `pelvis_tz` are its origin, midway
+between the anterior superior iliac spines, as far from the hips as in the unscaled model. Instants with a
+missing value are left out, since OpenSim stops reading there.
 
 In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
 left out, as are columns of a states file that are not the value of a coordinate;
@@ -27,7 +27,9 @@ reversed. Tables of vectors (`DataType=Vec3`) are not read.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,8 +59,20 @@ OPENSIM = {
 """OpenSim's coordinate for each angle of `track.csv` and `postures.csv`."""
 
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
-_HIPS_M = np.array([-0.056276, -0.07849, 0.0])
-"""The point between the hips in the axes of the pelvis, Rajagopal 2016."""
+
+
+class Model(NamedTuple):
+    """What differs between OpenSim's gait models in a file of coordinates."""
+
+    hips_m: tuple[float, float, float]
+    """The point between the hips in the axes of the pelvis, of the unscaled model."""
+    knee_sign: float
+    """1 if flexion of the knee is positive, else -1."""
+    has_arms: bool
+
+
+RAJAGOPAL = Model((-0.056276, -0.07849, 0.0), 1.0, has_arms=True)
+GAIT2392 = Model((-0.0707, -0.0661, 0.0), -1.0, has_arms=False)
 
 _PLUG_IN_GAIT = {
     f"{side.upper()}{part}Angles_{axis}": f"{name}_{side}"
@@ -72,6 +86,7 @@ _PLUG_IN_GAIT = {
 
 _OURS = {name: joint for joint, name in OPENSIM.items()}
 _NO_ANGLES = ("/", "force", "moment", "torque", "ground_", "activation", "power", "emg")
+_OF_ARMS = ("shoulder", "elbow")
 _MOST_HEADER_LINES = 1000
 _BACKWARDS_DEG = 30.0  # farther than any knee bends backwards
 
@@ -126,14 +141,15 @@ def read_mot(path: Path, given: Given) -> Motion:
     return Motion(tuple(names), column["time"], points, (), angles, metadata, tuple(notes))
 
 
-def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
+def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> list[str]:
     """Writes the angles and the position of the pelvis; returns what was left out, in sentences."""
+    motion, armless = _of_model(motion, model)
     if not motion.angles:
         raise FormatError(
             "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
         )
     columns = {"time": motion.times_s}
-    pelvis_angles, origin = _pelvis(motion)
+    pelvis_angles, origin = _pelvis(motion, model)
     if up == "y":
         columns |= pelvis_angles
     if origin is not None:
@@ -179,7 +195,19 @@ def write_mot(path: Path, motion: Motion, up: Up) -> list[str]:
         notes.append("The pelvis position needs both hips, a knee and the flexion of that hip: left out.")
     left_out = ["events"] * bool(motion.events)
     left_out += ["points except the pelvis"] * (len(motion.names) > 1)
+    if armless:
+        notes.append(f"The model has no arms: {', '.join(armless)} left out.")
     return notes + [f"A MOT or STO file cannot store {what}: left out." for what in left_out]
+
+
+def _of_model(motion: Motion, model: Model) -> tuple[Motion, list[str]]:
+    """The motion with the model's signs, and the angles that the model does not have."""
+    armless = [] if model.has_arms else [a for a in motion.angles if a.partition("_")[2].startswith(_OF_ARMS)]
+    sign = {f"{side}_knee": model.knee_sign for side in ("right", "left")}
+    angles = {
+        name: sign.get(name, 1.0) * values for name, values in motion.angles.items() if name not in armless
+    }
+    return (replace(motion, angles=angles) if angles or motion.names else motion), armless
 
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int]:
@@ -243,7 +271,7 @@ def _is_turned(knee_deg: np.ndarray) -> bool:
     return bool(len(known)) and known.min() < -_BACKWARDS_DEG and -known.min() > known.max()
 
 
-def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+def _pelvis(motion: Motion, model: Model) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     """The pelvis' angles (T,) in degrees, and (T, 3) its origin; the origin in a file is kept."""
     found = joints_found(motion.names)
     hips = [f"{side}_hip" for side in ("right", "left")]
@@ -251,12 +279,12 @@ def _pelvis(motion: Motion) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     if not (sides and all(hip in found for hip in hips)):
         return {}, motion.points[:, found["pelvis"]] if "pelvis" in found else None
     with np.errstate(over="ignore", invalid="ignore"):
-        angles, origin = _pelvis_of_legs(motion, found, sides)
+        angles, origin = _pelvis_of_legs(motion, found, sides, model)
     return (angles, origin) if np.isfinite(origin).any() else ({}, None)
 
 
 def _pelvis_of_legs(
-    motion: Motion, found: dict[str, int], sides: list[str]
+    motion: Motion, found: dict[str, int], sides: list[str], model: Model
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The angles and the origin of the pelvis that give the directions of the thighs on these sides."""
     points = {name: from_z_up(motion.points[:, k], "y") for name, k in found.items()}
@@ -274,7 +302,7 @@ def _pelvis_of_legs(
     heading[known] = np.unwrap(heading[known])
     middle = (points["right_hip"] + points["left_hip"]) / 2
     angles = dict(zip(PELVIS, np.rad2deg([tilt, sideways, heading]), strict=True))
-    return angles, to_z_up(middle - turn @ _HIPS_M, "y")
+    return angles, to_z_up(middle - turn @ np.array(model.hips_m), "y")
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -24,11 +24,13 @@ from memo.files import JOINTS
 from memo.formats.motion import FormatError, Motion, Up
 
 __all__ = [
+    "NAMINGS",
     "SHORT",
     "joint_points",
     "joints_found",
     "mapped_points",
     "read_marker_map",
+    "renamed",
     "standing_up",
 ]
 
@@ -40,6 +42,14 @@ SHORT = {
     for part, short in zip(_PARTS, ("SH", "EL", "WR", "HP", "KN", "AN"), strict=True)
 }
 """memo's short name of each joint, as in point-light displays."""
+
+_POSE2SIM = {
+    f"{side}_{part}": side[0].upper() + part.capitalize() for side in ("right", "left") for part in _PARTS
+} | {"head": "Head", "neck": "Neck", "pelvis": "Hip"}
+"""The markers of Pose2Sim's OpenSim models (Markers_Halpe26.xml) at memo's joints."""
+
+NAMINGS = ("memo", "pose2sim", "gait2392")
+"""Names in which motions can be written: memo's own joints, and those of two families of OpenSim models."""
 
 _MIDDLE = {
     "head": ("head", "headtop", "nose"),
@@ -134,6 +144,23 @@ def joint_points(motion: Motion) -> Motion:
     kept = [*JOINTS, *(("head",) if "head" in found else ())]
     names = tuple(SHORT.get(joint, joint.upper()) for joint in kept)
     return replace(motion, names=names, points=motion.points[:, [found[joint] for joint in kept]])
+
+
+def renamed(motion: Motion, naming: str) -> tuple[Motion, list[str]]:
+    """The motion with its joints named as in a naming of `NAMINGS`, and what kept its name, in sentences."""
+    if naming == "gait2392":
+        raise FormatError(
+            "gait2392 has markers on the skin, and memo's joints are joint centres: write joint angles"
+            " (.mot) for this model, or joints for Pose2Sim's models (--names pose2sim)"
+        )
+    if naming not in NAMINGS:
+        raise FormatError(f"the names must be one of {', '.join(NAMINGS)}, got {naming!r}")
+    spelt = {index: joint for joint, index in joints_found(motion.names).items()}
+    known = {index: _POSE2SIM[joint] if naming == "pose2sim" else joint for index, joint in spelt.items()}
+    names = tuple(known.get(index, name) for index, name in enumerate(motion.names))
+    others = [name for index, name in enumerate(motion.names) if index not in known]
+    notes = [f"Not joints of memo, so they keep their names: {listed(others)}."] if others else []
+    return replace(motion, names=names), notes
 
 
 def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
