@@ -657,7 +657,10 @@ def tracks(d, tracker):
             if isinstance(times, np.ndarray) and times.ndim == 1 and index < len(times)
             else d.number(0, 9)
         )
-        yield tracker.update(frame, time_s)
+        height, width = frame.shape if isinstance(frame, np.ndarray) and frame.ndim == 2 else (8, 8)
+        whole = np.array([[0.0, 0, width, height]])
+        boxes = d.spoilt(whole) if d.random.random() < 0.5 else None
+        yield tracker.update(frame, time_s, boxes)
 
 
 @case(

@@ -257,7 +257,7 @@ def test_the_child_reads_a_row_as_it_was_given(tmp_path, truth):
         **{"camera": tmp_path / "-c.toml", "camera_name": "-1", "camera_unit": "mm", "camera_size": "4x3"},
         **{"camera_v_up": truth, "height_m": 1.7, "fov_deg": 59.125, "frames": "-5:", "fps": 1e-3},
         **{"shrink": 3, "overlay": truth, "plots": truth, "report": truth},
-        **{"steady": truth, "treadmill": truth, "follow": "10,20.5@7"},
+        **{"steady": truth, "treadmill": truth, "follow": "10,20.5@7", "boxes": tmp_path / "-b.txt"},
     }
     assert set(options) == set(batch.OPTIONS)
     row = Row("name", tmp_path / "--out", options, "here")

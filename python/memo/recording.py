@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 import memo
 from memo import _memo
@@ -96,6 +97,8 @@ class Recording:
     page: bool = False
     follow: Point | None = None
     """Of several people, only the one who is there."""
+    boxes: Path | None = None
+    """MOTChallenge rows of the boxes around people, in place of looking for what moves."""
 
 
 @dataclass
@@ -196,9 +199,11 @@ def _track_recording(
             camera_given="camera" in options,
             shrink=reader.shrink,
             size=reader.full_size,
+            boxes=recording.boxes,
         )
         tracker, point = memo.Tracker(**options), recording.follow
-        recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, point)
+        boxes = None if recording.boxes is None else _boxes(recording.boxes, reader)
+        recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, point, boxes)
         if point is not None and recorded.followed is None:
             at = f"{point.u_px:g},{point.v_px:g}@{point.frame}"
             remark(f"{video}: nobody was tracked at {at}: the results are those of everybody")
@@ -233,8 +238,9 @@ def follow(
     progress: Progress = _unseen,
     stop: Stop | None = None,
     point: Point | None = None,
+    boxes: Mapping[int, npt.NDArray[np.float64]] | None = None,
 ) -> Recorded:
-    """Passes all frames to the tracker; a stop ends it after the current frame.
+    """Passes all frames to the tracker, with the boxes of each frame; a stop ends it after the current frame.
 
     An error in between is raised again after the tables of what was tracked until then are written.
     """
@@ -242,7 +248,8 @@ def follow(
     try:
         with _never() if stop is None else stop as asked:
             for frame in _told(frames, "tracking", count, progress):
-                tracker.update(frame.luma, frame.time_s)
+                own = None if boxes is None else boxes.get(frame.index, np.empty((0, 4)))
+                tracker.update(frame.luma, frame.time_s, own)
                 frames_read += 1
                 if asked.requested:
                     break
@@ -307,6 +314,23 @@ def _fitted(options: Mapping[str, Any], reader: VideoReader) -> dict[str, Any]:
         f"{reader.path}: the camera is for {width}x{height} pixels, the video has "
         f"{video_width}x{video_height}{turned}"
     )
+
+
+def _boxes(path: Path, reader: VideoReader) -> dict[int, npt.NDArray[np.float64]]:
+    """By frame of the video, the boxes (N, 4) within the picture, in pixels of frames as they are read."""
+    from memo.formats.motchallenge import read_motchallenge
+
+    rows = read_motchallenge(path)
+    boxes = np.stack([rows[f"{name}_px"] for name in ("left", "top", "width", "height")], axis=1)
+    boxes = boxes / reader.shrink
+    low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+    # Rows with a confidence of 0 are not to be considered.
+    shown = (high >= 1).all(axis=1) & (low <= np.subtract(reader.size, 1)).all(axis=1)
+    shown &= (boxes[:, 2:] >= 1).all(axis=1) & (rows["conf"] != 0)
+    if not shown.any():
+        raise InputError(f"{path}: no box is within the {reader.size[0]}x{reader.size[1]} pixels of a frame")
+    frames = rows["frame"]
+    return {int(frame): boxes[shown & (frames == frame)] for frame in np.unique(frames[shown])}
 
 
 def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:

@@ -2,14 +2,15 @@
 
 Keys: `schema` (`SCHEMA`; 1 where it is missing), `memo` (version), `command`, `video` (absolute path, null
 where frames were drawn), `frames` ([first, stop], stop null for the end), `frames_read`, `interrupted`
-(whether requested frames were left unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`,
-`shrink` (pixels of the video, along each axis, per pixel of the pictures that were tracked), `pixels_of`
-("video": the unit of the pixels of `track.csv` and of `camera`), `camera_given`, `camera` (of the video:
-the camera given, or the one assumed for the longest walk; the keys of a Pose2Sim TOML, and for Tsai's lens
-`tsai_kappa` with the distortions nearest to it; null if nobody was tracked without a camera), `options` (of
-`Tracker`), `summary` and `sentences` (of `Track`), `walks` (per walk `message`, `start_s`, `end_s`,
-`direction`, `gait`, `p_swapped`, and the input of `memo.explain` and `contours_of_run`: pixels there are
-those of the pictures that were tracked, and frames are counted from the first one read).
+(whether requested frames were left unread: Ctrl-C, or an error in the video), `rate_hz`, `fps_given`, `boxes`
+(absolute path of the boxes around people, null without), `shrink` (pixels of the video, along each axis, per
+pixel of the pictures that were tracked), `pixels_of` ("video": the unit of the pixels of `track.csv` and of
+`camera`), `camera_given`, `camera` (of the video: the camera given, or the one assumed for the longest walk;
+the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` with the distortions nearest to it; null if
+nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`),
+`walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and the input of
+`memo.explain` and `contours_of_run`: pixels there are those of the pictures that were tracked, and frames are
+counted from the first one read).
 
 Without `pixels_of`, as in folders of older versions, table and camera are those of the pictures that were
 tracked; `read_run`, `read_track_csv` and `read_keypoints` convert them to the video.
@@ -63,6 +64,8 @@ class Source:
     """Pixels of the video per pixel of a frame, along each axis."""
     size: tuple[int, int] | None = None
     """Width and height of the video, pixels, if known."""
+    boxes: Path | None = None
+    """The file with boxes around people, if one was given."""
 
 
 def write_run(
@@ -99,6 +102,7 @@ def write_run(
             "shrink": source.shrink,
             "pixels_of": "video",
             "camera_given": source.camera_given,
+            "boxes": None if source.boxes is None else str(source.boxes.absolute()),
             "camera": camera,
             "options": dict(options),
             "summary": track.summary,

@@ -111,13 +111,19 @@ class Tracker:
         self._camera = camera
         self._walks: list[_memo.Walk] = []
 
-    def update(self, frame: npt.NDArray[np.uint8], time_s: float) -> _memo.WalkerState | None:
+    def update(
+        self, frame: npt.NDArray[np.uint8], time_s: float, boxes: npt.ArrayLike | None = None
+    ) -> _memo.WalkerState | None:
         """Takes the next frame, (H, W) uint8; times must increase.
+
+        `boxes`: (N, 4) boxes around the people in the frame, from a detector or another tracker: left, top,
+        width and height in pixels, from crown to sole. With boxes, possibly none, nobody is looked for
+        elsewhere; None looks for what moves.
 
         Returns the filtered state of the first person being followed, or None if there is none; `people` has
         everybody's.
         """
-        self._core.update(frame, time_s)
+        self._core.update(frame, time_s, boxes)
         return next(iter(self._core.people()), None)
 
     def people(self) -> list[_memo.WalkerState]:
@@ -154,6 +160,7 @@ def track(
     times_s: Iterable[float] | None = None,
     fps: float | None = None,
     camera: _memo.Camera | None = None,
+    boxes: Iterable[npt.ArrayLike] | None = None,
     progress: Callable[[int, int | None], object] | None = None,
     fov_deg: float | None = None,
     gait: str | None = None,
@@ -172,6 +179,8 @@ def track(
 
     `height_m`: body height, or those of people in order of appearance; None measures or assumes it
     (`Tracker`).
+    `boxes`: of each frame, the (N, 4) boxes around the people in it (`Tracker.update`); None looks for what
+    moves.
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
@@ -196,8 +205,11 @@ def track(
         full_velocity=full_velocity,
         part_weights=part_weights,
     )
-    _feed(tracker, frames, times_s, fps, progress)
+    _feed(tracker, frames, times_s, fps, boxes, progress)
     return tracker.finish()
+
+
+_ABSENT: Any = object()
 
 
 def _feed(
@@ -205,27 +217,26 @@ def _feed(
     frames: Iterable[npt.NDArray[np.uint8]],
     times_s: Iterable[float] | None,
     fps: float | None,
+    boxes: Iterable[npt.ArrayLike] | None,
     progress: Callable[[int, int | None], object] | None,
 ) -> None:
-    """Gives the tracker all frames with their times."""
+    """Gives the tracker all frames with their times and boxes."""
     count = len(frames) if isinstance(frames, Sized) else None
-    times = iter(times_s) if times_s is not None else None
+    given = {"times_s": times_s, "boxes": boxes}
+    each = {name: iter(values) for name, values in given.items() if values is not None}
     index = -1
     for index, frame in enumerate(frames):
-        if times is not None:
-            try:
-                time_s = float(next(times))
-            except StopIteration:
-                raise ValueError(
-                    f"times_s has {counted(index, 'value')}, but there are more frames than that"
-                ) from None
-        else:
-            time_s = index / float(fps or 1)
-        tracker.update(frame, time_s)
+        own: dict[str, Any] = {name: next(values, _ABSENT) for name, values in each.items()}
+        for name, value in own.items():
+            if value is _ABSENT:
+                raise ValueError(f"{name} has {counted(index, 'value')}, but there are more frames than that")
+        time_s = float(own["times_s"]) if "times_s" in own else index / float(fps or 1)
+        tracker.update(frame, time_s, own.get("boxes"))
         if progress is not None:
             progress(index + 1, count)
-    if times is not None and next(times, None) is not None:
-        raise ValueError(f"times_s has more values than the {counted(index + 1, 'frame')}")
+    for name, values in each.items():
+        if next(values, _ABSENT) is not _ABSENT:
+            raise ValueError(f"{name} has more values than the {counted(index + 1, 'frame')}")
 
 
 ALONG_SIGHT = float(np.cos(np.radians(35)))

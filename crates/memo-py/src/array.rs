@@ -2,6 +2,7 @@
 
 use crate::error::value_error;
 use glam::DVec2;
+use memo_core::image::Rectangle;
 use memo_core::model::JOINT_COUNT;
 use memo_core::{Frame, Image, Mask, StickFigure};
 use numpy::{
@@ -170,6 +171,35 @@ pub fn vectors_from_numpy<const N: usize>(
     let numbers = numbers.try_readonly()?;
     let flat: Vec<f64> = numbers.as_array().iter().copied().collect();
     Ok((flat.chunks_exact(N).map(|row| std::array::from_fn(|i| row[i])).collect(), shape))
+}
+
+/// Boxes (N, 4), left, top, width and height in pixels, as the pixels of a picture that they cover.
+pub fn boxes_from_numpy(boxes: &Bound<'_, PyAny>, [width, height]: [usize; 2]) -> PyResult<Vec<Rectangle>> {
+    let (rows, shape) = vectors_from_numpy::<4>(boxes, "boxes must have shape (N, 4)")?;
+    if shape.len() != 1 {
+        return Err(PyValueError::new_err("boxes must have shape (N, 4): those of one frame"));
+    }
+    let covered = |(k, row): (usize, &[f64; 4])| {
+        let [left, top, wide, high] = *row;
+        let (first, last) = ([left, top], [left + wide, top + high]);
+        let size = [width as f64, height as f64];
+        let is_seen =
+            (0..2).all(|i| last[i] - first[i] >= 1.0 && last[i] >= 1.0 && first[i] <= size[i] - 1.0);
+        if !(row.iter().all(|number| number.is_finite()) && is_seen) {
+            return Err(PyValueError::new_err(format!(
+                "box {k} must be left, top, width and height of pixels in a {width}x{height} picture, got {row:?}"
+            )));
+        }
+        let [low, high] = [first.map(f64::round), last.map(|end| end.round() - 1.0)];
+        let within = |value: f64, i: usize| value.clamp(0.0, size[i] - 1.0) as usize;
+        Ok(Rectangle {
+            left: within(low[0], 0),
+            top: within(low[1], 1),
+            right: within(high[0].max(low[0]), 0),
+            bottom: within(high[1].max(low[1]), 1),
+        })
+    };
+    rows.iter().enumerate().map(covered).collect()
 }
 
 /// Rows of N numbers as an array of shape (..., N), `shape` standing before the last axis.

@@ -1,6 +1,6 @@
 //! `Tracker`.
 
-use crate::array::frame_from_numpy;
+use crate::array::{boxes_from_numpy, frame_from_numpy};
 use crate::camera::PyCamera;
 use crate::defaults::dict;
 use crate::error::value_error;
@@ -235,10 +235,24 @@ impl PyTracker {
         Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
     }
 
-    /// Adds the next frame, (H, W) uint8, and its time in seconds.
-    fn update(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: f64) -> PyResult<()> {
+    /// Adds the next frame, (H, W) uint8, and its time in seconds; with the boxes (N, 4) of the people in it, nobody is
+    /// looked for elsewhere.
+    #[pyo3(signature = (frame, time_s, boxes=None))]
+    fn update(
+        &self,
+        py: Python<'_>,
+        frame: &Bound<'_, PyAny>,
+        time_s: f64,
+        boxes: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
         let image = frame_from_numpy(frame)?.into_image()?;
-        self.call(py, move |tracker| tracker.update(&image.as_frame(), time_s))?.map_err(value_error)
+        let size = [image.width(), image.height()];
+        let boxes = boxes.map(|boxes| boxes_from_numpy(boxes, size)).transpose()?;
+        let update = move |tracker: &mut Tracker| match boxes {
+            None => tracker.update(&image.as_frame(), time_s),
+            Some(boxes) => tracker.update_with_boxes(&image.as_frame(), time_s, &boxes),
+        };
+        self.call(py, update)?.map_err(value_error)
     }
 
     /// Ends the stream: processes the last frame and ends the current walk.

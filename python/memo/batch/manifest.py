@@ -54,6 +54,7 @@ OPTIONS = {
     "fps": Option("--fps", float),
     "shrink": Option("--shrink", int),
     "follow": Option("--follow", str),
+    "boxes": Option("--boxes", Path),
     "overlay": Option("--overlay", bool),
     "plots": Option("--plots", bool),
     "report": Option("--report", bool),
@@ -127,7 +128,7 @@ class Row:
 
     @property
     def fingerprint(self) -> dict[str, Any]:
-        """What the result depends on: options, size and time of the video, content of the camera file."""
+        """What the result depends on: options, size and time of the video, content of other files."""
         stats = [file.stat() for file in _files(self.video)]
         print_: dict[str, Any] = {
             "video_bytes": sum(stat.st_size for stat in stats),
@@ -135,9 +136,9 @@ class Row:
             "video_modified_s": max((int(stat.st_mtime) for stat in stats), default=0),
             **self.options,
         }
-        camera = self.options.get("camera")
-        if isinstance(camera, Path):
-            print_["camera"] = hashlib.sha256(camera.read_bytes()).hexdigest() if camera.is_file() else None
+        for name, file in self.options.items():
+            if isinstance(file, Path):
+                print_[name] = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else None
         return print_
 
 
@@ -418,6 +419,8 @@ def _check_options(row: Row) -> None:
     frame_range(options.get("frames", ":"))
     if "follow" in options:
         point_in_frame(options["follow"])
+    if "boxes" in options and not options["boxes"].is_file():
+        raise ValueError(nothing_at(options["boxes"], "file"))
     camera = options.get("camera")
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
     height = options.get("height_m")

@@ -89,6 +89,14 @@ def add_track(app: "typer.Typer") -> None:
                 help="Of several people, keep only the one who is at pixel X,Y in frame F.", metavar="X,Y@F"
             ),
         ] = None,
+        boxes: Annotated[
+            Path | None,
+            typer.Option(
+                help="Boxes around people from a detector or another tracker, as MOTChallenge rows, in place "
+                "of looking for what moves.",
+                metavar="FILE",
+            ),
+        ] = None,
         out: Annotated[
             Path | None, typer.Option(help="Folder for the results; default: memo-out/VIDEO.")
         ] = None,
@@ -108,7 +116,7 @@ def add_track(app: "typer.Typer") -> None:
             options = tracker_options(heights(height), camera, reading, fov_deg, steady, treadmill)
             asked = frame_range(frames)
             point = None if follow is None else Point(*point_in_frame(follow))
-            recording = Recording(video, options, asked, fps, shrink, overlay, plots, page, point)
+            recording = Recording(video, options, asked, fps, shrink, overlay, plots, page, point, boxes)
             return _track(recording, delivery)
 
         raise typer.Exit(guarded(work))

@@ -91,6 +91,17 @@ pub struct Sides {
     pub bottom: f64,
 }
 
+impl Sides {
+    /// Area of the intersection of two boxes over that of their union.
+    pub fn overlap(&self, other: &Self) -> f64 {
+        let shared = |low: f64, high: f64| (high - low).max(0.0);
+        let width = shared(self.left.max(other.left), self.right.min(other.right));
+        let height = shared(self.top.max(other.top), self.bottom.min(other.bottom));
+        let area = |sides: &Self| (sides.right - sides.left) * (sides.bottom - sides.top);
+        width * height / (area(self) + area(other) - width * height)
+    }
+}
+
 /// A set of pixels that represents one moving object: a connected area, or several areas grouped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Region {
@@ -241,6 +252,15 @@ pub(super) mod tests {
     pub fn mask_of(rows: &[&str]) -> Mask {
         let pixels = rows.iter().flat_map(|row| row.bytes().map(|c| c == b'#')).collect();
         Image::from_vec(rows[0].len(), rows.len(), pixels).unwrap()
+    }
+
+    #[test]
+    fn boxes_overlap_by_their_common_area_over_all_of_it() {
+        let own = Sides { left: 0.0, top: 0.0, right: 4.0, bottom: 3.0 };
+        let beside = |by: f64| Sides { left: own.left + by, right: own.right + by, ..own };
+        assert_eq!([0.0, 2.0, 4.0, 9.0].map(|by| own.overlap(&beside(by))), [1.0, 6.0 / 18.0, 0.0, 0.0]);
+        let inside = Sides { left: 1.0, top: 1.0, right: 2.0, bottom: 2.0 };
+        assert_eq!([own.overlap(&inside), inside.overlap(&own)], [1.0 / 12.0; 2]);
     }
 
     /// Masks from nearly empty to nearly full, wide enough for whole blocks.

@@ -53,6 +53,12 @@ impl Candidate {
         self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
     }
 
+    /// Overlap of a rectangle with the last one, intersection over union.
+    pub fn overlap(&self, rectangle: &Rectangle) -> f64 {
+        let last = self.seen.last().map(|last| last.sighting.rectangle.sides(0.0));
+        last.map_or(0.0, |last| last.overlap(&rectangle.sides(0.0)))
+    }
+
     /// True if it was last seen in a part of the image.
     pub fn is_in(&self, window: &Rectangle) -> bool {
         self.seen.last().is_some_and(|last| last.sighting.rectangle.gap(window) == [0, 0])

@@ -233,9 +233,30 @@ impl EvidenceStream {
         Self { steadier, ..self }
     }
 
+    /// Number of frames so far.
+    pub(crate) fn frame_count(&self) -> usize {
+        self.frames
+    }
+
     /// The camera in the latest frames; none without a steadier.
     pub fn camera_motions(&self) -> impl Iterator<Item = &CameraMotion> {
         self.steadier.iter().flat_map(|steadier| steadier.motions())
+    }
+
+    /// Where a rectangle of a frame is in the camera of the first frame.
+    pub(crate) fn in_first_view(&self, frame: usize, r: &Rectangle, size: [usize; 2]) -> Rectangle {
+        let Some(steadier) = &self.steadier else { return *r };
+        let corners = [[r.left, r.top], [r.right, r.top], [r.left, r.bottom], [r.right, r.bottom]];
+        let places = corners.map(|[x, y]| steadier.in_first_view(frame, DVec2::new(x as f64, y as f64)));
+        let last = DVec2::new(size[0] as f64, size[1] as f64) - 1.0;
+        let low = places.into_iter().fold(DVec2::INFINITY, DVec2::min).round().clamp(DVec2::ZERO, last);
+        let high = places.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max).round().clamp(DVec2::ZERO, last);
+        Rectangle {
+            left: low.x as usize,
+            top: low.y as usize,
+            right: high.x as usize,
+            bottom: high.y as usize,
+        }
     }
 
     /// The views that have ended.

@@ -11,6 +11,9 @@
 //! Something that stays in one place for `path_frames` frames may walk on a treadmill ([`treadmill`](super::treadmill)),
 //! while nobody else is followed.
 //!
+//! Boxes around people from elsewhere, such as those of a detector, can be given instead of looking for moving regions
+//! ([`Tracker::update_with_boxes`]).
+//!
 //! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the rows of the current
 //! walk and its edges (without a fit, those of the latest frames, some more than `path_frames`) and, for the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the
 //! person. A walk longer than [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`]
@@ -39,10 +42,11 @@ use super::standing::Standing;
 use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::OptionError;
-use crate::image::{Frame, GroupOptions, Mask, Rectangle, Region, group_regions, regions};
+use crate::image::{Frame, GroupOptions, Mask, Rectangle, Sides, group_regions, regions};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Why tracking stopped with an error.
@@ -61,6 +65,19 @@ pub enum TrackError {
     /// [`Tracker::finish`] was called before.
     #[error("the stream has ended: make a new tracker for further frames")]
     Finished,
+    /// A box is not within its frame.
+    #[error(
+        "a box must be within its {width}x{height} frame, got columns {} to {} and rows {} to {}",
+        given.left, given.right, given.top, given.bottom
+    )]
+    Box {
+        /// The box.
+        given: Rectangle,
+        /// Width of the frame.
+        width: usize,
+        /// Height of the frame.
+        height: usize,
+    },
     /// The camera is calibrated for another image size.
     #[error(
         "the camera is calibrated for {camera_width}x{camera_height} images, the frames are {width}x{height}"
@@ -83,6 +100,8 @@ pub const LONGEST_WALK: usize = 20_000;
 const MOST_CANDIDATES: usize = 3;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
+/// A box belongs to somebody who is followed if it overlaps the body's box by this, intersection over union.
+const OWN_BOX: f64 = 0.3;
 /// Edges are searched this far around the predicted body, pixels.
 const WINDOW_MARGIN_PX: f64 = 16.0;
 
@@ -113,6 +132,8 @@ pub struct Tracker {
     identities: Identities,
     /// Frames of something that may walk on the spot.
     standing: Standing,
+    /// Boxes around people that were given, by frame.
+    boxes: BTreeMap<usize, Vec<Rectangle>>,
     finished: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
@@ -137,6 +158,7 @@ impl Tracker {
             fading: Vec::new(),
             identities: Identities::default(),
             standing: Standing::default(),
+            boxes: BTreeMap::new(),
             finished: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
@@ -156,6 +178,31 @@ impl Tracker {
             self.end_view(&loss);
         }
         evidence.map_or(Ok(()), |evidence| self.advance(&evidence))
+    }
+
+    /// The same with boxes around the people in the frame, from a detector or another tracker: nobody is looked for
+    /// elsewhere, and boxes that overlap are of different people. A box reaches from the crown to the soles.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Tracker::update`]; a box is not within the frame.
+    pub fn update_with_boxes(
+        &mut self,
+        frame: &Frame<'_>,
+        time_s: f64,
+        boxes: &[Rectangle],
+    ) -> Result<(), TrackError> {
+        let (width, height) = (frame.width(), frame.height());
+        let is_within =
+            |r: &&Rectangle| r.left <= r.right && r.right < width && r.top <= r.bottom && r.bottom < height;
+        if let Some(given) = boxes.iter().find(|given| !is_within(given)) {
+            return Err(TrackError::Box { given: *given, width, height });
+        }
+        let number = self.stream.frame_count();
+        self.boxes.insert(number, boxes.to_vec());
+        self.update(frame, time_s).inspect_err(|_| {
+            self.boxes.remove(&number);
+        })
     }
 
     /// Ends the stream: processes the last frame and ends the current walk.
@@ -249,10 +296,25 @@ impl Tracker {
             self.backdrop.push(evidence.frame, &evidence.grey);
         }
         let expected = self.expect(evidence);
-        let regions = evidence.candidates(&self.options.evidence);
+        let given = self.given_boxes(evidence);
+        let are_given = given.is_some();
+        let regions = given.unwrap_or_else(|| {
+            evidence.candidates(&self.options.evidence).into_iter().map(|region| region.rectangle).collect()
+        });
         self.follow(evidence, &expected, &regions)?;
         self.end_walks(evidence);
-        self.seek(evidence, regions)
+        self.seek(evidence, regions, are_given)
+    }
+
+    /// The boxes given for a frame, the largest first; `None` if none were given.
+    fn given_boxes(&mut self, evidence: &Evidence) -> Option<Vec<Rectangle>> {
+        let later = self.boxes.split_off(&(evidence.frame + 1));
+        let given = std::mem::replace(&mut self.boxes, later).remove(&evidence.frame)?;
+        let size = [evidence.grey.width(), evidence.grey.height()];
+        let place = |r: &Rectangle| self.stream.in_first_view(evidence.frame, r, size);
+        let mut boxes: Vec<Rectangle> = given.iter().map(place).collect();
+        boxes.sort_by_key(|r| std::cmp::Reverse(r.width() * r.height()));
+        Some(boxes)
     }
 
     /// Sorts the people by distance and predicts each.
@@ -303,7 +365,7 @@ impl Tracker {
         &mut self,
         evidence: &Evidence,
         expected: &[Expected],
-        regions: &[Region],
+        regions: &[Rectangle],
     ) -> Result<(), TrackError> {
         for (k, own) in expected.iter().enumerate() {
             let meeting: Vec<usize> =
@@ -322,7 +384,7 @@ impl Tracker {
             edges.shared = !meeting.is_empty();
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
-            let overlaps = |region: &&Region| region.rectangle.gap(&own.window) == [0, 0];
+            let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
             let region = if meeting.is_empty() { regions.iter().find(overlaps) } else { None };
             let sighting = region.and_then(|region| whole(region, evidence));
             let active = &mut self.people[k];
@@ -388,24 +450,35 @@ impl Tracker {
     }
 
     /// Adds the regions that nobody explains to the candidates, and starts those that walk.
-    fn seek(&mut self, evidence: &Evidence, regions: Vec<Region>) -> Result<(), TrackError> {
+    fn seek(
+        &mut self,
+        evidence: &Evidence,
+        regions: Vec<Rectangle>,
+        are_given: bool,
+    ) -> Result<(), TrackError> {
         self.report.frames_with_candidate += usize::from(!regions.is_empty());
         let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
         self.report.frames_cut_off += usize::from(is_cut_off);
         if self.people.is_empty() {
             self.stand(evidence, regions.first().and_then(|region| whole(region, evidence)))?;
         }
-        let regions = if self.people.is_empty() { regions } else { self.unexplained(evidence) };
+        let regions = match are_given {
+            _ if self.people.is_empty() => regions,
+            true => self.unclaimed(regions),
+            false => self.unexplained(evidence),
+        };
         self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
         let camera = if self.people.is_empty() { None } else { self.camera() };
         let can_be = |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting));
         let whole = regions.iter().filter_map(|region| whole(region, evidence));
-        let sightings: Vec<Sighting> = whole.filter(can_be).take(MOST_CANDIDATES).collect();
+        let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
+        let sightings: Vec<Sighting> = whole.filter(can_be).take(most).collect();
         for sighting in sightings {
             let seen = self.seen(evidence, sighting)?;
             let rectangle = &sighting.rectangle;
-            let known = self.candidates.iter_mut().find(|c| c.missed > 0 && c.is_at(rectangle));
-            match known {
+            let known = self.candidates.iter_mut().filter(|c| c.missed > 0 && c.is_at(rectangle));
+            let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
+            match nearest {
                 Some(candidate) => candidate.add(seen),
                 None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
             }
@@ -416,8 +489,26 @@ impl Tracker {
         Ok(())
     }
 
+    /// Boxes that are not those of the people who are followed: each has the box that overlaps the body most.
+    fn unclaimed(&self, mut boxes: Vec<Rectangle>) -> Vec<Rectangle> {
+        for active in &self.people {
+            let Some([low, high]) =
+                active.as_followed().and_then(|seen| body_box(&active.camera, &seen.body))
+            else {
+                continue;
+            };
+            let body = Sides { left: low.x, top: low.y, right: high.x, bottom: high.y };
+            let overlaps = boxes.iter().map(|r| r.sides(0.0).overlap(&body)).enumerate();
+            let own = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((k, _)) = own.filter(|(_, part)| *part >= OWN_BOX) {
+                boxes.remove(k);
+            }
+        }
+        boxes
+    }
+
     /// Regions of change that the bodies of the people do not explain.
-    fn unexplained(&self, evidence: &Evidence) -> Vec<Region> {
+    fn unexplained(&self, evidence: &Evidence) -> Vec<Rectangle> {
         let mut mask: Mask = evidence.firm_mask.clone();
         for active in &self.people {
             if let Some(seen) = active.as_followed() {
@@ -425,7 +516,8 @@ impl Tracker {
             }
         }
         let group: &GroupOptions = &self.options.evidence.group;
-        group_regions(&regions(&mask, group.min_part_area), group)
+        let regions = group_regions(&regions(&mask, group.min_part_area), group);
+        regions.into_iter().map(|region| region.rectangle).collect()
     }
 
     /// What a candidate shows in a frame, without the edges of people who are followed.
@@ -564,8 +656,8 @@ fn feet(sighting: &Sighting, evidence: &Evidence, options: &TrackerOptions) -> O
 }
 
 /// The sighting of a region that the image border does not cut.
-fn whole(region: &Region, evidence: &Evidence) -> Option<Sighting> {
-    let rectangle = region.rectangle;
+fn whole(region: &Rectangle, evidence: &Evidence) -> Option<Sighting> {
+    let rectangle = *region;
     let is_cut = touches_border(&rectangle, evidence.grey.width()) || evidence.is_cut_off(&rectangle);
     (!is_cut).then_some(Sighting { time_s: evidence.time_s, rectangle })
 }

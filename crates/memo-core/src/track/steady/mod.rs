@@ -323,6 +323,18 @@ impl Steadier {
         Ok(self.noted(number, found.map(|(_, estimate)| estimate.support), frame))
     }
 
+    /// Where a pixel of a frame is in the camera of the first frame; the same pixel if the frame was left as it is.
+    pub fn in_first_view(&self, frame: usize, pixel: DVec2) -> DVec2 {
+        let motion = self.motions.iter().rev().find(|motion| motion.frame == frame);
+        let moved = motion.filter(|motion| motion.state == CameraState::Turned).zip(self.view.as_ref());
+        let seen = |(motion, view): (&CameraMotion, &View)| {
+            let camera = &view.camera;
+            let ray = ((camera.undistort(pixel).ok()? - camera.centre_px) / camera.focal_px).extend(1.0);
+            pixel_of(camera, &motion.turned().transpose(), ray)
+        };
+        moved.and_then(seen).unwrap_or(pixel)
+    }
+
     /// The camera in the frames so far, of the last 25 000 of them.
     pub fn motions(&self) -> &VecDeque<CameraMotion> {
         &self.motions

@@ -118,6 +118,13 @@ fn a_turned_frame_is_turned_back() {
         panic!("left as it was")
     };
     assert_eq!(motion.state, CameraState::Turned);
+    // A pixel of the turned frame is where its ray meets the picture of the first view.
+    let pixel = DVec2::new(250.0, 60.0);
+    let ray = ((pixel - camera.centre_px) / camera.focal_px).extend(1.0);
+    let seen = turned.turned.transpose() * ray;
+    let expected = seen.truncate() / seen.z * camera.focal_px + camera.centre_px;
+    assert!(steadier.in_first_view(1, pixel).distance(expected) < 0.1 && pixel.distance(expected) > 3.0);
+    assert_eq!([steadier.in_first_view(0, pixel), steadier.in_first_view(7, pixel)], [pixel; 2]);
     let mut square = (0.0, 0.0);
     for (k, (a, b)) in picture.pixels().iter().zip(first.pixels()).enumerate() {
         let pixel = DVec2::new((k % 320) as f64, (k / 320) as f64);

@@ -509,6 +509,64 @@ fn nobody_is_started_on_the_changes_of_somebody_who_is_followed() {
     assert_eq!(sought, [person(20)]);
 }
 
+/// The places of the candidates' last sightings after two frames in which these boxes were given, and a region moved
+/// somewhere else.
+fn sought_in(mut tracker: Tracker, first_frame: usize, given: [&[Rectangle]; 2]) -> Vec<Rectangle> {
+    for (k, boxes) in given.into_iter().enumerate() {
+        tracker.boxes.insert(first_frame + k, boxes.to_vec());
+        tracker.advance(&evidence(first_frame + k, &[boxed(500, 399, 80, 200)])).unwrap();
+    }
+    assert!(tracker.boxes.is_empty(), "boxes of frames that are done");
+    tracker.candidates.iter().map(|c| c.seen.last().unwrap().sighting.rectangle).collect()
+}
+
+#[test]
+fn given_boxes_are_sought_instead_of_what_moves() {
+    let boxes = [person(100), person(150), person(200), person(250)];
+    let moved = boxes.map(|r| Rectangle { left: r.left + 4, right: r.right + 4, ..r });
+    assert_eq!(
+        sought_in(tracker(), 0, [&boxes, &moved]),
+        moved,
+        "each goes on with the box nearest to its own"
+    );
+    assert!(sought_in(tracker(), 0, [&[], &[]]).is_empty());
+}
+
+#[test]
+fn somebody_who_is_followed_has_the_box_that_overlaps_the_body_most() {
+    let followed = following(30, 0.0, 1.2);
+    let body = body_box(&followed.people[0].camera, &followed.people[0].body().unwrap()).unwrap();
+    let [low, high] = body.map(|corner| corner.round());
+    let own = Rectangle {
+        left: low.x as usize,
+        top: low.y as usize,
+        right: high.x as usize,
+        bottom: high.y as usize,
+    };
+    let beside = |by: usize| Rectangle { left: own.left + by, right: own.right + by, ..own };
+    let half = (own.width() as f64 * 0.5) as usize;
+    assert_eq!(followed.unclaimed(vec![beside(half), own]), [beside(half)], "one box for one person");
+    assert_eq!(followed.unclaimed(vec![beside(half)]), [], "it overlaps by a third");
+    assert_eq!(followed.unclaimed(vec![beside(2 * half)]), [beside(2 * half)]);
+}
+
+#[test]
+fn boxes_belong_to_their_frame_whatever_was_refused_before() {
+    let frame = Image::filled(SIZE[0], SIZE[1], 100);
+    let mut tracker = tracker();
+    let outside = Rectangle { right: 640, ..person(600) };
+    let refused = tracker.update_with_boxes(&frame.as_frame(), 0.0, &[person(100), outside]);
+    assert_eq!(refused, Err(TrackError::Box { given: outside, width: 640, height: 480 }));
+    tracker.update_with_boxes(&frame.as_frame(), 0.0, &[person(100)]).unwrap();
+    let late = tracker.update_with_boxes(&frame.as_frame(), 0.0, &[person(300)]);
+    assert!(matches!(late, Err(TrackError::Evidence(EvidenceError::TimeOrder { .. }))));
+    tracker.update_with_boxes(&frame.as_frame(), 0.04, &[person(104)]).unwrap();
+    tracker.update(&frame.as_frame(), 0.08).unwrap();
+    let seen: Vec<usize> =
+        tracker.candidates[0].seen.iter().map(|seen| seen.sighting.rectangle.left).collect();
+    assert_eq!((tracker.candidates.len(), seen), (1, vec![100, 104]));
+}
+
 #[test]
 fn heights_are_those_of_people_in_order_of_appearance() {
     let mut options = TrackerOptions::for_height(1.8);
