@@ -117,7 +117,7 @@ class Tracker:
         self.camera, self.times_s, self.seen = camera, [], False
         self.options = {"height_m": height_m, "fov_deg": fov_deg}
 
-    def update(self, frame, time_s):
+    def update(self, frame, time_s, boxes=None):
         assert frame.dtype == np.uint8 and frame.ndim == 2
         self.camera = self.camera or Camera(frame.shape[::-1])
         self.times_s.append(time_s)
