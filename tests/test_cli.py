@@ -44,11 +44,11 @@ import sys, pathlib, memo, memo.cli
 started = pathlib.Path(sys.argv.pop(1))
 class Telling(memo.Tracker):
     frames = 0
-    def update(self, frame, time_s):
+    def update(self, *frame):
         self.frames += 1
         if self.frames == 50:
             started.touch()
-        return super().update(frame, time_s)
+        return super().update(*frame)
 memo.Tracker = Telling
 memo.cli.main()
 """
