@@ -699,6 +699,22 @@ def _(d):
     return WALK.contours(d.whole(0, len(WALK)))
 
 
+@case("fit_walk", "memo.fit_walk")
+def _(d, name):
+    rows = WALK.columns["frame"].tolist()
+    scene = _memo.Scene(5, frames=14)
+    shown = [d.laid_out(np.ascontiguousarray(scene.frame(index)[::2, ::2])) for index in range(14)]
+    (empty,) = [shown[0]] if d.random.random() < 0.5 else d.frames(1, shown[0].shape)
+    options = d.options(
+        empty=lambda: d.maybe(lambda: empty),
+        height_sd=lambda: d.number(0.001, 0.2),
+        frame_sd_deg=lambda: d.number(0.1, 20),
+    )
+    if name == "memo.fit_walk":
+        return memo.fit_walk(WALK, d.frames(14) if d.is_wrong() else shown, **options)
+    return _memo.fit_walk(WALK, d.frames(d.size()) if d.is_wrong() else [shown[k] for k in rows], **options)
+
+
 def record(d):
     record = dict(WALK.record)
     for key in list(record):
@@ -749,7 +765,7 @@ def _(d):
 @case("defaults")
 def _(d):
     return _memo.defaults(
-        d.choice("edge_segments", "planar", "pointlight", "posture", "track", "walker_motion")
+        d.choice("edge_segments", "fit_walk", "planar", "pointlight", "posture", "track", "walker_motion")
     )
 
 

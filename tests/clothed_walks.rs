@@ -6,10 +6,12 @@
 
 use glam::DVec2;
 use memo_core::synth::{ClothedOptions, FootContact, Mover};
-use memo_core::track::fit::FitError;
+use memo_core::track::fit::{FitError, FitOptions, WalkFit};
 use memo_core::track::start::Direction;
 use memo_core::track::{EventKind, Row};
-use memo_core::{ClothedScene, GaitParameter, GaitQuantity, Side, TrackedWalk, Tracker, TrackerOptions};
+use memo_core::{
+    ClothedScene, GaitParameter, GaitQuantity, Image, Side, TrackedWalk, Tracker, TrackerOptions,
+};
 use std::sync::LazyLock;
 
 /// Above this probability of interchanged sides a walk claims nothing by side.
@@ -465,4 +467,30 @@ fn a_walk_along_the_line_of_sight_is_followed_by_its_feet() {
     let stated = row.sd[0].hypot(row.sd[1]);
     assert!(along < 0.3 && along < 2.0 * stated, "seed {seed}: {along}, stated {stated}");
     assert!(phase < 0.1 && row.sd[3] > 0.03, "seed {seed}: {phase}");
+}
+
+#[test]
+fn a_walk_is_fitted_again_to_pictures_of_ones_own() {
+    let one = &FOLLOWED[0];
+    let walk = &one.walks[0];
+    let options = FitOptions::default();
+    let frames: Vec<_> = walk.rows().iter().map(|row| one.scene.frame(row.frame)).collect();
+    let first = walk.fit.as_ref().unwrap().as_ref().unwrap();
+    // 1. The same frames give the same person, and a stiffer one varies less about the curves.
+    let again = walk.fit(&frames, None, &options).unwrap();
+    let stiff = walk.fit(&frames, None, &FitOptions { frame_sd_rad: 1e-4, ..options }).unwrap();
+    let knees = |fit: &WalkFit| fit.frames.iter().map(|f| f.posture.right.knee).collect::<Vec<_>>();
+    let apart =
+        |a: &WalkFit, b: &WalkFit| rms(knees(a).iter().zip(knees(b)).map(|(a, b)| a - b)).to_degrees();
+    assert!(apart(first, &again) < 0.3, "{}", apart(first, &again));
+    assert!(apart(&stiff, &again) > 0.3, "{}", apart(&stiff, &again));
+    // 2. What are no pictures of the walk is refused.
+    let few = walk.fit(&frames[1..], None, &options);
+    assert_eq!(few.unwrap_err(), FitError::Pictures { got: frames.len() - 1, wanted: frames.len() });
+    let small = Image::filled(3, 2, 0);
+    let wanted = [frames[0].width(), frames[0].height()];
+    let empty = walk.fit(&frames, Some(&small), &options);
+    assert_eq!(empty.unwrap_err(), FitError::PictureSize { got: [3, 2], wanted });
+    let wrong = walk.fit(&frames, None, &FitOptions { height_sd: -1.0, ..options });
+    assert!(matches!(wrong.unwrap_err(), FitError::Option(_)));
 }

@@ -13,7 +13,16 @@ PICTURE = {"dot_px": "dot_px", "shape": "shape"}
 
 FUNCTIONS = {
     name: getattr(memo, name)
-    for name in ("edge_segments", "planar", "pointlight", "posture", "silhouettes", "track", "walker_motion")
+    for name in (
+        "edge_segments",
+        "fit_walk",
+        "planar",
+        "pointlight",
+        "posture",
+        "silhouettes",
+        "track",
+        "walker_motion",
+    )
 }
 OPTIONS = {
     ("planar", "noise_px"): "noise_px",

@@ -37,7 +37,7 @@ from memo.postures import Postures, posture
 from memo.scene import DemoScene, demo_scene
 from memo.segment_lengths import read_lengths
 from memo.sides import SideRepair, unswap
-from memo.tracking import Track, Tracker, track
+from memo.tracking import Track, Tracker, fit_walk, track
 
 _logging.getLogger("memo").addHandler(_logging.NullHandler())
 
@@ -59,6 +59,7 @@ __all__ = [
     "demo_scene",
     "edge_segments",
     "explain",
+    "fit_walk",
     "foot_points",
     "gait",
     "head_points",

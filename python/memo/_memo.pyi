@@ -63,6 +63,7 @@ __all__ = [
     "defaults",
     "edge_segments",
     "euler_angles",
+    "fit_walk",
     "follow_everyone",
     "foot_points",
     "gait_curves",
@@ -738,6 +739,14 @@ class PointLightDisplay:
         stop: int | None = None,
     ) -> npt.NDArray[np.uint8]: ...
 
+def fit_walk(
+    walk: Walk,
+    pictures: Sequence[npt.NDArray[np.uint8]],
+    *,
+    empty: npt.NDArray[np.uint8] | None = None,
+    height_sd: float | None = None,
+    frame_sd_deg: float | None = None,
+) -> Walk: ...
 def euler_angles(rotations: npt.NDArray[np.float64], order: str) -> npt.NDArray[np.float64]: ...
 def walker_motion(
     frames: int | None = None,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["Track", "Tracker", "track"]
+__all__ = ["Track", "Tracker", "fit_walk", "track"]
 
 LIKELY_SWAPPED = 0.2
 """From this probability on, check left and right before use."""
@@ -207,6 +207,42 @@ def track(
     )
     _feed(tracker, frames, times_s, fps, boxes, progress)
     return tracker.finish()
+
+
+def fit_walk(
+    walk: _memo.Walk,
+    frames: Iterable[npt.NDArray[np.uint8]],
+    *,
+    empty: npt.NDArray[np.uint8] | None = None,
+    height_sd: float | None = None,
+    frame_sd_deg: float | None = None,
+) -> _memo.Walk:
+    """Fits the person of a tracked walk again, to pictures of one's own; returns a walk with this fit.
+
+    `frames` are pictures of all frames from the first one that was tracked, (H, W) uint8 each, as large as
+    the frames: the frames themselves, frames that were cleaned, or silhouettes from a segmentation, 255 on
+    the person and 0 elsewhere. `empty` is the picture without people, 0 everywhere for silhouettes; None
+    takes the median of the frames where the person is elsewhere. Other people are taken for part of the
+    scene. The walk must be one that was tracked in this process, not one from a file or from a pickle.
+
+    `height_sd`: standard deviation of a given body height, as a share of it. `frame_sd_deg`: standard
+    deviation of hip and knee about the person's own curves; ankle and arms have twice as much. If the model
+    does not fit, the new walk has `fit` None and the reason in `fit_problem`.
+
+    Defaults: `height_sd` 0.012, `frame_sd_deg` 3.0.
+    """
+    wanted = walk.columns["frame"].tolist()
+    own = set(wanted)
+    pictures = {number: frame for number, frame in enumerate(frames) if number in own}
+    if absent := [number for number in wanted if number not in pictures]:
+        raise ValueError(f"the walk goes on to frame {absent[-1]}, but there are fewer frames")
+    return _memo.fit_walk(
+        walk,
+        [pictures[number] for number in wanted],
+        empty=empty,
+        height_sd=height_sd,
+        frame_sd_deg=frame_sd_deg,
+    )
 
 
 _ABSENT: Any = object()

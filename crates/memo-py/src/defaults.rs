@@ -1,6 +1,6 @@
 //! The defaults of the core's options, for help and documentation.
 
-use crate::{image, planar, pointlight, posture, tracker};
+use crate::{image, planar, pointlight, posture, tracker, walk};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -20,6 +20,7 @@ pub(crate) use dict;
 pub fn defaults<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyDict>> {
     match function {
         "edge_segments" => image::edge_defaults(py),
+        "fit_walk" => walk::fit_defaults(py),
         "planar" => planar::defaults(py),
         "pointlight" => pointlight::defaults(py),
         "pointlight_frames" => pointlight::picture_defaults(py),

@@ -100,7 +100,7 @@ mod _memo {
     use super::wait::panic_on_purpose;
     #[pymodule_export]
     use super::walk::{
-        BodyHeight, GaitEvent, GaitParameter, PhaseLine, Treadmill, Walk, WalkRatio, WalkStart,
+        BodyHeight, GaitEvent, GaitParameter, PhaseLine, Treadmill, Walk, WalkRatio, WalkStart, fit_walk,
     };
 
     #[pymodule_init]

@@ -1,20 +1,24 @@
 //! `Walk`: a walk that has ended, and what it consists of.
 
-use crate::array::{numpy_from_column, numpy_from_rows};
+use crate::array::{frame_from_numpy, numpy_from_column, numpy_from_rows};
 use crate::camera::PyCamera;
 use crate::cycles::{Departure, GaitCycle, departures_of, gait_cycles_of};
+use crate::defaults::dict;
+use crate::error::value_error;
 use crate::fit::WalkFit;
 use crate::record::{Recorded, SegmentsWithParts, WalkRecord};
 use crate::result::{objects, result};
+use crate::wait::watched;
 use glam::{DVec2, DVec3};
-use memo_core::TrackedWalk;
 use memo_core::model::SideJoints;
+use memo_core::track::fit::{FitError, FitOptions};
 use memo_core::track::start::{Direction, PhaseLine as CoreLine, StartReport};
 use memo_core::track::walk::Step;
 use memo_core::track::{Event, Row, height, plausible, treadmill};
 use memo_core::wording::counted;
+use memo_core::{Image, TrackedWalk};
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::OnceLock;
@@ -239,6 +243,51 @@ impl Walk {
     pub fn tracked(&self) -> PyResult<&(TrackedWalk, Vec<Row>)> {
         self.tracked.as_ref().ok_or_else(|| PyRuntimeError::new_err("the walk is from another process"))
     }
+}
+
+/// The walk with the person fitted again to pictures of its rows, (H, W) uint8 each, before the `empty` scene, which is
+/// otherwise the median of the pictures where the person is elsewhere. `height_sd` and `frame_sd_deg` are how well a
+/// given height is known, as a share of it, and how much hip and knee vary about the person's curves.
+#[pyfunction]
+#[pyo3(signature = (walk, pictures, *, empty=None, height_sd=None, frame_sd_deg=None))]
+pub fn fit_walk(
+    py: Python<'_>,
+    walk: &Walk,
+    pictures: Vec<Bound<'_, PyAny>>,
+    empty: Option<&Bound<'_, PyAny>>,
+    height_sd: Option<f64>,
+    frame_sd_deg: Option<f64>,
+) -> PyResult<Walk> {
+    let mut walk = walk.tracked()?.0.clone();
+    let image = |picture: &Bound<'_, PyAny>| frame_from_numpy(picture)?.into_image();
+    let pictures: Vec<Image<u8>> = pictures.iter().map(image).collect::<PyResult<_>>()?;
+    let empty = empty.map(image).transpose()?;
+    if let Some(got) = frame_sd_deg.filter(|&sd| !(sd > 0.0 && sd.is_finite())) {
+        let refusal = format!("frame_sd_deg must be positive and finite, got {got}");
+        return Err(PyValueError::new_err(refusal));
+    }
+    let usual = FitOptions::default();
+    let options = FitOptions {
+        height_sd: height_sd.unwrap_or(usual.height_sd),
+        frame_sd_rad: frame_sd_deg.map_or(usual.frame_sd_rad, f64::to_radians),
+        ..usual
+    };
+    let walk = watched(py, None, move |_| {
+        let fit = walk.fit(&pictures, empty.as_ref(), &options);
+        if let Err(FitError::Option(_) | FitError::Pictures { .. } | FitError::PictureSize { .. }) = fit {
+            return fit.map(|_| walk);
+        }
+        walk.fit = Some(fit);
+        Ok(walk)
+    })?;
+    Walk::of_tracked(py, walk.map_err(value_error)?)
+}
+
+/// The defaults of [`fit_walk`].
+pub fn fit_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let options = FitOptions::default();
+    let frame_sd_deg = (options.frame_sd_rad.to_degrees() * 1e9).round() / 1e9;
+    dict!(py, { height_sd: options.height_sd, frame_sd_deg: frame_sd_deg, })
 }
 
 fn direction(walk: &TrackedWalk) -> &'static str {

@@ -5,17 +5,15 @@ use super::decisions::{
     DECIDING_SHARE, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN, SLOWEST_HZ, SLOWEST_MPS,
     STRIDE_HEIGHTS,
 };
-use super::fit::edge_search::View;
+use super::fit::of_walk::Tracked;
 use super::fit::views::{Backdrop, Piece};
-use super::fit::{FitError, FitFrame, Problem, WalkFit, fit_on_the_spot, fitted_route};
+use super::fit::{FitError, WalkFit};
 use super::frontal::Frontal;
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
 use super::people::{Now, Sign};
-use super::result::smoothed_hypotheses;
-use super::search::mirrored;
-use super::search::{Hypothesis, Scene};
+use super::search::Scene;
 use super::start::{StartReport, start};
 use super::steady::CameraMotion;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
@@ -278,36 +276,20 @@ impl Active {
             true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
             false => backdrop.views(pieces),
         };
-        let mut frames = self.fit_frames(views, options);
-        let route = &fitted_route(&self.camera, &self.average, &self.walk.route, &mut frames, fit);
-        let problem = |route| {
-            let problem = Problem::new(&self.camera, &self.average, route, &frames, fit);
-            match (&options.camera, self.height.source) {
-                (None, _) => problem.of_assumed_camera(),
-                (Some(_), HeightSource::Given) => problem,
-                (Some(_), _) => problem.of_height(&self.height),
-            }
-        };
-        if !self.is_on_treadmill {
-            return Some(problem(route).fit(p_swapped));
-        }
-        let mirrored = mirrored(&route.at(0.0), &self.camera).into();
-        let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
-        Some(fit_on_the_spot(&here, &there, p_swapped))
+        Some(self.tracked(options).fit(views, fit, p_swapped))
     }
 
-    /// The frames to be fitted, in their views, from where the smoothed track has the person.
-    fn fit_frames(&self, views: Vec<View>, options: &TrackerOptions) -> Vec<FitFrame> {
-        let walker = &self.walk.walker;
-        let steps = &self.walk.twins[self.walk.best()].steps;
-        let half_torso_m = 0.5 * walker.body.torso_length_m();
-        let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
-            let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
-            let start = Hypothesis { height_m, ..place };
-            FitFrame { time_s: step.time_s, view, visible: step.visible.into(), start }
-        };
-        let places = smoothed_hypotheses(steps, &options.walk.filter);
-        steps.iter().zip(places).zip(views).map(frame).collect()
+    /// What a fit starts from.
+    fn tracked<'a>(&'a self, options: &'a TrackerOptions) -> Tracked<'a> {
+        Tracked {
+            walk: &self.walk,
+            camera: &self.camera,
+            is_camera_assumed: options.camera.is_none(),
+            average: &self.average,
+            height: &self.height,
+            is_on_treadmill: self.is_on_treadmill,
+            filter: &options.walk.filter,
+        }
     }
 
     /// True unless the fitted feet of a person on the spot take steps that no legs of that height take.
@@ -383,9 +365,10 @@ impl Active {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::fit::edge_search::View;
     use super::super::route::Route;
     use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
-    use super::super::search::{Axis, Path, Scene};
+    use super::super::search::{Axis, Hypothesis, Path, Scene};
     use super::super::start::Direction;
     use super::super::start::tests::report;
     use super::super::walk::{Look, State, Step};
@@ -489,7 +472,8 @@ pub(super) mod tests {
         walk.walk.twins[0].steps.iter_mut().for_each(|step| step.visible = step.frame as f32 / 64.0);
         let view =
             View { corner: [0, 0], grey: Image::filled(1, 1, 0), background: None, others: Vec::new() };
-        let frames = walk.fit_frames(vec![view; 40], &options());
+        let options = options();
+        let frames = walk.tracked(&options).frames(vec![view; 40]);
         assert_eq!(frames.len(), 40);
         for (k, frame) in frames.iter().enumerate() {
             assert_eq!(frame.visible, k as f64 / 64.0);

@@ -16,7 +16,7 @@ use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{State, Step, Walk, WalkOptions};
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
-use crate::model::{Camera, PosedBody, Posture, SideJoints};
+use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 
@@ -37,6 +37,8 @@ pub struct TrackedWalk {
     pub camera_is_guessed: bool,
     /// The body height that the walk was tracked with: given, measured or assumed.
     pub height: BodyHeight,
+    /// The average walker of the person's height, from which a fit starts.
+    pub average: Walker,
     /// Standard deviation of the path's distance from the camera, metres.
     pub depth_sd_m: f64,
     /// Report of the starting phase.

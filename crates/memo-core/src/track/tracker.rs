@@ -636,6 +636,7 @@ impl Tracker {
             walk: active.walk,
             height,
             camera: active.camera,
+            average: active.average,
             depth_sd_m: active.depth_sd_m,
             start: active.start,
             camera_is_guessed: self.options.camera.is_none(),

@@ -22,6 +22,7 @@ pub mod contacts;
 pub(crate) mod edge_search;
 mod headings;
 mod lines;
+pub(crate) mod of_walk;
 mod problem;
 mod quality;
 mod route;
@@ -95,6 +96,25 @@ pub enum FitError {
     /// The frames do not determine the unknowns.
     #[error("the frames do not show enough of the person")]
     Undetermined,
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+    /// Another number of pictures than the walk has rows.
+    #[error("a walk of {} needs a picture of each, got {}", counted(*.wanted, "row"), counted(*.got, "picture"))]
+    Pictures {
+        /// Pictures given.
+        got: usize,
+        /// Rows of the walk.
+        wanted: usize,
+    },
+    /// A picture of another size than the frames.
+    #[error("pictures must be {}x{} like the frames, got {}x{}", wanted[0], wanted[1], got[0], got[1])]
+    PictureSize {
+        /// Width and height given.
+        got: [usize; 2],
+        /// Those of the frames.
+        wanted: [usize; 2],
+    },
     /// The person walks towards the camera or away from it.
     #[error("seen from the front or from behind, the outline does not show the joint angles")]
     Frontal,

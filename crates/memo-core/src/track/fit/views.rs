@@ -56,6 +56,12 @@ impl Piece {
         };
         Self { frame, window, kept, grey: cut(image, &kept), others }
     }
+
+    /// The piece before an empty scene that is as large as the frames.
+    pub fn before(self, empty: &Image<u8>) -> View {
+        let background = Some(cut(empty, &self.kept));
+        View { corner: [self.kept.left, self.kept.top], grey: self.grey, background, others: self.others }
+    }
 }
 
 /// Margin about the window of the person, as a share of its height: edges are searched beyond the outline.

@@ -67,6 +67,7 @@ pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedW
     TrackedWalk {
         person: 0,
         camera_turns: Vec::new(),
+        average: walk.walker.clone(),
         walk,
         camera: camera(),
         camera_is_guessed: false,

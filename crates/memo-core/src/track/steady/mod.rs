@@ -590,6 +590,16 @@ fn vector(turned: &Turned) -> DVec3 {
     DQuat::from_mat3(turned).normalize().to_scaled_axis()
 }
 
+/// A picture of a camera that has turned, in the camera of the first view; what it does not show is that of `beyond`.
+pub(crate) fn turned_back(
+    picture: &Image<u8>,
+    camera: &Camera,
+    turn_rad: DVec3,
+    beyond: &Image<u8>,
+) -> Image<u8> {
+    Warp::new(camera).steadied(&picture.as_frame(), camera, &matrix(turn_rad), beyond).0
+}
+
 /// The rotation of a rotation vector.
 fn matrix(turn_rad: DVec3) -> Turned {
     DMat3::from_quat(DQuat::from_scaled_axis(turn_rad))

@@ -1,0 +1,139 @@
+//! The fit of a tracked walk: where the problem starts, and a fit to pictures that are given afterwards.
+
+use super::super::height::{BodyHeight, HeightSource};
+use super::super::result::{TrackedWalk, smoothed_hypotheses};
+use super::super::search::{Hypothesis, mirrored};
+use super::super::steady;
+use super::super::walk::{Step, Walk};
+use super::edge_search::View;
+use super::views::{Backdrop, Piece};
+use super::{FitError, FitFrame, FitOptions, Problem, WalkFit, fit_on_the_spot, fitted_route};
+use crate::estimate::kalman::FilterOptions;
+use crate::image::Image;
+use crate::model::{Camera, Walker};
+use glam::DVec3;
+
+/// A walk as it was tracked.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tracked<'a> {
+    pub walk: &'a Walk,
+    pub camera: &'a Camera,
+    pub is_camera_assumed: bool,
+    /// The average walker of the person's height.
+    pub average: &'a Walker,
+    pub height: &'a BodyHeight,
+    pub is_on_treadmill: bool,
+    pub filter: &'a FilterOptions,
+}
+
+impl Tracked<'_> {
+    /// Fits the person to the views of all frames, from the smoothed track. With the probability by the tracker that the
+    /// sides are exchanged, they are decided anew.
+    pub fn fit(
+        &self,
+        views: Vec<View>,
+        options: &FitOptions,
+        p_swapped: Option<f64>,
+    ) -> Result<WalkFit, FitError> {
+        let mut frames = self.frames(views);
+        let route = &fitted_route(self.camera, self.average, &self.walk.route, &mut frames, options);
+        let problem = |route| {
+            let problem = Problem::new(self.camera, self.average, route, &frames, options);
+            match self.height.source {
+                _ if self.is_camera_assumed => problem.of_assumed_camera(),
+                HeightSource::Given => problem,
+                _ => problem.of_height(self.height),
+            }
+        };
+        if !self.is_on_treadmill {
+            return problem(route).fit(p_swapped);
+        }
+        let mirrored = mirrored(&route.at(0.0), self.camera).into();
+        let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
+        fit_on_the_spot(&here, &there, p_swapped)
+    }
+
+    /// The frames to be fitted, in their views, from where the smoothed track has the person.
+    pub fn frames(&self, views: Vec<View>) -> Vec<FitFrame> {
+        let walker = &self.walk.walker;
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let half_torso_m = 0.5 * walker.body.torso_length_m();
+        let places = smoothed_hypotheses(steps, self.filter);
+        let frame = |((step, place), view): ((&Step, Hypothesis), View)| {
+            let height_m = place.height_m + walker.gait.vertical_m(place.phase) - half_torso_m;
+            let start = Hypothesis { height_m, ..place };
+            FitFrame { time_s: step.time_s, view, visible: step.visible.into(), start }
+        };
+        steps.iter().zip(places).zip(views).map(frame).collect()
+    }
+}
+
+impl TrackedWalk {
+    /// Fits the person again to pictures of one's own: the frames with other options, cleaned frames, or silhouettes
+    /// from a segmentation, white before a black `empty` scene. The walk keeps the fit it has.
+    ///
+    /// `pictures` are those of the rows of the walk, in order, as large as the frames. `empty` is the scene without
+    /// people; without it, it is the median of the pictures where the person is elsewhere. Other people are taken for
+    /// part of the scene.
+    ///
+    /// # Errors
+    ///
+    /// An option is outside its range, the pictures are not those of the walk, or why no person was measured.
+    pub fn fit(
+        &self,
+        pictures: &[Image<u8>],
+        empty: Option<&Image<u8>>,
+        options: &FitOptions,
+    ) -> Result<WalkFit, FitError> {
+        options.check()?;
+        // 1. The pictures in the camera of the walk.
+        let steps = self.steps();
+        if pictures.len() != steps.len() {
+            return Err(FitError::Pictures { got: pictures.len(), wanted: steps.len() });
+        }
+        let wanted = self.camera.size.map(|side| side as usize);
+        let others = |picture: &&Image<u8>| [picture.width(), picture.height()] != wanted;
+        if let Some(other) = pictures.iter().chain(empty).find(others) {
+            return Err(FitError::PictureSize { got: [other.width(), other.height()], wanted });
+        }
+        if self.is_frontal {
+            return Err(FitError::Frontal);
+        }
+        let turned_back = |k: usize| match self.camera_turns.get(k) {
+            Some(turn) if *turn != DVec3::ZERO => {
+                steady::turned_back(&pictures[k], &self.camera, *turn, empty.unwrap_or(&pictures[0]))
+            }
+            _ => pictures[k].clone(),
+        };
+        // 2. The part around the person, and the empty scene behind it.
+        let mut backdrop = Backdrop::default();
+        let mut pieces = Vec::with_capacity(steps.len());
+        for (k, step) in steps.iter().enumerate() {
+            let picture = turned_back(k);
+            backdrop.push(k, &picture);
+            backdrop.occupy(k, step.look.window);
+            pieces.push(Piece::new(k, &picture, step.look.window, Vec::new()));
+        }
+        let views = match empty {
+            Some(empty) => pieces.into_iter().map(|piece| piece.before(empty)).collect(),
+            None if self.is_on_treadmill => backdrop.views_on_the_spot(pieces.iter()),
+            None => backdrop.views(pieces.iter()),
+        };
+        // 3. The fit, with the sides open as they were to the tracker. A height that was measured in the same pictures
+        // tells nothing more about them.
+        let height = match self.height.source {
+            HeightSource::Given => self.height,
+            _ => BodyHeight::POPULATION,
+        };
+        let tracked = Tracked {
+            walk: &self.walk,
+            camera: &self.camera,
+            is_camera_assumed: self.camera_is_guessed,
+            average: &self.average,
+            height: &height,
+            is_on_treadmill: self.is_on_treadmill,
+            filter: &self.options.filter,
+        };
+        tracked.fit(views, options, Some(self.walk.swap_probability(&self.options.swap)))
+    }
+}
