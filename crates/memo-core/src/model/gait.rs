@@ -171,6 +171,15 @@ impl GaitStyle {
         leg_amplitude: 1.0,
         arm_amplitude: 1.0,
     };
+    /// Short steps: legs and arms swing 0.65 as far as the average's, for strides of about half the body height. A place
+    /// to start from, not a measured gait.
+    pub const SHORT_STEPS: Self = Self {
+        hip_offset: 0.0,
+        knee_offset: 0.0,
+        leg_amplitude: 0.65,
+        arm_amplitude: 0.65,
+        ..Self::CROUCHED
+    };
 }
 
 impl Default for GaitStyle {

@@ -17,7 +17,7 @@ pub(super) const MISSED_FRAMES: usize = 3;
 /// Speed of a comfortable walk, used before the speed is known, m/s.
 pub(super) const COMFORTABLE_MPS: f64 = 1.3;
 /// Gaits other than the average with which a walk can start.
-const OTHER_GAITS: [GaitStyle; 1] = [GaitStyle::CROUCHED];
+const OTHER_GAITS: [GaitStyle; 2] = [GaitStyle::CROUCHED, GaitStyle::SHORT_STEPS];
 
 /// One frame of a candidate.
 #[derive(Debug, Clone)]
@@ -77,7 +77,8 @@ impl Candidate {
     /// Starts a walk; `None` for things that do not move like a walker.
     ///
     /// 1. Camera and course from the rectangles.
-    /// 2. Lines of phase over the whole cycle, of several gaits; the most similar gait starts.
+    /// 2. Lines of phase over the whole cycle, of several gaits; of those that look like walking the most similar one
+    ///    starts.
     /// 3. Both twins followed through the start frames.
     pub fn begin(&self, given: &Given<'_>) -> Option<Active> {
         let options = given.options;
@@ -89,16 +90,16 @@ impl Candidate {
         let average = self.started(&sightings, given, &height, &GaitStyle::default())?;
         let similarity = |started: &Started| started.start.lines.best.similarity;
         let others = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
-        let Started { camera, course, walker, start } = others
+        let other = others
             .iter()
             .filter_map(|style| self.started(&sightings, given, &height, style))
+            .filter(Started::walks)
             .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
-            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
-            .unwrap_or(average);
-        // A thing carried along in one posture looks like a walker, but then a constant phase explains it best.
-        if start.contrast() < WALKER_CONTRAST || start.frozen.similarity >= start.lines.best.similarity {
-            return None;
-        }
+            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
+        let Started { camera, course, walker, start } = match other {
+            Some(other) => other,
+            None => average.walks().then_some(average)?,
+        };
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         for seen in &self.seen {
             walk.follow(&seen.edges, &camera, &options.walk);
@@ -154,6 +155,15 @@ struct Started {
     start: StartReport,
 }
 
+impl Started {
+    /// True for what walks. A thing carried along in one posture looks like a walker, but then a constant phase explains
+    /// it best.
+    fn walks(&self) -> bool {
+        self.start.contrast() >= WALKER_CONTRAST
+            && self.start.frozen.similarity < self.start.lines.best.similarity
+    }
+}
+
 pub(super) fn course(
     sightings: &[Sighting],
     given: &Given<'_>,
@@ -189,6 +199,7 @@ fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fit::FitOptions;
     use super::super::score::EdgeLine;
     use super::super::search::tests::{camera, edges_of, walker};
     use super::super::search::{Hypothesis, Path, Scene};
@@ -233,8 +244,12 @@ mod tests {
 
     /// Five sightings of a person at this speed, with the contours of a walker.
     fn seen_walking(speed_mps: f64) -> Vec<Seen> {
-        let (walker, camera) = (walker(), camera());
-        let scene = Scene::new(&walker, &camera, &PATH);
+        seen_of(&walker(), speed_mps)
+    }
+
+    fn seen_of(walker: &Walker, speed_mps: f64) -> Vec<Seen> {
+        let camera = camera();
+        let scene = Scene::new(walker, &camera, &PATH);
         let crown_m = walker.level_crown_height_m();
         let frame = |k: usize| {
             let time_s = 0.1 * k as f64;
@@ -257,9 +272,13 @@ mod tests {
     }
 
     fn begun(seen: Vec<Seen>) -> Option<Active> {
+        begun_with(seen, None)
+    }
+
+    fn begun_with(seen: Vec<Seen>, fit: Option<FitOptions>) -> Option<Active> {
         let options = TrackerOptions {
             camera: Some(camera()),
-            fit: None,
+            fit,
             start_frames: 5,
             ..TrackerOptions::for_height(1.75)
         };
@@ -297,6 +316,23 @@ mod tests {
         let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
         let course = locate(&sightings, &camera(), &crown).unwrap();
         assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+    }
+
+    #[test]
+    fn who_crouches_or_takes_short_steps_starts_with_that_gait() {
+        let half = GaitStyle { leg_amplitude: 0.5, arm_amplitude: 0.5, ..GaitStyle::default() };
+        for (style, speed_mps, expected) in [
+            (GaitStyle::default(), 1.3, GaitStyle::default()),
+            (GaitStyle::CROUCHED, 1.3, GaitStyle::CROUCHED),
+            (half, 0.8, GaitStyle::SHORT_STEPS),
+        ] {
+            let seen = seen_of(&Walker { style, ..walker() }, speed_mps);
+            let started = begun_with(seen.clone(), Some(FitOptions::default())).expect("a walker");
+            assert_eq!(started.walk.walker.style, expected, "{style:?}");
+            // Without the fit that measures another gait, everybody is taken to walk like the average.
+            let plain = begun(seen).map(|started| started.walk.walker.style);
+            assert!(plain.is_none_or(|style| style == GaitStyle::default()));
+        }
     }
 
     #[test]
