@@ -1,7 +1,8 @@
 //! Postures from real detections of a man balancing on a beam, seen by two cameras, against joints triangulated
 //! from four cameras. He does not walk: physical constraints alone.
 //!
-//! `cargo test --release -p memo-tests posture_detections -- --nocapture` prints the table.
+//! `cargo test --release -p memo-tests posture_detections -- --nocapture` prints the table,
+//! with `MEMO_FULL=1` with estimated lengths as well.
 
 use crate::recorded;
 
@@ -15,6 +16,11 @@ use memo_core::{
 
 use crate::recordings;
 use recorded::{keypoints, triangulated};
+
+/// Known lengths of the segments, and with `MEMO_FULL=1` estimated ones, of which only a table is printed.
+fn kinds_of_lengths() -> usize {
+    if std::env::var_os("MEMO_FULL").is_some() { 2 } else { 1 }
+}
 
 /// The frame rate of the recording.
 const RATE_HZ: f64 = 60.0;
@@ -125,7 +131,8 @@ fn postures_are_nearer_than_a_flat_figure() {
     for name in ["cam_02", "cam_04"] {
         let recording = recording(name);
         let lengths = SegmentLengths::from_figures(&recording.truth).unwrap();
-        for (label, lengths) in [("known lengths", Some(lengths)), ("estimated", None)] {
+        let of_both = [("known lengths", Some(lengths)), ("estimated", None)];
+        for (label, lengths) in of_both.into_iter().take(kinds_of_lengths()) {
             for source in CHOICES {
                 let found = recording.postures(&physical(lengths, AnchorChoice::Source(source)));
                 let necks = found.linked.figures.iter().map(|figure| figure[Joint::Neck]);
@@ -243,7 +250,8 @@ fn real_walks_look_like_walking() {
                 head_points_px: None,
                 foot_points_px: None,
             };
-            for (label, lengths) in [("known", Some(walk.lengths)), ("estimated", None)] {
+            let of_both = [("known", Some(walk.lengths)), ("estimated", None)];
+            for (label, lengths) in of_both.into_iter().take(kinds_of_lengths()) {
                 let options = SequenceOptions { lengths, noise_px: 1.0, ..SequenceOptions::default() };
                 let found = postures(&sequence, &recording.camera, &options).unwrap();
                 let empty = found.frames.iter().flatten().filter(|frame| frame.survivors() == 0).count();

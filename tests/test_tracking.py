@@ -170,10 +170,10 @@ def resident_kb():
         return next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
 
 tracker, walks = memo.Tracker(1.75, adapt=False), 0
-for index in range(14 * len(frames)):
+for index in range(9 * len(frames)):
     tracker.update(frames[index % len(frames)], index / 25)
     walks += len(tracker.take_finished())
-    if index + 1 in (2 * len(frames), 14 * len(frames)):
+    if index + 1 in (2 * len(frames), 9 * len(frames)):
         print(walks, resident_kb())
 """
 )
@@ -235,11 +235,11 @@ def test_same_result_with_any_number_of_threads(small_walker):
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="needs Linux's /proc")
 def test_memory_does_not_grow_with_the_stream(small_walker):
-    """One frame is 25 kB: 516 more of them, or their edges, would show."""
+    """One frame is 25 kB: 301 more of them, or their edges, would show."""
     (_, early_kb), (walks, late_kb) = (
         map(int, line.split()) for line in python(MEMORY, small_walker).splitlines()
     )
-    assert walks >= 12 and late_kb - early_kb < 3000
+    assert walks >= 8 and late_kb - early_kb < 3000
 
 
 @pytest.mark.parametrize("time_s", [np.nan, np.inf, -np.inf])

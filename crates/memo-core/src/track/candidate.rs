@@ -1,13 +1,15 @@
 //! A moving region that may be a person: its frames, and the start of a walk on them (Rohr 1994, section 6).
 
 use super::active::Active;
-use super::decisions::{FASTEST_MPS, OTHER_GAIT_GAIN, SLOWEST_MPS, WALKER_CONTRAST};
+use super::decisions::{
+    FASTEST_MPS, GLANCE_CONTRAST, GLANCE_SHARE, OTHER_GAIT_GAIN, SLOWEST_MPS, WALKER_CONTRAST,
+};
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M};
 use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
 use super::options::TrackerOptions;
 use super::options::start_height;
-use super::start::{StartReport, start};
+use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
 use crate::image::Rectangle;
 use crate::model::{Camera, GaitStyle, Walker, assumed_field_of_view_rad};
@@ -16,6 +18,8 @@ use crate::model::{Camera, GaitStyle, Walker, assumed_field_of_view_rad};
 pub(super) const MISSED_FRAMES: usize = 3;
 /// Speed of a comfortable walk, used before the speed is known, m/s.
 pub(super) const COMFORTABLE_MPS: f64 = 1.3;
+/// A glance at a start looks at every such frame.
+const GLANCE_EVERY: usize = 3;
 /// Gaits other than the average with which a walk can start.
 const OTHER_GAITS: [GaitStyle; 2] = [GaitStyle::CROUCHED, GaitStyle::SHORT_STEPS];
 
@@ -78,7 +82,7 @@ impl Candidate {
     ///
     /// 1. Camera and course from the rectangles.
     /// 2. Lines of phase over the whole cycle, of several gaits; of those that look like walking the most similar one
-    ///    starts.
+    ///    starts ([`Self::started`]).
     /// 3. Both twins followed through the start frames.
     pub fn begin(&self, given: &Given<'_>) -> Option<Active> {
         let options = given.options;
@@ -87,19 +91,7 @@ impl Candidate {
             return None;
         }
         let height = start_height(options, given.height_m, given.camera, &sightings);
-        let average = self.started(&sightings, given, &height, &GaitStyle::default())?;
-        let similarity = |started: &Started| started.start.lines.best.similarity;
-        let others = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
-        let other = others
-            .iter()
-            .filter_map(|style| self.started(&sightings, given, &height, style))
-            .filter(Started::walks)
-            .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
-            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-        let Started { camera, course, walker, start } = match other {
-            Some(other) => other,
-            None => average.walks().then_some(average)?,
-        };
+        let Started { camera, course, walker, start } = self.started(&sightings, given, &height)?;
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         for seen in &self.seen {
             walk.follow(&seen.edges, &camera, &options.walk);
@@ -123,17 +115,64 @@ impl Candidate {
         })
     }
 
-    /// The course and the lines of phase of one gait; `None` for things that do not move like a walker.
-    fn started(
-        &self,
+    /// The gait with which a walk starts; `None` for things that do not move like a walker.
+    ///
+    /// 1. A glance at every third frame, with every gait.
+    /// 2. All frames with the gaits that may be of somebody who walks, and with the average one if there is any.
+    /// 3. Of those that look like walking the most similar one, if it is clearly more similar than the average one.
+    fn started(&self, sightings: &[Sighting], given: &Given<'_>, height: &BodyHeight) -> Option<Started> {
+        let options = given.options;
+        let entered = |style: &GaitStyle| Entered::new(sightings, given, height, style);
+        let average = entered(&GaitStyle::default())?;
+        let gaits = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
+        let others: Vec<Entered> = gaits.iter().filter_map(entered).collect();
+
+        let edges: Vec<&FrameEdges> = self.seen.iter().map(|seen| &seen.edges).collect();
+        let mut of_average = average.search(&edges, options);
+        let first = of_average.glance(GLANCE_EVERY)?;
+        let promising = |entered: Entered| {
+            let mut search = entered.search(&edges, options);
+            let glance = search.glance(GLANCE_EVERY)?;
+            let is_similar = glance.similarity >= GLANCE_SHARE * first.similarity;
+            (is_similar && glance.contrast >= GLANCE_CONTRAST)
+                .then(|| search.finish())?
+                .map(|start| (entered, start))
+        };
+        let others: Vec<(Entered, StartReport)> = others.into_iter().filter_map(promising).collect();
+        if first.contrast < GLANCE_CONTRAST && others.is_empty() {
+            return None;
+        }
+
+        let start = of_average.finish()?;
+        let average = Started::new(average, start);
+        let similarity = |started: &Started| started.start.lines.best.similarity;
+        let other = others
+            .into_iter()
+            .map(|(entered, start)| Started::new(entered, start))
+            .filter(Started::walks)
+            .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
+            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
+        other.or_else(|| average.walks().then_some(average))
+    }
+}
+
+/// The course of a candidate as somebody of one gait.
+struct Entered {
+    camera: Camera,
+    course: Course,
+    walker: Walker,
+}
+
+impl Entered {
+    /// `None` for what is no course of a person, or slower or faster than people walk.
+    fn new(
         sightings: &[Sighting],
         given: &Given<'_>,
         height: &BodyHeight,
         style: &GaitStyle,
-    ) -> Option<Started> {
-        let options = given.options;
+    ) -> Option<Self> {
         let styled = |speed_mps: f64| {
-            Some(Walker { style: *style, ..options.walker(height.height_m, speed_mps).ok()? })
+            Some(Walker { style: *style, ..given.options.walker(height.height_m, speed_mps).ok()? })
         };
         let crown_m = styled(COMFORTABLE_MPS)?.level_crown_height_m();
         let (camera, course) = course(sightings, given, crown_m, height).ok()?;
@@ -141,9 +180,11 @@ impl Candidate {
             return None;
         }
         let walker = styled(course.speed_mps)?;
-        let edges: Vec<&FrameEdges> = self.seen.iter().map(|seen| &seen.edges).collect();
-        let start = start(&edges, &course, &walker, &camera, &options.cadence, &options.walk)?;
-        Some(Started { camera, course, walker, start })
+        Some(Self { camera, course, walker })
+    }
+
+    fn search<'a>(&'a self, edges: &'a [&FrameEdges], options: &'a TrackerOptions) -> StartSearch<'a> {
+        StartSearch::new(edges, &self.course, &self.walker, &self.camera, &options.cadence, &options.walk)
     }
 }
 
@@ -156,6 +197,11 @@ struct Started {
 }
 
 impl Started {
+    fn new(entered: Entered, start: StartReport) -> Self {
+        let Entered { camera, course, walker } = entered;
+        Self { camera, course, walker, start }
+    }
+
     /// True for what walks. A thing carried along in one posture looks like a walker, but then a constant phase explains
     /// it best.
     fn walks(&self) -> bool {

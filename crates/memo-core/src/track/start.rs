@@ -256,17 +256,37 @@ impl StartReport {
     /// Similarity along the best line divided by the mean over all phases. It is near 1 if no phase fits better
     /// than another, as for things that do not walk; 0 if nothing matched at all.
     pub fn contrast(&self) -> f64 {
-        let all: Vec<f64> = self.curves.iter().flat_map(|c| &c.scores).map(|s| f64::from(*s)).collect();
-        let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
-        if mean > 0.0 { self.lines.best.similarity / mean } else { 0.0 }
+        contrast(self.lines.best.similarity, &self.curves)
     }
 }
 
-/// Whole-cycle search in every frame, for one direction the body may face.
+/// Whole-cycle search, for one direction the body may face.
 struct Faced {
     path: Path,
-    curves: Vec<PhaseCurve>,
-    hypotheses: Vec<Vec<Hypothesis>>,
+    /// Best hypothesis and similarity at each phase, of the frames searched so far.
+    found: Vec<Option<Vec<(Hypothesis, f32)>>>,
+}
+
+/// The search for a start on a few frames: [`glance`](Self::glance) at some of them, then [`finish`](Self::finish).
+pub struct StartSearch<'a> {
+    frames: &'a [&'a FrameEdges],
+    course: &'a Course,
+    walker: &'a Walker,
+    camera: &'a Camera,
+    /// Cadences forwards and backwards.
+    rates: [CadenceRange; 2],
+    options: &'a WalkOptions,
+    /// The body ahead and turned about.
+    faced: [Faced; 2],
+}
+
+/// What some of the frames say of a start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Glance {
+    /// Similarity along the best line, in the better direction.
+    pub similarity: f64,
+    /// As [`StartReport::contrast`].
+    pub contrast: f64,
 }
 
 /// Starts a walk on a few frames: whole-cycle search, phase lines for forward and backward walking, regression.
@@ -279,76 +299,123 @@ pub fn start(
     rates: &CadenceRange,
     options: &WalkOptions,
 ) -> Option<StartReport> {
-    // 1. Similarity over the whole cycle, for both directions the body may face.
-    let ahead = face(frames, course, false, walker, camera, options);
-    let back = face(frames, course, true, walker, camera, options);
-    // 2. The best line of phase over time for each direction.
-    let reversed = CadenceRange { low_hz: -rates.high_hz, high_hz: -rates.low_hz };
-    let forward = phase_lines(&ahead.curves, rates)?;
-    let backward = phase_lines(&back.curves, &reversed)?;
-    let is_forward = forward.best.similarity >= backward.best.similarity;
-    let (direction, faced, lines, other) = if is_forward {
-        (Direction::Forward, ahead, forward, backward)
-    } else {
-        (Direction::Backward, back, backward, forward)
-    };
-    let duration_s = frames.last()?.time_s - frames.first()?.time_s;
-    let p_other_direction =
-        swap_probability(lines.best.similarity, other.best.similarity, duration_s, &options.swap);
-    // 3. Position and speed by regression over the hypotheses on the line.
-    let beginning = beginning(frames, &faced, &lines.best)?;
-    let used = if is_forward { *rates } else { reversed };
-    let two_line_rule = two_line_rule(&estimates(&faced.curves), &used)?;
-    let frozen = frozen_line(&faced.curves)?;
-    Some(StartReport {
-        path: faced.path,
-        beginning,
-        direction,
-        p_other_direction,
-        lines,
-        other_direction: other.best,
-        frozen,
-        two_line_rule,
-        curves: faced.curves,
-        frames: frames.iter().map(|f| f.frame).collect(),
-    })
+    StartSearch::new(frames, course, walker, camera, rates, options).finish()
 }
 
-fn face(
-    frames: &[&FrameEdges],
-    course: &Course,
-    turned: bool,
-    walker: &Walker,
-    camera: &Camera,
-    options: &WalkOptions,
-) -> Faced {
-    let sign = if turned { -1.0 } else { 1.0 };
-    let turn = if turned { std::f64::consts::PI } else { 0.0 };
-    let path = Path { heading_rad: course.path.heading_rad + turn, ..course.path };
-    let scene = Scene::new(walker, camera, &path);
-    let height_m = walker.level_torso_height_m();
-    let mut faced = Faced { path, curves: Vec::new(), hypotheses: Vec::new() };
-    for (frame, along) in frames.iter().zip(&course.along_m) {
-        let others = Others::new(&frame.others, camera.position());
-        let scene = scene.among(&others);
-        let grid = Grid::whole_cycle(sign * along, height_m);
-        let curve = search(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines).curve();
-        let scores = curve.iter().map(|(_, score)| *score).collect();
-        faced.curves.push(PhaseCurve { time_s: frame.time_s, scores });
-        faced.hypotheses.push(curve.into_iter().map(|(hypothesis, _)| hypothesis).collect());
+impl<'a> StartSearch<'a> {
+    /// A search on frames that nobody has looked at yet.
+    pub fn new(
+        frames: &'a [&'a FrameEdges],
+        course: &'a Course,
+        walker: &'a Walker,
+        camera: &'a Camera,
+        rates: &CadenceRange,
+        options: &'a WalkOptions,
+    ) -> Self {
+        let path = course.path;
+        let back = Path { heading_rad: path.heading_rad + std::f64::consts::PI, ..path };
+        let faced = [path, back].map(|path| Faced { path, found: vec![None; frames.len()] });
+        let reversed = CadenceRange { low_hz: -rates.high_hz, high_hz: -rates.low_hz };
+        Self { frames, course, walker, camera, rates: [*rates, reversed], options, faced }
     }
-    faced
+
+    /// Searches every `every`-th frame. `None` if there are no frames.
+    pub fn glance(&mut self, every: usize) -> Option<Glance> {
+        self.look(every);
+        let curves = self.curves();
+        let lines = self.lines(&curves)?;
+        let better = usize::from(lines[1].best.similarity > lines[0].best.similarity);
+        let similarity = lines[better].best.similarity;
+        Some(Glance { similarity, contrast: contrast(similarity, &curves[better]) })
+    }
+
+    /// Searches all frames and decides. `None` if there are no frames.
+    pub fn finish(mut self) -> Option<StartReport> {
+        // 1. Similarity over the whole cycle, for both directions the body may face.
+        self.look(1);
+        let [ahead, back] = self.curves();
+        // 2. The best line of phase over time for each direction.
+        let [forward, backward] = self.lines(&[ahead.clone(), back.clone()])?;
+        let is_forward = forward.best.similarity >= backward.best.similarity;
+        let (direction, faced, curves, rates, lines, other) = if is_forward {
+            (Direction::Forward, &self.faced[0], ahead, self.rates[0], forward, backward)
+        } else {
+            (Direction::Backward, &self.faced[1], back, self.rates[1], backward, forward)
+        };
+        let duration_s = self.frames.last()?.time_s - self.frames.first()?.time_s;
+        let (here, there) = (lines.best.similarity, other.best.similarity);
+        let p_other_direction = swap_probability(here, there, duration_s, &self.options.swap);
+        // 3. Position and speed by regression over the hypotheses on the line.
+        let beginning = beginning(self.frames, faced, &lines.best)?;
+        let two_line_rule = two_line_rule(&estimates(&curves), &rates)?;
+        let frozen = frozen_line(&curves)?;
+        Some(StartReport {
+            path: faced.path,
+            beginning,
+            direction,
+            p_other_direction,
+            lines,
+            other_direction: other.best,
+            frozen,
+            two_line_rule,
+            curves,
+            frames: self.frames.iter().map(|f| f.frame).collect(),
+        })
+    }
+
+    /// Searches every `every`-th frame that has not been searched yet, for both directions.
+    fn look(&mut self, every: usize) {
+        let height_m = self.walker.level_torso_height_m();
+        for (faced, sign) in self.faced.iter_mut().zip([1.0, -1.0]) {
+            let scene = Scene::new(self.walker, self.camera, &faced.path);
+            let frames = self.frames.iter().zip(&self.course.along_m).zip(&mut faced.found);
+            for ((frame, along_m), found) in frames.step_by(every) {
+                if found.is_none() {
+                    let others = Others::new(&frame.others, self.camera.position());
+                    let scene = scene.among(&others);
+                    let grid = Grid::whole_cycle(sign * along_m, height_m);
+                    let (similarity, hidden_lines) = (&self.options.similarity, self.options.hidden_lines);
+                    *found = Some(search(&frame.edges, &scene, &grid, similarity, hidden_lines).curve());
+                }
+            }
+        }
+    }
+
+    /// The similarity curves of the frames searched so far, for both directions.
+    fn curves(&self) -> [Vec<PhaseCurve>; 2] {
+        [0, 1].map(|k| {
+            let frames = self.frames.iter().zip(&self.faced[k].found);
+            let of = |(frame, found): (&&FrameEdges, &Option<Vec<(Hypothesis, f32)>>)| {
+                let scores = found.as_ref()?.iter().map(|(_, score)| *score).collect();
+                Some(PhaseCurve { time_s: frame.time_s, scores })
+            };
+            frames.filter_map(of).collect()
+        })
+    }
+
+    /// The best lines through the curves, for both directions.
+    fn lines(&self, curves: &[Vec<PhaseCurve>; 2]) -> Option<[TwinLines; 2]> {
+        let [ahead, back] = curves;
+        Some([phase_lines(ahead, &self.rates[0])?, phase_lines(back, &self.rates[1])?])
+    }
+}
+
+/// The similarity along a line over the mean of all phases; 0 if nothing matched at all.
+fn contrast(similarity: f64, curves: &[PhaseCurve]) -> f64 {
+    let all: Vec<f64> = curves.iter().flat_map(|c| &c.scores).map(|s| f64::from(*s)).collect();
+    let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
+    if mean > 0.0 { similarity / mean } else { 0.0 }
 }
 
 /// Regression of position over time, over each frame's best hypothesis at the line's phase.
 fn beginning(frames: &[&FrameEdges], faced: &Faced, line: &PhaseLine) -> Option<Beginning> {
     let first = frames.first()?.time_s;
-    let on_line = |(frame, hypotheses): (&&FrameEdges, &Vec<Hypothesis>)| {
-        let elapsed = frame.time_s - first;
-        let index = (line.at(elapsed) * hypotheses.len() as f64).round() as usize % hypotheses.len();
-        (elapsed, hypotheses[index])
+    let on_line = |(frame, found): (&&FrameEdges, &Option<Vec<(Hypothesis, f32)>>)| {
+        let (elapsed, found) = (frame.time_s - first, found.as_ref()?);
+        let index = (line.at(elapsed) * found.len() as f64).round() as usize % found.len();
+        Some((elapsed, found[index].0))
     };
-    let found: Vec<(f64, Hypothesis)> = frames.iter().zip(&faced.hypotheses).map(on_line).collect();
+    let found: Vec<(f64, Hypothesis)> = frames.iter().zip(&faced.found).filter_map(on_line).collect();
     let (speed_mps, along_m) = line_through(&found.iter().map(|(t, h)| (*t, h.along_m)).collect::<Vec<_>>());
     Some(Beginning { time_s: first, along_m, phase: line.phase_at_start, speed_mps, rate_hz: line.rate_hz })
 }

@@ -253,6 +253,31 @@ fn a_start_finds_place_speed_phase_rate_and_the_way_faced() {
     }
 }
 
+/// A glance at all frames says what the whole start says; one at some of them leaves the result as it is.
+#[test]
+fn a_glance_is_a_start_on_some_of_the_frames() {
+    for (forward, rate_hz) in [(true, 0.9), (false, 0.8)] {
+        let (frames, course, camera) = planted(forward, rate_hz);
+        let (options, rates) = (WalkOptions::default(), CadenceRange::default());
+        let frames: Vec<&FrameEdges> = frames.iter().collect();
+        let whole = start(&frames, &course, &walker(), &camera, &rates, &options).unwrap();
+        let every = |every: usize| {
+            let (frames, along_m) = (0..5).step_by(every).map(|k| (frames[k], course.along_m[k])).unzip();
+            (frames, Course { along_m, ..course.clone() })
+        };
+        for n in [1, 2, 3] {
+            let (some, course_of_some): (Vec<&FrameEdges>, Course) = every(n);
+            let of_some = start(&some, &course_of_some, &walker(), &camera, &rates, &options).unwrap();
+            let walker = walker();
+            let mut search = StartSearch::new(&frames, &course, &walker, &camera, &rates, &options);
+            let glance = search.glance(n).unwrap();
+            let similarity = of_some.lines.best.similarity;
+            assert_eq!(glance, Glance { similarity, contrast: of_some.contrast() }, "{n}");
+            assert_eq!(search.finish().unwrap(), whole, "{n}");
+        }
+    }
+}
+
 #[test]
 fn the_contrast_is_the_best_line_over_the_mean_of_all_phases() {
     let (frames, course, camera) = planted(true, 0.9);
