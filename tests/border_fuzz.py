@@ -600,6 +600,7 @@ def _(d, name):
         late_left=lambda: d.number(-0.1, 0.1),
         slant_rad=lambda: d.number(-1, 1),
         turn_rad=lambda: d.number(-5, 5),
+        pause_s=lambda: (d.number(0, 3), d.number(0, 5)),
         mover=lambda: d.choice("walker", "rider", "waver", "trolley", "treadmill"),
     )
     scene = _memo.ClothedScene(d.whole(0, 2**62), **options)

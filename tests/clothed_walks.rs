@@ -5,7 +5,7 @@
 //! `MEMO_FULL=1` draws eight times as many.
 
 use glam::DVec2;
-use memo_core::synth::{ClothedOptions, FootContact, Mover};
+use memo_core::synth::{ClothedOptions, FootContact, Mover, Pause};
 use memo_core::track::fit::{FitError, FitOptions, WalkFit};
 use memo_core::track::start::Direction;
 use memo_core::track::{EventKind, Row};
@@ -341,6 +341,34 @@ fn followed(options: ClothedOptions) -> (Followed, Vec<usize>) {
 }
 
 /// Someone who turns is followed along a curve, with the heading of every frame.
+/// Somebody who stands still for three seconds in the middle of the picture.
+#[test]
+fn who_stops_and_goes_on_is_one_person_with_two_walks() {
+    let (mut one, mut all) = (0, 0);
+    for seed in 0..many(2) {
+        let pause = Some(Pause { at_s: 2.6, lasts_s: 3.0 });
+        let scene = scene(ClothedOptions { seed, frames: 200, pause, ..ClothedOptions::default() });
+        let walks = tracked(&scene, 0..scene.len(), true);
+        let people: Vec<usize> = walks.iter().map(|walk| walk.person).collect();
+        let frames: Vec<[usize; 2]> = walks
+            .iter()
+            .map(|walk| [walk.rows()[0].frame, walk.rows()[walk.rows().len() - 1].frame])
+            .collect();
+        println!("seed {seed}: people {people:?}, frames {frames:?}");
+        (one, all) = (one + usize::from(people == [0, 0]), all + 1);
+        // Nobody is made up in the pause, and the walk is followed on both sides of it.
+        assert!(frames[0][1] < 80 && frames[1..].iter().all(|frames| frames[0] > 135), "{frames:?}");
+        for walk in &walks {
+            let along = |row: &Row| {
+                (row.torso_centre - scene.truth(row.frame).unwrap().torso_centre).truncate().length()
+            };
+            let off_m = rms(walk.rows().iter().map(along));
+            assert!(off_m < 0.15, "seed {seed}: {off_m} m");
+        }
+    }
+    assert!(10 * one >= 9 * all, "{one} of {all}");
+}
+
 #[test]
 fn a_walk_that_turns_is_followed_round_its_curve() {
     for (seed, turn_rad) in [(8, -1.4), (3, 1.1)].into_iter().take(many(1) as usize) {

@@ -1,5 +1,7 @@
 """Drawn scenes with truth: what `memo.demo_scene` and `model_scene` give."""
 
+import itertools
+
 import memo
 import numpy as np
 import pytest
@@ -92,3 +94,15 @@ def test_the_model_as_a_walker_is_tracked_to_the_centimetre():
     assert len(track) > 50
     assert np.sqrt(np.mean((track.columns["x_m"] - scene.truth["x_m"][rows]) ** 2)) < 0.015
     assert np.nanmax(np.abs(track.columns["right_knee_deg"] - scene.truth["right_knee_deg"][rows])) < 5
+
+
+def test_in_a_pause_the_person_stands_still_in_truth_and_picture():
+    scene = memo.demo_scene(1, frames=60, noise_sd=0.0, pause_s=(0.9, 0.8))
+    place_m = np.column_stack([scene.truth["x_m"], scene.truth["y_m"]])
+    moves = np.linalg.norm(np.diff(place_m, axis=0), axis=1) > 1e-9
+    from_s, to_s = scene.times_s[:-1], scene.times_s[1:]
+    assert np.array_equal(moves, (from_s < 0.9 - 1e-9) | (to_s > 1.7 + 1e-9))
+    changed = np.array([(a != b).any() for a, b in itertools.pairwise(scene.frames)])
+    assert np.array_equal(changed, moves)
+    with pytest.raises(ValueError, match=r"pause.at_s must be 0.8 to 10000 s, got 0.5"):
+        memo.demo_scene(pause_s=(0.5, 1.0))

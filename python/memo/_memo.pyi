@@ -212,6 +212,7 @@ class ClothedScene:
         late_left: float | None = None,
         slant_rad: float | None = None,
         turn_rad: float = 0.0,
+        pause_s: tuple[float, float] | None = None,
         mover: str = "walker",
     ) -> Self: ...
     def frame(self, index: int) -> npt.NDArray[np.uint8]: ...

@@ -60,6 +60,7 @@ def demo_scene(
     late_left: float | None = None,
     turn_deg: float = 0.0,
     slant_deg: float | None = None,
+    pause_s: tuple[float, float] | None = None,
     mover: Literal["walker", "rider", "waver", "trolley", "treadmill"] = "walker",
     progress: Progress | None = None,
 ) -> DemoScene:
@@ -72,7 +73,8 @@ def demo_scene(
     `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
     by which the left foot strikes late (-0.1 to 0.1), `turn_deg` how far a walker turns to the left in all
     (-229 to 229): the path is an arc. `slant_deg` turns the path out of the image plane, to the left (-91 to
-    91): a person who walks to the right goes away at 90. Movers other than a walker must be refused by the
+    91): a person who walks to the right goes away at 90. With `pause_s`, when and for how long, the person slows
+    down, stands still in the posture of that moment and goes on. Movers other than a walker must be refused by the
     tracker: a `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`;
     they have no truth. `progress` is called with the number of frames drawn and the total.
     """
@@ -84,6 +86,7 @@ def demo_scene(
         late_left=late_left,
         turn_rad=float(np.radians(turn_deg)),
         slant_rad=None if slant_deg is None else float(np.radians(slant_deg)),
+        pause_s=pause_s,
         mover=mover,
     )
     rows = [(index, *known) for index in range(len(scene)) if (known := scene.truth(index)) is not None]

@@ -4,7 +4,7 @@ use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use memo_core::model::{SideAngles, SideJoints};
-use memo_core::synth::{ClothedOptions, Mover, SceneOptions};
+use memo_core::synth::{ClothedOptions, Mover, Pause, SceneOptions};
 use memo_core::wording::counted;
 use memo_core::{ClothedScene, Image, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
@@ -50,7 +50,7 @@ pub struct PyClothedScene(ClothedScene);
 #[pymethods]
 impl PyClothedScene {
     #[new]
-    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, mover="walker"))]
+    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, pause_s=None, mover="walker"))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         seed: u64,
@@ -60,6 +60,7 @@ impl PyClothedScene {
         late_left: Option<f64>,
         slant_rad: Option<f64>,
         turn_rad: f64,
+        pause_s: Option<(f64, f64)>,
         mover: &str,
     ) -> PyResult<Self> {
         let mover = match mover {
@@ -87,6 +88,7 @@ impl PyClothedScene {
             late_left,
             slant_rad,
             turn_rad,
+            pause: pause_s.map(|(at_s, lasts_s)| Pause { at_s, lasts_s }),
             mover,
             ..ClothedOptions::default()
         };

@@ -6,7 +6,7 @@ pub(crate) mod pointlight;
 pub(crate) mod random;
 pub(crate) mod scene;
 
-pub use clothed::{ClothedOptions, ClothedTruth, FootContact, Mover};
+pub use clothed::{ClothedOptions, ClothedTruth, FootContact, Mover, Pause};
 pub use motion::{
     MotionError, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, WALKER_LIMBS, WALKER_NAMES, limbs_of,
 };

@@ -3,7 +3,7 @@
 use super::crowd::{Expected, body_box, expected};
 use super::decisions::{
     DECIDING_SHARE, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN, SLOWEST_HZ, SLOWEST_MPS,
-    STRIDE_HEIGHTS,
+    STANDING_SHARE, STRIDE_HEIGHTS,
 };
 use super::fit::of_walk::Tracked;
 use super::fit::views::{Backdrop, Piece};
@@ -141,7 +141,23 @@ impl Active {
             time_s: step.time_s,
             place_m: path.point(step.state.along.position, 0.0).truncate(),
             velocity_mps: step.state.along.velocity * path.direction(),
+            stands: false,
         })
+    }
+
+    /// Where the person is if the walk ended because the person stopped: the person was seen to the end and was by then
+    /// much slower than before. Who is lost or hidden seems to go on.
+    pub(super) fn standing(&self) -> Option<Sign> {
+        let twin = &self.walk.twins[self.walk.best()];
+        let recent = &twin.steps[twin.steps.len().checked_sub(RECENT_FRAMES)?..];
+        let (first, last) = (&twin.steps[0], &recent[RECENT_FRAMES - 1]);
+        let covered_m = last.state.along.position - first.state.along.position;
+        let mean_mps = covered_m.abs() / (last.time_s - first.time_s);
+        let speed_mps = last.state.along.velocity.abs();
+        let is_seen = matched(recent).is_some_and(|found| found >= LOST_SHARE * mean_similarity(twin));
+        let stands = is_seen && speed_mps < STANDING_SHARE * mean_mps;
+        let is_on_a_path = !self.is_on_treadmill && self.frontal.is_none();
+        self.sign().filter(|_| stands && is_on_a_path).map(|sign| Sign { stands, ..sign })
     }
 
     /// The person as followed in the last frame.
@@ -453,6 +469,30 @@ pub(super) mod tests {
         ] {
             assert_eq!(ending(40, speed_mps, rate_hz, 0.5).is_over(), is_over, "{speed_mps}, {rate_hz}");
         }
+    }
+
+    /// At 0.6 of the mean speed and less; who is hidden or lost, or walks on a treadmill, does not stand.
+    #[test]
+    fn who_is_seen_to_slow_down_stands() {
+        let slowed = |share: f64| {
+            let mut walk = ending(40, 1.2, 0.9, 0.5);
+            walk.walk.twins[0].steps[39].state.along.velocity = share * 1.2;
+            walk
+        };
+        let last = slowed(0.1).sign().unwrap();
+        assert_eq!(slowed(0.1).standing(), Some(Sign { stands: true, ..last }));
+        for (share, stands) in [(0.59, true), (-0.59, true), (0.61, false), (-0.61, false), (1.0, false)] {
+            assert_eq!(slowed(share).standing().is_some(), stands, "{share}");
+        }
+        for (visible, similarity) in [(0.2, 0.5), (1.0, 0.1)] {
+            let mut unseen = slowed(0.1);
+            for step in &mut unseen.walk.twins[0].steps[28..] {
+                (step.visible, step.similarity) = (visible, similarity);
+            }
+            assert_eq!(unseen.standing(), None, "{visible}, {similarity}");
+        }
+        assert_eq!(Active { is_on_treadmill: true, ..slowed(0.1) }.standing(), None);
+        assert_eq!(active(Vec::new()).standing(), None);
     }
 
     /// Frames in which others hide the person do not end a walk.

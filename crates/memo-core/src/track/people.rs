@@ -1,7 +1,8 @@
 //! Who is who: numbers of people over the walks of one stream.
 //!
 //! A walk can end because a person was hidden, stood still or could not be told from the background. A walk that
-//! starts soon after where that person would be by then, in the same direction, is the same person's.
+//! starts soon after where that person would be by then, in the same direction, is the same person's. Somebody who stood
+//! still stays there, and may go any way and much later.
 
 use super::decisions::{PLACE_M, PLACE_M_PER_S, SAME_WAY};
 use glam::{DVec2, DVec3};
@@ -33,10 +34,14 @@ pub(super) struct Sign {
     pub time_s: f64,
     pub place_m: DVec2,
     pub velocity_mps: DVec2,
+    /// Whether the person stood still.
+    pub stands: bool,
 }
 
 /// A person is expected back for this long, seconds.
 const EXPECTED_S: f64 = 3.0;
+/// Somebody who stood still is expected to go on for this long, seconds: it may be that nobody saw the person go.
+const STANDS_S: f64 = 60.0;
 
 /// The numbers given so far.
 #[derive(Debug, Default)]
@@ -53,7 +58,7 @@ impl Identities {
 
     /// The person who ended nearest to where this walk starts, or a new one.
     pub fn appear(&mut self, sign: &Sign) -> usize {
-        self.ended.retain(|(_, end)| sign.time_s - end.time_s <= EXPECTED_S);
+        self.ended.retain(|(_, end)| sign.time_s - end.time_s <= end.expected_s());
         let nearest = |(n, (_, end)): (usize, &(usize, Sign))| Some((n, end.distance_to(sign)?));
         let known = self.ended.iter().enumerate().filter_map(nearest).min_by(|a, b| a.1.total_cmp(&b.1));
         match known {
@@ -97,12 +102,21 @@ impl Sign {
     /// How far a later walk starts from where this one would be by then, metres; `None` if it is somebody else's.
     fn distance_to(&self, later: &Self) -> Option<f64> {
         let elapsed_s = later.time_s - self.time_s;
+        if self.stands {
+            let off_m = self.place_m.distance(later.place_m);
+            return (elapsed_s >= 0.0 && off_m <= PLACE_M).then_some(off_m);
+        }
         let off_m = (self.place_m + elapsed_s * self.velocity_mps).distance(later.place_m);
         let ways = [self, later].map(|sign| sign.velocity_mps.normalize_or_zero());
         let is_same = elapsed_s >= 0.0
             && off_m <= PLACE_M + PLACE_M_PER_S * elapsed_s
             && ways[0].dot(ways[1]) >= SAME_WAY;
         is_same.then_some(off_m)
+    }
+
+    /// How long the person is expected back, seconds.
+    fn expected_s(&self) -> f64 {
+        if self.stands { STANDS_S } else { EXPECTED_S }
     }
 }
 
@@ -111,7 +125,7 @@ mod tests {
     use super::*;
 
     fn sign(time_s: f64, x: f64, speed_mps: f64) -> Sign {
-        Sign { time_s, place_m: DVec2::new(x, 5.0), velocity_mps: DVec2::new(speed_mps, 0.0) }
+        Sign { time_s, place_m: DVec2::new(x, 5.0), velocity_mps: DVec2::new(speed_mps, 0.0), stands: false }
     }
 
     #[test]
@@ -133,6 +147,25 @@ mod tests {
             people.appear(&sign(0.0, 0.0, 1.2));
             people.end(0, sign(2.0, 2.4, 1.2));
             assert_eq!(people.appear(&other), 1, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn who_stood_still_goes_on_any_way_and_later() {
+        let stood = Sign { stands: true, ..sign(2.0, 2.4, 0.1) };
+        for (other, number) in [
+            (sign(3.0, 2.9, 1.2), 0),
+            (sign(61.9, 2.9, 1.2), 0),
+            (sign(62.1, 2.9, 1.2), 1),
+            (sign(9.0, 1.7, -1.2), 0),
+            (sign(9.0, 1.5, -1.2), 1),
+            (sign(9.0, 3.3, 1.2), 1),
+            (sign(1.9, 2.4, 1.2), 1),
+        ] {
+            let mut people = Identities::default();
+            people.appear(&sign(0.0, 0.0, 1.2));
+            people.end(0, stood);
+            assert_eq!(people.appear(&other), number, "{other:?}");
         }
     }
 

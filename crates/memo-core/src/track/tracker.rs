@@ -438,8 +438,8 @@ impl Tracker {
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
         let Some(start) = new.sign_at(0) else { return self.identities.count() };
-        let leads =
-            |(_, old): &(f64, Active)| old.sign_before(start.time_s).is_some_and(|end| end.leads_to(&start));
+        let end = |old: &Active| old.standing().or_else(|| old.sign_before(start.time_s));
+        let leads = |(_, old): &(f64, Active)| end(old).is_some_and(|end| end.leads_to(&start));
         let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };
         let (_, mut old) = self.fading.remove(n);
         old.end_before(start.time_s);
@@ -611,6 +611,7 @@ impl Tracker {
         active.turned(&self.options);
         active.pace_all();
         active.straighten(&self.options.walk);
+        let standing = active.standing();
         active.trim();
         if !active.is_walk() {
             self.report.refused_starts += 1;
@@ -626,7 +627,7 @@ impl Tracker {
             self.identities.withdraw(active.person);
             return;
         }
-        if let Some(sign) = active.sign() {
+        if let Some(sign) = standing.or_else(|| active.sign()) {
             self.identities.end(active.person, sign);
         }
         let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));

@@ -58,7 +58,7 @@ pub enum Mover {
 pub struct ClothedOptions {
     /// Seed; determines everything that is not fixed by the other options.
     pub seed: u64,
-    /// Number of frames. The walker passes the middle of the image half-way through them.
+    /// Number of frames. The walker passes the middle of the image half-way through them, without a pause.
     pub frames: usize,
     /// Frames per second, 1 to 10,000.
     pub rate_hz: f64,
@@ -74,8 +74,33 @@ pub struct ClothedOptions {
     pub late_left: Option<f64>,
     /// How far a walker turns to the left in all, radians, -4 to 4: the path is an arc about its middle.
     pub turn_rad: f64,
+    /// When the mover stands still.
+    pub pause: Option<Pause>,
     /// What moves.
     pub mover: Mover,
+}
+
+/// The mover slows down, stands still in the posture of that moment, and goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pause {
+    /// From this time on the mover stands still, seconds.
+    pub at_s: f64,
+    /// For so long, seconds.
+    pub lasts_s: f64,
+}
+
+/// How long a mover slows down before a pause and speeds up after it, seconds.
+const EASE_S: f64 = 0.8;
+
+impl Pause {
+    /// The time that the same movement without the pause takes. The speed falls and rises as half a cosine.
+    fn moved_s(&self, time_s: f64) -> f64 {
+        let wave = |u: f64| EASE_S / TAU * (std::f64::consts::PI * u / EASE_S).sin();
+        let slowing = (time_s - (self.at_s - EASE_S)).clamp(0.0, EASE_S);
+        let speeding = (time_s - (self.at_s + self.lasts_s)).clamp(0.0, EASE_S);
+        let full = time_s.min(self.at_s - EASE_S) + (time_s - (self.at_s + self.lasts_s + EASE_S)).max(0.0);
+        full + 0.5 * slowing + wave(slowing) + 0.5 * speeding - wave(speeding)
+    }
 }
 
 impl Default for ClothedOptions {
@@ -90,6 +115,7 @@ impl Default for ClothedOptions {
             slant_rad: None,
             late_left: None,
             turn_rad: 0.0,
+            pause: None,
             mover: Mover::Walker,
         }
     }
@@ -235,13 +261,32 @@ impl ClothedScene {
         frame as f64 / self.options.rate_hz
     }
 
+    /// A time less that of a pause: what moves is a function of it.
+    fn moved_s(&self, time_s: f64) -> f64 {
+        self.options.pause.map_or(time_s, |pause| pause.moved_s(time_s))
+    }
+
+    /// The time of the scene at which the mover has moved for so long, by bisection up to the last frame.
+    fn scene_s(&self, moved_s: f64) -> f64 {
+        if self.options.pause.is_none() {
+            return moved_s;
+        }
+        let (mut low, mut high) = (0.0, self.time_s(self.len()));
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.moved_s(middle) < moved_s { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
+    }
+
     /// The ground truth of a frame; `None` unless the mover is a walker.
     pub fn truth(&self, frame: usize) -> Option<ClothedTruth> {
         if !self.walks() {
             return None;
         }
         let time_s = self.time_s(frame);
-        let [right, left] = self.figure(time_s).joints;
+        let moved_s = self.moved_s(time_s);
+        let [right, left] = self.figure(moved_s).joints;
         Some(ClothedTruth {
             frame,
             time_s,
@@ -250,7 +295,7 @@ impl ClothedScene {
             right,
             left,
             angles: self.angles([right, left]),
-            phase: self.phase(time_s),
+            phase: self.phase(moved_s),
         })
     }
 
@@ -260,8 +305,7 @@ impl ClothedScene {
         if !self.walks() || self.is_empty() {
             return Vec::new();
         }
-        let end_s = self.time_s(self.len() - 1);
-        let last = self.cycles(end_s);
+        let last = self.cycles(self.moved_s(self.time_s(self.len() - 1)));
         let mut contacts = Vec::new();
         for (index, side) in [Side::Right, Side::Left].into_iter().enumerate() {
             let strike = (EventKind::HeelStrike, self.stride.strikes[index]);
@@ -269,8 +313,8 @@ impl ClothedScene {
             for (kind, cycles) in [strike, leave] {
                 let first = (self.start_cycles - cycles).ceil() as i64;
                 for turn in first..=(last - cycles).floor() as i64 {
-                    let time_s = self.time_of(turn as f64 + cycles);
-                    let heel = self.figure(time_s).feet[index][0];
+                    let moved_s = self.time_of(turn as f64 + cycles);
+                    let (time_s, heel) = (self.scene_s(moved_s), self.figure(moved_s).feet[index][0]);
                     contacts.push(FootContact { time_s, kind, side, heel });
                 }
             }
@@ -310,10 +354,11 @@ impl ClothedScene {
     }
 
     fn own_solids(&self, time_s: f64) -> (Vec<Solid>, Vec<(DVec3, f64)>) {
+        let moved_s = self.moved_s(time_s);
         if self.options.mover == Mover::Trolley {
-            return self.trolley(time_s);
+            return self.trolley(moved_s);
         }
-        let figure = self.figure(time_s);
+        let figure = self.figure(moved_s);
         let radii = self.sizes.foot_radii_m();
         let feet = figure.feet.iter().flat_map(|foot| foot.iter().copied().zip(radii));
         (person::solids(&figure, &self.sizes, &self.clothes), feet.collect())
@@ -324,7 +369,7 @@ impl ClothedScene {
         matches!(self.options.mover, Mover::Walker | Mover::Treadmill)
     }
 
-    /// The posed person at a time.
+    /// The posed person after this time in motion.
     fn figure(&self, time_s: f64) -> Figure {
         let cycles = self.cycles(time_s);
         let middle = self.stride.length_m * self.cycles(self.middle_s());
@@ -382,9 +427,9 @@ impl ClothedScene {
         (solids, wheels)
     }
 
-    /// The time at which the mover passes the middle of the image.
+    /// The time in motion at which the mover passes the middle of the image: half of all.
     fn middle_s(&self) -> f64 {
-        0.5 * self.options.frames as f64 / self.options.rate_hz
+        0.5 * self.moved_s(self.time_s(self.len()))
     }
 
     /// Gait cycles at a time: a constant rate with a slow wave.
@@ -450,6 +495,8 @@ fn check(options: &ClothedOptions) -> Result<(), SceneError> {
         ("slant_rad", options.slant_rad.unwrap_or(0.0), -1.6..=1.6, "-1.6 to 1.6 rad"),
         ("turn_rad", options.turn_rad, -4.0..=4.0, "-4 to 4 rad"),
         ("late_left", options.late_left.unwrap_or(0.0), -0.1..=0.1, "-0.1 to 0.1 of a cycle"),
+        ("pause.at_s", options.pause.map_or(EASE_S, |pause| pause.at_s), EASE_S..=1e4, "0.8 to 10000 s"),
+        ("pause.lasts_s", options.pause.map_or(0.0, |pause| pause.lasts_s), 0.0..=1e4, "0 to 10000 s"),
     ])
 }
 

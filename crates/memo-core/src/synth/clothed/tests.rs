@@ -26,6 +26,9 @@ fn what_cannot_be_drawn_is_refused() {
     assert!(refused(ClothedOptions { slant_rad: Some(2.0), ..base() }).ends_with("got 2"));
     assert!(refused(ClothedOptions { turn_rad: 5.0, ..base() }).ends_with("got 5"));
     assert!(refused(ClothedOptions { late_left: Some(0.2), ..base() }).ends_with("got 0.2"));
+    let pause = |at_s, lasts_s| Some(Pause { at_s, lasts_s });
+    assert!(refused(ClothedOptions { pause: pause(0.7, 1.0), ..base() }).ends_with("got 0.7"));
+    assert!(refused(ClothedOptions { pause: pause(2.0, -1.0), ..base() }).ends_with("got -1"));
 }
 
 #[test]
@@ -37,6 +40,37 @@ fn scenes_of_one_pixel_of_no_frames_and_beyond_the_last_frame_can_be_drawn() {
             let drawn = scene.frame(frame);
             assert_eq!([drawn.width() as u32, drawn.height() as u32], size);
         }
+    }
+}
+
+/// Over a pause the walk is the same, later: slower before and after, still within, at full speed elsewhere.
+#[test]
+fn in_a_pause_the_person_stands_and_then_walks_on() {
+    let (at_s, lasts_s) = (2.0, 1.5);
+    let pause = Some(Pause { at_s, lasts_s });
+    let paused = scene(ClothedOptions { seed: 3, frames: 160, pause, ..ClothedOptions::default() });
+    let place = |k: usize| paused.truth(k).unwrap().torso_centre.truncate();
+    let speeds_mps: Vec<(f64, f64)> =
+        (1..160).map(|k| (paused.time_s(k) - 0.02, 25.0 * place(k).distance(place(k - 1)))).collect();
+    for (time_s, speed_mps) in &speeds_mps {
+        let is_still = (at_s + 0.02..at_s + lasts_s - 0.02).contains(time_s);
+        assert_eq!(*speed_mps < 1e-9, is_still, "{time_s}: {speed_mps}");
+    }
+    let mean = |from_s: f64, to_s: f64| {
+        let there: Vec<f64> =
+            speeds_mps.iter().filter(|(t, _)| (from_s..to_s).contains(t)).map(|(_, v)| *v).collect();
+        there.iter().sum::<f64>() / there.len() as f64 / paused.speed_mps
+    };
+    let means = [mean(0.0, 1.2), mean(4.3, 6.4), mean(1.2, 2.0), mean(3.5, 4.3)];
+    assert!((means[0] - 1.0).abs() < 0.1 && (means[1] - 1.0).abs() < 0.1, "{means:?}");
+    assert!((means[2] - 0.5).abs() < 0.1 && (means[3] - 0.5).abs() < 0.1, "{means:?}");
+    // The feet touch the floor when the person is at that place.
+    let contacts = paused.contacts();
+    assert!(contacts.len() >= 12 && contacts.iter().all(|contact| contact.time_s < 6.4));
+    for contact in contacts.iter().filter(|contact| contact.kind == EventKind::HeelStrike) {
+        let phase = paused.phase(paused.moved_s(contact.time_s));
+        let own = if contact.side == Side::Right { phase } else { phase - 0.5 };
+        assert!((own - own.round()).abs() < 1e-6, "{contact:?}: {phase}");
     }
 }
 
