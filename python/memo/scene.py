@@ -73,10 +73,10 @@ def demo_scene(
     `noise_sd` is the standard deviation of the sensor noise in grey levels, `late_left` the share of a cycle
     by which the left foot strikes late (-0.1 to 0.1), `turn_deg` how far a walker turns to the left in all
     (-229 to 229): the path is an arc. `slant_deg` turns the path out of the image plane, to the left (-91 to
-    91): a person who walks to the right goes away at 90. With `pause_s`, when and for how long, the person slows
-    down, stands still in the posture of that moment and goes on. Movers other than a walker must be refused by the
-    tracker: a `rider` carried along in one posture, a `waver` who stands and swings the arms, a `trolley`;
-    they have no truth. `progress` is called with the number of frames drawn and the total.
+    91): a person who walks to the right goes away at 90. `pause_s` is when and for how long the person stands
+    still, in the posture of that moment; before and after it the person is slower. Movers other than a walker
+    must be refused by the tracker: a `rider` carried along in one posture, a `waver` who stands and swings
+    the arms, a `trolley`; they have no truth. `progress` is called with the number of frames drawn and the total.
     """
     scene = _memo.ClothedScene(
         seed,
