@@ -76,7 +76,8 @@ def demo_scene(
     91): a person who walks to the right goes away at 90. `pause_s` is when and for how long the person stands
     still, in the posture of that moment; before and after it the person is slower. Movers other than a walker
     must be refused by the tracker: a `rider` carried along in one posture, a `waver` who stands and swings
-    the arms, a `trolley`; they have no truth. `progress` is called with the number of frames drawn and the total.
+    the arms, a `trolley`; they have no truth. `progress` is called with the number of frames drawn and the
+    total.
     """
     scene = _memo.ClothedScene(
         seed,
