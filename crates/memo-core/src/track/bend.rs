@@ -12,7 +12,7 @@ use super::decisions::{EARLY_TURN_GAIN, QUICK_TURN_GAIN, TURN_GAIN};
 use super::locate::{Crown, Sighting, foot};
 use super::options::TrackerOptions;
 use super::route::Route;
-use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search};
+use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
 use super::walk::{Beginning, FrameEdges, Step, Walk};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::smooth::Measured;
@@ -151,7 +151,7 @@ impl Active {
             height: Axis::around(height_m, 2.0 * POSITION_STEP_M, POSITION_STEP_M),
             phase: Axis::around(phase, PHASE_STEP, PHASE_STEP),
         };
-        let found = search(&edges.edges, &scene, &grid, &options.walk.similarity, options.walk.hidden_lines);
+        let found = search_peak(&edges.edges, &scene, &grid, &options.walk.similarity, options.walk.hidden_lines);
         f64::from(found.best_score())
     }
 }

@@ -12,7 +12,7 @@
 //! Both twins are returned, and [`swap_probability`] is the probability that the wrong one was chosen.
 
 use super::locate::Course;
-use super::search::{Grid, Hypothesis, Path, Scene, search};
+use super::search::{Grid, Hypothesis, Path, Scene, search_each_phase};
 use super::swap::swap_probability;
 use super::walk::{Beginning, FrameEdges, WalkOptions};
 use crate::estimate::line::line_through;
@@ -375,7 +375,7 @@ impl<'a> StartSearch<'a> {
                     let scene = scene.among(&others);
                     let grid = Grid::whole_cycle(sign * along_m, height_m);
                     let (similarity, hidden_lines) = (&self.options.similarity, self.options.hidden_lines);
-                    *found = Some(search(&frame.edges, &scene, &grid, similarity, hidden_lines).curve());
+                    *found = Some(search_each_phase(&frame.edges, &scene, &grid, similarity, hidden_lines).curve());
                 }
             }
         }

@@ -18,7 +18,7 @@ use super::height::BodyHeight;
 use super::locate::Course;
 use super::options::TrackerOptions;
 use super::result::TrackedWalk;
-use super::search::{Grid, Path, Scene, search};
+use super::search::{Grid, Path, Scene, search_each_phase};
 use super::standing::Standing;
 use super::start::{CadenceRange, Direction, PhaseCurve, StartReport, phase_lines, start};
 use super::walk::{FrameEdges, Walk, WalkOptions};
@@ -166,7 +166,7 @@ fn best_heading(
         let scene = Scene::new(walker, camera, &path);
         let grid = Grid::whole_cycle_within(0.0, height_m, REACH_M);
         let curve = |frame: &&FrameEdges| {
-            let found = search(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
+            let found = search_each_phase(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
             let scores = found.curve().iter().map(|(_, score)| *score).collect();
             PhaseCurve { time_s: frame.time_s, scores }
         };

@@ -6,7 +6,7 @@
 
 use super::route::Route;
 use super::score::{EdgeLine, SimilarityOptions};
-use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search};
+use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search_peak};
 use super::swap::{SwapModel, swap_probability};
 use crate::OptionError;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
@@ -299,7 +299,7 @@ impl Walk {
 /// Searches around a prediction and updates the state with the result.
 fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options: &WalkOptions) -> Step {
     let grid = predicted.grid();
-    let found = search(&edges.edges, scene, &grid, &options.similarity, options.hidden_lines);
+    let found = search_peak(&edges.edges, scene, &grid, &options.similarity, options.hidden_lines);
     let similarity = found.best_score();
     let visible = scene.visible_share(&predicted.hypothesis());
     let measured = (similarity > 0.0 && visible >= LEAST_VISIBLE).then(|| found.refined());

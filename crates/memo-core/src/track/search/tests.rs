@@ -277,3 +277,85 @@ fn every_instruction_set_gives_the_same_bits() {
     let (best, plain) = (on(pulp::Arch::new()), on(pulp::Arch::Scalar));
     assert!(best[8] > 0.1 && best.map(f32::to_bits) == plain.map(f32::to_bits));
 }
+
+/// A planted walker whose edges are broken, moved and incomplete, before a wall of other edges.
+fn cluttered(scene: &Scene<'_>, truth: &Hypothesis, seed: u64) -> Vec<EdgeLine> {
+    let mut state = seed;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let mut edges = Vec::new();
+    for edge in edges_of(scene, truth) {
+        let mut moved = |p: [f32; 2]| p.map(|x| x + 4.0 * (random() - 0.5));
+        let (start, end) = (moved(edge.start), moved(edge.end));
+        if random() < 0.8 {
+            edges.push(EdgeLine { start, end, ..edge });
+        }
+    }
+    for _ in 0..40 {
+        let (x, y) = (200.0 + 240.0 * random(), 120.0 + 300.0 * random());
+        let (turn, length) = (std::f32::consts::PI * random(), 10.0 + 40.0 * random());
+        let end = [x + length * turn.cos(), y + length * turn.sin()];
+        edges.push(EdgeLine { start: [x, y], end, gradient: 20.0, velocity: 0.0 });
+    }
+    edges
+}
+
+#[test]
+fn the_highest_point_is_found_without_the_whole_grid() {
+    let (walker, camera) = (walker(), camera());
+    let height_m = walker.level_torso_height_m();
+    let options = SimilarityOptions::default();
+    let (mut same_phases, mut phases, mut looked, mut all) = (0, 0, 0, 0);
+    for seed in 0..12 {
+        let path = Path { origin: DVec2::ZERO, heading_rad: 0.1 * seed as f64 };
+        let scene = Scene::new(&walker, &camera, &path);
+        let truth = Hypothesis { along_m: 0.05 * seed as f64 - 0.3, height_m, phase: 0.083 * seed as f64 };
+        let edges = cluttered(&scene, &truth, seed);
+        let off = Hypothesis {
+            along_m: truth.along_m + 0.07,
+            height_m: height_m - 0.03,
+            phase: truth.phase - 0.09,
+        };
+        let grid = Grid::printed(&off);
+        let whole = search(&edges, &scene, &grid, &options, HiddenLines::default());
+        let peak = search_peak(&edges, &scene, &grid, &options, HiddenLines::default());
+        assert_eq!((peak.best_index, peak.refined()), (whole.best_index, whole.refined()), "seed {seed}");
+        let scored = || peak.scores.iter().zip(&whole.scores).filter(|(a, _)| **a > f32::NEG_INFINITY);
+        assert!(scored().all(|(a, b)| a.to_bits() == b.to_bits()));
+        looked += scored().count();
+        all += grid.len();
+
+        let cycle = Grid::whole_cycle(off.along_m, height_m);
+        let whole = search(&edges, &scene, &cycle, &options, HiddenLines::default()).curve();
+        let each = search_each_phase(&edges, &scene, &cycle, &options, HiddenLines::default()).curve();
+        for (each, whole) in each.iter().zip(&whole) {
+            assert!(each.1 <= whole.1 && each.1 > whole.1 - 0.02, "seed {seed}: {each:?} against {whole:?}");
+            same_phases += usize::from(each == whole);
+        }
+        phases += whole.len();
+    }
+    assert!(2 * looked < all, "{looked} of {all} hypotheses");
+    assert!(same_phases as f64 > 0.95 * phases as f64, "{same_phases} of {phases} phases");
+}
+
+#[test]
+fn a_grid_of_one_column_or_of_even_numbers_is_searched_to_its_ends() {
+    let (walker, camera) = (walker(), camera());
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let scene = Scene::new(&walker, &camera, &path);
+    let truth = Hypothesis { along_m: 0.0, height_m: walker.level_torso_height_m(), phase: 0.2 };
+    let (edges, options) = (edges_of(&scene, &truth), SimilarityOptions::default());
+    let axis = |centre: f64, count: usize| Axis { centre, step: 0.02, count };
+    for (alongs, phases) in [(1, 1), (1, 4), (4, 1), (2, 2), (4, 6)] {
+        let height = axis(truth.height_m, 3);
+        // The truth is in the last column of either axis.
+        let last = |at: f64, count: usize| axis(at - 0.01 * (count as f64 - 1.0), count);
+        let grid = Grid { along: last(0.0, alongs), height, phase: last(0.2, phases) };
+        for find in [search, search_peak, search_each_phase] {
+            let found = find(&edges, &scene, &grid, &options, HiddenLines::default());
+            assert_eq!(found.best_index, grid.len() - 2, "{alongs} x {phases}");
+        }
+    }
+}
