@@ -42,7 +42,7 @@ pub(crate) struct Problem<'a> {
     walker: &'a Walker,
     /// The tracker's route.
     route: &'a Route,
-    frames: &'a [FitFrame],
+    frames: Vec<&'a FitFrame>,
     options: &'a FitOptions,
     priors: Vec<Prior>,
     /// How much taller the person is than the walker, as a share of the walker's height.
@@ -103,6 +103,11 @@ const SAMPLES_PER_HEIGHT: f64 = 75.0;
 const LEAST_SPACING_PX: f64 = 2.0;
 const LEAST_REACH_PX: f64 = 4.0;
 
+/// From which gait a fit starts is decided by this many frames, and at least one in so many seconds: steps take half a
+/// second.
+const FEW_FRAMES: usize = 24;
+const FEW_S: f64 = 0.125;
+
 impl<'a> Problem<'a> {
     pub fn new(
         camera: &'a Camera,
@@ -118,7 +123,7 @@ impl<'a> Problem<'a> {
             camera,
             walker,
             route,
-            frames,
+            frames: frames.iter().collect(),
             options,
             priors: priors(),
             excess: Prior { mean: 0.0, sd: options.height_sd },
@@ -200,11 +205,23 @@ impl<'a> Problem<'a> {
         self.route.at(self.origin_along_m).heading_rad + fitted.unknowns.whole[WHOLE_HEADING]
     }
 
-    /// The start whose first steps come nearest to the edges, with the tracker's phase shifted by some cycles.
+    /// The first steps from the gait with which a few of the frames come nearest to their edges, with the tracker's
+    /// phase shifted by some cycles.
     pub(super) fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
-        let starts = StartGait::ALL.into_iter().filter_map(|gait| Some((self.started(phase, gait)?, gait)));
-        let ((_, unknowns), gait) = starts.min_by(|a, b| a.0.0.total_cmp(&b.0.0))?;
-        Some((unknowns, gait))
+        let few = self.of_few_frames();
+        let costs = StartGait::ALL.into_iter().filter_map(|gait| Some((few.started(phase, gait)?.0, gait)));
+        let (_, gait) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((self.started(phase, gait)?.1, gait))
+    }
+
+    /// The same with every second, third ... frame, but no fewer than [`FEW_FRAMES`] in all and one in [`FEW_S`].
+    fn of_few_frames(&self) -> Self {
+        let count = self.frames.len();
+        let elapsed_s = self.frames[count - 1].time_s - self.frames[0].time_s;
+        let every_s = elapsed_s / (count - 1).max(1) as f64;
+        let every = (count / FEW_FRAMES).min((FEW_S / every_s) as usize).max(1);
+        let frames = self.frames.iter().copied().step_by(every).collect();
+        Self { frames, priors: self.priors.clone(), ..*self }
     }
 
     /// The first steps from one gait, and their cost.
@@ -241,7 +258,7 @@ impl<'a> Problem<'a> {
         };
         Unknowns {
             whole: self.priors.iter().map(|prior| prior.mean).collect(),
-            frames: self.frames.iter().map(frame).collect(),
+            frames: self.frames.iter().copied().map(frame).collect(),
         }
     }
 
