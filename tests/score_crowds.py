@@ -12,7 +12,8 @@ others follow the regions that change against the temporal median (`silhouettes`
 * `blobs`: each region goes on with the nearest centre of the frame before, within half of its height.
 
 MOTA, IDF1, identity switches, recall and precision are motmetrics', with an overlap of at least a half. Then,
-of every walk of memo of 20 frames and more, the share of frames with such an overlap.
+of every walk of memo of 20 frames and more, the share of frames with such an overlap, and in TUD-Stadtmitte
+the heel strikes of people in side view against those marked by eye (`annotated/stadtmitte_strikes.csv`).
 
 Cannot do: where people are in depth; gait.
 """
@@ -20,11 +21,13 @@ Cannot do: where people are in depth; gait.
 from __future__ import annotations
 
 import argparse
+import csv
 import re
 import sys
 import tempfile
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +45,11 @@ CLIPS: dict[str, tuple[str, ...]] = {
     "pets09_s2l1": ("--camera", "View_001.xml", "--camera-size", "768x576"),
 }
 OVERLAP = 0.5
+#: A heel strike is that of memo within so many frames: a quarter of a second, half a step.
+REACH_FRAMES = 6.25
 LEAST_REGION_PX = 20
+#: Heel strikes marked by eye, by clip.
+STRIKES = {"tud_stadtmitte": Path(__file__).parent / "annotated" / "stadtmitte_strikes.csv"}
 
 Array = np.ndarray
 #: Frame from 1, identity, and left, top, width, height in pixels.
@@ -187,6 +194,58 @@ def share_on_somebody(truth: Rows, found: Rows) -> dict[int, float]:
     return {k: float(np.mean(np.array(v) >= OVERLAP)) for k, v in walks.items() if len(v) >= 20}
 
 
+@dataclass(frozen=True)
+class Strike:
+    """A heel strike, marked or found."""
+
+    frame: float
+    """From 0."""
+    person: int
+    """Of the boxes."""
+    side: str
+
+
+def marked_strikes(file: Path) -> list[Strike]:
+    """Those marked by eye; who walks to the right has the right foot nearer to the camera."""
+    with file.open() as lines:
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    near = {"right": ("right", "left"), "left": ("left", "right")}
+    return [
+        Strike(float(row["frame"]), int(row["id"]), near[row["walks"]][row["foot"] == "far"]) for row in rows
+    ]
+
+
+def strikes_of(run: Path) -> list[Strike]:
+    """Those of a run; the boxes of MOTChallenge count people from 1."""
+    with (run / "events.csv").open() as lines:
+        rows = [row for row in csv.DictReader(lines) if row["event"] == "heel_strike"]
+    return [Strike(float(row["frame"]), int(row["person"]) + 1, row["side"]) for row in rows]
+
+
+def strike_errors(
+    marked: Sequence[Strike], found: Sequence[Strike], truth: Rows, rows: Rows
+) -> tuple[int, list[tuple[float, bool]]]:
+    """How many strikes are marked where memo is on the person, and of each one found the error in frames and
+    whether its side is right."""
+
+    def on(strike: Strike) -> set[int]:
+        """Who of memo is on the person of a marked strike."""
+        at = round(strike.frame) + 1
+        boxes = [box for frame, identity, box in truth if (frame, identity) == (at, strike.person)]
+        own = [(identity, box) for frame, identity, box in rows if frame == at]
+        return {who for who, box in own for other in boxes if overlaps(box[None], other[None]) >= OVERLAP}
+
+    seen, errors = 0, []
+    for strike in marked:
+        who = on(strike)
+        seen += bool(who)
+        near = [f for f in found if f.person in who and abs(f.frame - strike.frame) <= REACH_FRAMES]
+        if near:
+            best = min(near, key=lambda f: abs(f.frame - strike.frame))
+            errors.append((best.frame - strike.frame, best.side == strike.side))
+    return seen, errors
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", metavar="PATTERN", default="", help="clips whose name has this (regex)")
@@ -223,6 +282,15 @@ def main() -> int:
             f"{identity}: {share:.2f}" for identity, share in share_on_somebody(truth, of_memo).items()
         )
         print(f"{name:15} walks of memo on somebody: {alone or 'none'}; {took_s:.0f} s")
+        if name in STRIKES:
+            seen, errors = strike_errors(
+                marked_strikes(STRIKES[name]), strikes_of(runs / name), truth, of_memo
+            )
+            print(
+                f"{name:15} heel strikes found: {len(errors)} of {seen}, frames late: "
+                f"{' '.join(f'{error:+.1f}' for error, _ in errors)}; "
+                f"sides right: {sum(right for _, right in errors)} of {len(errors)}"
+            )
     return 0
 
 

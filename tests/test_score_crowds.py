@@ -59,3 +59,25 @@ def test_regions_are_those_that_change():
         frame[30:90, 15 * k : 15 * k + 20] = 200
     found = crowds.regions_of(list(frames))
     assert all(np.abs(boxes[0] - [15 * k, 30, 20, 60]).max() <= 3 for k, boxes in enumerate(found))
+
+
+def test_strikes_are_told_by_who_walks_there_and_by_their_side():
+    truth = [(frame, identity, box) for frame, identity, box in moving() if identity == 1]
+    rows = [(frame, 7, box + 1) for frame, _, box in truth]
+    marked = [crowds.Strike(5.5, 1, "right"), crowds.Strike(18.0, 1, "left"), crowds.Strike(30.0, 1, "right")]
+    found = [
+        crowds.Strike(6.5, 7, "right"),
+        crowds.Strike(17.0, 7, "right"),
+        crowds.Strike(18.0, 3, "left"),
+        crowds.Strike(38.0, 7, "right"),
+    ]
+    assert crowds.strike_errors(marked, found, truth, rows) == (3, [(1.0, True), (-1.0, False)])
+    elsewhere = [(frame, 7, box + 100) for frame, _, box in truth]
+    assert crowds.strike_errors(marked, found, truth, elsewhere) == (0, [])
+
+
+def test_who_walks_to_the_right_shows_the_right_foot():
+    marked = crowds.marked_strikes(crowds.STRIKES["tud_stadtmitte"])
+    assert len(marked) == 25 and {strike.person for strike in marked} == {2, 4, 7, 10}
+    assert marked[0] == crowds.Strike(8.5, 2, "left") and marked[1] == crowds.Strike(21.5, 2, "right")
+    assert [strike.side for strike in marked if strike.person == 7][:2] == ["right", "left"]
