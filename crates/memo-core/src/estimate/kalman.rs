@@ -62,6 +62,15 @@ impl FilterOptions {
         };
         Self { along: of(self.along), vertical: of(self.vertical), phase: of(self.phase) }
     }
+
+    /// The noise of somebody whose legs swing this share as far as the average's: contours that move less show the phase
+    /// less well, and neighbouring frames err alike. Its variance grows with the inverse fourth power: with the inverse
+    /// square, the phase of two of six drawn people with half the swing stood still.
+    #[must_use]
+    pub fn of_swing(&self, share: f64) -> Self {
+        let measurement_variance = self.phase.measurement_variance / share.powi(4).max(f64::MIN_POSITIVE);
+        Self { phase: Noise { measurement_variance, ..self.phase }, ..*self }
+    }
 }
 
 /// Position and velocity of one coordinate, with their covariance.

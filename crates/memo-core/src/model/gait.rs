@@ -171,6 +171,9 @@ impl GaitStyle {
         leg_amplitude: 1.0,
         arm_amplitude: 1.0,
     };
+    /// Very short steps: legs and arms swing 0.45 as far as the average's, for strides of about a third of the body
+    /// height. A place to start from, not a measured gait.
+    pub const SHUFFLING: Self = Self { leg_amplitude: 0.45, arm_amplitude: 0.45, ..Self::SHORT_STEPS };
     /// Short steps: legs and arms swing 0.65 as far as the average's, for strides of about half the body height. A place
     /// to start from, not a measured gait.
     pub const SHORT_STEPS: Self = Self {
@@ -308,6 +311,13 @@ impl Gait {
         let at = |k: usize| self.side(k as f64 / 50.0, style);
         let curve = |angle: fn(&SideAngles) -> f64| (0..50).map(|k| angle(&at(k))).collect();
         [curve(|a| a.hip), curve(|a| a.knee), curve(|a| a.shoulder), curve(|a| a.elbow)]
+    }
+
+    /// How far the thigh swings, radians.
+    pub fn leg_swing_rad(&self, style: &GaitStyle) -> f64 {
+        let hips = (0..50).map(|k| self.side(k as f64 / 50.0, style).hip);
+        let (low, high) = hips.fold((f64::MAX, f64::MIN), |(low, high), hip| (low.min(hip), high.max(hip)));
+        high - low
     }
 
     /// Angles of the side whose heel strike is at phase 0.

@@ -259,12 +259,13 @@ impl Active {
         if turns.iter().any(|turn| *turn != DVec3::ZERO) { turns } else { Vec::new() }
     }
 
-    /// Starts again on an oblique path if the kept frames show one, and with the person's own body and gait. This
-    /// happens once per walk.
+    /// Starts again with smaller steps if the phase stands still, on an oblique path if the kept frames show one, and with
+    /// the person's own body and gait. This happens once per walk.
     pub(super) fn settle(&mut self, backdrop: &Backdrop, options: &TrackerOptions) {
         if !std::mem::replace(&mut self.settled, true) {
             let kept = std::mem::take(&mut self.kept);
             if !self.is_on_treadmill {
+                self.look_for_steps(&kept, options);
                 self.turn_path(&kept, options);
             }
             self.adopt_person(&kept, backdrop, options);

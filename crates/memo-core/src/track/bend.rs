@@ -151,7 +151,8 @@ impl Active {
             height: Axis::around(height_m, 2.0 * POSITION_STEP_M, POSITION_STEP_M),
             phase: Axis::around(phase, PHASE_STEP, PHASE_STEP),
         };
-        let found = search_peak(&edges.edges, &scene, &grid, &options.walk.similarity, options.walk.hidden_lines);
+        let found =
+            search_peak(&edges.edges, &scene, &grid, &options.walk.similarity, options.walk.hidden_lines);
         f64::from(found.best_score())
     }
 }

@@ -24,6 +24,7 @@ pub(crate) mod result;
 pub mod route;
 pub mod score;
 pub mod search;
+mod stall;
 mod standing;
 pub mod start;
 pub mod steady;

@@ -375,7 +375,9 @@ impl<'a> StartSearch<'a> {
                     let scene = scene.among(&others);
                     let grid = Grid::whole_cycle(sign * along_m, height_m);
                     let (similarity, hidden_lines) = (&self.options.similarity, self.options.hidden_lines);
-                    *found = Some(search_each_phase(&frame.edges, &scene, &grid, similarity, hidden_lines).curve());
+                    *found = Some(
+                        search_each_phase(&frame.edges, &scene, &grid, similarity, hidden_lines).curve(),
+                    );
                 }
             }
         }

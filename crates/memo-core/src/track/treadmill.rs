@@ -166,7 +166,8 @@ fn best_heading(
         let scene = Scene::new(walker, camera, &path);
         let grid = Grid::whole_cycle_within(0.0, height_m, REACH_M);
         let curve = |frame: &&FrameEdges| {
-            let found = search_each_phase(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
+            let found =
+                search_each_phase(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
             let scores = found.curve().iter().map(|(_, score)| *score).collect();
             PhaseCurve { time_s: frame.time_s, scores }
         };

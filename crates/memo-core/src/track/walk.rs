@@ -6,12 +6,14 @@
 
 use super::route::Route;
 use super::score::{EdgeLine, SimilarityOptions};
-use super::search::{Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search_peak};
+use super::search::{
+    Axis, Grid, HiddenLines, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search_peak,
+};
 use super::swap::{SwapModel, swap_probability};
 use crate::OptionError;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions};
 use crate::image::Rectangle;
-use crate::model::{Camera, EllipticCylinder, Others, Walker};
+use crate::model::{Camera, EllipticCylinder, Gait, GaitStyle, Others, Walker};
 
 /// Options of the following stage.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -192,18 +194,30 @@ pub struct Walk {
     /// The two half-cycle hypotheses.
     pub twins: [Twin; 2],
     first_time_s: Option<f64>,
+    /// How far the legs swing, as a share of the average's, at most 1.
+    swing: f64,
 }
 
 impl Walk {
     /// A walk at its beginning, with no frame followed.
     pub fn new(walker: Walker, route: impl Into<Route>, beginning: Beginning) -> Self {
         let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0, frame_count: 0 };
-        Self { walker, route: route.into(), beginning, twins: [twin.clone(), twin], first_time_s: None }
+        let average = Gait::dense().leg_swing_rad(&GaitStyle::default());
+        let swing = (walker.gait.leg_swing_rad(&walker.style) / average).min(1.0);
+        Self {
+            walker,
+            route: route.into(),
+            beginning,
+            twins: [twin.clone(), twin],
+            first_time_s: None,
+            swing,
+        }
     }
 
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
         let others = Others::new(&edges.others, camera.position());
+        let options = &WalkOptions { filter: options.filter.of_swing(self.swing), ..options.clone() };
         let step = |twin: usize| {
             let predicted = self.predict(twin, edges.time_s, &options.filter);
             let path = self.route.at(predicted.along.position);

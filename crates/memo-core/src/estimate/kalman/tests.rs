@@ -297,3 +297,14 @@ fn a_standard_deviation_is_never_nan() {
     let state = ConstantVelocity::new(0.0, 0.0, 0.04, 0.09);
     assert!((state.position_sd() - 0.2).abs() < 1e-12 && (state.velocity_sd() - 0.3).abs() < 1e-12);
 }
+
+#[test]
+fn less_swing_shows_the_phase_less_and_nothing_else() {
+    let all = FilterOptions::default();
+    let half = all.of_swing(0.5);
+    assert_eq!((half.along, half.vertical), (all.along, all.vertical));
+    assert!((half.phase.measurement_variance / all.phase.measurement_variance - 16.0).abs() < 1e-12);
+    assert_eq!(half.phase.velocity_variance_per_s, all.phase.velocity_variance_per_s);
+    assert_eq!(all.of_swing(1.0), all);
+    assert!(all.of_swing(0.0).phase.measurement_variance.is_finite());
+}
