@@ -405,6 +405,17 @@ mod tests {
     }
 
     #[test]
+    fn legs_swing_as_far_as_their_style_says() {
+        let gait = Gait::dense();
+        // The thigh of average adults swings by 40 to 45 degrees (Perry and Burnfield 2010).
+        let average = gait.leg_swing_rad(&GaitStyle::default());
+        assert!((40.0..47.0).contains(&average.to_degrees()), "{}", average.to_degrees());
+        let short = gait.leg_swing_rad(&GaitStyle::SHORT_STEPS);
+        assert!((short / average - 0.65).abs() < 1e-9);
+        assert!((gait.leg_swing_rad(&GaitStyle::SHUFFLING) / average - 0.45).abs() < 1e-9);
+    }
+
+    #[test]
     fn style_shifts_and_scales_about_the_mean() {
         let gait = Gait::dense();
         let style = GaitStyle { hip_offset: 0.1, leg_amplitude: 0.0, ..GaitStyle::default() };

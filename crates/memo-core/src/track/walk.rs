@@ -41,6 +41,12 @@ impl WalkOptions {
 /// largest are the paper's; the smallest keep three steps on each side.
 const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
 
+/// In the first frames a wrong phase is still put right in either direction.
+const FIRST_FRAMES: usize = 13;
+
+/// People whose legs swing this share as far as the average's or farther show the phase as well as the average.
+const USUAL_SWING: f64 = 0.75;
+
 /// Standard deviation of the torso's height given the ground and the leg length, metres. The paper's 10 cm is the
 /// standard deviation given the contours of one frame.
 const GROUND_SD_M: f64 = 0.02;
@@ -194,7 +200,7 @@ pub struct Walk {
     /// The two half-cycle hypotheses.
     pub twins: [Twin; 2],
     first_time_s: Option<f64>,
-    /// How far the legs swing, as a share of the average's, at most 1.
+    /// How far the legs swing, as a share of what is usual, at most 1.
     swing: f64,
 }
 
@@ -203,7 +209,7 @@ impl Walk {
     pub fn new(walker: Walker, route: impl Into<Route>, beginning: Beginning) -> Self {
         let twin = Twin { steps: Vec::new(), similarity_sum: 0.0, visible_sum: 0.0, frame_count: 0 };
         let average = Gait::dense().leg_swing_rad(&GaitStyle::default());
-        let swing = (walker.gait.leg_swing_rad(&walker.style) / average).min(1.0);
+        let swing = (walker.gait.leg_swing_rad(&walker.style) / (USUAL_SWING * average)).min(1.0);
         Self {
             walker,
             route: route.into(),
@@ -222,7 +228,13 @@ impl Walk {
             let predicted = self.predict(twin, edges.time_s, &options.filter);
             let path = self.route.at(predicted.along.position);
             let scene = Scene::new(&self.walker, camera, &path).among(&others);
-            match_frame(edges, &scene, &predicted, options)
+            let mut step = match_frame(edges, &scene, &predicted, options);
+            let steps = &self.twins[twin].steps;
+            if let Some(before) = steps.last().filter(|_| steps.len() >= FIRST_FRAMES) {
+                step.state.phase =
+                    onward(&step.state.phase, before.state.phase.position, self.beginning.rate_hz);
+            }
+            step
         };
         let (first, second) = rayon::join(|| step(0), || step(1));
         for (twin, step) in self.twins.iter_mut().zip([first, second]) {
@@ -310,6 +322,13 @@ impl Walk {
     }
 }
 
+/// Nobody steps back in the gait cycle: a phase that would go against its way stays where it was.
+fn onward(phase: &ConstantVelocity, before: f64, rate_hz: f64) -> ConstantVelocity {
+    let way = rate_hz.signum();
+    let position = before + way * (way * (phase.position - before)).max(0.0);
+    ConstantVelocity { position, velocity: way * (way * phase.velocity).max(0.0), ..*phase }
+}
+
 /// Searches around a prediction and updates the state with the result.
 fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options: &WalkOptions) -> Step {
     let grid = predicted.grid();
@@ -346,6 +365,31 @@ mod tests {
 
     fn walk() -> Walk {
         Walk::new(walker(), PATH, BEGINNING)
+    }
+
+    #[test]
+    fn a_phase_goes_on_its_way_or_stays() {
+        let phase = |position: f64, velocity: f64| ConstantVelocity::new(position, velocity, 1e-4, 1e-3);
+        assert_eq!(onward(&phase(3.1, 0.9), 3.06, 0.9), phase(3.1, 0.9));
+        assert_eq!(onward(&phase(3.0, -0.2), 3.06, 0.9), phase(3.06, 0.0));
+        assert_eq!(onward(&phase(3.0, 0.3), 3.06, 0.9), phase(3.06, 0.3));
+        assert_eq!(onward(&phase(-3.1, -0.9), -3.06, -0.9), phase(-3.1, -0.9), "backwards");
+        assert_eq!(onward(&phase(-3.0, 0.2), -3.06, -0.9), phase(-3.06, 0.0));
+    }
+
+    /// After the first frames, edges whose cycle runs the other way do not turn the phase round.
+    #[test]
+    fn edges_that_step_back_hold_the_phase() {
+        let mut walk = walk();
+        for k in 0..30 {
+            let time_s = 2.0 + 0.04 * k as f64;
+            let turned = if k < 20 { time_s } else { 2.0 + 0.04 * (40 - k) as f64 };
+            let edges = FrameEdges { time_s, ..planted(k, turned) };
+            walk.follow(&edges, &camera(), &WalkOptions::default());
+        }
+        let phases: Vec<f64> = walk.twins[0].steps.iter().map(|s| s.state.phase.position).collect();
+        assert!(phases[19] - phases[10] > 0.25);
+        assert!(phases[FIRST_FRAMES..].windows(2).all(|w| w[1] >= w[0]), "{phases:?}");
     }
 
     /// The true state of the planted walker, on the line from `BEGINNING`.
