@@ -9,7 +9,7 @@ import memo
 import numpy as np
 import pytest
 from conftest import shared_video
-from memo import _memo, cli
+from memo import _memo, cli, tracking
 from memo.gait import (
     DEFINITIONS,
     GAIT_COLUMNS,
@@ -215,3 +215,13 @@ def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):
     )
     assert lookup(table, 0, "speed")["value"] == pytest.approx(said["speed_mps"], abs=1e-4)
     assert 50 < lookup(table, 0, "stance")["ci_low"] < 65 and lookup(table, 0, "stance")["n"] >= 2
+
+
+def test_steps_that_are_hardly_visible_are_not_compared(monkeypatch):
+    scene = memo.demo_scene(2, frames=60)
+    track = memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera)
+    said, seen = "The left step is 39 cm shorter than the right (20 to 57).", "Its steps were hardly visible."
+    monkeypatch.setattr(tracking, "symmetry_sentences", lambda table, walk: [said])
+    assert said in track.sentences
+    monkeypatch.setattr(tracking, "cadence_sentences", lambda table, walk: [seen])
+    assert said not in track.sentences and seen in track.sentences

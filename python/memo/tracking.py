@@ -397,12 +397,13 @@ class Track:
             told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += measured_height_sentences(walk)
-            told += cadence_sentences(self.gait_parameters, index)
+            unseen = cadence_sentences(self.gait_parameters, index)
+            told += unseen
             told += implausible_sentences(walk)
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
-            told += symmetry_sentences(self.gait_parameters, index)
+            told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
             if walk.p_swapped <= LIKELY_SWAPPED:
                 told += departure_sentences(walk.departures)
             several = f"Walk {index + 1} of {len(self.walks)}" if len(self.walks) > 1 else ""
