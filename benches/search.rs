@@ -5,7 +5,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
 use memo_core::model::GaitStyle;
 use memo_core::track::score::{EdgeLine, SimilarityOptions};
-use memo_core::track::search::{Grid, HiddenLines, Hypothesis, Path, Scene, search};
+use memo_core::track::search::{
+    Grid, HiddenLines, Hypothesis, Path, Scene, SearchResult, search, search_each_phase, search_peak,
+};
 use memo_core::{Body, Camera, Gait, Walker};
 use std::hint::black_box;
 
@@ -40,11 +42,16 @@ fn grid_search(c: &mut Criterion) {
     group.sample_size(30);
     let tracking = Grid::printed(&truth);
     let whole_cycle = Grid::whole_cycle(truth.along_m, truth.height_m);
-    for (name, grid, hidden_lines) in [
-        ("tracking, hidden lines per column", tracking, HiddenLines::PerColumn),
-        ("tracking, hidden lines per hypothesis", tracking, HiddenLines::PerHypothesis),
-        ("whole cycle, hidden lines per column", whole_cycle, HiddenLines::PerColumn),
-    ] {
+    let (per_column, per_hypothesis) = (HiddenLines::PerColumn, HiddenLines::PerHypothesis);
+    type Search = fn(&[EdgeLine], &Scene<'_>, &Grid, &SimilarityOptions, HiddenLines) -> SearchResult;
+    let searches: [(&str, Search, Grid, HiddenLines); 5] = [
+        ("tracking, hidden lines per column", search, tracking, per_column),
+        ("tracking, hidden lines per hypothesis", search, tracking, per_hypothesis),
+        ("tracking, highest point", search_peak, tracking, per_column),
+        ("whole cycle, hidden lines per column", search, whole_cycle, per_column),
+        ("whole cycle, highest point of each phase", search_each_phase, whole_cycle, per_column),
+    ];
+    for (name, search, grid, hidden_lines) in searches {
         group.throughput(Throughput::Elements(grid.len() as u64));
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -1,7 +1,8 @@
 //! Grid search over position and gait phase (Rohr 1994, sections 4.3, 5.1 and 6).
 //!
-//! Hidden-line removal leaves no analytical relation between parameters and similarity, so every point of an
-//! equally spaced grid is scored and the best one taken. Columns of the grid (one phase, one position along the
+//! Hidden-line removal leaves no analytical relation between parameters and similarity, so the points of an
+//! equally spaced grid are scored and the best one taken: all of them ([`search`]), or those that lead to the highest
+//! ([`search_peak`], [`search_each_phase`]). Columns of the grid (one phase, one position along the
 //! path) are independent and run in parallel. Each score depends only on its own hypothesis, so the result does
 //! not depend on the number of threads.
 
