@@ -223,7 +223,7 @@ impl Walk {
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
         let others = Others::new(&edges.others, camera.position());
-        let options = &WalkOptions { filter: options.filter.of_swing(self.swing), ..options.clone() };
+        let options = &WalkOptions { filter: options.filter.of_swing(self.swing), ..*options };
         let step = |twin: usize| {
             let predicted = self.predict(twin, edges.time_s, &options.filter);
             let path = self.route.at(predicted.along.position);
