@@ -106,3 +106,13 @@ def test_in_a_pause_the_person_stands_still_in_truth_and_picture():
     assert np.array_equal(changed, moves)
     with pytest.raises(ValueError, match=r"pause.at_s must be 0.8 to 10000 s, got 0.5"):
         memo.demo_scene(pause_s=(0.5, 1.0))
+
+
+def test_walks_before_and_after_a_pause_are_of_one_person():
+    scene = memo.demo_scene(206, frames=120, pause_s=(2.4, 0.8))
+    track = memo.track(
+        scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera, adapt=False
+    )
+    assert track.people == [0, 0] and len(track.walks) == 2
+    begins = {sentence.split(":")[0] for sentence in track.sentences}
+    assert begins == {"Walk 1 of 2 (person 1)", "Walk 2 of 2 (person 1)"}

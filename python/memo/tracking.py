@@ -406,10 +406,12 @@ class Track:
             told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
             if walk.p_swapped <= LIKELY_SWAPPED:
                 told += departure_sentences(walk.departures)
-            several = f"Walk {index + 1} of {len(self.walks)}" if len(self.walks) > 1 else ""
-            several += f" (person {self.people[index] + 1})" if max(self.people) > 0 else ""
-            several += ": " if several else ""
-            said += [several + sentence for sentence in told]
+            whose = ""
+            if len(self.walks) > 1:
+                whose = f"Walk {index + 1} of {len(self.walks)} (person {self.people[index] + 1}): "
+            elif self.people[index] > 0:
+                whose = f"Person {self.people[index] + 1}: "
+            said += [whose + sentence for sentence in told]
         return said
 
     @property
