@@ -127,6 +127,15 @@ mod tests {
     }
 
     #[test]
+    fn steps_too_small_for_every_gait_change_nothing() {
+        let kept = walking(0.2);
+        let mut person = followed(&kept, RATE_HZ);
+        assert!(stalls(&person.walk));
+        person.look_for_steps(&kept, &TrackerOptions::default());
+        assert_eq!(person.walk.walker.style, GaitStyle::default());
+    }
+
+    #[test]
     fn who_steps_on_keeps_the_gait() {
         let kept = walking(1.0);
         let mut person = followed(&kept, RATE_HZ);

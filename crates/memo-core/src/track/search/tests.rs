@@ -359,3 +359,32 @@ fn a_grid_of_one_column_or_of_even_numbers_is_searched_to_its_ends() {
         }
     }
 }
+
+/// The lower of two peaks is at a column that is looked at first, the higher one between such columns.
+#[test]
+fn the_higher_of_two_peaks_is_found() {
+    let (walker, camera) = (walker(), camera());
+    let height_m = walker.level_torso_height_m();
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let scene = Scene::new(&walker, &camera, &path);
+    let grid = Grid::printed(&Hypothesis { along_m: 0.0, height_m, phase: 0.3 });
+    let at = |phase: usize, along: usize| Hypothesis {
+        along_m: grid.along.at(along),
+        height_m,
+        phase: grid.phase.at(phase),
+    };
+    let options = SimilarityOptions::default();
+    for (high, low) in [([5, 3], [16, 16]), ([15, 17], [4, 4]), ([17, 5], [2, 16])] {
+        let mut edges = edges_of(&scene, &at(low[0], low[1]));
+        let shortened = |edge: &EdgeLine| {
+            let [x, y] = [0, 1].map(|k| edge.start[k] + 0.85 * (edge.end[k] - edge.start[k]));
+            EdgeLine { end: [x, y], ..*edge }
+        };
+        edges = edges.iter().map(shortened).collect();
+        edges.extend(edges_of(&scene, &at(high[0], high[1])));
+        let whole = search(&edges, &scene, &grid, &options, HiddenLines::default());
+        let found = search_peak(&edges, &scene, &grid, &options, HiddenLines::default());
+        assert_eq!(whole.grid.split(whole.best_index).0, high[0], "planted");
+        assert_eq!(found.best_index, whole.best_index, "{high:?}");
+    }
+}
