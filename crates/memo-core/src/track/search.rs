@@ -317,9 +317,9 @@ pub fn search(
     options: &SimilarityOptions,
     hidden_lines: HiddenLines,
 ) -> SearchResult {
-    let mut columns = Columns::new(edges, scene, grid, options, hidden_lines);
-    columns.score(&(0..columns.count()).collect::<Vec<_>>());
-    columns.result()
+    let columns = Columns::new(edges, scene, grid, options, hidden_lines);
+    let all = (0..columns.count()).collect();
+    columns.climbed(all, |_| Vec::new())
 }
 
 /// The highest point of [`search`], for less than half of its work: scores every second column along both axes, then
@@ -334,19 +334,17 @@ pub fn search_peak(
     options: &SimilarityOptions,
     hidden_lines: HiddenLines,
 ) -> SearchResult {
-    let mut columns = Columns::new(edges, scene, grid, options, hidden_lines);
+    let columns = Columns::new(edges, scene, grid, options, hidden_lines);
     let [phases, alongs] = [grid.phase.count, grid.along.count];
-    let mut next: Vec<usize> =
-        (0..phases).step_by(2).flat_map(|p| (0..alongs).step_by(2).map(move |a| p * alongs + a)).collect();
-    while !next.is_empty() {
-        columns.score(&next);
+    let every_second =
+        (0..phases).step_by(2).flat_map(|p| (0..alongs).step_by(2).map(move |a| p * alongs + a));
+    columns.climbed(every_second.collect(), |columns| {
         let around = columns.highest(0..columns.count(), PEAKS).flat_map(|column| {
             let (p, a) = (column / alongs, column % alongs);
             beside(p, phases).flat_map(move |p| beside(a, alongs).map(move |a| p * alongs + a))
         });
-        next = columns.unscored(around);
-    }
-    columns.result()
+        around.collect()
+    })
 }
 
 /// The highest point of each phase, as [`SearchResult::curve`] of [`search`], for two thirds of its work: along each
@@ -358,19 +356,17 @@ pub fn search_each_phase(
     options: &SimilarityOptions,
     hidden_lines: HiddenLines,
 ) -> SearchResult {
-    let mut columns = Columns::new(edges, scene, grid, options, hidden_lines);
+    let columns = Columns::new(edges, scene, grid, options, hidden_lines);
     let (phases, alongs) = (grid.phase.count, grid.along.count);
     let of_phase = |p: usize| p * alongs..(p + 1) * alongs;
-    let mut next: Vec<usize> = (0..phases).flat_map(|p| of_phase(p).step_by(2)).collect();
-    while !next.is_empty() {
-        columns.score(&next);
+    let every_second = (0..phases).flat_map(|p| of_phase(p).step_by(2));
+    columns.climbed(every_second.collect(), |columns| {
         let around = (0..phases).flat_map(|p| {
             let highest = columns.highest(of_phase(p), PEAKS_OF_PHASE);
             highest.flat_map(move |column| beside(column % alongs, alongs).map(move |a| p * alongs + a))
         });
-        next = columns.unscored(around);
-    }
-    columns.result()
+        around.collect()
+    })
 }
 
 /// So many columns are climbed from: similarity has several peaks, where a leg fits the other leg's edges.
@@ -427,13 +423,17 @@ impl<'a> Columns<'a> {
         columns.into_iter().take(count).map(|(column, _)| column)
     }
 
-    /// Those of some columns that are not scored yet.
-    fn unscored(&self, columns: impl Iterator<Item = usize>) -> Vec<usize> {
-        let mut unscored: Vec<usize> =
-            columns.filter(|&column| self.heights(column)[0] == f32::NEG_INFINITY).collect();
-        unscored.sort_unstable();
-        unscored.dedup();
-        unscored
+    /// Scores some columns, in ascending order, then those around, until all of these are scored.
+    fn climbed(mut self, mut next: Vec<usize>, around: impl Fn(&Self) -> Vec<usize>) -> SearchResult {
+        while !next.is_empty() {
+            self.score(&next);
+            next = around(&self);
+            next.retain(|&column| self.heights(column)[0] == f32::NEG_INFINITY);
+            next.sort_unstable();
+            next.dedup();
+        }
+        let best_index = arg_max(&self.scores);
+        SearchResult { grid: self.grid, scores: self.scores, best_index }
     }
 
     /// Scores some columns, in ascending order, in parallel.
@@ -459,11 +459,6 @@ impl<'a> Columns<'a> {
                 }
             }
         }
-    }
-
-    fn result(self) -> SearchResult {
-        let best_index = arg_max(&self.scores);
-        SearchResult { grid: self.grid, scores: self.scores, best_index }
     }
 }
 

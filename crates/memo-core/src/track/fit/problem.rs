@@ -217,8 +217,8 @@ impl<'a> Problem<'a> {
     /// The same with every second, third ... frame, but no fewer than [`FEW_FRAMES`] in all and one in [`FEW_S`].
     fn of_few_frames(&self) -> Self {
         let count = self.frames.len();
-        let elapsed_s = self.frames[count - 1].time_s - self.frames[0].time_s;
-        let every_s = elapsed_s / (count - 1).max(1) as f64;
+        let ends = self.frames.first().zip(self.frames.last());
+        let every_s = ends.map_or(0.0, |(first, last)| last.time_s - first.time_s) / count.max(2) as f64;
         let every = (count / FEW_FRAMES).min((FEW_S / every_s) as usize).max(1);
         let frames = self.frames.iter().copied().step_by(every).collect();
         Self { frames, priors: self.priors.clone(), ..*self }
