@@ -962,7 +962,6 @@ class PostureSequence:
     second: Final[SecondMotion | None]
     heading_source: Final[str]
     rules: Final[str]
-    prior: Final[str]
     warnings: Final[list[str]]
 
 def posture(

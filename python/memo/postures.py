@@ -196,11 +196,9 @@ class Postures(Shown):
     heading_source: str
     """Source of the direction of walking."""
     rules: str
-    """The rules that the postures left obey: "physical" if those asked for leave no posture in a third of the
-    frames."""
-    prior: str
-    """The rules whose habits chose the most probable motion: "physical" if with those asked for it breaks
-    limits of the body, or swings the segments of a limb against each other, in three tenths of the frames."""
+    """The rules that cut postures and whose habits chose among them: "physical" if those asked for leave no
+    posture in a third of the frames, or if the most probable motion breaks limits of the body, or swings the
+    segments of a limb against each other, in three tenths of the frames."""
     warnings: tuple[str, ...]
     """Warnings to read before the numbers are used."""
     repair: sides.SideRepair | None
@@ -302,7 +300,6 @@ class Postures(Shown):
             "camera_assumed": self.camera_assumed,
             "heading_source": self.heading_source,
             "rules": self.rules,
-            "prior": self.prior,
             "undecided_frames": int(self.undecided.sum()),
             "most_cut": None if most is None else most._asdict(),
             "second": None
@@ -359,7 +356,7 @@ def posture(
     to sole, refined by the frames; with neither they are estimated, with the ground as scale.
     `rules`: "physical", "walking" or "walking-general" (holds for any way of
     walking); `strength`: "measured" limits or those of the "paper". Measured rules that do not fit the
-    motion are dropped, with a warning (`Postures.rules`, `Postures.prior`).
+    motion are dropped, with a warning (`Postures.rules`).
     `anchor`: source of the distance of the neck, "auto", "ground", "trunk", "extent", "head" or
     "combined"; or `distance_m`, one number or (T,), 0.1 to 1000, NaN if unknown, with its standard
     deviation `distance_sd_m`.
@@ -643,7 +640,6 @@ def _named(
         ),
         heading_source=found.heading_source,
         rules=found.rules.replace("_", "-"),
-        prior=found.prior.replace("_", "-"),
         warnings=(*keypoints.doubts, *_head_down(found.linked_m), *found.warnings),
         repair=repair,
     )

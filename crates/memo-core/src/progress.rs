@@ -46,6 +46,11 @@ impl Progress {
         self.total.store(total, Ordering::Relaxed);
     }
 
+    /// Adds units to the number in all.
+    pub(crate) fn expect_more(&self, units: usize) {
+        self.total.fetch_add(units, Ordering::Relaxed);
+    }
+
     /// Counts units as done; [`Stopped`] if the call is cancelled.
     pub(crate) fn advance(&self, units: usize) -> Result<(), Stopped> {
         self.done.fetch_add(units, Ordering::Relaxed);
@@ -64,6 +69,8 @@ mod tests {
         progress.expect(5);
         assert_eq!(progress.advance(2), Ok(()));
         assert_eq!((progress.done(), progress.total()), (2, 5));
+        progress.expect_more(4);
+        assert_eq!(progress.total(), 9);
         progress.stop();
         assert_eq!(progress.advance(1), Err(Stopped));
     }

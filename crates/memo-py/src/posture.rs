@@ -92,7 +92,6 @@ result! {
         },
         heading_source: String = found.heading.from.name(),
         rules: String = found.rules.name(),
-        prior: String = found.prior.name(),
         warnings: Vec<String> = texts(&found.warnings),
     }
     |own| counted(own.problems.len(), "frame")

@@ -5,6 +5,7 @@
 //! with what is known: the trunk is upright, one ankle (the supporting one) is at its height above the ground,
 //! the other is not below it, and the neck is above the middle between the ankles. The sum over all chains is the
 //! probability of the distance; either ankle may be the supporting one.
+//! With [`super::Bending`] the trunk leans mostly forwards, and the body's centre is above the ankles, not the neck.
 //!
 //! Errors along the rays are propagated down the chain as variances. Roots that do not exist cost the square of
 //! their gap relative to noise and lengths. The bending direction of the knees is not used. Feet in the air, or
@@ -14,8 +15,8 @@
 use glam::DVec3;
 
 use super::{
-    Anchor, AnchorError, AnchorOptions, AnchorSource, Ground, NORMAL_NODES, anchor_of_density, check_lengths,
-    check_up, from_extent, neck_ray, pelvis_to_hip_line_m, positive,
+    Anchor, AnchorError, AnchorOptions, AnchorSource, Bending, Ground, NORMAL_NODES, anchor_of_density,
+    check_lengths, check_up, from_extent, neck_ray, pelvis_to_hip_line_m, positive,
 };
 use crate::model::skeleton::{Joint, SegmentLengths, Side};
 use crate::posture::lift::{JointRays, RootKind, roots};
@@ -122,7 +123,7 @@ impl Scene<'_> {
                     .iter()
                     .map(|&side| self.ankles(Link { point: middle, ..pelvis }, side, right_is_near))
                     .collect();
-                self.close(neck, pelvis.cost, &ankles, &mut chains);
+                self.close(self.above_ankles(neck, middle), pelvis.cost, &ankles, &mut chains);
             }
         }
         let best = chains.iter().copied().fold(f64::INFINITY, f64::min);
@@ -150,19 +151,32 @@ impl Scene<'_> {
         self.rays.noise_rad.hypot(own)
     }
 
-    /// Combines the pelvis with the position on its ray at which the trunk is vertical.
+    /// The place whose vertical goes through the ankles, given the middle of the hips.
+    fn above_ankles(&self, neck: DVec3, hips: DVec3) -> DVec3 {
+        self.options.bending.map_or(neck, |b| b.balance.above_ankles(neck, hips, b.front))
+    }
+
+    /// Combines the pelvis with the position on its ray at which the trunk has its usual lean.
     fn upright(&self, neck: DVec3, pelvis: Link) -> Link {
         let ray = self.rays.ray[Joint::Pelvis];
         let up = self.ground.up_in_camera;
         let length = self.lengths.to[Joint::Pelvis];
-        // The point of the ray with the smallest horizontal distance from the neck.
+        // The point of the ray with the smallest horizontal distance from where the pelvis usually is.
         let flat = |v: DVec3| v - v.dot(up) * up;
         let (ray_flat, neck_flat) = (flat(ray), flat(neck));
         if ray_flat.length_squared() < 1e-6 {
             return pelvis;
         }
-        let k = neck_flat.dot(ray_flat) / ray_flat.length_squared();
-        let expected = (self.options.lean_sd_rad * length).powi(2) / ray_flat.length_squared();
+        let (usual, sd_rad) = match self.options.bending {
+            None => (neck_flat, self.options.lean_sd_rad),
+            Some(Bending { front, lean, .. }) => {
+                let spine = neck - pelvis.point;
+                let lean_rad = spine.dot(front).atan2(spine.dot(up));
+                (neck_flat - lean.mean_rad * length * front, lean.sd_rad(lean_rad))
+            }
+        };
+        let k = usual.dot(ray_flat) / ray_flat.length_squared();
+        let expected = (sd_rad * length).powi(2) / ray_flat.length_squared();
         let found = pelvis.point.dot(ray);
         let sum = expected + pelvis.variance;
         let k_mean = (found * expected + k * pelvis.variance) / sum;
@@ -187,7 +201,7 @@ impl Scene<'_> {
     }
 
     /// Costs of all ways in which one trunk's chains end on the ground.
-    fn close(&self, neck: DVec3, cost: f64, ankles: &[Vec<Link>], chains: &mut Vec<f64>) {
+    fn close(&self, above: DVec3, cost: f64, ankles: &[Vec<Link>], chains: &mut Vec<f64>) {
         let roles = |a: &Link| (a.cost + self.support(a), a.cost + self.swing(a));
         if let [right, left] = ankles {
             let left: Vec<_> = left.iter().map(|l| (l, roles(l))).collect();
@@ -195,7 +209,7 @@ impl Scene<'_> {
                 let (r_support, r_swing) = roles(r);
                 for (l, (l_support, l_swing)) in &left {
                     let balance =
-                        self.balance(neck, 0.5 * (r.point + l.point), 0.25 * (r.variance + l.variance));
+                        self.balance(above, 0.5 * (r.point + l.point), 0.25 * (r.variance + l.variance));
                     chains.push(cost + balance + r_support + l_swing);
                     chains.push(cost + balance + r_swing + l_support);
                 }
@@ -203,7 +217,7 @@ impl Scene<'_> {
         } else if let [one] = ankles {
             for a in one {
                 let (support, swing) = roles(a);
-                let balance = self.balance(neck, a.point, a.variance);
+                let balance = self.balance(above, a.point, a.variance);
                 chains.push(cost + balance + support);
                 chains.push(cost + balance + swing);
             }
@@ -232,15 +246,17 @@ impl Scene<'_> {
         above * above / (own * own + variance) + width.ln()
     }
 
-    fn balance(&self, neck: DVec3, middle: DVec3, variance: f64) -> f64 {
-        let offset = middle - neck;
+    /// Cost of ankles with this middle below a place of the body.
+    fn balance(&self, above: DVec3, middle: DVec3, variance: f64) -> f64 {
+        let sd_m = self.options.bending.map_or(self.options.balance_sd_m, |b| b.balance.sd_m);
+        let offset = middle - above;
         let up = self.ground.up_in_camera;
         let flat = offset - offset.dot(up) * up;
         // The variance of the chain is only along the ray.
         let ray = middle.normalize_or_zero();
         let along = (ray - ray.dot(up) * up).normalize_or_zero();
-        let (depth, total) = (flat.dot(along), self.options.balance_sd_m.powi(2) + variance);
-        let side = (flat.length_squared() - depth * depth).max(0.0) / self.options.balance_sd_m.powi(2);
+        let (depth, total) = (flat.dot(along), sd_m.powi(2) + variance);
+        let side = (flat.length_squared() - depth * depth).max(0.0) / sd_m.powi(2);
         depth * depth / total + total.ln() + side
     }
 }

@@ -13,7 +13,7 @@
 //! lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk 0.005-0.012),
 //! and above the middle of the ankles by 0.930-0.954 (0.013-0.022). The trunk leans forward by -1 to 12 degrees.
 //! The lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and jumping violate these
-//! assumptions.
+//! assumptions; once it is known which way a person faces, [`Bending`] replaces them by those for people who bend.
 
 mod ground;
 mod track;
@@ -24,6 +24,7 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::lift::JointRays;
+use super::prior::{Balance, Lean};
 use crate::model::camera::Camera;
 use crate::model::skeleton::{Joint, SegmentLengths, Side};
 
@@ -225,6 +226,19 @@ pub struct AnchorOptions {
     /// Standard deviation of the horizontal distance of the neck from the middle of the ankles, per direction,
     /// metres.
     pub balance_sd_m: f64,
+    /// Instead of an upright person, one who may bend. Used by [`from_ground`] and [`from_trunk`].
+    pub bending: Option<Bending>,
+}
+
+/// A person who may bend, of whom it is known which way the front is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bending {
+    /// Horizontal unit vector to the person's front, camera axes.
+    pub front: DVec3,
+    /// Lean of the trunk.
+    pub lean: Lean,
+    /// Balance above the feet.
+    pub balance: Balance,
 }
 
 impl Default for AnchorOptions {
@@ -238,6 +252,7 @@ impl Default for AnchorOptions {
             ankle_height_sd_m: 0.02,
             swing_height_m: 0.09,
             balance_sd_m: 0.12,
+            bending: None,
         }
     }
 }

@@ -236,7 +236,9 @@ impl Problem<'_> {
         if let Some(up) = self.up {
             let down = rotation.y_axis;
             let (e1, e2) = up.any_orthonormal_pair();
-            for e in [e1, e2].map(|e| e / self.options.lean_sd_rad) {
+            let spread = |b: super::Bending| 0.5 * (b.lean.backward_sd_rad + b.lean.forward_sd_rad);
+            let sd_rad = self.options.bending.map_or(self.options.lean_sd_rad, spread);
+            for e in [e1, e2].map(|e| e / sd_rad) {
                 add(e.dot(down), down.cross(e), DVec3::ZERO);
             }
         } else {

@@ -44,6 +44,9 @@ pub(super) struct LimbFrame {
     pub swing: [[Measured; 2]; 4],
     /// Height of the end above that of a supporting foot, metres; NaN for arms and if it is not known.
     lift_m: [f64; 4],
+    /// How far an ankle is behind the place below the body's centre, as seen from the camera, metres; nothing for
+    /// arms and without balance.
+    behind_m: [Measured; 4],
 }
 
 /// The reading of one limb in a pair's reading.
@@ -189,7 +192,9 @@ fn pair_costs(problem: &Problem, limbs: &Pair, pair: usize, cycle: Option<&Cycle
             std::array::from_fn(|state| {
                 let bits = [0, 1].map(|side| limb_bits(state, side));
                 let lift_m = [0, 1].map(|side| limbs[side].lift_m[bits[side]]);
-                own[0][bits[0]] + own[1][bits[1]] + weight * problem.support_cost(lift_m)
+                let behind_m = [0, 1].map(|side| limbs[side].behind_m[bits[side]]);
+                let standing = problem.support_cost(lift_m) + problem.balance_cost(behind_m);
+                own[0][bits[0]] + own[1][bits[1]] + weight * standing
             })
         })
         .collect()
@@ -203,13 +208,17 @@ impl Problem<'_> {
             cost: [0.0; 4],
             swing: [[Measured { value: f64::NAN, sd: 0.0 }; 2]; 4],
             lift_m: [f64::NAN; 4],
+            behind_m: [Measured::NOTHING; 4],
         };
         let [hung, middle, end] = PAIRS[pair][side];
         for bits in 0..4 {
             let [(inner, u), (outer, v)] = self.limb_extents(t, trunk, pair, side, bits);
             limb.extents[bits] = [inner, outer];
             if pair == 1 {
-                limb.lift_m[bits] = self.lift_m(end, trunk.smoothed[t][hung] + u + v);
+                let ankle = trunk.smoothed[t][hung] + u + v;
+                limb.lift_m[bits] = self.lift_m(end, ankle);
+                let sd = inner.sd.hypot(outer.sd);
+                limb.behind_m[bits] = Measured { value: self.behind_m(t, &trunk.smoothed[t], ankle), sd };
             }
             if let Some(axes) = reference {
                 limb.swing[bits] =

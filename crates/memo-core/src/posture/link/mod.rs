@@ -27,7 +27,7 @@ use thiserror::Error;
 
 use super::anchor::{AnchorOptions, Ground};
 use super::lift::{JointRays, RootKind, Roots, extent_sd, roots};
-use super::prior::{MotionPrior, chi_sq};
+use super::prior::{MotionPrior, chi_sq, heavy_tailed};
 use crate::estimate::smooth::Measured;
 use crate::model::angles::trunk_axes;
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, SegmentLengths, StickFigure};
@@ -351,6 +351,33 @@ impl Problem<'_> {
         let lower = lift_m[0].min(lift_m[1]);
         let both = !lift_m[0].is_nan() && !lift_m[1].is_nan();
         chi_sq(if both { lower } else { lower.min(0.0) } / self.options.prior.support_sd_m)
+    }
+
+    /// How far an ankle is behind the vertical through the body's centre, along the horizontal direction of view,
+    /// metres; NaN without a balance, and if vertical or trunk are not known.
+    fn behind_m(&self, t: usize, trunk: &StickFigure, ankle: DVec3) -> f64 {
+        let known = || {
+            let balance = self.options.prior.balance?;
+            let up = self.options.up?.try_normalize()?;
+            let front = self.reference(trunk)?.x_axis;
+            let hips = trunk[Joint::RightHip].midpoint(trunk[Joint::LeftHip]);
+            let away = self.ray(t, Joint::Neck).reject_from_normalized(up).try_normalize()?;
+            Some((ankle - balance.above_ankles(trunk[Joint::Neck], hips, front)).dot(away))
+        };
+        known().unwrap_or(f64::NAN)
+    }
+
+    /// Twice the cost of a body that is not in balance: its centre is above one of the feet or between them. Nothing
+    /// if one of the feet is not seen: the body may stand on it.
+    fn balance_cost(&self, behind_m: [Measured; 2]) -> f64 {
+        let Some(balance) = self.options.prior.balance else { return 0.0 };
+        let [right, left] = behind_m;
+        let is_between = right.value * left.value <= 0.0;
+        if is_between || right.value.is_nan() || left.value.is_nan() {
+            return 0.0;
+        }
+        let next = if right.value.abs() < left.value.abs() { right } else { left };
+        heavy_tailed(next.value / balance.sd_m.hypot(next.sd))
     }
 
     /// Half the squared change of velocity in units of its standard deviation; 0 if an extent is not known.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::posture::prior::{Balance, SegmentPrior, Soft};
 use crate::reproduce::stick_walker::StickWalker;
 use glam::DQuat;
 
@@ -156,6 +157,32 @@ fn wrong_input_is_named() {
     assert!(matches!(link(&frames, &short, &options), Err(LinkError::Lengths(_))));
 }
 
+/// No habits: only limits of the joints, inertia, and perhaps balance.
+fn without_habits(balance: Option<Balance>) -> MotionPrior {
+    let any = MotionPrior::any();
+    let segments =
+        any.segments.map(|segment| SegmentPrior { swing: Soft::FREE, outward: Soft::FREE, ..segment });
+    MotionPrior { segments, balance, ..any }
+}
+
+/// A walker seen from the front, whose feet are below the middle of the body on the average: with balance more legs
+/// are right than without it, or with one half a metre in front of the feet.
+#[test]
+fn a_body_is_above_its_feet() {
+    let found = |balance: Option<Balance>| {
+        let of_yaw = |yaw_deg: f64| {
+            let (truth, frames, lengths, options) = sequence(yaw_deg.to_radians());
+            let options = LinkOptions { prior: without_habits(balance), moving_direction: None, ..options };
+            share(&link(&frames, &lengths, &options).unwrap().smoothed, &truth) / 5.0
+        };
+        [150.0, 165.0, 180.0, 195.0, 210.0].map(of_yaw).iter().sum::<f64>()
+    };
+    let [without, balanced, leaning] = [None, Some(0.0), Some(0.5)]
+        .map(|ahead_m| found(ahead_m.map(|ahead_m| Balance { ahead_m, sd_m: 0.1 })));
+    assert!(balanced > without + 0.02, "{without} without balance, {balanced} with");
+    assert!(leaning < balanced - 0.02, "{balanced} above the feet, {leaning} elsewhere");
+}
+
 /// No prior of the motion: seen from above, many mirrored legs would leave the ground.
 #[test]
 fn somebody_stands_on_the_ground() {
@@ -169,7 +196,7 @@ fn somebody_stands_on_the_ground() {
         }
         let feet = truth.iter().map(|figure| figure[Joint::RightAnkle].y.max(figure[Joint::LeftAnkle].y));
         let ground_y = feet.fold(f64::NEG_INFINITY, f64::max) + 0.17 * lengths.to[Joint::RightAnkle];
-        let anything = LinkOptions { prior: MotionPrior::any(), ..options };
+        let anything = LinkOptions { prior: without_habits(None), ..options };
         let ground = Ground { up_in_camera: -DVec3::Y, camera_height_m: ground_y };
         for (share_sum, ground) in shares.iter_mut().zip([None, Some(ground)]) {
             let path = link(&frames, &lengths, &LinkOptions { ground, ..anything.clone() }).unwrap();

@@ -181,7 +181,8 @@ impl Problem<'_> {
         let spine = figure.segment(Joint::Pelvis);
         let (pelvis, sd) = (Joint::Pelvis, sd_m[Joint::Pelvis]);
         let roll = axes.z_axis.dot(spine).atan2(axes.y_axis.dot(spine));
-        let mut cost = usual(prior.trunk_lean, -swing_rad(&axes, spine), spine, sd, axes.x_axis, pelvis)
+        let lean_noise = sd * axes.x_axis.dot(self.ray(t, pelvis)).abs() / spine.length();
+        let mut cost = prior.trunk_lean.cost(-swing_rad(&axes, spine), lean_noise)
             + usual(prior.trunk_roll, roll, spine, sd, axes.z_axis, pelvis);
         for (right, left, soft) in [
             (Joint::RightShoulder, Joint::LeftShoulder, prior.shoulder_turn),
@@ -256,7 +257,7 @@ impl Problem<'_> {
             if matches!(joint, Joint::RightShoulder | Joint::RightHip) { -half } else { half }
         };
         let (usual, sd_m) = match joint {
-            Joint::Pelvis => (length * axes.y_axis, length * prior.trunk_lean.sd_rad),
+            Joint::Pelvis => (length * axes.y_axis, length * prior.trunk_lean.forward_sd_rad),
             Joint::RightShoulder | Joint::LeftShoulder => {
                 let side = half(RigidDistance::Shoulders);
                 let back = self.neck_forward_m() * axes.x_axis;

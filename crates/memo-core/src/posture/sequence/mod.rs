@@ -24,14 +24,16 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::anchor::{AnchorError, AnchorSource, Ground};
+use super::anchor::{AnchorError, AnchorSource, Bending, Ground};
 use super::constraint::Constraint;
 use super::lift::JointRays;
 use super::link::{
     Alternative, FrontPoints, LinkError, LinkFrame, LinkOptions, LinkedPath, link_with_progress,
 };
+use super::prior::MotionPrior;
 use super::tree::{DEFAULT_LENGTH_SD_M, TreeOptions};
 use super::uncertainty::{Causes, propagate};
+use crate::model::angles::{hip_axes, trunk_axes};
 use crate::model::camera::{Camera, CameraError};
 use crate::model::skeleton::{JOINT_COUNT, Joint, LengthError, PerJoint, StickFigure};
 use crate::{Progress, Stopped};
@@ -151,12 +153,9 @@ pub struct PostureSequence {
     /// Standard deviation of each joint's position in `linked.figures`, metres: from noise, lengths and the
     /// neck's distance. It does not contain the error of choosing the wrong root. NaN if the joint is unknown.
     pub sd_m: Vec<PerJoint<f64>>,
-    /// The rules of the postures that frames allow: those of the options' motion, or only the limits of bodies if these
-    /// rules do not fit ([`Warning::RulesDropped`]).
+    /// The motion whose rules cut postures and whose habits chose among them: that of the options, or none if these do
+    /// not fit ([`Warning::RulesDropped`], [`Warning::HabitsDropped`]).
     pub rules: Motion,
-    /// The motion whose habits chose the linked postures: that of the options, or none if they do not fit
-    /// ([`Warning::HabitsDropped`]).
-    pub prior: Motion,
     /// Reasons to doubt the results.
     pub warnings: Vec<Warning>,
 }
@@ -180,7 +179,7 @@ pub fn postures(
 }
 
 /// [`postures`] with progress and cancellation. Every frame is counted three times: for the neck, the tree and
-/// the link; a tree that is grown again without rules is not counted.
+/// the link, and again for what is done again: the total grows.
 ///
 /// # Errors
 ///
@@ -193,7 +192,8 @@ pub fn postures_with_progress(
 ) -> Result<PostureSequence, SequenceError> {
     // 1. Check the input; rays through the lens.
     check(sequence, options)?;
-    progress.expect(3 * sequence.times_s.len());
+    let frame_count = sequence.times_s.len();
+    progress.expect(3 * frame_count);
     let camera = camera.clone().validated()?;
     let mut warnings = Vec::new();
     let rays = rays(sequence, &camera, options, &mut warnings);
@@ -204,34 +204,37 @@ pub fn postures_with_progress(
     warnings.extend(warning::of_scale(&scene));
     // 3. The neck in each frame.
     let heads = neck::heads(&scene);
-    let neck = neck::track(&scene, &heads, &warnings, progress)?;
-    let necks = neck.places(&rays);
-    lengths::impossible(&rays, &neck, &lengths, &mut warnings);
+    let mut neck = neck::track(&scene, &heads, None, &warnings, progress)?;
     // 4. The moving direction, and the postures that every frame allows.
-    let allow = |scene: &neck::Scene, counted| {
-        Allowed::find(scene, &heads, &neck, &necks, |frames| progress.advance(frames * counted))
-    };
-    let mut allowed = allow(&scene, 1)?;
+    let mut allowed = Allowed::find(&scene, &heads, &neck, progress)?;
     // 5. One posture per frame.
-    let mut linked = link_frames(&scene, &allowed.heading, &necks, &allowed.frames, progress)?;
+    let mut linked = link_frames(&scene, &neck, &allowed, progress)?;
     let mut linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
     warnings.extend(warning::backwards(&scene, &allowed.heading, &linked));
     // 6. If the rules or the habits of the motion do not fit, the same without them.
     let without_rules = SequenceOptions { motion: Motion::Physical, ..options.clone() };
-    let free = neck::Scene { options: &without_rules, ..scene };
-    let dropped = warning::misfit(&scene, &allowed, &linked_breaks);
-    let (mut rules, mut prior) = (options.motion, options.motion);
-    if let Some(misfit) = dropped {
-        allowed = allow(&free, 0)?;
-        rules = Motion::Physical;
-        if misfit.is_of_habits() {
-            linked = link_frames(&free, &allowed.heading, &necks, &allowed.frames, &Progress::new())?;
-            prior = Motion::Physical;
-        }
-        linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
+    let mut scene = scene;
+    if let Some(misfit) = warning::misfit(&scene, &allowed, &linked_breaks) {
         warnings.push(misfit);
+        scene = neck::Scene { options: &without_rules, ..scene };
+        progress.expect_more(2 * frame_count);
+        allowed = Allowed::find(&scene, &heads, &neck, progress)?;
+        linked = link_frames(&scene, &neck, &allowed, progress)?;
+        linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
     }
-    let scene = if prior == options.motion { scene } else { free };
+    // 7. Who does not walk may bend. Now that it is known which way a person faces, the neck and what depends on it.
+    let rules = scene.options.motion;
+    if rules == Motion::Physical && scene.options.anchor.may_bend() {
+        progress.expect_more(3 * frame_count);
+        let bending = bending(&scene, &linked);
+        if let Some(found) = neck::again(&scene, &heads, &bending, progress)? {
+            neck = found;
+            allowed = Allowed::find(&scene, &heads, &neck, progress)?;
+            linked = link_frames(&scene, &neck, &allowed, progress)?;
+            linked_breaks = broken(&allowed.trees, &allowed.frames, &linked);
+        }
+    }
+    lengths::impossible(&rays, &neck, &lengths, &mut warnings);
     let Allowed { heading, trees, frames, warnings: noticed } = allowed;
     warnings.extend(noticed);
     // A wrong focal length scales all distances, and hardly changes a figure relative to its neck.
@@ -241,7 +244,7 @@ pub fn postures_with_progress(
         neck.of_focal(options.focal_sd)
     };
     let sd_m = uncertainty(&scene, &neck, &linked);
-    // 7. Reasons to doubt the results.
+    // 8. Reasons to doubt the results.
     let found = warning::Found {
         trees: &trees,
         frames: &frames,
@@ -251,18 +254,7 @@ pub fn postures_with_progress(
     };
     warning::judge(&scene, &found, &mut warnings);
     let linked = to_world(linked, &camera);
-    Ok(PostureSequence {
-        lengths,
-        neck,
-        heading,
-        frames,
-        linked,
-        linked_breaks,
-        sd_m,
-        rules,
-        prior,
-        warnings,
-    })
+    Ok(PostureSequence { lengths, neck, heading, frames, linked, linked_breaks, sd_m, rules, warnings })
 }
 
 /// The postures that every frame allows, with the constraints used.
@@ -278,11 +270,11 @@ impl Allowed {
         scene: &neck::Scene,
         heads: &[Option<neck::Head>],
         neck: &NeckTrack,
-        necks: &[DVec3],
-        advance: impl Fn(usize) -> Result<(), Stopped> + Sync,
+        progress: &Progress,
     ) -> Result<Self, Stopped> {
         let mut warnings = Vec::new();
-        let heading = heading::find(scene, necks, neck, heads, &mut warnings);
+        let necks = neck.places(scene.rays);
+        let heading = heading::find(scene, &necks, neck, heads, &mut warnings);
         let SequenceOptions { motion, strength, keep_cuts, .. } = *scene.options;
         let tree = TreeOptions { keep_cuts, ..motion.tree(strength) };
         let trees: Vec<TreeOptions> = heads
@@ -290,7 +282,7 @@ impl Allowed {
             .map(|head| tree.clone().with_bearings(scene.bearings(heading.direction, head.as_ref())))
             .collect();
         let read = |t: usize| {
-            advance(1)?;
+            progress.advance(1)?;
             Ok(frame::read(scene, &trees[t], neck, necks[t], t))
         };
         let frames = (0..necks.len()).into_par_iter().map(read).collect::<Result<Vec<_>, Stopped>>()?;
@@ -404,11 +396,12 @@ fn rays(
 
 fn link_frames(
     scene: &neck::Scene,
-    heading: &Heading,
-    necks: &[DVec3],
-    frames: &[Result<FrameReading, FrameProblem>],
+    neck: &NeckTrack,
+    allowed: &Allowed,
     progress: &Progress,
 ) -> Result<LinkedPath, LinkError> {
+    let Allowed { heading, frames, .. } = allowed;
+    let necks = neck.places(scene.rays);
     let link_frames: Vec<LinkFrame> = (0..necks.len())
         .map(|t| LinkFrame {
             time_s: scene.sequence.times_s[t],
@@ -429,6 +422,17 @@ fn link_frames(
         ..LinkOptions::default()
     };
     link_with_progress(&link_frames, &scene.lengths.lengths, &options, progress)
+}
+
+/// In each frame, that the person may bend, if the posture shows which way the front is.
+fn bending(scene: &neck::Scene, linked: &LinkedPath) -> Vec<Option<Bending>> {
+    let MotionPrior { trunk_lean: lean, balance, .. } = scene.options.motion.prior();
+    let of_figure = |figure: &StickFigure| {
+        let axes = [trunk_axes(figure), hip_axes(figure)].into_iter().flatten();
+        let front = axes.map(|axes| axes.x_axis).sum::<DVec3>().reject_from_normalized(scene.up());
+        Some(Bending { front: front.try_normalize()?, lean, balance: balance? })
+    };
+    linked.smoothed.iter().map(of_figure).collect()
 }
 
 /// The rays to feet and face in a frame.

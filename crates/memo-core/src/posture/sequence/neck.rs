@@ -14,8 +14,8 @@ use crate::model::camera::Camera;
 use crate::model::resection::{Resection, ResectionOptions, resect_in_image};
 use crate::model::skeleton::{Joint, SegmentLengths};
 use crate::posture::anchor::{
-    Anchor, AnchorError, AnchorOptions, AnchorSource, Conflict, DepthMode, Ground, combine, from_extent,
-    from_given, from_ground, from_trunk, smooth,
+    Anchor, AnchorError, AnchorOptions, AnchorSource, Bending, Conflict, DepthMode, Ground, SmoothOptions,
+    combine, from_extent, from_given, from_ground, from_trunk, smooth,
 };
 use crate::posture::head::{HeadModel, LEE_CHEN_BODY_HEIGHT_M};
 use crate::posture::lift::JointRays;
@@ -229,10 +229,16 @@ struct FrameAnchor {
     is_combined: bool,
 }
 
-/// The neck's distance over the sequence. If no frame gives it, the error contains the reasons and `warnings`.
+/// A person who bends accelerates the neck more than a walker: increase of its velocity's variance, (m/s)²/s. Values
+/// of 1 and 3 give the same on ten motions.
+const BENDING_VELOCITY_VARIANCE_PER_S: f64 = 1.0;
+
+/// The neck's distance over the sequence. If no frame gives it, the error contains the reasons and `warnings`. With
+/// `bending`, people may bend in the frames in which it is known which way they face.
 pub(super) fn track(
     scene: &Scene,
     heads: &[Option<Head>],
+    bending: Option<&[Option<Bending>]>,
     warnings: &[Warning],
     progress: &Progress,
 ) -> Result<NeckTrack, SequenceError> {
@@ -243,18 +249,37 @@ pub(super) fn track(
         }
         _ => {
             let asked = asked(scene.sequence.times_s);
-            let found = anchors(scene, heads, &asked, progress)?;
-            over_time(scene, &asked, found)
+            let found = anchors(scene, heads, bending, &asked, progress)?;
+            let mut options = scene.options.smooth_options;
+            if bending.is_some() {
+                options.velocity_variance_per_s =
+                    options.velocity_variance_per_s.max(BENDING_VELOCITY_VARIANCE_PER_S);
+            }
+            over_time(scene, &asked, found, &options)
         }
     };
     let no_neck = |reasons| SequenceError::NoNeck { reasons, warnings: warnings.to_vec() };
     found.map_err(no_neck).map(NeckTrack::without_vague)
 }
 
+/// [`track`] for a person who may bend; `None` if no frame gives a distance.
+pub(super) fn again(
+    scene: &Scene,
+    heads: &[Option<Head>],
+    bending: &[Option<Bending>],
+    progress: &Progress,
+) -> Result<Option<NeckTrack>, SequenceError> {
+    match track(scene, heads, Some(bending), &[], progress) {
+        Err(SequenceError::NoNeck { .. }) => Ok(None),
+        found => found.map(Some),
+    }
+}
+
 /// Anchors from the images, each frame alone.
 fn anchors(
     scene: &Scene,
     heads: &[Option<Head>],
+    bending: Option<&[Option<Bending>]>,
     asked: &[usize],
     progress: &Progress,
 ) -> Result<Vec<FrameAnchor>, Stopped> {
@@ -262,13 +287,19 @@ fn anchors(
     let anchor = |(place, &t): (usize, &usize)| {
         let next = asked.get(place + 1).copied().unwrap_or(scene.rays.len());
         progress.advance(next - if place == 0 { 0 } else { t })?;
+        let options = AnchorOptions { bending: bending.and_then(|bending| bending[t]), ..options };
         Ok(frame_anchor(scene, &options, &scene.rays[t], heads[t].as_ref()))
     };
     asked.par_iter().enumerate().map(anchor).collect()
 }
 
 /// Filters all frames together.
-fn over_time(scene: &Scene, asked: &[usize], found: Vec<FrameAnchor>) -> Result<NeckTrack, Vec<AnchorError>> {
+fn over_time(
+    scene: &Scene,
+    asked: &[usize],
+    found: Vec<FrameAnchor>,
+    options: &SmoothOptions,
+) -> Result<NeckTrack, Vec<AnchorError>> {
     let times_s = scene.sequence.times_s;
     let conflicts = conflicts(&found);
     let mut errors = Vec::new();
@@ -280,7 +311,7 @@ fn over_time(scene: &Scene, asked: &[usize], found: Vec<FrameAnchor>) -> Result<
         return Err(told_once(errors));
     }
     let asked_s: Vec<f64> = asked.iter().map(|&t| times_s[t]).collect();
-    let track = smooth(&asked_s, &anchors, &scene.options.smooth_options).map_err(|error| vec![error])?;
+    let track = smooth(&asked_s, &anchors, options).map_err(|error| vec![error])?;
     let mut from = vec![NeckFrom::Neighbours; times_s.len()];
     for (&t, anchor) in asked.iter().zip(&anchors) {
         from[t] = anchor.as_ref().map_or(NeckFrom::Neighbours, |anchor| NeckFrom::Source(anchor.source));
@@ -392,10 +423,15 @@ fn frame_anchor(
         AnchorSource::Head => from_head(rays, head),
         Extent | Combined | Given => from_extent(rays, lengths, up, options),
     };
+    let mut all = vec![AnchorSource::Ground, Trunk];
+    // Who bends is not as high as the extent assumes.
+    if options.bending.is_none() || scene.ground.is_none() {
+        all.push(Extent);
+    }
     let (asked, or_head) = match scene.options.anchor {
         AnchorChoice::Source(source) if ![Combined, Given].contains(&source) => (vec![source], false),
-        AnchorChoice::Source(_) => (vec![AnchorSource::Ground, Trunk, Extent], false),
-        _ => (vec![AnchorSource::Ground, Trunk, Extent], true),
+        AnchorChoice::Source(_) => (all, false),
+        _ => (all, true),
     };
     let mut errors = Vec::new();
     let mut ask = |source| by(source).map_err(|error| errors.push(error)).ok();

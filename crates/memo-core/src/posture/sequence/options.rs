@@ -103,7 +103,8 @@ impl Strength {
 /// Source of the neck's distance.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnchorChoice {
-    /// Ground, trunk and extent combined, as far as a frame allows each; the head if it allows none.
+    /// Ground, trunk and extent combined, as far as a frame allows each; the head if it allows none. Of people who
+    /// do not walk, and thus may bend, the extent is used only where there is no ground.
     Auto,
     /// One source: ground, trunk, extent or head. `Combined` is `Auto` without the head.
     Source(AnchorSource),
@@ -124,6 +125,12 @@ impl AnchorChoice {
             Self::Source(source) => source.name(),
             Self::Given { .. } => "given",
         }
+    }
+
+    /// True if the distance depends on whether the person may bend.
+    pub(super) fn may_bend(&self) -> bool {
+        use AnchorSource::{Combined, Ground, Trunk};
+        matches!(self, Self::Auto | Self::Source(Ground | Trunk | Combined))
     }
 }
 

@@ -139,7 +139,7 @@ pub enum Warning {
         /// Number of frames.
         of: usize,
     },
-    /// The rules of the motion leave no posture in many frames: the postures left are those of the physical limits.
+    /// The rules of the motion leave no posture in many frames, so its habits and rules were not used.
     RulesDropped {
         /// The motion.
         motion: Motion,
@@ -161,13 +161,6 @@ pub enum Warning {
         /// Share of linked postures that break a rule.
         linked: f64,
     },
-}
-
-impl Warning {
-    /// True if it says that the habits of the motion are dropped, and not only its rules.
-    pub(super) fn is_of_habits(&self) -> bool {
-        matches!(self, Self::HabitsDropped { .. })
-    }
 }
 
 /// Largest share of segments without real root that noise explains: 36 % at 8 px, measured on walks.
@@ -248,8 +241,7 @@ fn noisy(scene: &Scene) -> Option<Warning> {
 /// true postures. Of upright motion-captured walks they leave none in at most WALKS %, of crouched ones up to 55 %.
 const MISFIT: f64 = 0.32;
 /// The habits of a motion are dropped if the linked posture breaks limits of the body, or rule 3, in this share of the
-/// frames: of motion-captured walks, crouched and limping ones too, in at most 21 %; of other motions, habits of walking
-/// have larger errors than none where the share is above 30 %, and mostly smaller ones below.
+/// frames: of motion-captured walks, crouched and limping ones too, in at most 21 %.
 const BROKEN_BODIES: f64 = 0.3;
 
 /// True of limits of the body, and of rule 3, by which the segments of one limb swing together: walkers of all kinds keep

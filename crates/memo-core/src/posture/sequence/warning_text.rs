@@ -72,8 +72,8 @@ impl fmt::Display for Warning {
             ),
             Self::RulesDropped { motion, frames, of } => write!(
                 f,
-                "the rules of {} leave no posture in {frames} of {}, so the postures left are those of the limits of \
-                 bodies, as with \"physical\"",
+                "the rules of {0} leave no posture in {frames} of {1}: neither the rules nor the habits of {0} were \
+                 used, as with \"physical\"",
                 motion.name().replace('_', "-"),
                 counted(*of, "frame"),
             ),
