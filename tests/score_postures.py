@@ -10,6 +10,9 @@ are pooled over the motions of people for tuning and of the others:
 * other motions (jumps, playground, bending, fencing, ...), rules "physical" unless `--rules` names others.
   Their two groups of people swap their parts: what is tuned on one is reported on the other.
 
+"but Gait" is "others" without BTK_Gait, whose skeleton is impossible: the knees cross, the right one is 7 cm to
+the left of the left one over the whole walk, and straight legs bend by 22 degrees.
+
 Kinds of rows: `lengths`, with the true lengths and toes; `bare`, the same without toes; `height`, with the
 body height alone; `assumed`, with the body height and without the camera, whose field of view is drawn from
 45 to 75 degrees and whose height from 0.9 to 2.2 m, at the distance at which the person is 290 px tall.
@@ -388,7 +391,9 @@ def report(scores: Sequence[Score]) -> str:
     groups: dict[tuple[Any, ...], list[Score]] = {}
     for score in scores:
         job = score.job
-        groups.setdefault((job.row, job.kind, job.people, job.noise_px), []).append(score)
+        people = [job.people] + ["but Gait"] * (job.people == "others" and "Gait" not in job.motion)
+        for group in people:
+            groups.setdefault((job.row, job.kind, group, job.noise_px), []).append(score)
     lines = []
     for (row, kind, people, noise_px), members in groups.items():
         cells = pooled(members)
