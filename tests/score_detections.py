@@ -2,14 +2,15 @@
 
     python tests/score_detections.py
 
-OpenPose BODY_25B of two cameras, 100 frames at 60 fps, against joints triangulated from four cameras (Pose2Sim). He
-does not walk, leans to the sides by up to 44 degrees, and stands 7 cm above the ground. The detector's points are 8 to
-9 px from the triangulated ones, mostly to one side for the whole sequence, so smoothing does not reduce it.
+OpenPose BODY_25B of two cameras, 100 frames at 60 fps, against joints triangulated from four cameras
+(Pose2Sim). He does not walk, leans to the sides by up to 44 degrees, and stands 7 cm above the ground. The
+detector's points are 8 to 9 px from the triangulated ones, mostly to one side for the whole sequence, so
+smoothing does not reduce it.
 
-`height` is his body height by the rule of `score_postures.py` from his triangulated segments, `lengths` the lengths of
-these segments. Rules "default" is what `memo.posture` does without being told. Columns as in `score_postures.py`; `best`
-is the error of the posture nearest to the truth of those left in each frame, `stated` the mean stated `p_mirrored` of
-the limb segments counted in `signs`.
+`height` is his body height by the rule of `score_postures.py` from his triangulated segments, `lengths` the
+lengths of these segments. Rules "default" is what `memo.posture` does without being told. Columns as in
+`score_postures.py`; `best` is the error of the posture nearest to the truth of those left in each frame,
+`stated` the mean stated `p_mirrored` of the limb segments counted in `signs`.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ are pooled over the motions of people for tuning and of the others:
 * other motions (jumps, playground, bending, fencing, ...), rules "physical" unless `--rules` names others.
   Their two groups of people swap their parts: what is tuned on one is reported on the other.
 
-"but Gait" is "others" without BTK_Gait, whose skeleton is impossible: the knees cross, the right one is 7 cm to
-the left of the left one over the whole walk, and straight legs bend by 22 degrees.
+"but Gait" is "others" without BTK_Gait, whose skeleton is impossible: the knees cross, the right one is 7 cm
+to the left of the left one over the whole walk, and straight legs bend by 22 degrees.
 
 Kinds of rows: `lengths`, with the true lengths and toes; `bare`, the same without toes; `height`, with the
 body height alone; `assumed`, with the body height and without the camera, whose field of view is drawn from

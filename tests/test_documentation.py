@@ -40,7 +40,7 @@ NOT_RUN = {
     "docs/start/install.md": 4,
     "docs/start/rust.md": 3,
     "docs/start/vision-science.md": 1,
-    "docs/reference/accuracy.md": 9,
+    "docs/reference/accuracy.md": 10,
     "docs/methods/point-light-displays.md": 1,
     "docs/start/keypoints-from.md": 1,
 }

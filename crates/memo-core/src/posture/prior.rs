@@ -198,7 +198,8 @@ pub struct MotionPrior {
 /// as the prior of the motion.
 ///
 /// Logistic regression on motion capture at 0, 2 and 5 px of noise (`python tests/score_postures.py` prints the
-/// rates of mirrored segments for other people than those of the regression).
+/// rates of mirrored segments); for any motion also with points that are off by the same 3.5 px (standard deviation)
+/// in all frames, as those of detectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MirrorOdds {
     /// Log odds without extent and margin.
@@ -302,7 +303,7 @@ impl MotionPrior {
             shoulder_turn: Soft::FREE,
             hip_turn: Soft::degrees(0.0, 20.0),
             overconfidence: 12.0,
-            mirrored: MirrorOdds { base: -0.8, per_m: 3.3, per_nat: 0.64 },
+            mirrored: MirrorOdds { base: -0.7, per_m: 4.3, per_nat: 0.38 },
             ..Self::walking()
         }
     }
