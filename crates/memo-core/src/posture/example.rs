@@ -1,11 +1,12 @@
-//! Hand-made figures for tests of single constraints.
+//! Hand-made figures for tests.
 //!
-//! Axes are those of an upright trunk: x forward, y down, z to the left, metres.
+//! If nothing else is said, axes are those of an upright trunk: x forward, y down, z to the left, metres.
 
 use std::array::from_fn;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
+use super::anchor::rigid_trunk;
 use super::placed::{Placed, placed_points};
 use crate::model::skeleton::{Joint, PerJoint, SegmentLengths, Side, StickFigure};
 
@@ -33,6 +34,34 @@ pub(super) fn standing() -> StickFigure {
         figure[side.ankle()] = figure[side.knee()] + DVec3::Y * LEG_M;
     }
     figure
+}
+
+/// A person 4 m in front of a level camera at 1.2 m who faces it, bent forwards, the body's middle 7 cm in front of
+/// the ankles and the arms hanging; camera axes.
+pub(super) fn bent(lengths: &SegmentLengths, lean_rad: f64) -> StickFigure {
+    let trunk = rigid_trunk(lengths);
+    let facing = DMat3::from_cols(DVec3::NEG_Z, DVec3::Y, DVec3::X);
+    let turn = DMat3::from_rotation_x(lean_rad) * facing;
+    let mut figure = PerJoint(trunk.0.map(|joint| turn * joint));
+    let hips = figure[Joint::RightHip].midpoint(figure[Joint::LeftHip]);
+    let feet_z = 0.5 * hips.z + 0.07;
+    for side in Side::BOTH {
+        let (thigh, shank) = (lengths.to[side.knee()], lengths.to[side.ankle()]);
+        let hip = figure[side.hip()];
+        let reach = 0.97 * (thigh + shank);
+        let back = feet_z - hip.z;
+        let leg = DVec3::new(0.0, (reach * reach - back * back).sqrt(), back) / reach;
+        let along = (reach * reach + thigh * thigh - shank * shank) / (2.0 * reach);
+        let knee = along * leg + (thigh * thigh - along * along).sqrt() * DVec3::new(0.0, leg.z, -leg.y);
+        figure[side.knee()] = hip + knee;
+        let shoulder = figure[side.shoulder()];
+        figure[side.elbow()] = shoulder + lengths.to[side.elbow()] * DVec3::Y;
+        figure[side.wrist()] = figure[side.elbow()] + lengths.to[side.wrist()] * DVec3::Y;
+        figure[side.ankle()] = hip + reach * leg;
+    }
+    let sole = 0.17 * lengths.to[Joint::RightAnkle];
+    let lift = 1.2 - sole - figure[Joint::RightAnkle].y;
+    PerJoint(figure.0.map(|p| p + DVec3::new(0.1, lift, 4.0)))
 }
 
 /// The direction away from the body's middle.

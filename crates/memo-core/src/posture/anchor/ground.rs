@@ -266,6 +266,8 @@ mod tests {
     use super::super::trunk::rigid_trunk;
     use super::*;
     use crate::model::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
+    use crate::posture::example::bent;
+    use crate::posture::prior::MotionPrior;
 
     /// A person upright 4 m in front of a level camera at 1.2 m, facing obliquely, with one foot lifted.
     fn standing(lengths: &SegmentLengths, lifted: Side) -> StickFigure {
@@ -290,6 +292,25 @@ mod tests {
 
     fn rays(figure: &StickFigure) -> JointRays {
         JointRays { noise_rad: 2e-3, ..JointRays::from_points(figure) }
+    }
+
+    /// Told which way the person faces, the neck of one who bends is where it is; taken as upright, it is too far away.
+    #[test]
+    fn who_bends_towards_the_camera_has_the_neck_in_front_of_the_feet() {
+        let lengths = SegmentLengths::from_height(1.75).unwrap();
+        let MotionPrior { trunk_lean: lean, balance, .. } = MotionPrior::any();
+        let bending = balance.map(|balance| Bending { front: DVec3::NEG_Z, lean, balance });
+        for lean_deg in [25.0_f64, 40.0, 55.0] {
+            let figure = bent(&lengths, lean_deg.to_radians());
+            let off_m = |bending| {
+                let options = AnchorOptions { bending, ..AnchorOptions::default() };
+                let found = from_ground(&rays(&figure), &lengths, &GROUND, &options).unwrap();
+                found.distance_m - figure[Joint::Neck].length()
+            };
+            let [upright, told] = [None, bending].map(off_m);
+            assert!(told.abs() < 0.06, "{lean_deg} degrees: {told} m");
+            assert!(upright > told.abs() + 0.08, "{lean_deg} degrees: {upright} m if upright, {told} m");
+        }
     }
 
     /// Right and left swapped and the image mirrored: the same distance, whichever foot supports.

@@ -30,6 +30,8 @@ use crate::model::skeleton::{Joint, SegmentLengths, Side};
 
 pub use ground::from_ground;
 pub use track::{DepthTrack, SmoothOptions, smooth};
+#[cfg(test)]
+pub(super) use trunk::rigid_trunk;
 pub use trunk::{TrunkAttitude, TrunkFit, from_trunk};
 
 /// Source of an anchor.
@@ -267,6 +269,12 @@ impl AnchorOptions {
         positive("ankle_height_sd_m", self.ankle_height_sd_m)?;
         positive("swing_height_m", self.swing_height_m)?;
         positive("balance_sd_m", self.balance_sd_m)?;
+        if let Some(Bending { front, lean, balance }) = self.bending {
+            positive("length of bending.front", front.length())?;
+            positive("bending.lean.backward_sd_rad", lean.backward_sd_rad)?;
+            positive("bending.lean.forward_sd_rad", lean.forward_sd_rad)?;
+            positive("bending.balance.sd_m", balance.sd_m)?;
+        }
         if self.scale_sd == 0.0 { Ok(()) } else { positive("scale_sd", self.scale_sd) }
     }
 }

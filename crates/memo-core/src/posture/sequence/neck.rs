@@ -423,21 +423,21 @@ fn frame_anchor(
         AnchorSource::Head => from_head(rays, head),
         Extent | Combined | Given => from_extent(rays, lengths, up, options),
     };
-    let mut all = vec![AnchorSource::Ground, Trunk];
-    // Who bends is not as high as the extent assumes.
-    if options.bending.is_none() || scene.ground.is_none() {
-        all.push(Extent);
-    }
-    let (asked, or_head) = match scene.options.anchor {
-        AnchorChoice::Source(source) if ![Combined, Given].contains(&source) => (vec![source], false),
-        AnchorChoice::Source(_) => (all, false),
-        _ => (all, true),
+    // Who bends is not as high as the extent assumes: it is used only if there is nothing better.
+    let (all, rest) = match options.bending {
+        None => (vec![AnchorSource::Ground, Trunk, Extent], vec![]),
+        Some(_) => (vec![AnchorSource::Ground, Trunk], vec![Extent]),
+    };
+    let (asked, or_else) = match scene.options.anchor {
+        AnchorChoice::Source(source) if ![Combined, Given].contains(&source) => (vec![source], vec![]),
+        AnchorChoice::Source(_) => (all, rest),
+        _ => (all, [rest, vec![AnchorSource::Head]].concat()),
     };
     let mut errors = Vec::new();
     let mut ask = |source| by(source).map_err(|error| errors.push(error)).ok();
     let mut found: Vec<Anchor> = asked.into_iter().filter_map(&mut ask).collect();
-    if found.is_empty() && or_head {
-        found.extend(ask(AnchorSource::Head));
+    if found.is_empty() {
+        found.extend(or_else.into_iter().find_map(ask));
     }
     if found.is_empty() {
         return FrameAnchor { anchor: Err(errors), conflicts: Vec::new(), is_combined: false };

@@ -104,7 +104,7 @@ impl Strength {
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnchorChoice {
     /// Ground, trunk and extent combined, as far as a frame allows each; the head if it allows none. Of people who
-    /// do not walk, and thus may bend, the extent is used only where there is no ground.
+    /// do not walk, and thus may bend, the extent is used only where ground and trunk give nothing.
     Auto,
     /// One source: ground, trunk, extent or head. `Combined` is `Auto` without the head.
     Source(AnchorSource),

@@ -2,6 +2,7 @@ use super::example::{Walk, walk, with_lengths};
 use super::*;
 use crate::model::skeleton::SegmentLengths;
 use crate::posture::constraint::ConstraintKind;
+use crate::posture::example::bent;
 use proptest::prelude::*;
 
 /// Median and 90 % quantile of the distances from the truth, with necks aligned, cm.
@@ -428,4 +429,34 @@ fn rules_that_do_not_fit_the_motion_are_dropped() {
     assert_eq!(printed.rules, Motion::Walking);
     let fitting = super::example::walk(60.0, 30, 0.5).postures(&with_lengths()).unwrap();
     assert_eq!((fitting.rules, fitting.warnings), (Motion::Walking, vec![]));
+}
+
+/// A person who faces the camera and bends forwards by 55 degrees within a second and up again.
+#[test]
+fn who_bends_is_found_bent() {
+    let mut bow = walk(0.0, 50, 0.0);
+    let mut random = crate::synth::Random::new(11);
+    let lengths = SegmentLengths::lee_chen();
+    let leans =
+        (0..50).map(|t| 55f64.to_radians() * (std::f64::consts::PI * f64::from(t) / 49.0).sin().powi(2));
+    let leans: Vec<f64> = leans.collect();
+    for (t, &lean) in leans.iter().enumerate() {
+        bow.truth[t] = figure_in_world(&bent(&lengths, lean), &bow.camera);
+        bow.points_px[t] = PerJoint(bow.truth[t].0.map(|p| {
+            let [a, b] = random.normal_pair().map(f64::from);
+            bow.camera.project(p).unwrap() + 0.5 * DVec2::new(a, b)
+        }));
+    }
+    let found = bow.postures(&SequenceOptions { motion: Motion::Physical, ..with_lengths() }).unwrap();
+    let away = bow.camera.rotation.transpose() * DVec3::Z;
+    let spine = |figure: &StickFigure| figure[Joint::Neck] - figure[Joint::Pelvis];
+    for (t, figure) in found.linked.smoothed.iter().enumerate() {
+        let off_m = figure[Joint::Neck].distance(bow.truth[t][Joint::Neck]);
+        assert!(off_m < 0.12, "frame {t}: {off_m} m");
+        let [got, true_lean] = [figure, &bow.truth[t]].map(|f| (-spine(f).dot(away)).atan2(spine(f).z));
+        if leans[t] > 0.35 {
+            assert!((got - true_lean).abs() < 0.2, "frame {t}: {got} of {true_lean} rad");
+        }
+    }
+    assert_eq!(found.rules, Motion::Physical);
 }
