@@ -263,7 +263,7 @@ impl Scene<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::trunk::rigid_trunk;
+    use super::super::trunk::{from_trunk, rigid_trunk};
     use super::*;
     use crate::model::skeleton::{JOINT_COUNT, PerJoint, StickFigure};
     use crate::posture::example::bent;
@@ -310,6 +310,17 @@ mod tests {
             let [upright, told] = [None, bending].map(off_m);
             assert!(told.abs() < 0.06, "{lean_deg} degrees: {told} m");
             assert!(upright > told.abs() + 0.08, "{lean_deg} degrees: {upright} m if upright, {told} m");
+            let by_trunk = |bending| {
+                let options = AnchorOptions { bending, ..AnchorOptions::default() };
+                let up = Some(GROUND.up_in_camera);
+                let found = from_trunk(&rays(&figure), &lengths, up, &options).unwrap().anchor;
+                (found.distance_m - figure[Joint::Neck].length()).abs()
+            };
+            let [upright, told] = [None, bending].map(by_trunk);
+            assert!(
+                told < 0.6 * upright,
+                "{lean_deg} degrees: {told} m by the trunk, {upright} m if upright"
+            );
         }
     }
 

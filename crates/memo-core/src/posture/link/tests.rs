@@ -183,6 +183,26 @@ fn a_body_is_above_its_feet() {
     assert!(leaning < balanced - 0.02, "{balanced} above the feet, {leaning} elsewhere");
 }
 
+/// Twice the cost of a body whose centre is not above its feet: by the nearer foot, with its uncertainty.
+#[test]
+fn a_body_may_be_above_either_foot_or_between_them() {
+    let (_, frames, lengths, options) = sequence(0.3);
+    let balance = Some(Balance { ahead_m: 0.07, sd_m: 0.06 });
+    let cost = |feet: [(f64, f64); 2], balance: Option<Balance>| {
+        let options = LinkOptions { prior: without_habits(balance), ..options.clone() };
+        let problem = Problem { frames: &frames, lengths: &lengths, options: &options };
+        problem.balance_cost(feet.map(|(value, sd)| Measured { value, sd }))
+    };
+    for (right_m, left_m) in [(0.2, -0.1), (-0.3, 0.3), (0.0, 0.5), (f64::NAN, 0.4), (0.4, f64::NAN)] {
+        assert_eq!(cost([(right_m, 0.0), (left_m, 0.0)], balance), 0.0, "{right_m} {left_m}");
+    }
+    // 6 cm and 8 cm are 10 cm.
+    for feet in [[(0.2, 0.08), (0.5, 9.0)], [(-0.5, 9.0), (-0.2, 0.08)]] {
+        assert!((cost(feet, balance) - heavy_tailed(2.0)).abs() < 1e-12, "{feet:?}");
+        assert_eq!(cost(feet, None), 0.0);
+    }
+}
+
 /// No prior of the motion: seen from above, many mirrored legs would leave the ground.
 #[test]
 fn somebody_stands_on_the_ground() {

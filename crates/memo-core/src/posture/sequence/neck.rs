@@ -497,6 +497,7 @@ fn conflicts(found: &[FrameAnchor]) -> Vec<SourceConflict> {
 mod tests {
     use super::*;
     use crate::model::camera::Camera;
+    use crate::posture::prior::MotionPrior;
     use crate::posture::sequence::example::{walk, with_lengths};
 
     #[test]
@@ -658,6 +659,36 @@ mod tests {
         assert_eq!((auto.source, auto.distance_m), (AnchorSource::Head, 9.0));
         let combined = ask(AnchorChoice::Source(AnchorSource::Combined), &[neck_alone]).anchor;
         assert_eq!(combined.unwrap_err().len(), 3);
+    }
+
+    /// Of who may bend, the extent is not used beside ground and trunk, but where only neck and feet are seen.
+    #[test]
+    fn who_may_bend_need_not_be_as_high_as_the_extent_assumes() {
+        let walk = walk(60.0, 1, 0.0);
+        let found = walk.postures(&with_lengths()).unwrap();
+        let lengths = &found.lengths;
+        let options = with_lengths();
+        let mut rays = [found.frames[0].as_ref().unwrap().tree.view.rays];
+        let ground = Ground::of(&walk.camera);
+        let MotionPrior { trunk_lean: lean, balance, .. } = MotionPrior::any();
+        let front = walk.camera.rotation * walk.forward;
+        let bending = balance.map(|balance| Bending { front, lean, balance });
+        let told = AnchorOptions { bending, ..lengths.anchor_options(&options.anchor_options) };
+        let ask = |rays: &[JointRays; 1]| {
+            let (sequence, camera) = (&walk.sequence(), &walk.camera);
+            let scene = Scene { sequence, camera, ground: Some(ground), rays, lengths, options: &options };
+            frame_anchor(&scene, &told, &rays[0], None).anchor.unwrap()
+        };
+        let up = Some(walk.camera.rotation * DVec3::Z);
+        let by_ground = from_ground(&rays[0], &lengths.lengths, &ground, &told).unwrap();
+        let by_trunk = from_trunk(&rays[0], &lengths.lengths, up, &told).unwrap().anchor;
+        assert_eq!(ask(&rays), combine(&[by_ground, by_trunk]).unwrap().anchor);
+        for joint in Joint::ALL {
+            if ![Joint::Neck, Joint::RightAnkle, Joint::LeftAnkle].contains(&joint) {
+                rays[0].ray[joint] = DVec3::NAN;
+            }
+        }
+        assert_eq!(ask(&rays).source, AnchorSource::Extent);
     }
 
     /// Conflicts are counted among the frames with several sources, with the medians of their distances.

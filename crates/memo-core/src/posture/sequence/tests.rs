@@ -452,7 +452,8 @@ fn who_bends_is_found_bent() {
     let spine = |figure: &StickFigure| figure[Joint::Neck] - figure[Joint::Pelvis];
     for (t, figure) in found.linked.smoothed.iter().enumerate() {
         let off_m = figure[Joint::Neck].distance(bow.truth[t][Joint::Neck]);
-        assert!(off_m < 0.12, "frame {t}: {off_m} m");
+        // Taken as upright throughout, the neck would be up to 4.1 cm off.
+        assert!(off_m < 0.032, "frame {t}: {off_m} m");
         let [got, true_lean] = [figure, &bow.truth[t]].map(|f| (-spine(f).dot(away)).atan2(spine(f).z));
         if leans[t] > 0.35 {
             assert!((got - true_lean).abs() < 0.2, "frame {t}: {got} of {true_lean} rad");
