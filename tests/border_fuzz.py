@@ -822,6 +822,13 @@ def _(d):
     )
 
 
+@case("camera_tilt")
+def _(d):
+    (frame,) = d.frames(1)
+    still = d.maybe(lambda: d.mask(np.shape(frame)[:2] if np.ndim(frame) >= 2 else None))
+    return memo.camera_tilt(frame, still, **d.options(fov_deg=lambda: d.number(1, 180)))
+
+
 @case("velocity_field")
 def _(d):
     first, second = d.frames(2)
@@ -996,7 +1003,7 @@ def results():
         _memo.GaitEvent(0.1, 2.5, "toe_off", "left"),
         _memo.GaitCycle("left", "mean", float("nan"), float("nan"), cycle),
         *(_memo.Departure("left", "knee", 6.0, 2.0, 30, 0.2), _memo.WalkRatio(0.006, 0.004, 0.011)),
-        _memo.Treadmill(1.2, 0.03, -0.4, 0.3),
+        *(_memo.Treadmill(1.2, 0.03, -0.4, 0.3), _memo.CameraTilt(1.0, -2.0, 0.7, 3.0, 12.5)),
         *(walk, shown, limbs, window, window.chains[0], window.chains[0].links[0], postures),
         _memo.SecondMotion(["neck"], 0, joints, 1.0, 0.3),
         _memo.WalkFit(0.6, 200.0, 0.01, 0.02, 1.5, 0.01, False, "well", {"thigh": 0.4}, np.zeros((2, 5, 50))),

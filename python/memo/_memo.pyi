@@ -10,6 +10,7 @@ import numpy.typing as npt
 __all__ = [
     "BodyHeight",
     "Camera",
+    "CameraTilt",
     "ClothedScene",
     "CountTable",
     "Departure",
@@ -59,6 +60,7 @@ __all__ = [
     "body_parts",
     "calibrate_points",
     "calibrate_walker",
+    "camera_tilt",
     "change_mask",
     "defaults",
     "edge_segments",
@@ -565,6 +567,25 @@ class WalkRatio:
     def _repr_html_(self) -> str: ...
 
 @final
+class CameraTilt:
+    """How a camera is tilted, by the upright lines in its picture."""
+
+    roll_deg: Final[float]
+    """Rotation about the viewing direction; positive if upright lines lean to the right."""
+    pitch_deg: Final[float]
+    """Downwards from the horizon, for the focal length that was given or assumed."""
+    roll_sd_deg: Final[float]
+    """Standard deviation of the roll."""
+    pitch_sd_deg: Final[float]
+    """Standard deviation of the pitch."""
+    upright_lines: Final[float]
+    """How many lines are upright under this tilt, less those expected by chance."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
 class Treadmill:
     """A treadmill under a walk."""
 
@@ -657,6 +678,8 @@ class Walk:
     """Why no person was measured; None if there is a fit, or if none was asked for."""
     camera: Final[Camera]
     """The camera, given or assumed."""
+    camera_tilt: Final[CameraTilt | None]
+    """How the assumed camera is tilted; None if a camera was given."""
     start: Final[WalkStart]
     """The starting phase."""
     measured: Final[npt.NDArray[np.float64]]
@@ -697,6 +720,12 @@ def edge_segments(
     high: float | None = None,
     min_length_px: float | None = None,
 ) -> npt.NDArray[np.float64]: ...
+def camera_tilt(
+    frame: npt.NDArray[np.uint8],
+    still: npt.NDArray[np.bool_] | None = None,
+    *,
+    fov_deg: float | None = None,
+) -> CameraTilt: ...
 def velocity_field(
     first: npt.NDArray[np.uint8], second: npt.NDArray[np.uint8], region: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...

@@ -1,4 +1,4 @@
-"""Sentences about the body height of a walk and about values that contradict each other.
+"""Sentences about the height of a person, the tilt of a camera, and values that contradict each other.
 
 The core decides (`memo_core::track::height`, `plausible` and `fit`); this module words it.
 """
@@ -8,14 +8,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from memo._memo import Walk
+    from memo._memo import CameraTilt, Walk
 
 __all__ = [
     "assumed_height_sentences",
     "contradiction_sentences",
     "implausible_sentences",
     "measured_height_sentences",
+    "tilt_sentences",
 ]
+
+#: A camera whose roll is known worse than this is not known to be level, degrees.
+_UNKNOWN_ROLL_DEG = 2.0
 
 
 def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[str]:
@@ -31,6 +35,27 @@ def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[
         f"distances and speeds may be too large or too small by {2 * sd_m / height_m:.0%} (two standard "
         "deviations)."
     ]
+
+
+def tilt_sentences(tilt: CameraTilt | None) -> list[str]:
+    """How a camera that was not given is tilted, and what shows it; nothing about a given one."""
+    if tilt is None:
+        return []
+    sd = f"(standard deviation {tilt.roll_sd_deg:.1f}°)"
+    if tilt.roll_sd_deg > _UNKNOWN_ROLL_DEG:
+        return [
+            "The picture shows too few upright lines to tell whether the camera was level: hip angles may "
+            f"be off by its roll {sd}."
+        ]
+    seen = f"By {tilt.upright_lines:.0f} upright lines in the picture, the camera was"
+    looks = f"looked {abs(tilt.pitch_deg):.0f}° {'down' if tilt.pitch_deg > 0 else 'up'}wards"
+    pitched = f" and {looks} (standard deviation {tilt.pitch_sd_deg:.0f}°)"
+    if abs(tilt.pitch_deg) < 2 * tilt.pitch_sd_deg:
+        pitched = ""
+    if abs(tilt.roll_deg) < 2 * tilt.roll_sd_deg:
+        return [f"{seen} not turned {sd}{pitched}."]
+    way = "anticlockwise" if tilt.roll_deg > 0 else "clockwise"
+    return [f"{seen} turned {way} by {abs(tilt.roll_deg):.1f}° {sd}{pitched}."]
 
 
 def measured_height_sentences(walk: Walk) -> list[str]:

@@ -23,6 +23,7 @@ from memo.plausible import (
     contradiction_sentences,
     implausible_sentences,
     measured_height_sentences,
+    tilt_sentences,
 )
 from memo.table import data_frame
 from memo.treadmill import treadmill_figures, treadmill_sentence
@@ -397,6 +398,7 @@ class Track:
             told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += measured_height_sentences(walk)
+            told += tilt_sentences(walk.camera_tilt) if index == 0 else []
             unseen = cadence_sentences(self.gait_parameters, index)
             told += unseen
             told += implausible_sentences(walk)

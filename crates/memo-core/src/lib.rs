@@ -107,7 +107,7 @@
 //!
 //! # Other entry points
 //!
-//! * A camera that is not calibrated: [`calibrate`], from measured points or from a walking person.
+//! * A camera that is not calibrated: [`calibrate`], from measured points, a walking person or upright lines.
 //! * A stage alone: [`image`] from pixels to edges, [`model`] from a phase to visible contours, [`track::score`]
 //!   for the similarity of the two.
 //!
@@ -146,6 +146,7 @@ pub mod wording;
 
 // What most callers need. Each public item has one path: here, or in its wing.
 pub use calibrate::points::camera_from_points;
+pub use calibrate::tilt::camera_tilt;
 pub use calibrate::walker::camera_from_walker;
 pub use image::frame::{Frame, Image, Mask};
 pub use keypoints::detector::Detector;

@@ -4,6 +4,7 @@ use crate::array::{frame_from_numpy, mask_from_numpy, numpy_from_image, numpy_fr
 use crate::defaults::dict;
 use crate::error::value_error;
 use crate::wait::interruptible;
+use crate::walk::CameraTilt;
 use memo_core::Image;
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
@@ -108,6 +109,23 @@ pub fn edge_segments<'py>(
         [s.start_px.x, s.start_px.y, s.end_px.x, s.end_px.y, s.mean_gradient, s.residual_rms_px]
     };
     numpy_from_rows(py, found.iter().map(row).collect())
+}
+
+/// How a camera is tilted, by the upright lines of one of its pictures. Without `fov_deg`, 62 degrees across the longer
+/// side are assumed. `still` marks the pixels to use: what moves, such as people, is not upright.
+#[pyfunction]
+#[pyo3(signature = (frame, still=None, *, fov_deg=None))]
+pub fn camera_tilt(
+    py: Python<'_>,
+    frame: &Bound<'_, PyAny>,
+    still: Option<&Bound<'_, PyAny>>,
+    fov_deg: Option<f64>,
+) -> PyResult<CameraTilt> {
+    let image = frame_from_numpy(frame)?.into_image()?;
+    let still = still.map(mask_from_numpy).transpose()?;
+    let estimate =
+        move || memo_core::camera_tilt(&image.as_frame(), still.as_ref(), fov_deg.map(f64::to_radians));
+    CameraTilt::of(py, &interruptible(py, estimate)?.map_err(value_error)?)
 }
 
 /// The components of a velocity field, (H, W) each.

@@ -51,7 +51,9 @@ mod _memo {
     #[pymodule_export]
     use super::fit::WalkFit;
     #[pymodule_export]
-    use super::image::{change_mask, edge_segments, moving_regions, shrunk, silhouettes, velocity_field};
+    use super::image::{
+        camera_tilt, change_mask, edge_segments, moving_regions, shrunk, silhouettes, velocity_field,
+    };
     #[pymodule_export]
     use super::keypoints::{
         follow_everyone, foot_points, guess_layout, head_points, joint_name, keypoint_layout,
@@ -100,7 +102,8 @@ mod _memo {
     use super::wait::panic_on_purpose;
     #[pymodule_export]
     use super::walk::{
-        BodyHeight, GaitEvent, GaitParameter, PhaseLine, Treadmill, Walk, WalkRatio, WalkStart, fit_walk,
+        BodyHeight, CameraTilt, GaitEvent, GaitParameter, PhaseLine, Treadmill, Walk, WalkRatio, WalkStart,
+        fit_walk,
     };
 
     #[pymodule_init]

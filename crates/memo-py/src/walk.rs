@@ -10,6 +10,7 @@ use crate::record::{Recorded, SegmentsWithParts, WalkRecord};
 use crate::result::{objects, result};
 use crate::wait::watched;
 use glam::{DVec2, DVec3};
+use memo_core::calibrate::TiltEstimate;
 use memo_core::model::SideJoints;
 use memo_core::track::fit::{FitError, FitOptions};
 use memo_core::track::start::{Direction, PhaseLine as CoreLine, StartReport};
@@ -70,6 +71,26 @@ result! {
         source: String = height.source.name(),
     }
     |own| format!("{:.3} m +- {:.3}, {}", own.height_m, own.sd_m, own.source)
+}
+
+result! {
+    /// How a camera is tilted, by the upright lines in its picture.
+    CameraTilt |_py, found: &TiltEstimate| {
+        /// Rotation about the viewing direction, degrees; positive if upright lines lean to the right.
+        roll_deg: f64 = found.tilt.roll_rad.to_degrees(),
+        /// Downwards from the horizon, degrees, for the focal length that was given or assumed.
+        pitch_deg: f64 = found.tilt.pitch_rad.to_degrees(),
+        /// Standard deviation of the roll, degrees.
+        roll_sd_deg: f64 = found.roll_sd_rad.to_degrees(),
+        /// Standard deviation of the pitch, degrees.
+        pitch_sd_deg: f64 = found.pitch_sd_rad.to_degrees(),
+        /// How many lines are upright under this tilt, less those expected by chance.
+        upright_lines: f64,
+    }
+    |own| format!(
+        "roll {:.1} +- {:.1} deg, pitch {:.1} +- {:.1} deg, {:.0} upright lines",
+        own.roll_deg, own.roll_sd_deg, own.pitch_deg, own.pitch_sd_deg, own.upright_lines
+    )
 }
 
 result! {
@@ -190,6 +211,9 @@ result! {
             walk.fit.as_ref().and_then(|fit| fit.as_ref().err()).map(ToString::to_string),
         /// The camera, given or assumed.
         camera: PyCamera = PyCamera(walk.camera.clone()),
+        /// How the assumed camera is tilted; None if a camera was given.
+        camera_tilt: Option<Py<CameraTilt>> =
+            walk.tilt.as_ref().map(|tilt| Py::new(py, CameraTilt::of(py, tilt)?)).transpose()?,
         /// The starting phase.
         start: Py<WalkStart> = Py::new(py, WalkStart::of(py, &walk.start)?)?,
         /// Best measured hypotheses per frame, (rows, 3): world x of the position along the path and z in metres, phase;

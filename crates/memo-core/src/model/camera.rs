@@ -13,6 +13,7 @@ use nalgebra::Matrix3x4;
 use thiserror::Error;
 
 use super::distortion::Distortion;
+use super::tilt::Tilt;
 
 /// Horizontal field of view assumed without calibration, radians (62 degrees).
 ///
@@ -276,6 +277,13 @@ impl Camera {
         let depth_m = focal_px * person_height_m / height_px;
         let camera_height_m = depth_m * (foot_row_px - horizon_row_px) / focal_px;
         Self::level(size, horizontal_field_of_view_rad, camera_height_m, depth_m)
+    }
+
+    /// The same camera turned about its centre of projection, from the level axes it has to tilted ones.
+    #[must_use]
+    pub fn tilted(self, tilt: &Tilt) -> Self {
+        let turn = tilt.rotation();
+        Self { rotation: turn * self.rotation, translation: turn * self.translation, ..self }
     }
 
     /// The camera itself if its parameters are valid.

@@ -15,6 +15,7 @@ pub(crate) mod silhouette;
 pub(crate) mod skeleton;
 pub mod spline;
 pub(crate) mod surface;
+pub(crate) mod tilt;
 pub(crate) mod visibility;
 
 pub use body::{BodyError, PART_COUNT, Part, PosedBody, Proportions, SideJoints};
@@ -33,6 +34,7 @@ pub use position::{
 pub use silhouette::{Contour, ContourKind, RimAspect, RimChord, rims, side_lines};
 pub use skeleton::{JOINT_COUNT, LengthError, MAX_SEGMENT_M, PELVIS_ON_TRUNK, RigidDistance, segment_name};
 pub use surface::{NO_PART, SurfaceError, SurfaceMap, surface_map};
+pub use tilt::Tilt;
 pub use visibility::{
     Others, PreparedView, VisibilityOptions, VisibleSegment, hidden_interval, visible_contours,
 };

@@ -17,6 +17,7 @@ use super::search::Scene;
 use super::start::{StartReport, start};
 use super::steady::CameraMotion;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
+use crate::calibrate::TiltEstimate;
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
 use glam::DVec3;
@@ -53,6 +54,8 @@ pub(super) struct Active {
     /// Whether somebody was followed when the walk started.
     pub(super) started_near: bool,
     pub(super) camera: Camera,
+    /// How the assumed camera is tilted; `None` of a given one.
+    pub(super) tilt: Option<TiltEstimate>,
     /// The body height with which the walk started.
     pub(super) height: BodyHeight,
     pub(super) depth_sd_m: f64,
@@ -301,7 +304,7 @@ impl Active {
         Tracked {
             walk: &self.walk,
             camera: &self.camera,
-            is_camera_assumed: options.camera.is_none(),
+            tilt: self.tilt.as_ref(),
             average: &self.average,
             height: &self.height,
             is_on_treadmill: self.is_on_treadmill,
@@ -410,6 +413,7 @@ pub(super) mod tests {
         walk.twins[1].steps = walk.twins[0].steps.clone();
         Active {
             camera: camera(),
+            tilt: None,
             height: BodyHeight::given(1.75),
             depth_sd_m: 0.1,
             start: report(PATH, BEGINNING, Direction::Forward),

@@ -31,6 +31,7 @@ impl Approach<'_> {
             person: 0,
             started_near: false,
             camera: (*camera).clone(),
+            tilt: None,
             height: *height,
             depth_sd_m: frontal.depth_sd_m(),
             start,

@@ -11,8 +11,9 @@ use super::options::TrackerOptions;
 use super::options::start_height;
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
+use crate::calibrate::TiltEstimate;
 use crate::image::Rectangle;
-use crate::model::{Camera, GaitStyle, Walker, assumed_field_of_view_rad};
+use crate::model::{Camera, GaitStyle, Tilt, Walker, assumed_field_of_view_rad};
 
 /// A candidate is dropped after this many consecutive frames without it.
 pub(super) const MISSED_FRAMES: usize = 3;
@@ -45,6 +46,8 @@ pub(super) struct Given<'a> {
     pub options: &'a TrackerOptions,
     /// The given camera, or the one assumed for the people who are followed already.
     pub camera: Option<&'a Camera>,
+    /// How a camera that is not given is tilted.
+    pub tilt: Option<TiltEstimate>,
     /// The given height.
     pub height_m: Option<f64>,
     /// Width and height of the frames.
@@ -100,6 +103,7 @@ impl Candidate {
             person: 0,
             started_near: false,
             camera,
+            tilt: given.tilt,
             height,
             depth_sd_m: course.depth_sd_m,
             start,
@@ -221,7 +225,8 @@ pub(super) fn course(
         // nearer or farther with all its lengths.
         let field_of_view_rad =
             given.options.field_of_view_rad.unwrap_or_else(|| assumed_field_of_view_rad(given.size));
-        let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m)?;
+        let tilt = given.tilt.map_or(Tilt::default(), |estimate| estimate.tilt);
+        let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m, &tilt)?;
         let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
         let course = locate(sightings, &camera, &crown)?;
         let distance_m = course.path.distance(camera.position().truncate());
@@ -329,7 +334,7 @@ mod tests {
             ..TrackerOptions::for_height(1.75)
         };
         let camera = options.camera.as_ref();
-        let given = Given { options: &options, camera, height_m: Some(1.75), size: [640, 480] };
+        let given = Given { options: &options, camera, tilt: None, height_m: Some(1.75), size: [640, 480] };
         Candidate { seen, missed: 0 }.begin(&given)
     }
 
@@ -341,7 +346,7 @@ mod tests {
             .collect();
         let focal_px = |size: [u32; 2], field_of_view_rad: Option<f64>| {
             let options = TrackerOptions { field_of_view_rad, ..TrackerOptions::default() };
-            let given = Given { options: &options, camera: None, height_m: Some(1.75), size };
+            let given = Given { options: &options, camera: None, tilt: None, height_m: Some(1.75), size };
             course(&sightings, &given, 1.75, &BodyHeight::given(1.75)).unwrap().0.focal_px.x
         };
         assert!((focal_px([640, 480], None) - focal_px([480, 640], None)).abs() < 1e-9);

@@ -7,6 +7,8 @@
 use super::score::EdgeLine;
 use super::steady::{CameraMotion, Loss, Steadied, Steadier};
 use crate::OptionError;
+use crate::calibrate::tilt::camera_tilt;
+use crate::calibrate::{TiltError, TiltEstimate};
 use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chains};
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
@@ -178,6 +180,14 @@ impl Evidence {
         };
         let lines = segments.iter().map(line).collect();
         Ok(WindowEdges { chains, segments, lines })
+    }
+
+    /// How a camera with this horizontal field of view, radians, is tilted: by the upright lines of what does not move.
+    pub fn tilt(&self, field_of_view_rad: Option<f64>) -> Result<TiltEstimate, TiltError> {
+        let mut still = Image::filled(self.grey.width(), self.grey.height(), true);
+        clear(&mut still, &dilate(&self.mask, EDGE_MARGIN_PX));
+        self.unseen.iter().for_each(|unseen| clear(&mut still, unseen));
+        camera_tilt(&self.grey.as_frame(), Some(&still), field_of_view_rad)
     }
 
     /// Image speed at a point, pixels per frame; 0 if it is not known.

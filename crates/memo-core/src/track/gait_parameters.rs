@@ -315,7 +315,7 @@ impl TrackedWalk {
         };
         let (eye, path) = (self.camera.position().truncate(), self.route().at(middle_m));
         let depth_sd_m = match self.fitted() {
-            Some(fit) if !self.camera_is_guessed => {
+            Some(fit) if self.tilt.is_none() => {
                 fit.frames.iter().map(|f| f.sd[1]).sum::<f64>() / fit.frames.len() as f64
             }
             _ => self.depth_sd_m,
@@ -328,7 +328,7 @@ impl TrackedWalk {
         let distance = relative.hypot(POSTURE_SD);
         let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
         let along_view_sq = path.direction().dot(view).powi(2);
-        if self.camera_is_guessed { distance.hypot(ASSUMED_FOCAL_SD * along_view_sq) } else { distance }
+        if self.tilt.is_some() { distance.hypot(ASSUMED_FOCAL_SD * along_view_sq) } else { distance }
     }
 }
 

@@ -13,7 +13,7 @@ use crate::model::position::{
     FootPosition, Midpoints, PositionError, PositionOptions, position_from_feet, position_from_head,
     position_on_ground,
 };
-use crate::model::{Camera, CameraError};
+use crate::model::{Camera, CameraError, Tilt};
 use glam::{DVec2, DVec3};
 use thiserror::Error;
 
@@ -82,14 +82,30 @@ fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
 }
 
 /// The camera assumed from the sightings of one person of known height; see [`Camera::from_person`].
+///
+/// A tilted camera is the level one that sees soles and crown in the rows in which they would be, turned.
 pub fn camera_from_sightings(
     sightings: &[Sighting],
     size: [u32; 2],
     field_of_view_rad: f64,
     height_m: f64,
+    tilt: &Tilt,
 ) -> Result<Camera, LocateError> {
     let (sole, crown) = person_rows(sightings);
-    Ok(Camera::from_person(size, field_of_view_rad, height_m, sole, crown)?)
+    let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
+    let level = Camera::assumed(size, field_of_view_rad)?;
+    // 1. The upright line through the middle of the rectangle meets its lower and its upper side.
+    let centre = DVec2::new(middle, 0.5 * (sole + crown));
+    let down = tilt.down();
+    let downwards = down.truncate() - down.z * (centre - level.centre_px) / level.focal_px;
+    let at = |row: f64| DVec2::new(middle + downwards.x / downwards.y * (row - centre.y), row);
+    // 2. Their rows in a level camera.
+    let level_row = |pixel: DVec2| {
+        let ray = tilt.rotation().transpose() * ((pixel - level.centre_px) / level.focal_px).extend(1.0);
+        level.centre_px.y + level.focal_px.y * ray.y / ray.z
+    };
+    let [sole, crown] = [sole, crown].map(|row| level_row(at(row)));
+    Ok(Camera::from_person(size, field_of_view_rad, height_m, sole, crown)?.tilted(tilt))
 }
 
 /// Path, positions along it and speed of a person.
@@ -317,9 +333,32 @@ mod tests {
     fn a_camera_made_from_the_person_puts_the_walk_on_its_origin() {
         let truth = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap();
         let seen = sightings(&truth, 0.0, 1.4, 1.7);
-        let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7).unwrap();
+        let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7, &Tilt::default()).unwrap();
         let course = locate(&seen, &camera, &crown(1.7)).unwrap();
         assert!(course.path.origin.length() < 0.05 && (course.speed_mps - 1.4).abs() < 0.05, "{course:?}");
+    }
+
+    #[test]
+    fn a_tilted_camera_is_made_from_the_person() {
+        for (roll_rad, pitch_rad, x_m) in [(0.1, 0.0, -0.6), (-0.07, 0.25, 0.0), (0.05, -0.1, -0.3)] {
+            let tilt = Tilt { roll_rad, pitch_rad };
+            let truth = Camera::level([640, 480], 1.0, 1.1, 6.0).unwrap().tilted(&tilt);
+            let mut seen = sightings(&truth, 0.0, 1.4, 1.7);
+            // The rectangle reaches from the foot to the head, which leans.
+            for sighting in &mut seen {
+                let foot = DVec3::new(x_m + 1.4 * sighting.time_s, 0.0, 0.0);
+                let [sole, crown] = [0.0, 1.7].map(|z| truth.project(foot + DVec3::Z * z).unwrap());
+                sighting.rectangle.left = (sole.x.min(crown.x) - 40.0) as usize;
+                sighting.rectangle.right = (sole.x.max(crown.x) + 40.0) as usize;
+                sighting.rectangle.top = (crown.y - MASK_MARGIN_PX).round() as usize;
+                sighting.rectangle.bottom = sole.y.round() as usize;
+            }
+            let camera = camera_from_sightings(&seen, [640, 480], 1.0, 1.7, &tilt).unwrap();
+            let off = (camera.position() - truth.position()).abs();
+            assert!(off.y < 0.15 && off.z < 0.05, "{roll_rad} {pitch_rad}: {off}");
+            let course = locate(&seen, &camera, &crown(1.7)).unwrap();
+            assert!((course.speed_mps - 1.4).abs() < 0.06, "{course:?}");
+        }
     }
 
     #[test]

@@ -15,6 +15,7 @@ use super::route::Route;
 use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
 use super::walk::{State, Step, Walk, WalkOptions};
+use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
 use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
 use glam::{DVec2, DVec3};
@@ -33,8 +34,8 @@ pub struct TrackedWalk {
     pub camera: Camera,
     /// Rotation vector of `frame_camera_from_first_camera` of each row, radians; empty if the camera stood still.
     pub camera_turns: Vec<DVec3>,
-    /// True if no camera was given.
-    pub camera_is_guessed: bool,
+    /// How the assumed camera is tilted; `None` if a camera was given.
+    pub tilt: Option<TiltEstimate>,
     /// The body height that the walk was tracked with: given, measured or assumed.
     pub height: BodyHeight,
     /// The average walker of the person's height, from which a fit starts.

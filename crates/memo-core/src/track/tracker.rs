@@ -42,6 +42,7 @@ use super::standing::Standing;
 use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::OptionError;
+use crate::calibrate::{TiltError, TiltEstimate};
 use crate::image::{Frame, GroupOptions, Mask, Rectangle, Sides, group_regions, regions};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
@@ -59,6 +60,9 @@ pub enum TrackError {
     /// A frame or an option of the image stages was refused.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
+    /// The tilt of the assumed camera.
+    #[error(transparent)]
+    Tilt(#[from] TiltError),
     /// An option is outside its range.
     #[error(transparent)]
     Option(#[from] OptionError),
@@ -132,6 +136,8 @@ pub struct Tracker {
     identities: Identities,
     /// Frames of something that may walk on the spot.
     standing: Standing,
+    /// How a camera that is not given is tilted, by the first frame with something that may be a person.
+    tilt: Option<TiltEstimate>,
     /// Boxes around people that were given, by frame.
     boxes: BTreeMap<usize, Vec<Rectangle>>,
     finished: Vec<TrackedWalk>,
@@ -158,6 +164,7 @@ impl Tracker {
             fading: Vec::new(),
             identities: Identities::default(),
             standing: Standing::default(),
+            tilt: None,
             boxes: BTreeMap::new(),
             finished: Vec::new(),
             report: SeekReport::default(),
@@ -273,6 +280,7 @@ impl Tracker {
         }
         self.candidates.clear();
         self.standing = Standing::default();
+        self.tilt = None;
         self.identities.forget_ended();
         self.backdrop = Backdrop::default();
     }
@@ -301,6 +309,9 @@ impl Tracker {
         let regions = given.unwrap_or_else(|| {
             evidence.candidates(&self.options.evidence).into_iter().map(|region| region.rectangle).collect()
         });
+        if self.options.camera.is_none() && self.tilt.is_none() && !regions.is_empty() {
+            self.tilt = Some(evidence.tilt(self.options.field_of_view_rad)?);
+        }
         self.follow(evidence, &expected, &regions)?;
         self.end_walks(evidence);
         self.seek(evidence, regions, are_given)
@@ -564,7 +575,8 @@ impl Tracker {
                 continue;
             }
             let height_m = self.options.height_of(self.identities.count());
-            let given = Given { options: &self.options, camera: self.camera(), height_m, size };
+            let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
+            let given = Given { options, camera, tilt, height_m, size };
             let begun = candidate.begin(&given).filter(|active| self.is_somebody_else(active));
             match begun.filter(|active| !self.is_left_over(active)) {
                 Some(mut active) => {
@@ -640,7 +652,7 @@ impl Tracker {
             average: active.average,
             depth_sd_m: active.depth_sd_m,
             start: active.start,
-            camera_is_guessed: self.options.camera.is_none(),
+            tilt: active.tilt,
             gait_speed_mps: active.gait_speed_mps,
             is_on_treadmill: active.is_on_treadmill,
             is_frontal: active.frontal.is_some(),

@@ -22,6 +22,7 @@ use super::search::{Grid, Path, Scene, search_each_phase};
 use super::standing::Standing;
 use super::start::{CadenceRange, Direction, PhaseCurve, StartReport, phase_lines, start};
 use super::walk::{FrameEdges, Walk, WalkOptions};
+use crate::calibrate::TiltEstimate;
 use crate::model::{Camera, GaitStyle, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -88,6 +89,8 @@ const AVERAGE_GAIT_SHARE: f64 = 0.15;
 /// What a start on the spot needs besides the frames.
 pub(super) struct Spot<'a> {
     pub(super) camera: Camera,
+    /// How the assumed camera is tilted; `None` of a given one.
+    pub(super) tilt: Option<TiltEstimate>,
     /// The course of the rectangles as of somebody who walks along the image plane.
     pub(super) course: Course,
     pub(super) height: BodyHeight,
@@ -105,7 +108,7 @@ impl Spot<'_> {
         }
         let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
         let Some(start) = self.start(&frames) else { return Err(standing) };
-        let Self { camera, course, height, walker, options, .. } = self;
+        let Self { camera, tilt, course, height, walker, options, .. } = self;
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         for (_, edges) in &standing.kept {
             walk.follow(edges, camera, &options.walk);
@@ -114,6 +117,7 @@ impl Spot<'_> {
             person: 0,
             started_near: false,
             camera: camera.clone(),
+            tilt: *tilt,
             height: *height,
             depth_sd_m: course.depth_sd_m,
             start,
@@ -226,7 +230,8 @@ mod tests {
         let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: 0.02 };
         let course = locate(&standing.sightings(), &camera(), &crown).unwrap();
         let height = BodyHeight::given(1.75);
-        let spot = Spot { camera: camera(), course, height, walker, backdrop: &backdrop, options: &options };
+        let (camera, backdrop, options) = (camera(), &backdrop, &options);
+        let spot = Spot { camera, tilt: None, course, height, walker, backdrop, options };
         spot.begin(standing).ok()
     }
 

@@ -8,17 +8,19 @@ use super::super::walk::{Step, Walk};
 use super::edge_search::View;
 use super::views::{Backdrop, Piece};
 use super::{FitError, FitFrame, FitOptions, Problem, WalkFit, fit_on_the_spot, fitted_route};
+use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::FilterOptions;
 use crate::image::Image;
 use crate::model::{Camera, Walker};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// A walk as it was tracked.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tracked<'a> {
     pub walk: &'a Walk,
     pub camera: &'a Camera,
-    pub is_camera_assumed: bool,
+    /// How an assumed camera is tilted; `None` of a given one.
+    pub tilt: Option<&'a TiltEstimate>,
     /// The average walker of the person's height.
     pub average: &'a Walker,
     pub height: &'a BodyHeight,
@@ -40,17 +42,21 @@ impl Tracked<'_> {
         let problem = |route| {
             let problem = Problem::new(self.camera, self.average, route, &frames, options);
             match self.height.source {
-                _ if self.is_camera_assumed => problem.of_assumed_camera(),
+                _ if self.tilt.is_some() => problem.of_assumed_camera(),
                 HeightSource::Given => problem,
                 _ => problem.of_height(self.height),
             }
         };
+        let with_tilt = |mut fit: WalkFit| {
+            self.tilt.iter().for_each(|tilt| fit.add_tilt(self.camera, tilt));
+            fit
+        };
         if !self.is_on_treadmill {
-            return problem(route).fit(p_swapped);
+            return problem(route).fit(p_swapped).map(with_tilt);
         }
         let mirrored = mirrored(&route.at(0.0), self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
-        fit_on_the_spot(&here, &there, p_swapped)
+        fit_on_the_spot(&here, &there, p_swapped).map(with_tilt)
     }
 
     /// The frames to be fitted, in their views, from where the smoothed track has the person.
@@ -65,6 +71,22 @@ impl Tracked<'_> {
             FitFrame { time_s: step.time_s, view, visible: step.visible.into(), start }
         };
         steps.iter().zip(places).zip(views).map(frame).collect()
+    }
+}
+
+impl WalkFit {
+    /// Adds the error of the camera's tilt to the angles against the vertical, those of hip and shoulder: of its turns
+    /// about the viewing direction and about the picture's rows, the share about the axis across the way.
+    fn add_tilt(&mut self, camera: &Camera, tilt: &TiltEstimate) {
+        let level = |axis: DVec3| (camera.rotation.transpose() * axis).truncate().normalize_or_zero();
+        let (right, ahead) = (level(DVec3::X), level(DVec3::Z));
+        for frame in &mut self.frames {
+            let across = DVec2::from_angle(frame.heading_rad).perp();
+            let sd_rad = (tilt.roll_sd_rad * ahead.dot(across)).hypot(tilt.pitch_sd_rad * right.dot(across));
+            for [hip, _, _, shoulder, _] in frame.measured.iter_mut().map(|side| &mut side.angles) {
+                hip.iter_mut().chain(shoulder).for_each(|[_, sd]| *sd = sd.hypot(sd_rad));
+            }
+        }
     }
 }
 
@@ -128,7 +150,7 @@ impl TrackedWalk {
         let tracked = Tracked {
             walk: &self.walk,
             camera: &self.camera,
-            is_camera_assumed: self.camera_is_guessed,
+            tilt: self.tilt.as_ref(),
             average: &self.average,
             height: &height,
             is_on_treadmill: self.is_on_treadmill,

@@ -4,6 +4,7 @@ use super::super::search::{Axis, Hypothesis, Path};
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Walk, WalkOptions};
 use super::*;
+use crate::calibrate::tilt_of_lines;
 use crate::estimate::kalman::ConstantVelocity;
 use crate::image::Rectangle;
 use crate::synth::Random;
@@ -174,7 +175,7 @@ impl Simulated {
         }
         let path = Path { heading_rad: slant_rad.unwrap_or(0.0), ..ACROSS };
         let mut walk = tracked(&measured, path, Direction::Forward);
-        walk.camera_is_guessed = slant_rad.is_some();
+        walk.tilt = slant_rad.map(|_| tilt_of_lines(&[], [640, 480], 500.0));
         Self { walk, speed_mps, stride_s, late_right: shown_late + strikes_late, right_reach_m }
     }
 
@@ -521,7 +522,7 @@ fn the_scale_is_uncertain_by_distance_posture_and_along_the_view_by_a_guessed_fo
     let scale_sd = |slant_rad: f64, camera_is_guessed: bool| {
         let path = Path { heading_rad: slant_rad, ..ACROSS };
         let mut walk = tracked(&exact(1.0, 0.0), path, Direction::Forward);
-        walk.camera_is_guessed = camera_is_guessed;
+        walk.tilt = camera_is_guessed.then(|| tilt_of_lines(&[], [640, 480], 500.0));
         walk.scale_sd()
     };
     // The camera is 6 m in front of the origin and looks along y.

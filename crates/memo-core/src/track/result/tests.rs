@@ -70,7 +70,7 @@ pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedW
         average: walk.walker.clone(),
         walk,
         camera: camera(),
-        camera_is_guessed: false,
+        tilt: None,
         is_on_treadmill: false,
         is_frontal: false,
         height: BodyHeight::given(1.75),

@@ -6,6 +6,7 @@ use super::super::start::Direction;
 use super::super::start::tests::report;
 use super::super::walk::{Beginning, Look, State, Step, Walk};
 use super::*;
+use crate::calibrate::tilt_of_lines;
 use crate::estimate::kalman::ConstantVelocity;
 use crate::image::flow::FlowOptions;
 use crate::image::{BackgroundOptions, CleanOptions, Image};
@@ -253,6 +254,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         started_near: false,
         height: super::super::height::BodyHeight::given(1.75),
         camera: camera(),
+        tilt: None,
         depth_sd_m: 0.1,
         start: report(PATH, BEGINNING, Direction::Forward),
         walk,
@@ -425,12 +427,13 @@ fn what_is_handed_out_is_trimmed_and_knows_its_camera() {
     tracker.finish().unwrap();
     let walk = tracker.take_finished().remove(0);
     assert_eq!((walk.steps().len(), walk.steps()[0].frame), (28, 2));
-    assert!(!walk.camera_is_guessed && walk.camera == camera() && walk.fit.is_none());
+    assert!(walk.tilt.is_none() && walk.camera == camera() && walk.fit.is_none());
     assert_eq!((walk.depth_sd_m, walk.gait_speed_mps, walk.options), (0.1, 1.25, options().walk));
     let mut guessed = following(30, 0.0, 1.2);
-    guessed.options.camera = None;
+    let tilt = tilt_of_lines(&[], [640, 480], 500.0);
+    guessed.people[0].tilt = Some(tilt);
     guessed.finish().unwrap();
-    assert!(guessed.take_finished()[0].camera_is_guessed);
+    assert_eq!(guessed.take_finished()[0].tilt, Some(tilt));
     let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
     assert_eq!(tracker.update(&frame.as_frame(), 9.0), Err(TrackError::Finished));
 }
