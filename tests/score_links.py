@@ -5,7 +5,8 @@
 Up to 2.4 s of a recording at 50 to 75 Hz are seen in parallel projection at 200 px per metre, from the side
 and turned out of it, with independent noise in every coordinate and windows of the default length. Displays:
 
-* `walker`: the joints; shown are all twelve, or fewer, or with the head and a joint of another recording;
+* `walker`: the joints; shown are all twelve, or fewer, or with the head and a joint of another recording, or
+  with the toes, heels, neck and head that the recording has;
 * `scattered`: each joint's motion relative to the pelvis, put at a random place in the walker's area, or in
   half of it;
 * `mixed`: at each joint's place that joint of a random recording of the same group, at a random instant.
@@ -20,12 +21,13 @@ side; the share of windows that are interpreted, by angle; the same of scattered
 false; of other motions the share interpreted and how many of their limb links are right. Links inside the
 trunk count neither way.
 
-Cannot do: perspective, and dots that are not joints other than the two extra ones.
+Cannot do: perspective, and dots that are no joints other than these.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import pickle
 import sys
 import zlib
@@ -39,8 +41,12 @@ from conftest import SHARED_DATA
 from score_postures import HARD, OTHER, WALKS
 
 JOINTS = ("RSH", "REL", "RWR", "LSH", "LEL", "LWR", "RHP", "RKN", "RAN", "LHP", "LKN", "LAN")
+#: Further points of some recordings, after the joints; then the two points that are added.
+FURTHER = ("RTO", "LTO", "NEC", "HED", "RHEE", "LHEE", "C7")
+HEAD, STRAY = 19, 20
 LIMBS = frozenset(frozenset((first, first + 1)) for first in (0, 1, 3, 4, 6, 7, 9, 10))
-TRUNK = frozenset((0, 3, 6, 9))
+TRUNK = frozenset((0, 3, 6, 9, 14, 15, 18, HEAD))
+FEET = (frozenset((8, 12, 16)), frozenset((11, 13, 17)))
 GROUPS = {
     "tuned": WALKS["tuning"] + HARD["tuning"],
     "unseen": WALKS["others"] + HARD["others"],
@@ -68,30 +74,41 @@ class Display(NamedTuple):
 
 
 class Window(NamedTuple):
-    """What one window of a call holds: right, found and true limb links, and the verdict."""
+    """What one window of a call holds: right, found and true limb links, and the verdict.
+
+    Links within a foot are found and right, but need not be found.
+    """
 
     display: Display
     right: int
     found: int
+    recalled: int
     true: int
     interpreted: bool
     features: dict[str, float]
 
 
 def recording(name: str) -> tuple[float, np.ndarray]:
-    """Frame rate, and joints (T, 12, 3), metres; `drawn` walkers are memo's own, with a rigid trunk."""
+    """Frame rate, and joints and further points (T, 19, 3), metres, NaN for those that it does not have.
+
+    `drawn` walkers are memo's own, with a rigid trunk.
+    """
     if name.startswith("drawn"):
         speed_mps = float(name.split()[1])
         walk = memo.walker_motion(240, rate_hz=RATE_HZ, speed_mps=speed_mps)
-        return RATE_HZ, walk.positions[:, [walk.names.index(joint) for joint in JOINTS]]
+        joints = walk.positions[:, [walk.names.index(joint) for joint in JOINTS]]
+        return RATE_HZ, np.concatenate([joints, np.full((len(joints), len(FURTHER), 3), np.nan)], axis=1)
     path = SHARED_DATA / "mocap" / "joints" / f"{name}.csv"
     with path.open(encoding="utf-8") as lines:
         rate_hz = float(lines.readline().split(",")[2].split()[0])
         heads = lines.readline().strip().split(",")
     rows = np.loadtxt(path, delimiter=",", skiprows=2)
-    columns = [[heads.index(f"{joint}_{axis}") for axis in "xyz"] for joint in JOINTS]
     every = max(1, round(rate_hz / RATE_HZ))
-    return rate_hz / every, rows[::every][:, columns]
+    joints = np.full((len(rows[::every]), len(JOINTS) + len(FURTHER), 3), np.nan)
+    for k, joint in enumerate((*JOINTS, *FURTHER)):
+        if f"{joint}_x" in heads:
+            joints[:, k] = rows[::every][:, [heads.index(f"{joint}_{axis}") for axis in "xyz"]]
+    return rate_hz / every, joints
 
 
 def seen(joints: np.ndarray, angle_deg: float) -> np.ndarray:
@@ -114,7 +131,7 @@ def about_pelvis(points_px: np.ndarray) -> np.ndarray:
 def tracks(
     display: Display, recordings: dict[str, tuple[float, np.ndarray]]
 ) -> tuple[np.ndarray, list[int], float]:
-    """(T, K, 2) pixels of a display, which joints they are (12 and 13: no joints), and the frame rate."""
+    """(T, K, 2) pixels of a display, which joints they are (`HEAD` and `STRAY`: no joints), and the frame rate."""
     random = np.random.default_rng(zlib.crc32(repr(display).encode()))
     rate_hz, joints = recordings[display.name]
     frames = min(len(joints), int(SECONDS * rate_hz))
@@ -135,13 +152,15 @@ def tracks(
         own = about_pelvis(points)
         middle = own.mean(axis=0)
         low, high = (
-            np.minimum(middle.min(axis=0), (-60, np.inf)),
-            np.maximum(middle.max(axis=0), (60, -np.inf)),
+            np.minimum(np.nanmin(middle, axis=0), (-60, np.inf)),
+            np.maximum(np.nanmax(middle, axis=0), (60, -np.inf)),
         )
-        points = pelvis + own - middle + random.choice([0.5, 1.0]) * random.uniform(low, high, (12, 2))
+        points = pelvis + own - middle + random.choice([0.5, 1.0]) * random.uniform(low, high, middle.shape)
     elif display.kind == "mixed":
-        points = pelvis + np.stack([joint_of_another(joint) for joint in range(12)], axis=1)
+        points = pelvis + np.stack([joint_of_another(joint) for joint in range(points.shape[1])], axis=1)
     which = list(SHOWN.get(display.shown, range(12)))
+    if display.shown == "as recorded":
+        which = [joint for joint in range(points.shape[1]) if np.isfinite(points[:, joint]).any()]
     if display.shown == "one missing":
         which.remove(int(random.integers(12)))
     points = points[:, which]
@@ -150,7 +169,7 @@ def tracks(
         head = pelvis[:, 0] + up + 50 * up / np.linalg.norm(up, axis=1, keepdims=True)
         stray = joint_of_another(int(random.choice([1, 2, 4, 5, 7, 8, 10, 11])))
         stray = pelvis[:, 0] + stray - stray.mean(axis=0) + random.uniform((-70, -140), (70, 140))
-        points, which = np.concatenate([points, head[:, None], stray[:, None]], axis=1), [*which, 12, 13]
+        points, which = np.concatenate([points, head[:, None], stray[:, None]], axis=1), [*which, HEAD, STRAY]
     return points + random.normal(0.0, display.noise_px, points.shape), which, rate_hz
 
 
@@ -163,12 +182,13 @@ def windows(display: Display, recordings: dict[str, tuple[float, np.ndarray]]) -
     counted = []
     for window in figure.windows:
         links = {frozenset(which[k] for k in link.points) for chain in window.chains for link in chain.links}
-        limbs = {link for link in links if not link <= TRUNK | {12}}
+        limbs = {link for link in links if not link <= TRUNK}
         counted.append(
             Window(
                 display,
-                right=len(limbs & true),
+                right=len(limbs & true) + sum(any(link <= foot for foot in FEET) for link in limbs),
                 found=len(limbs),
+                recalled=len(limbs & true),
                 true=len(true),
                 interpreted=window.status == "interpreted",
                 features=features(window, noise_px, len(which)),
@@ -215,8 +235,9 @@ def displays(noises_px: Sequence[float]) -> list[Display]:
         for angle_deg in ANGLES_DEG
         for noise_px in noises_px
         for kind in ("walker", "scattered", "mixed")
-        for shown in ("all", "one missing", "two more", "legs, an arm", "legs")
-        if (shown == "all" or not group.startswith("other")) and (group != "drawn" or kind != "mixed")
+        for shown in ("all", "as recorded", "one missing", "two more", "legs, an arm", "legs")
+        if (shown in ("all", "as recorded") or not group.startswith("other"))
+        and (group != "drawn" or (kind != "mixed" and shown != "as recorded"))
     ]
 
 
@@ -237,8 +258,9 @@ def report(counted: Sequence[Window]) -> str:
         return float(window.interpreted)
 
     def links(chosen: Sequence[Window]) -> str:
-        right, found, true = (sum(getattr(w, name) for w in chosen) for name in ("right", "found", "true"))
-        return f"{right / max(true, 1):.3f}/{right / max(found, 1):.3f}"
+        right, found = (sum(getattr(w, name) for w in chosen) for name in ("right", "found"))
+        recalled, true = (sum(getattr(w, name) for w in chosen) for name in ("recalled", "true"))
+        return f"{recalled / max(true, 1):.3f}/{right / max(found, 1):.3f}"
 
     lines = ["Limb links of all windows, recall/precision, by the angle from the side"]
     angles = sorted({abs(angle) for angle in ANGLES_DEG})
@@ -278,12 +300,13 @@ def report(counted: Sequence[Window]) -> str:
     for group in GROUPS:
         if group in walkers:
             continue
-        for noise_px in noises_px:
-            own = select(kind="walker", group=group, noise_px=noise_px)
-            false = [w for w in select(group=group, noise_px=noise_px) if w.display.kind != "walker"]
-            read = [w for w in own if w.interpreted]
+        for shown, noise_px in itertools.product(("all", "as recorded"), noises_px):
+            chosen = select(shown=shown, group=group, noise_px=noise_px)
+            own = [window for window in chosen if window.display.kind == "walker"]
+            false = [window for window in chosen if window.display.kind != "walker"]
+            read = [window for window in own if window.interpreted]
             cells = f"{share(own, interpreted)}  {links(read)} {share(false, interpreted)}"
-            lines.append(f"{group:14}{noise_px:4.0f} px  {cells}")
+            lines.append(f"{shown:14}{group:14}{noise_px:4.0f} px  {cells}")
     return "\n".join(lines)
 
 

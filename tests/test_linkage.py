@@ -342,7 +342,10 @@ def test_a_spanning_tree_is_told(tmp_path):
     tracks = np.concatenate([shown.positions_px, shown.positions_px[:, :6] + 400], axis=1)
     points = figure.Points([f"d{i}" for i in range(19)], shown.times_s, tracks)
     found = memo.planar(tracks, shown.times_s)
-    assert "19 are too many points" in _about_figure(found, points, 0.5)[1]
+    said = _about_figure(found, points, 0.5)
+    assert "19 are too many points" in said[1]
+    assert "too many points for a verdict. The best guess is in links.csv" in said[2]
+    assert not found.interpreted and found.links()
     figure.write_figure_csv(tmp_path, found, points)
     rows = csv.DictReader((tmp_path / "windows.csv").read_text().splitlines())
     assert {row["method"] for row in rows} == {"forest"}

@@ -144,8 +144,8 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     lines = [f"Windows: {', '.join(told)}."]
     if any(window.method == "forest" and window.chains for window in figure.windows):
         lines.append(
-            f"{len(points.names)} are too many points to compare all links (at most 16): "
-            "a spanning tree links them, without confidences, and false links are likely."
+            f"{len(points.names)} are too many points to compare all links (at most 16): a spanning tree links "
+            "them, without evidence that they are a body. Leave out what is no joint of a limb."
         )
     if not figure.interpreted:
         guess = " The best guess is in links.csv." if any(w.chains for w in figure.windows) else ""
@@ -171,7 +171,10 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
 
 def _why_not(figure: Any) -> str:
     """Why no window is interpreted."""
-    if any(window.status == "lost" for window in figure.windows):
+    lost = [window for window in figure.windows if window.status == "lost"]
+    if lost and all(window.method == "forest" for window in lost):
+        return "too many points for a verdict"
+    if lost:
         return "the points do not move like the joints of one body whose limbs swing in planes"
     return "no stretch of frames shows motion in planes"
 
