@@ -131,7 +131,7 @@ def about_pelvis(points_px: np.ndarray) -> np.ndarray:
 def tracks(
     display: Display, recordings: dict[str, tuple[float, np.ndarray]]
 ) -> tuple[np.ndarray, list[int], float]:
-    """(T, K, 2) pixels of a display, which joints they are (`HEAD` and `STRAY`: no joints), and the frame rate."""
+    """(T, K, 2) pixels of a display, which joints they are (`HEAD`, `STRAY`: none), and the frame rate."""
     random = np.random.default_rng(zlib.crc32(repr(display).encode()))
     rate_hz, joints = recordings[display.name]
     frames = min(len(joints), int(SECONDS * rate_hz))

@@ -144,8 +144,8 @@ def _about_figure(figure: Any, points: Any, noise_px: float) -> list[str]:
     lines = [f"Windows: {', '.join(told)}."]
     if any(window.method == "forest" and window.chains for window in figure.windows):
         lines.append(
-            f"{len(points.names)} are too many points to compare all links (at most 16): a spanning tree links "
-            "them, without evidence that they are a body. Leave out what is no joint of a limb."
+            f"{len(points.names)} are too many points to compare all links (at most 16): a spanning tree "
+            "links them, without evidence that they are a body. Leave out what is no joint of a limb."
         )
     if not figure.interpreted:
         guess = " The best guess is in links.csv." if any(w.chains for w in figure.windows) else ""
