@@ -17,7 +17,7 @@ use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk};
+use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk, standing_scale};
 use super::lift::JointRays;
 use crate::model::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
 
@@ -60,8 +60,9 @@ pub struct LengthPrior {
 pub const ASSUMED_HEIGHT_M: f64 = 1.70;
 /// Relative standard deviation of adult height over both sexes.
 const ASSUMED_HEIGHT_SD: f64 = 0.06;
-/// Relative standard deviation of the scale of a body of known height.
-const KNOWN_HEIGHT_SD: f64 = 0.02;
+/// Relative standard deviation of the scale of a body of known height: between joint centres, from neck to ankle, men have
+/// 79 % of their height and women 75 % (de Leva, J Biomech 29:1223, 1996).
+const KNOWN_HEIGHT_SD: f64 = 0.03;
 
 impl LengthPrior {
     /// The prior for a person of known height, or for an adult of [`ASSUMED_HEIGHT_M`].
@@ -107,26 +108,47 @@ pub struct LengthFit {
 }
 
 impl LengthFit {
-    /// Scales all lengths so that neck to sole is as in the prior.
+    /// Scales all lengths so that neck to sole is `scale` times that of the prior, with the standard deviation
+    /// `scale_sd`.
     ///
     /// The height of a person on the ground and the distance that it implies determine each other: extents at a
     /// distance that is too large are too large, and longer legs put the neck farther away. With a known height
-    /// the images give the proportions only.
-    fn keep_height_of(&mut self, prior: &LengthPrior) {
-        let factor = neck_to_ankle_m(&prior.lengths) / neck_to_ankle_m(&self.lengths);
+    /// extents give the proportions only.
+    fn keep_height_of(&mut self, prior: &LengthPrior, (scale, scale_sd): (f64, f64)) {
+        let factor = scale * neck_to_ankle_m(&prior.lengths) / neck_to_ankle_m(&self.lengths);
         self.lengths.to.0.iter_mut().chain(&mut self.lengths.rigid).for_each(|length_m| *length_m *= factor);
         self.scale *= factor;
         for estimate in &mut self.estimates {
             let own_sq = estimate.sd_m.powi(2) - (self.scale_sd * estimate.length_m).powi(2);
             estimate.length_m *= factor;
-            estimate.sd_m = own_sq.max(0.0).sqrt().hypot(prior.scale_sd * estimate.length_m);
+            estimate.sd_m = own_sq.max(0.0).sqrt().hypot(scale_sd * estimate.length_m);
         }
         for (joint, length_m) in Joint::ALL.into_iter().zip(self.lengths.to.0).skip(1) {
             let own_sq = self.sd_m[joint].powi(2) - (self.scale_sd * length_m / factor).powi(2);
-            self.sd_m[joint] = own_sq.max(0.0).sqrt().hypot(prior.scale_sd * length_m);
+            self.sd_m[joint] = own_sq.max(0.0).sqrt().hypot(scale_sd * length_m);
         }
-        (self.scale_sd, self.scale_from) = (prior.scale_sd, prior.scale_from);
+        (self.scale_sd, self.scale_from) = (scale_sd, prior.scale_from);
     }
+}
+
+/// Scale and standard deviation of a body of known height, from the scale at which feet and neck are `seen`.
+///
+/// People of one height differ in their proportions, some of them much: the prior is Student's distribution with three
+/// degrees of freedom about 1, so that a scale far from 1 is that which is seen.
+fn scale_of_height(prior_sd: f64, seen: Option<(f64, f64)>) -> (f64, f64) {
+    let Some((seen, seen_sd)) = seen else { return (1.0, prior_sd) };
+    let weight = |scale: f64| {
+        let (off, own) = ((scale - 1.0) / prior_sd, (scale - seen) / seen_sd);
+        (-2.0 * (off * off / 3.0).ln_1p() - 0.5 * own * own).exp()
+    };
+    let nodes = (0..=200).map(|k| seen + 0.05 * seen_sd * f64::from(k - 100));
+    let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
+    for scale in nodes {
+        let p = weight(scale);
+        (total, first, second) = (total + p, first + p * scale, second + p * scale * scale);
+    }
+    let mean = first / total;
+    if total > 0.0 { (mean, (second / total - mean * mean).max(0.0).sqrt()) } else { (1.0, prior_sd) }
 }
 
 /// Length of trunk, thigh and shank of an upright person.
@@ -296,6 +318,8 @@ pub fn estimate_from_sequence(
     let up = ground.map(|g| g.up_in_camera);
     let mut lengths = prior.lengths;
     let mut options = AnchorOptions { scale_sd: prior.scale_sd, ..*options };
+    let seen = ground.and_then(|ground| standing_scale(&rays, &prior.lengths, ground, &options));
+    let scale = scale_of_height(prior.scale_sd, seen);
     let mut fit = None;
     for _ in 0..ROUNDS {
         let mut error = AnchorError::Empty;
@@ -314,7 +338,7 @@ pub fn estimate_from_sequence(
         }
         let mut found = estimate(&rays, &anchors, up, prior, ground.map(|_| ScaleFrom::Ground))?;
         if ground.is_some() && prior.scale_from == ScaleFrom::BodyHeight {
-            found.keep_height_of(prior);
+            found.keep_height_of(prior, scale);
         }
         lengths = found.lengths;
         options.scale_sd = found.scale_sd;
@@ -525,6 +549,20 @@ mod tests {
     }
 
     /// The largest of extents that have a spread of 3 cm and noise of 3 cm: 0.84 of the spread above the median.
+    /// Near 1, the prior counts as a normal one does; far from it, what is seen.
+    #[test]
+    fn unusual_proportions_are_taken_as_they_are_seen() {
+        assert_eq!(scale_of_height(0.02, None), (1.0, 0.02));
+        let (near, near_sd) = scale_of_height(0.02, Some((1.01, 0.02)));
+        assert!((1.004..1.007).contains(&near) && (0.011..0.016).contains(&near_sd), "{near} {near_sd}");
+        for far in [0.85, 1.15] {
+            let (scale, sd) = scale_of_height(0.02, Some((far, 0.02)));
+            assert!((scale - far).abs() < 0.014 && (0.018..0.022).contains(&sd), "{scale} {sd}");
+        }
+        let (vague, vague_sd) = scale_of_height(0.02, Some((1.2, 0.5)));
+        assert!((vague - 1.0).abs() < 0.02 && vague_sd < 0.05, "{vague} {vague_sd}");
+    }
+
     #[test]
     fn noise_does_not_lengthen_a_segment() {
         use crate::synth::Random;
@@ -585,7 +623,7 @@ mod tests {
     #[test]
     fn the_scale_is_that_of_the_limbs_and_of_the_prior() {
         let prior = LengthPrior::from_height(None).unwrap();
-        assert_eq!((prior.scale_sd, LengthPrior::from_height(Some(1.7)).unwrap().scale_sd), (0.06, 0.02));
+        assert_eq!((prior.scale_sd, LengthPrior::from_height(Some(1.7)).unwrap().scale_sd), (0.06, 0.03));
         let pooled: Vec<f64> =
             GROUPS.iter().map(|g| 1.1 * 0.99 * length_of(&prior.lengths, g.pairs[0])).collect();
         let (scale, sd) = scale_seen(&pooled, &prior, 0.02);
@@ -617,11 +655,11 @@ mod tests {
         assert!((right.length_m / shank - 1.05).abs() < 0.03, "{}", right.length_m);
         let thigh = of("right_hip_to_right_knee");
         assert_eq!(thigh.basis, LengthBasis::Prior);
-        // From the 8 % between people and the 2 % for a known height.
-        let expected = thigh.length_m * 0.08f64.hypot(0.02);
+        // From the 8 % between people and the 3 % for a known height.
+        let expected = thigh.length_m * 0.08f64.hypot(0.03);
         assert!((thigh.sd_m - expected).abs() < 1e-9, "{}", thigh.sd_m);
-        assert!(right.sd_m > 0.02 * right.length_m && right.sd_m < 0.06 * right.length_m, "{}", right.sd_m);
-        assert_eq!((fit.scale, fit.scale_sd, fit.scale_from), (1.0, 0.02, ScaleFrom::BodyHeight));
+        assert!(right.sd_m > 0.02 * right.length_m && right.sd_m < 0.065 * right.length_m, "{}", right.sd_m);
+        assert_eq!((fit.scale, fit.scale_sd, fit.scale_from), (1.0, 0.03, ScaleFrom::BodyHeight));
         assert_eq!(fit.sd_m[Joint::RightAnkle], right.sd_m);
         // A scale that is no more certain than the prior is the prior's, whatever its source would be.
         let again = estimate(&rays, &anchors, up, &prior, Some(ScaleFrom::Ground)).unwrap();

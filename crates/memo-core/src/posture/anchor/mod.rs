@@ -12,7 +12,7 @@
 //! The posture constants ([`AnchorOptions`]) were measured on four walks of motion capture. The neck is above the
 //! lower ankle by 0.963-0.982 of trunk, thigh and shank together (standard deviation within a walk 0.005-0.012),
 //! and above the middle of the ankles by 0.930-0.954 (0.013-0.022). The trunk leans forward by -1 to 12 degrees.
-//! The lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank. Sitting, bending and jumping violate these
+//! The lower ankle is 6-8 cm above the ground, 0.15-0.21 of the shank; drawn people in shoes have 8-10 cm. Sitting, bending and jumping violate these
 //! assumptions; once it is known which way a person faces, [`Bending`] replaces them by those for people who bend.
 
 mod ground;
@@ -28,7 +28,7 @@ use super::prior::{Balance, Lean};
 use crate::model::camera::Camera;
 use crate::model::skeleton::{Joint, SegmentLengths, Side};
 
-pub use ground::from_ground;
+pub use ground::{from_ground, standing_scale};
 pub use track::{DepthTrack, SmoothOptions, smooth};
 #[cfg(test)]
 pub(super) use trunk::rigid_trunk;
@@ -250,7 +250,7 @@ impl Default for AnchorOptions {
             length_sd: 0.02,
             rigidity_sd_m: 0.01,
             lean_sd_rad: 7f64.to_radians(),
-            ankle_height_over_shank: 0.17,
+            ankle_height_over_shank: 0.19,
             ankle_height_sd_m: 0.02,
             swing_height_m: 0.09,
             balance_sd_m: 0.12,
