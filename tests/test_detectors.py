@@ -260,3 +260,22 @@ def test_damaged_files_raise_one_kind_of_error(tmp_path, name):
             memo.read_keypoints(tmp_path / file, fps=30, image_size=made.SIZE)
         except memo.keypoints.KeypointsError as error:
             assert str(tmp_path) in str(error) and "\n" not in str(error)
+
+
+@pytest.mark.parametrize("command", ["posture", "unswap"])
+@pytest.mark.parametrize(
+    ("person", "words"),
+    [
+        ("1,1@-1", "--person 1,1@-1 is not a point in a frame: X,Y@F, such as 320,240@50"),
+        ("nan,nan@50", "--person nan,nan@50 is not a point in a frame"),
+        ("@", "--person @ is not a point in a frame"),
+        ("340,250", "a place needs its frame: X,Y@F in pixels, such as 340,250@50"),
+        ("7", "no person 7: there is 1 person, and the first is 0"),
+        ("anna", "no person anna: the file does not name people"),
+    ],
+)
+def test_a_person_that_is_none_is_said_in_one_line(tmp_path, memo_command, command, person, words):
+    made.yolo_json(tmp_path / "yolo.json")
+    options = ["--fps", "30", "--image-size", "1280x720", "--person", person, "--out", tmp_path / "out"]
+    code, said, err = memo_command(command, tmp_path / "yolo.json", *options)
+    assert code == 1 and said == "" and words in err and len(err.splitlines()) == 1

@@ -103,7 +103,7 @@ def point_in_frame(text: str, option: str = "--follow") -> tuple[float, float, i
     """A point of the picture in a frame, as in 320,240@50: pixels, and the frame's number in the video."""
     point = _POINT.fullmatch(text.strip())
     if point is None:
-        raise InputError(f"{option} {text} is not a point in a frame such as 320,240@50")
+        raise InputError(f"{option} {text} is not a point in a frame: X,Y@F, such as 320,240@50")
     return float(point[1]), float(point[2]), int(point[3])
 
 

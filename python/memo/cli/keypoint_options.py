@@ -1,11 +1,14 @@
 """Options that the commands on keypoints share. Needs typer, so import it only where commands are made."""
 
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from memo.given import InputError, point_in_frame
+
+_PLACE_WITHOUT_FRAME = re.compile(r"[-+.\d\s]+,[-+.\d\s]+")
 
 KeypointsPath = Annotated[
     Path,
@@ -40,10 +43,21 @@ Person = Annotated[
 ]
 
 
+def reading_of(
+    fps: float | None, layout: str | None, person: str | None, image_size: str | None
+) -> dict[str, Any]:
+    """The options of `memo.read_keypoints`."""
+    return {"fps": fps, "layout": layout, "person": person_of(person), "image_size": size_of(image_size)}
+
+
 def person_of(text: str | None) -> int | str | tuple[float, float, int] | None:
     """A person chosen by number, name or place."""
-    if text is None or "@" in text:
-        return None if text is None else point_in_frame(text, "--person")
+    if text is None:
+        return None
+    if "@" in text:
+        return point_in_frame(text, "--person")
+    if _PLACE_WITHOUT_FRAME.fullmatch(text):
+        raise InputError(f"--person {text}: a place needs its frame: X,Y@F in pixels, such as {text}@50")
     return int(text) if text.isascii() and text.isdecimal() else text
 
 

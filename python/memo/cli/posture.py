@@ -82,7 +82,7 @@ def add_posture(app: "typer.Typer") -> None:
     import typer
 
     from memo.cli.camera_options import CAMERA_HELP, CameraName, CameraSize, CameraUnit, CameraVUp
-    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, person_of
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, reading_of
 
     usual = memo._memo.defaults("posture")
     usual_rules, usual_strength = Rules(usual["rules"]), Strength(usual["strength"])
@@ -158,11 +158,11 @@ def add_posture(app: "typer.Typer") -> None:
         """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
-        reading = {"fps": fps, "layout": layout, "person": person_of(person), "image_size": image_size}
         options: dict[str, Any] = {"rules": rules.value, "strength": strength.value, "anchor": anchor.value}
         options |= {"unswap": unswap, "noise_px": noise_px, "keep_all": keep_all}
 
         def work() -> Exit:
+            reading = reading_of(fps, layout, person, image_size)
             scale = _scale(lengths, height) | {"distance_m": _checked_distance(distance)}
             check_apart([keypoints, camera, lengths], [delivery.out / name for name in (*WRITTEN, _DRAWN)])
             view = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
@@ -184,10 +184,7 @@ def _posture(
     frame: int | None,
     delivery: Delivery,
 ) -> Exit:
-    from memo.cli.keypoint_options import size_of
-
     check_writable(delivery.out)
-    reading = {**reading, "image_size": size_of(reading["image_size"])}
     with with_count("finding postures", delivery) as progress:
         keypoints = memo.read_keypoints(path, **reading)
         row = None if frame is None else _row(keypoints, frame)

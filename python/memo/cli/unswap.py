@@ -42,7 +42,7 @@ _ENDS = {Written.OPENPOSE: "_json", Written.COCO: ".json", Written.CSV: ".csv"}
 def add_unswap(app: "typer.Typer") -> None:
     import typer
 
-    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, person_of
+    from memo.cli.keypoint_options import Fps, ImageSize, KeypointsPath, LayoutName, Person, reading_of
 
     @app.command(epilog=EPILOG)
     def unswap(
@@ -70,15 +70,15 @@ def add_unswap(app: "typer.Typer") -> None:
         Labels that are exchanged in all frames, or in most, cannot be detected.
         """
         delivery = Delivery(out or Path("memo-out") / keypoints.resolve().stem, as_json=as_json, quiet=quiet)
-        options = {"fps": fps, "layout": layout, "person": person_of(person), "image_size": image_size}
-        raise typer.Exit(guarded(lambda: _unswap(keypoints, options, written, delivery)))
+
+        def work() -> Exit:
+            return _unswap(keypoints, reading_of(fps, layout, person, image_size), written, delivery)
+
+        raise typer.Exit(guarded(work))
 
 
-def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
-    from memo.cli.keypoint_options import size_of
-
+def _unswap(path: Path, reading: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
     check_writable(delivery.out)
-    reading = {**options, "image_size": size_of(options["image_size"])}
     with with_elapsed("looking at right and left", delivery):
         keypoints = memo.read_keypoints(path, **reading)
         repair = memo.unswap(keypoints)
@@ -112,7 +112,7 @@ def _unswap(path: Path, options: dict[str, Any], as_format: Written, delivery: D
     lines = [
         f"Right and left exchanged, of {counted(frames, 'frame')}: {exchanges(repair)}; {_majority(repair)}."
     ]
-    lines[0] += one_of_several(keypoints, options["person"] is None)
+    lines[0] += one_of_several(keypoints, reading["person"] is None)
     lines += [f"Warning: {doubt}." for doubt in keypoints.doubts]
     if left_out:
         lines.append(f"{as_format.value} cannot store {', '.join(left_out)}.")
