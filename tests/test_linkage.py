@@ -373,3 +373,41 @@ def test_senseless_options_are_refused(tmp_path):
     ):
         refused = run(*command, "--out", tmp_path)
         assert refused.returncode == 1 and part in refused.stderr
+
+
+def test_keypoints_are_read_as_for_posture(tmp_path, memo_command):
+    import detector_files as made
+
+    options = ["--no-video", "--noise-px", 2, "--fps", 30, "--out", tmp_path / "out"]
+    files = {
+        "mediapipe.json": made.mediapipe,
+        "labels": made.yolo_labels,
+        "dlc.csv": made.deeplabcut,
+        "sleap.csv": made.sleap_csv,
+    }
+    for name, write in files.items():
+        write(tmp_path / name)
+        code, said, err = memo_command("planar", tmp_path / name, "--image-size", "1280x720", *options)
+        assert code in (0, 3) and said.startswith(("Windows: ", "No window", "2 people")) and not err, name
+    assert (
+        "2 people in the file: 0 (19 frames"
+        in memo_command("planar", tmp_path / "mediapipe.json", "--image-size", "1280x720", *options)[1]
+    )
+    made.deeplabcut(tmp_path / "two.csv", individuals=("anna", "ben"))
+    _, said, _ = memo_command("planar", tmp_path / "two.csv", *options)
+    assert said.startswith("2 people in the file: ") and "anna (20 frames of frames 0 to 19, " in said
+    points = []
+    for name in ("anna", "ben"):
+        _, said, err = memo_command("planar", tmp_path / "two.csv", *options, "--person", name)
+        assert "people" not in said and not err
+        points.append(np.genfromtxt(tmp_path / "out" / "points3d.csv", delimiter=",", names=True)["RKN_u_px"])
+    np.testing.assert_allclose(points[1], points[0] + 300)
+    code, _, err = memo_command("planar", tmp_path / "two.csv", *options, "--person", "carl")
+    assert code == 1 and "no person carl: the file names anna, ben" in err
+
+
+def test_options_for_people_are_refused_for_points(tmp_path, memo_command):
+    (tmp_path / "dots.csv").write_text("time_s,a_u_px,a_v_px\n0,1,2\n1,1,2\n")
+    options = ["--person", "0", "--image-size", "10x10", "--out", tmp_path / "out"]
+    code, _, err = memo_command("planar", tmp_path / "dots.csv", *options)
+    assert code == 1 and "is a table of points and not of keypoints: leave --person, --image-size out" in err

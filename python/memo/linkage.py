@@ -19,7 +19,9 @@ import numpy.typing as npt
 from memo import _memo
 from memo.files import JOINTS, read_text, write_table
 from memo.given import nothing_at
-from memo.keypoints import read_keypoints
+from memo.keypoints import Keypoints, read_keypoints
+from memo.keypoints.recognising import is_no_table
+from memo.keypoints.table import PERSON_COLUMNS
 from memo.notebook import Shown
 from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
@@ -33,6 +35,8 @@ __all__ = [
     "FigureLink",
     "PlanarFigure",
     "Points",
+    "holds_keypoints",
+    "limb_points",
     "planar",
     "read_points_csv",
     "read_tracks",
@@ -238,39 +242,45 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
 def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Points:
     """Image points to search for limbs: from a CSV file for `read_points_csv`, or from keypoints.
 
-    Keypoints are anything that `read_keypoints` accepts; a CSV file of keypoints is recognised by its
-    scores, a column `joint`, or columns NAME_x without NAME_z. Only the shoulders, elbows, wrists, hips,
-    knees and ankles of one person are used.
+    Keypoints are anything that `read_keypoints` accepts, of the most prominent person; a CSV file of
+    keypoints is recognised by the form of a detector, its scores, a column `joint` or `person`, or columns
+    NAME_x without NAME_z. For another person read the keypoints and pass them to `limb_points`.
     """
     path = Path(path)
     if not path.exists():
         raise ValueError(nothing_at(path, "file or folder"))
-    if not _holds_keypoints(path):
-        points = read_points_csv(path, 2, rate_hz)
-        shrink = shrink_of_table(path) if path.name == "track.csv" else 1
-        return replace(points, positions=of_video(points.positions, shrink))
-    keypoints = read_keypoints(path, fps=rate_hz)
+    if holds_keypoints(path):
+        return limb_points(read_keypoints(path, fps=rate_hz))
+    points = read_points_csv(path, 2, rate_hz)
+    shrink = shrink_of_table(path) if path.name == "track.csv" else 1
+    return replace(points, positions=of_video(points.positions, shrink))
+
+
+def limb_points(keypoints: Keypoints) -> Points:
+    """The shoulders, elbows, wrists, hips, knees and ankles of one person."""
     limbs = [name for name in keypoints.names if name in _SHORT]
     if len(limbs) < 2:
         raise ValueError(
-            f"{path}: fewer than two joints of arms or legs; it has {', '.join(keypoints.names)}"
+            f"{keypoints.source.path}: fewer than two joints of arms or legs; "
+            f"it has {', '.join(keypoints.names)}"
         )
     places = [keypoints.names.index(name) for name in limbs]
     return Points([_SHORT[name] for name in limbs], keypoints.times_s, keypoints.points[:, places])
 
 
-def _holds_keypoints(path: Path) -> bool:
-    if path.is_dir() or path.suffix.lower() in (".json", ".trc", ".parquet"):
+def holds_keypoints(path: Path) -> bool:
+    """Whether `read_keypoints` reads this file or folder, and not `read_points_csv`."""
+    if is_no_table(path):
         return True
-    header = next(
-        (line for line in read_text(path).splitlines() if line.strip() and not line.startswith("#")), ""
-    )
+    lines = read_text(path).splitlines()
+    header = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     columns = [cell.strip() for cell in header.replace(";", ",").replace("\t", ",").split(",")]
 
     def some(end: str) -> bool:
         return any(column.endswith(end) for column in columns)
 
-    return "joint" in columns or some("_score") or (some("_x") and not some("_z"))
+    is_long = not {"joint", *PERSON_COLUMNS}.isdisjoint(columns)
+    return is_long or some("_score") or (some("_x") and not some("_z"))
 
 
 def write_points_csv(path: str | PathLike[str], points: Points) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import memo
 from memo.cli.delivery import Delivery, guarded, with_count
+from memo.cli.unswap import one_of_several
 from memo.exits import Exit
 from memo.given import InputError, check_writable
 from memo.wording import counted
@@ -20,6 +21,7 @@ EPILOG = """Examples:
   memo planar dots.csv
   memo planar joints.csv --fps 60 --noise-px 1 --names
   memo planar walk_json --fps 30 --noise-px 2 --names
+  memo planar mediapipe.json --image-size 1280x720 --noise-px 2 --names --person 1
 
 Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 3 no window shows a body; 4 the app extra is not installed."""
@@ -27,6 +29,8 @@ Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 
 def add_planar(app: "typer.Typer") -> None:
     import typer
+
+    from memo.cli.keypoint_options import Fps, ImageSize, LayoutName, Person, reading_of
 
     usual = memo._memo.defaults("planar")
 
@@ -45,7 +49,10 @@ def add_planar(app: "typer.Typer") -> None:
         window: Annotated[float, typer.Option(help="Length of the windows in time, seconds.")] = usual[
             "window_s"
         ],
-        fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has no time_s.")] = None,
+        fps: Fps = None,
+        layout: LayoutName = None,
+        person: Person = None,
+        image_size: ImageSize = None,
         carry: Annotated[
             bool, typer.Option("--carry", help="Carry lengths through windows that no plane fits.")
         ] = False,
@@ -75,23 +82,28 @@ def add_planar(app: "typer.Typer") -> None:
         delivery = Delivery(
             out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json, quiet=quiet
         )
-        raise typer.Exit(guarded(lambda: _planar(tracks, noise_px, fps, names, turn_deg, options, delivery)))
+
+        def work() -> Exit:
+            reading = reading_of(fps, layout, person, image_size)
+            return _planar(tracks, noise_px, reading, names, turn_deg, options, delivery)
+
+        raise typer.Exit(guarded(work))
 
 
 def _planar(
     tracks: Path,
     noise_px: float,
-    fps: float | None,
+    reading: dict[str, Any],
     names: bool,
     turn_deg: float,
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.linkage import JOINT_NAMES, read_tracks, write_figure_csv
+    from memo.linkage import JOINT_NAMES, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
     _check(options["focal_px"], turn_deg)
-    points, out = read_tracks(tracks, fps).at_one_scale(), delivery.out
+    (points, who), out = _read(tracks, reading), delivery.out
     if names and not any(name in JOINT_NAMES for name in points.names):
         raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)
@@ -124,8 +136,27 @@ def _planar(
         "links": links,
         "perspective_px": figure.perspective_px,
     }
-    delivery.tell(summary, _about_figure(figure, points, noise_px), written)
+    delivery.tell(summary, [*who, *_about_figure(figure, points, noise_px)], written)
     return Exit.DONE if figure.interpreted else Exit.NOBODY
+
+
+def _read(tracks: Path, reading: dict[str, Any]) -> tuple[Any, list[str]]:
+    """The points, and sentences on whose they are, if the file is of keypoints."""
+    from memo.linkage import holds_keypoints, limb_points, read_tracks
+
+    if tracks.exists() and holds_keypoints(tracks):
+        keypoints = memo.read_keypoints(tracks, **reading)
+        who = one_of_several(keypoints, reading["person"] is None).strip()
+        warned = [f"Warning: {doubt}." for doubt in keypoints.doubts]
+        return limb_points(keypoints), [who] * bool(who) + warned
+    unused = [
+        f"--{name.replace('_', '-')}" for name in reading if name != "fps" and reading[name] is not None
+    ]
+    if unused:
+        raise InputError(
+            f"{tracks}: is a table of points and not of keypoints: leave {', '.join(unused)} out"
+        )
+    return read_tracks(tracks, reading["fps"]).at_one_scale(), []
 
 
 def _check(focal_px: float | None, turn_deg: float) -> None:

@@ -25,9 +25,12 @@ from memo.keypoints.trc import is_trc, read_trc
 from memo.keypoints.vitpose import is_vitpose, read_vitpose
 from memo.keypoints.yolo import is_detections, read_detections, read_labels
 
-__all__ = ["everybody_in"]
+__all__ = ["everybody_in", "is_no_table"]
 
 ImageSize = tuple[int, int] | None
+
+_NO_TEXT = (".parquet", ".slp", *ENDINGS)
+_TEXTS = ((is_trc, read_trc), (is_deeplabcut, read_deeplabcut), (is_sleap, read_sleap))
 
 
 def everybody_in(path: Path, image_size: ImageSize) -> Found:
@@ -46,12 +49,24 @@ def everybody_in(path: Path, image_size: ImageSize) -> Found:
     content = content_of(path)
     if not content.strip():
         raise KeypointsError(f"{path}: the file is empty")
-    if content.lstrip()[:1] in ("{", "["):
+    if _is_json(path, content):
         return _in_json(path, parsed(path, content), image_size)
-    for is_own, read in ((is_trc, read_trc), (is_deeplabcut, read_deeplabcut), (is_sleap, read_sleap)):
+    for is_own, read in _TEXTS:
         if is_own(content):
             return read(path, content)
     return read_csv(path, content)
+
+
+def is_no_table(path: Path) -> bool:
+    """Whether `everybody_in` reads this file or folder as something else than a table in CSV."""
+    if path.is_dir() or path.suffix.lower() in _NO_TEXT:
+        return True
+    content = content_of(path)
+    return _is_json(path, content) or any(is_own(content) for is_own, _ in _TEXTS)
+
+
+def _is_json(path: Path, content: str) -> bool:
+    return path.suffix.lower() == ".json" or content.lstrip()[:1] in ("{", "[")
 
 
 def _in_folder(folder: Path, image_size: ImageSize) -> Found:

@@ -25,12 +25,12 @@ from memo.keypoints.text import LONGEST_NAME, content_of, short, write_text
 from memo.spreadsheet import CsvRows, Error, write_rows
 from memo.wording import counted
 
-__all__ = ["read_csv", "read_parquet_table", "write_csv"]
+__all__ = ["PERSON_COLUMNS", "read_csv", "read_parquet_table", "write_csv"]
 
 _AXES_SUFFIXES = (("_x", "_y"), ("_x_px", "_y_px"), ("_u_px", "_v_px"))
 _SCORE_SUFFIXES = ("_score", "_confidence", "_likelihood", "_visibility")
 _LONG_COLUMNS = ("joint", "x", "y")
-_PERSON_COLUMNS = ("person", "person_id", "track_id")
+PERSON_COLUMNS = ("person", "person_id", "track_id")
 
 
 def write_csv(path: str | PathLike[str], keypoints: Keypoints) -> tuple[str, ...]:
@@ -128,7 +128,7 @@ def _columns(path: Path, rows: list[list[str]]) -> Columns:
     header = [cell.strip() for cell in rows[0]] if rows else []
     lower = {cell.lower(): index for index, cell in reversed(list(enumerate(header)))}
     frame, time_s = lower.get("frame"), lower.get("time_s")
-    person = next((lower[name] for name in _PERSON_COLUMNS if name in lower), None)
+    person = next((lower[name] for name in PERSON_COLUMNS if name in lower), None)
     if frame is None and time_s is None:
         raise KeypointsError(f"{path}: a table of keypoints needs a column `frame` or `time_s`")
     if all(name in lower for name in _LONG_COLUMNS):
