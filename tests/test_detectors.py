@@ -46,7 +46,8 @@ def test_points_are_where_the_detector_put_them(tmp_path, name):
         else 1
         for frame in range(made.FRAMES)
     ]
-    assert np.allclose(np.diff(read.times_s), 1 / made.FPS)
+    assert np.allclose(read.times_s, np.arange(made.FRAMES) / made.FPS)
+    assert read.frames.tolist() == list(range(made.FRAMES))
 
 
 def test_feet_and_face_are_kept_where_the_layout_has_them(tmp_path):
@@ -104,6 +105,22 @@ def test_variants_of_yolo_sleap_and_deeplabcut(tmp_path):
     points, scores = made.sleap_h5(tmp_path / "s.h5", dims=("frame", "track", "node", "xy"))
     read = memo.read_keypoints(tmp_path / "s.h5", fps=30)
     assert np.allclose(read.points, points) and np.allclose(read.scores, scores)
+
+
+def test_numbers_of_frames_are_kept_where_the_first_one_is_0_or_they_are_of_images(tmp_path):
+    made.yolo_labels(tmp_path / "labels")
+    (tmp_path / "images").mkdir()
+    for file in (tmp_path / "labels").iterdir():
+        number = int(file.stem.removeprefix("walk_"))
+        (tmp_path / "images" / f"walk_{number:04d}.txt").write_text(file.read_text())
+    (tmp_path / "labels" / "walk_0.txt").write_text("")
+    made.mmpose_demo(tmp_path / "demo.json")
+    demo = json.loads((tmp_path / "demo.json").read_text())
+    demo["instance_info"].insert(0, {"frame_id": 0, "instances": []})
+    (tmp_path / "demo.json").write_text(json.dumps(demo))
+    for name, first in (("labels", 0), ("images", 1), ("demo.json", 0)):
+        read = memo.read_keypoints(tmp_path / name, fps=made.FPS, image_size=made.SIZE)
+        assert (read.frames[0], read.frames[-1]) == (first, made.FRAMES), name
 
 
 def saved(folder, name, text):

@@ -1,13 +1,15 @@
 """RTMPose and every other model of MMPose, ViTPose included: the JSON files that MMPose writes.
 
 - `demo/topdown_demo_with_mmdet.py --save-predictions` and other demos: `{"meta_info", "instance_info"}`,
-  with a list of `{"frame_id", "instances"}`; `meta_info.keypoint_id2name` names the points.
-- `MMPoseInferencer(..., pred_out_dir=...)` of a video: a list of `{"frame_id", "instances"}`; of a folder
-  of images: a folder of JSON files, each a list of instances. The dictionaries that it yields, as a list.
+  with a list of `{"frame_id", "instances"}` in which the first frame of the video is 1;
+  `meta_info.keypoint_id2name` names the points.
+- `MMPoseInferencer(..., pred_out_dir=...)` of a video: a list of `{"frame_id", "instances"}`, from 0; of a
+  folder of images: a folder of JSON files, each a list of instances. The dictionaries that it yields, as a
+  list.
 
 An instance is `{"keypoints": [[x, y], ...], "keypoint_scores": [...], "bbox", "bbox_score"}`. Sources:
 open-mmlab/mmpose `mmpose/structures/utils.py` (`split_instances`),
-`mmpose/apis/inferencers/base_mmpose_inferencer.py`, and its demos.
+`mmpose/apis/inferencers/base_mmpose_inferencer.py`, and its demos (`frame_idx`).
 
 Of the 133 points of COCO-WholeBody the 17 of the body and the 6 of the feet are kept; points of hands and
 the outline of the face have no names here.
@@ -52,9 +54,13 @@ def is_instances(people: Any) -> bool:
 def read_mmpose(path: Path, data: Any) -> Found:
     """All people in a file."""
     named = _names_of(data.get("meta_info")) if isinstance(data, dict) else None
+    entries = list(_frames(path, data))
+    is_demo = isinstance(data, dict) and "instance_info" in data
+    first = 1 if is_demo and min((number for number, _, _ in entries), default=0) > 0 else 0
     people: list[Person] = []
     frames = []
-    for frame, instances, where in _frames(path, data):
+    for number, instances, where in entries:
+        frame = number - first
         frames.append(frame)
         if not isinstance(instances, list):
             raise KeypointsError(f"{where}: wanted a list of people, got {short(instances)}")

@@ -2,12 +2,13 @@
 
 - A folder with a text file per frame, `NAME_1.txt`, ...: `class x y width height`, then `x y` or `x y
   confidence` of each of the 17 points, all as fractions of the picture, then perhaps the box's confidence
-  and the track's number. A frame without people has no file.
+  and the track's number. A frame without people has no file. The first frame of a video is 1.
 - `results.to_json()`: `[{"name", "class", "confidence", "box", "keypoints": {"x": [...], "y": [...],
   "visible": [...]}}]`, in pixels or, if normalized, in fractions: a folder with a file per frame, or one
   file with a list of these lists.
 
-Source: ultralytics/ultralytics `ultralytics/engine/results.py`, `Results.save_txt`, `Results.summary`.
+Source: ultralytics/ultralytics `ultralytics/engine/results.py`, `Results.save_txt`, `Results.summary`, and
+`ultralytics/data/loaders.py`, `LoadImagesAndVideos`.
 Points at (0, 0) are missing. Only models with the 17 points of COCO can be read.
 """
 
@@ -61,15 +62,24 @@ def read_detections(
 
 def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] | None) -> Found:
     """All people in a folder of label files, by the number of their frame."""
+    first = _first_number(files)
     people = []
-    for frame, file in files.items():
-        for number, line in enumerate(content_of(file).splitlines(), start=1):
+    for number, file in files.items():
+        frame = number - first
+        for place, line in enumerate(content_of(file).splitlines(), start=1):
             if not line.strip():
                 continue
-            values = _of_line(line, f"{file}: line {number}")
+            values = _of_line(line, f"{file}: line {place}")
             if values is not None:
                 people.append(Person(frame, _in_pixels(values, path, image_size), None))
-    return Found(Source(path, None), people, image_size=image_size, frames=tuple(files))
+    frames = tuple(number - first for number in files)
+    return Found(Source(path, None), people, image_size=image_size, frames=frames)
+
+
+def _first_number(files: dict[int, Path]) -> int:
+    """The number of the first frame: 1 in a video; pictures, with digits of equal count, keep theirs."""
+    is_video = all(file.stem.endswith(f"_{number}") for number, file in files.items())
+    return 1 if is_video and min(files) > 0 else 0
 
 
 def _of_detection(detection: Any, where: str) -> Array:
