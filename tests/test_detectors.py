@@ -123,6 +123,54 @@ def test_numbers_of_frames_are_kept_where_the_first_one_is_0_or_they_are_of_imag
         assert (read.frames[0], read.frames[-1]) == (first, made.FRAMES), name
 
 
+def with_tracks(folder, confidence):
+    """As `model.track(video, save_txt=True)`: another person is track 3; frame 9 has no tracks."""
+    points, _ = made.yolo_labels(folder)
+    for file in folder.iterdir():
+        line = file.read_text().strip()
+        cells = line.split()
+        other = " ".join([*cells[:5], *(f"{float(cell) * 0.4:g}" for cell in cells[5:])])
+        behind = [f"{' 0.8' * confidence}{'' if file.stem == 'walk_10' else f' {track}'}" for track in (7, 3)]
+        both = [line + behind[0], other + behind[1]]
+        file.write_text("\n".join(both[:: 1 if int(file.stem[5:]) % 2 else -1]) + "\n")
+    return points
+
+
+@pytest.mark.parametrize("confidence", [False, True])
+def test_tracks_of_yolo_are_people(tmp_path, confidence):
+    points = with_tracks(tmp_path / "labels", confidence)
+    reading = {"fps": made.FPS, "image_size": made.SIZE}
+    tracked = np.array([frame not in (4, 9) for frame in range(made.FRAMES)])
+    for person, scale in ((7, 1), ("7", 1), (3, 0.4)):
+        read = memo.read_keypoints(tmp_path / "labels", person=person, **reading)
+        assert np.allclose(read.points[tracked], scale * points[tracked], atol=0.02)
+        assert np.isnan(read.points[~tracked]).all()
+    assert [(one.name, one.frames) for one in read.everyone] == [("7", 18), ("3", 18)]
+    followed = memo.read_keypoints(tmp_path / "labels", **reading)
+    assert np.isfinite(followed.points[9]).all()
+    with pytest.raises(memo.keypoints.KeypointsError, match="no person 0: the file names 3, 7"):
+        memo.read_keypoints(tmp_path / "labels", person=0, **reading)
+
+
+def test_confidences_are_no_tracks_and_json_has_tracks_too(tmp_path):
+    made.yolo_labels(tmp_path / "labels")
+    for file in (tmp_path / "labels").iterdir():
+        file.write_text(file.read_text().strip() + (" 1\n" if file.stem == "walk_3" else " 0.91\n"))
+    read = memo.read_keypoints(tmp_path / "labels", fps=30, image_size=made.SIZE)
+    assert [one.name for one in read.everyone] == ["0"]
+    points, _ = made.yolo_json(tmp_path / "yolo.json")
+    frames = json.loads((tmp_path / "yolo.json").read_text())
+    for people in frames:
+        people.extend({**person, "track_id": 5} for person in people[:1])
+        for person in people[:1]:
+            person["track_id"] = 12
+            person["keypoints"] = {**person["keypoints"], "x": [3.0] * 17}
+    (tmp_path / "yolo.json").write_text(json.dumps(frames))
+    read = memo.read_keypoints(tmp_path / "yolo.json", fps=30, person=5)
+    seen = np.arange(made.FRAMES) != 4
+    assert np.allclose(read.points[seen], points[seen], atol=0.01)
+
+
 def saved(folder, name, text):
     (folder / name).write_text(text)
     return folder / name

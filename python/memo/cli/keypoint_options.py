@@ -36,8 +36,8 @@ ImageSize = Annotated[
 Person = Annotated[
     str | None,
     typer.Option(
-        help="Which of several people: the number, 0 being the most prominent; the name in the file; or a "
-        "place as in 320,240@50, pixels and frame. Default: 0.",
+        help="Which of several people: the number, 0 being the most prominent; the name, or number of a "
+        "track, if the file has these; or a place as in 320,240@50, pixels and frame. Default: 0.",
         metavar="NUMBER|NAME|X,Y@F",
     ),
 ]

@@ -36,11 +36,11 @@ def read_keypoints(
     """Reads one person's keypoints; the format is recognised by the content.
 
     `person` chooses one of several people: the number, 0 being the most prominent (size times mean score,
-    summed over all frames); the name, if a table, DeepLabCut or SLEAP names people; or a place
-    `(u_px, v_px, frame)` where the person is; frames count from 0, also in files whose first one is 1
-    (labels of YOLO, demos of MMPose). Everyone is followed from frame to frame, whatever the order of
-    the detector's lists; who is not found for a while is expected on their way. By default the most
-    prominent person is chosen. `Keypoints.everyone` lists all, `doubts` says where two may be exchanged.
+    summed over all frames); the name, if a table, DeepLabCut or SLEAP names people, or the number of a
+    track of YOLO; or a place `(u_px, v_px, frame)` where the person is. Frames count from 0, also in files
+    whose first one is 1 (labels of YOLO, demos of MMPose). Everyone is followed from frame to frame, whatever
+    the order of the detector's lists; who is not found for a while is expected on their way. By default the
+    most prominent person is chosen. `Keypoints.everyone` lists all, `doubts` says where two may be exchanged.
     `fps` is needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the
     file does not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether
     the points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels,

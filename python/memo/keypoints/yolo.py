@@ -1,21 +1,24 @@
 """YOLO-pose of Ultralytics: label files (`save_txt=True`) and the JSON of its results.
 
 - A folder with a text file per frame, `NAME_1.txt`, ...: `class x y width height`, then `x y` or `x y
-  confidence` of each of the 17 points, all as fractions of the picture, then perhaps the box's confidence
-  and the track's number. A frame without people has no file. The first frame of a video is 1.
-- `results.to_json()`: `[{"name", "class", "confidence", "box", "keypoints": {"x": [...], "y": [...],
-  "visible": [...]}}]`, in pixels or, if normalized, in fractions: a folder with a file per frame, or one
-  file with a list of these lists.
+  confidence` of each of the 17 points, all as fractions of the picture, then the box's confidence
+  (`save_conf`) and the number of the track (`model.track`), each only if there is one. A frame without
+  people has no file. The first frame of a video is 1.
+- `results.to_json()`: `[{"name", "class", "confidence", "box", "track_id", "keypoints": {"x": [...],
+  "y": [...], "visible": [...]}}]`, in pixels or, if normalized, in fractions: a folder with a file per frame,
+  or one file with a list of these lists.
 
 Source: ultralytics/ultralytics `ultralytics/engine/results.py`, `Results.save_txt`, `Results.summary`, and
 `ultralytics/data/loaders.py`, `LoadImagesAndVideos`.
-Points at (0, 0) are missing. Only models with the 17 points of COCO can be read.
+The numbers of tracks are names of people. Points at (0, 0) are missing. Only models with the 17 points of
+COCO can be read.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +55,10 @@ def read_detections(
             if isinstance(detection, dict) and detection.get("class", _PERSON) != _PERSON:
                 continue
             values = _of_detection(detection, f"{where}, detection {place}")
-            people.append(Person(frame, values, None))
+            track = detection.get("track_id")
+            people.append(Person(frame, values, None, str(track) if type(track) is int else None))
     if people and all(np.nanmax(one.values[:, :2], initial=0) <= _LARGEST_FRACTION for one in people):
-        people = [Person(one.frame, _in_pixels(one.values, path, image_size), None) for one in people]
+        people = [replace(one, values=_in_pixels(one.values, path, image_size)) for one in people]
     return Found(
         Source(path, None), people, image_size=image_size, frames=tuple(frame for frame, _, _ in frames)
     )
@@ -63,15 +67,18 @@ def read_detections(
 def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] | None) -> Found:
     """All people in a folder of label files, by the number of their frame."""
     first = _first_number(files)
-    people = []
+    people, behind = [], []
     for number, file in files.items():
         frame = number - first
         for place, line in enumerate(content_of(file).splitlines(), start=1):
             if not line.strip():
                 continue
-            values = _of_line(line, f"{file}: line {place}")
-            if values is not None:
+            found = _of_line(line, f"{file}: line {place}")
+            if found is not None:
+                values, more = found
                 people.append(Person(frame, _in_pixels(values, path, image_size), None))
+                behind.append(more)
+    people = [replace(one, name=name) for one, name in zip(people, _tracks(behind), strict=True)]
     frames = tuple(number - first for number in files)
     return Found(Source(path, None), people, image_size=image_size, frames=frames)
 
@@ -98,8 +105,19 @@ def _of_detection(detection: Any, where: str) -> Array:
     return with_missing(values, where)
 
 
-def _of_line(line: str, where: str) -> Array | None:
-    """(17, 3) fractions and confidence of a line, None if it is not a person."""
+def _tracks(behind: list[list[float]]) -> list[str | None]:
+    """The number of each track, from what is behind the points: [], [confidence], [track] or both.
+
+    All lines have the confidence or none has it, and a line has no track while it belongs to none.
+    """
+    most = max(map(len, behind), default=0)
+    if most == 0 or (most == 1 and not all(number.is_integer() for more in behind for number in more)):
+        return [None] * len(behind)
+    return [str(int(more[-1])) if len(more) == most else None for more in behind]
+
+
+def _of_line(line: str, where: str) -> tuple[Array, list[float]] | None:
+    """(17, 3) fractions and confidence of a line, and the numbers behind them; None if not a person."""
     try:
         numbers = [float(cell) for cell in line.split()]
     except ValueError:
@@ -108,11 +126,12 @@ def _of_line(line: str, where: str) -> Array | None:
         raise KeypointsError(f"{where}: numbers that are not finite")
     if numbers and numbers[0] != _PERSON:
         return None
-    # Behind the points: nothing, the confidence of the box, or that and the number of the track.
     for each in (3, 2):
-        if 0 <= len(numbers) - _BOX - each * _POINTS <= 2:
-            points = np.array(numbers[_BOX : _BOX + each * _POINTS]).reshape(_POINTS, each)
-            return points if each == 3 else np.column_stack([points, np.ones(_POINTS)])
+        end = _BOX + each * _POINTS
+        if 0 <= len(numbers) - end <= 2:
+            points = np.array(numbers[_BOX:end]).reshape(_POINTS, each)
+            whole = points if each == 3 else np.column_stack([points, np.ones(_POINTS)])
+            return whole, numbers[end:]
     raise KeypointsError(
         f"{where}: {counted(len(numbers), 'number')}; wanted class, box and {_POINTS} points "
         "of 2 or 3 numbers, as a -pose model has"
