@@ -63,11 +63,12 @@ def test_a_tracked_walk_gives_camera_height_direction_and_distance(tmp_path, key
         (math.cos(HEADING_RAD), math.sin(HEADING_RAD), 0), abs=1e-5
     )
     postures = memo.posture(keypoints, track=folder, noise_px=1)
-    assert not postures.camera_assumed and postures.scale_from == "height"
+    assert not postures.camera_assumed and postures.scale_from == "track"
+    assert set(postures.anchor_source) == {"track"} and not any("height" in w for w in postures.warnings)
     assert postures.heading_source == "given" and postures.found.all()
     assert np.nanmean(errors_m(postures.smoothed_m, truth)) < 0.15
     given = memo.posture(keypoints, track=folder, height_m=1.6, moving_direction=(0, 1, 0), noise_px=1)
-    assert given.heading_source == "given"
+    assert given.heading_source == "given" and given.scale_from == "height"
     assert sum(given.lengths_m.values()) < 0.98 * sum(postures.lengths_m.values())
 
 
@@ -146,9 +147,20 @@ def test_the_command_takes_a_track(tmp_path, memo_command):
     )
     code, said, complaint = memo_command(*arguments)
     assert code == 0, complaint
-    assert "the height given" in said
+    assert "Sizes are based on the height of the tracked walk; the neck is " in said
+    assert " m away, from the track." in said
+    code, said, _ = memo_command(*arguments, "--height", 1.5)
+    assert "Sizes are based on the height given; the neck is " in said and " m away, from the track." in said
+    assert (
+        "the height given, 1.50 m, and that of the tracked walk, 1.80 m, differ by more than three standard "
+        "deviations (0.03 m)"
+    ) in said
+    assert "height given, " not in memo_command(*arguments, "--height", 1.78)[1]
     code, _, complaint = memo_command(*arguments, "--camera", folder / "camera.toml")
     assert code == 1 and "--track has a camera and distances: leave --camera" in complaint
+    arguments = [tmp_path / "nothere" if argument == folder else argument for argument in arguments]
+    code, _, complaint = memo_command(*arguments)
+    assert code == 1 and complaint == f"memo: {tmp_path / 'nothere'}: no such folder of memo track\n"
 
 
 def test_biases_of_clips_do_not_cancel_when_pooled():

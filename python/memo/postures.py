@@ -12,7 +12,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,7 +24,7 @@ from memo.keypoints import Keypoints, KeypointsError, read_keypoints
 from memo.notebook import Shown
 from memo.segment_lengths import checked_lengths, read_lengths
 from memo.table import data_frame
-from memo.tracked_person import tracked_person
+from memo.tracked_person import GIVEN_HEIGHT_SD, TrackedPerson, tracked_person
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ class Postures(Shown):
     length_basis: dict[str, str]
     """Source of each length."""
     scale_from: str
-    """Source of the scale."""
+    """Source of the scale: "lengths", "height", "track", "ground", "distance" or "assumed"."""
     anchor_m: Array
     """(T,) distance of the neck, the root of the tree, from the camera's centre, metres."""
     anchor_sd_m: Array
@@ -404,6 +404,8 @@ def posture(
         raise ValueError("fps, layout and person apply to keypoints read from a file only")
     _check_joints_there(keypoints)
     keypoints.check_pixels()
+    tracked: TrackedPerson | None = None
+    own_height_m = height_m
     if track is not None:
         if camera is not None or distance_m is not None or anchor not in (None, "auto", "given"):
             raise ValueError("the track has a camera and distances: leave camera, distance and anchor out")
@@ -441,9 +443,31 @@ def posture(
         progress=progress,
     )
     postures = _named(found, used, camera is None, points_px, weights, repair, keep_all)
+    if tracked is not None:
+        postures = _with_track(postures, tracked, own_height_m)
     for warning in postures.warnings:
         _log.warning("%s", warning)
     return postures
+
+
+def _with_track(postures: Postures, tracked: TrackedPerson, height_m: float | None) -> Postures:
+    """Names the track as the source of what is from it; warns of a given height that contradicts it."""
+    is_own = height_m is None and postures.scale_from == "height"
+    warnings = postures.warnings
+    if height_m is not None:
+        sd_m = math.hypot(tracked.height_sd_m, GIVEN_HEIGHT_SD * height_m)
+        if abs(height_m - tracked.height_m) > 3 * sd_m:
+            warnings += (
+                f"the height given, {height_m:.2f} m, and that of the tracked walk, "
+                f"{tracked.height_m:.2f} m, differ by more than three standard deviations ({sd_m:.2f} m)",
+            )
+    sources = tuple("track" if source == "given" else source for source in postures.anchor_source)
+    return replace(
+        postures,
+        scale_from="track" if is_own else postures.scale_from,
+        anchor_source=sources,
+        warnings=warnings,
+    )
 
 
 def _check_known(what: str, value: str | None, known: Sequence[str]) -> None:

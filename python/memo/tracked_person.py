@@ -18,10 +18,14 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.files import JOINTS, read_track
+from memo.given import nothing_at
 from memo.keypoints import Keypoints
 from memo.run import read_run
 
-__all__ = ["TrackedPerson", "tracked_person"]
+__all__ = ["GIVEN_HEIGHT_SD", "TrackedPerson", "tracked_person"]
+
+#: Of a height that a user gives, as a share of it: the usual `height_sd` of `Tracker`.
+GIVEN_HEIGHT_SD = 0.012
 
 _BEYOND_S = 0.5
 _PACE_S = 0.5
@@ -41,6 +45,8 @@ class TrackedPerson(NamedTuple):
     """The camera of the track."""
     height_m: float
     """The person's height, crown to sole."""
+    height_sd_m: float
+    """Its standard deviation."""
     moving_direction: tuple[float, float, float] | None
     """Direction of walking in the world; None for who turns, walks backwards or on a treadmill."""
     distance_m: Array
@@ -52,9 +58,12 @@ class TrackedPerson(NamedTuple):
 def tracked_person(folder: str | PathLike[str], keypoints: Keypoints) -> TrackedPerson:
     """The person of a folder of `memo track` whose joints are nearest to the keypoints in the image.
 
-    Raises ValueError if the folder holds no walk, shares no time with the keypoints, or nobody is near.
+    Raises ValueError if there is no such folder, or it holds no walk, shares no time with the keypoints, or
+    nobody is near.
     """
     folder = Path(folder)
+    if not folder.is_dir():
+        raise ValueError(nothing_at(folder, "folder of memo track"))
     columns, run = read_track(folder), read_run(folder)
     if run["camera"] is None or not len(columns["frame"]):
         raise ValueError(f"{folder}: nobody was tracked")
@@ -62,12 +71,17 @@ def tracked_person(folder: str | PathLike[str], keypoints: Keypoints) -> Tracked
     walk = _nearest_walk(folder, columns, keypoints)
     rows = np.flatnonzero(columns["walk"] == walk)
     record: dict[str, Any] = run["walks"][walk] if walk < len(run["walks"]) else {}
+    summary = run["summary"]
+    height_m = float(record.get("drawn_height_m") or record.get("height_m") or summary["height_m"])
+    known = summary.get("height_sd_m") and summary.get("height_m")
+    share = summary["height_sd_m"] / summary["height_m"] if known else GIVEN_HEIGHT_SD
     neck_m = 0.5 * (_joint(columns, "right_shoulder", rows) + _joint(columns, "left_shoulder", rows))
     path_m = _over_time(columns["time_s"][rows], neck_m, keypoints.times_s)
     return TrackedPerson(
         person=int(columns["person"][rows[0]]),
         camera=camera,
-        height_m=float(record.get("drawn_height_m") or record.get("height_m") or run["summary"]["height_m"]),
+        height_m=height_m,
+        height_sd_m=share * height_m,
         moving_direction=_direction(columns["heading_rad"][rows], neck_m, record),
         distance_m=np.linalg.norm(path_m - np.asarray(camera.position), axis=-1),
         distance_sd_m=_distance_sd(columns, rows, neck_m - np.asarray(camera.position)),

@@ -37,12 +37,14 @@ _MOST_BREAKS = 3
 _SCALES = {
     "lengths": "the lengths given",
     "height": "the height given",
+    "track": "the height of the tracked walk",
     "ground": "the distance from the camera, from the feet on the ground",
     "distance": "the distance given",
     "assumed": "the height of an average adult, assumed",
 }
 _SOURCES = {
     "given": "as given",
+    "track": "from the track",
     "ground": "from the ground",
     "trunk": "from the trunk",
     "extent": "from the whole figure",
