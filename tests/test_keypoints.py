@@ -152,10 +152,18 @@ def test_a_person_is_chosen_by_number_or_place_whatever_the_order_of_the_lists(t
             np.testing.assert_array_equal(
                 read_keypoints(folder, fps=25, person=(u + 1, v - 1, frame)).points, own.points
             )
+    least, size_px = np.nanmin(found.points[5, :, 1]), found.everyone[0].size_px
+    highest = found.points[5, np.nanargmin(found.points[5, :, 1])]
+    above = (highest[0], least - 0.9 * size_px, 5)
+    np.testing.assert_array_equal(read_keypoints(folder, fps=25, person=above).points, found.points)
     for person, said in [
         (7, "no person 7: there are 3 people, and the first is 0"),
         ("anna", "no person anna: the file does not name people"),
         ((10, 10, 77), "nobody is seen in frame 77"),
+        (
+            (-900, 10, 5),
+            r"nobody is at -900,10 in frame 5: the nearest person is at \d+,\d+, with the nearest point",
+        ),
         ((10, 10), "is no number"),
         (-1, "is no number"),
         (True, "is no number"),

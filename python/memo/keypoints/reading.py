@@ -22,6 +22,7 @@ from memo.wording import counted
 
 __all__ = ["read_keypoints"]
 
+_LEAST_BODY_PX = 20  # who is seen by a point or two has no size
 _OF_A_TRACK = ("track.csv", "track.parquet")
 
 
@@ -177,8 +178,7 @@ def _everyone(
     for index, name in enumerate(names):
         if name is not None:
             own.setdefault(name, []).append(index)
-    low, high = (extreme(points, axis=1) for extreme in (_least, _greatest))
-    sizes_px = np.hypot(*(high - low).T)
+    sizes_px = _sizes_px(points)
     seen = np.isfinite(points).all(axis=2)
     prominence = sizes_px * np.where(seen, scores, 0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
     ordered = sorted(own.items(), key=lambda item: -float(np.sum(prominence[item[1]])))
@@ -192,6 +192,13 @@ def _everyone(
         )
         for name, indices in ordered
     )
+
+
+def _sizes_px(points: Array) -> Array:
+    """The diagonal of the box around each detection's points, 0 without points."""
+    low, high = (extreme(points, axis=1) for extreme in (_least, _greatest))
+    sizes_px: Array = np.hypot(*(high - low).T)
+    return sizes_px
 
 
 def _least(points: Array, axis: int) -> Array:
@@ -235,16 +242,24 @@ def _at(
     numbers: Sequence[int | None],
     points: Array,
 ) -> int:
-    """The person whose points are nearest to a place of the picture in a frame."""
+    """The person whose points are nearest to a place in a frame, at most a body's size away."""
     u_px, v_px, frame = place
     there = [
-        (float(np.hypot(*(seen - (u_px, v_px)).T).min()), number)
+        (float(np.hypot(*(seen - (u_px, v_px)).T).min()), number, seen)
         for one, number, own in zip(people, numbers, points, strict=True)
         if one.frame == frame and number is not None and len(seen := own[np.isfinite(own).all(axis=1)])
     ]
     if not there:
         raise KeypointsError(f"{path}: nobody is seen in frame {frame}")
-    return min(there)[1]
+    away_px, nearest, seen = min(there, key=lambda each: each[0])
+    sizes_px = [size for size, number in zip(_sizes_px(points), numbers, strict=True) if number == nearest]
+    if away_px > max(np.median(sizes_px), _LEAST_BODY_PX):
+        u, v = np.median(seen, axis=0)
+        raise KeypointsError(
+            f"{path}: nobody is at {u_px:g},{v_px:g} in frame {frame}: the nearest person is at "
+            f"{u:.0f},{v:.0f}, with the nearest point {away_px:.0f} px away"
+        )
+    return nearest
 
 
 def _doubts(person: int, met: Iterable[tuple[int, int, int, float]]) -> Iterable[str]:
