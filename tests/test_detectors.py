@@ -1,6 +1,7 @@
 """Files of detectors: all points are where the detector put them, and damage is described."""
 
 import json
+import math
 
 import detector_files as made
 import memo
@@ -73,6 +74,76 @@ def test_mediapipe_is_read_in_each_form_in_which_people_save_it(tmp_path, shape)
     read = memo.read_keypoints(tmp_path / "other.json", fps=30, image_size=made.SIZE)
     seen = np.arange(made.FRAMES) != 5
     assert np.abs(read.points[seen] - points[seen]).max() < 1e-6 and read.layout == "MEDIAPIPE_33"
+
+
+@pytest.mark.parametrize("shape", ["x y z v", "x y v", "x y z", "people"])
+def test_arrays_of_mediapipe_are_read(tmp_path, shape):
+    points, scores = made.walker("MEDIAPIPE_33")
+    z = 0.2 * np.sin(np.arange(33)) * np.ones((made.FRAMES, 1))
+    columns = {"x": (points[..., 0] + 0.5) / 1280, "y": (points[..., 1] + 0.5) / 720, "z": z, "v": scores}
+    if shape == "people":
+        whole = np.dstack([columns[name] for name in "xyzv"])
+        data = [[frame, (0.3 * np.array(frame)).tolist()] for frame in whole.tolist()]
+    else:
+        data = np.dstack([columns[name] for name in shape.split()]).tolist()
+    data[5], data[6] = None, []
+    if shape != "people":
+        data[7][3], data[8][4] = [0.0] * len(data[7][3]), [math.nan] * len(data[8][4])
+    (tmp_path / "array.json").write_text(json.dumps(data))
+    read = memo.read_keypoints(tmp_path / "array.json", fps=30, image_size=made.SIZE)
+    seen = np.ones((made.FRAMES, 33), bool)
+    seen[5:7] = False
+    if shape != "people":
+        seen[7, 3] = seen[8, 4] = False
+    assert np.abs(read.points[seen] - points[seen]).max() < 1e-6 and np.isnan(read.points[~seen]).all()
+    assert np.allclose(read.scores[seen], 1 if shape == "x y z" else scores[seen])
+    assert len(read.everyone) == 1 + (shape == "people")
+
+
+def test_texts_of_yolo_are_read(tmp_path):
+    points, _ = made.yolo_json(tmp_path / "walk.json")
+    frames = json.loads((tmp_path / "walk.json").read_text())
+    (tmp_path / "texts.json").write_text(json.dumps([json.dumps(frame) for frame in frames]))
+    read = memo.read_keypoints(tmp_path / "texts.json", fps=30)
+    assert np.allclose(read.points[0], points[0], atol=0.01) and np.isnan(read.points[4]).all()
+
+
+NOBODY = "no person in any frame"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ([], NOBODY),
+        ([{"pose_landmarks": []}] * 3, NOBODY),
+        ([{"pose_landmarks": None}, {"landmarks": []}, {}], NOBODY),
+        ([[], [], []], NOBODY),
+        ([None, []], NOBODY),
+        (["[]", "[]"], NOBODY),
+        ([{"frame_id": 0, "instances": []}], NOBODY),
+        ({"meta_info": {}, "instance_info": []}, NOBODY),
+        (None, "holds null and no keypoints: wanted a list with an entry for each frame, or an object"),
+        ("walk", 'holds "walk" and no keypoints'),
+        (3, "holds 3 and no keypoints"),
+        (["[]", "{"], "entry 1: not JSON"),
+        (["a", 3], "a list whose first entry is str: no known form of keypoints"),
+        (np.ones((4, 17, 3)).tolist(), r"an array of shape \(4, 17, 3\), which does not name its points"),
+        ((500 * np.ones((4, 33, 3))).tolist(), "coordinates up to 500, which are no fractions"),
+        (np.zeros((4, 33, 4)).tolist(), NOBODY),
+        (np.tile([0.5, 0.5, 0.1, 7.0], (4, 33, 1)).tolist(), r"last numbers \(7 to 7\) are no visibility"),
+        (np.tile([0.5, 0.5, 7.0], (4, 33, 1)).tolist(), r"\(7 to 7\) are no visibility; wanted \(T, 33, 4\)"),
+        ([[[0.5, 0.5, 0.5, 1.0]] * 23 + [[0.0, 0.0, 0.1, 1.0]] * 10], "these are world landmarks"),
+        ([[[0.5, 0.5, 0.1]] * 32 + [[0.5, 0.5]]], "wanted 33 landmarks of 3 or 4 numbers each"),
+        ([[[10**400, 0.5, 0.1]] * 33], "a number too large"),
+        ([[{"x": 10**400, "y": 0.5}] * 33], "landmark 0, x: 1.* is not a number"),
+        ([[10**400]], "no known form of keypoints"),
+        ([[[0.5, 0.5, 0.1]] * 33, [[0.5, 0.5, 0.1, 1]] * 33], "with three numbers and with four"),
+    ],
+)
+def test_files_without_keypoints_are_refused_for_their_reason(tmp_path, data, words):
+    (tmp_path / "a.json").write_text(json.dumps(data))
+    with pytest.raises(memo.keypoints.KeypointsError, match=words):
+        memo.read_keypoints(tmp_path / "a.json", fps=30, image_size=made.SIZE)
 
 
 def test_mediapipe_gives_the_times_that_were_saved(tmp_path):

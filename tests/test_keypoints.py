@@ -337,7 +337,7 @@ def test_folders_that_are_no_sequence_are_refused(tmp_path):
     frame = json.dumps(openpose_frame(figure(names)))
     empty = tmp_path / "empty"
     empty.mkdir()
-    with pytest.raises(KeypointsError, match="without JSON files"):
+    with pytest.raises(KeypointsError, match="a folder without keypoints: wanted JSON files, one for each"):
         read_keypoints(empty, fps=25)
     (empty / "frame.json").write_text(frame)
     with pytest.raises(KeypointsError, match="no frame number"):

@@ -125,7 +125,10 @@ def numbered_files(folder: Path, ending: str = ".json") -> dict[int, Path]:
         if len(numbered) > _MAX_FRAME_FILES:
             raise KeypointsError(f"{folder}: more than {_MAX_FRAME_FILES} files")
     if not numbered:
-        raise KeypointsError(f"{folder}: a folder without JSON files")
+        raise KeypointsError(
+            f"{folder}: a folder without keypoints: wanted JSON files, one for each frame (OpenPose, MMPose, "
+            "YOLO), label files of YOLO (.txt), or a track.csv"
+        )
     return dict(sorted(numbered.items()))
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from memo.keypoints.coco import read_coco
 from memo.keypoints.deeplabcut import (
@@ -14,7 +17,7 @@ from memo.keypoints.deeplabcut import (
 )
 from memo.keypoints.found import Found
 from memo.keypoints.hdf5 import ENDINGS, opened
-from memo.keypoints.mediapipe import is_mediapipe, read_mediapipe
+from memo.keypoints.mediapipe import is_mediapipe, is_nobody, read_mediapipe
 from memo.keypoints.mmpose import is_instances, is_mmpose, read_images, read_mmpose
 from memo.keypoints.openpose import numbered_files, read_openpose
 from memo.keypoints.points import KeypointsError
@@ -50,7 +53,7 @@ def everybody_in(path: Path, image_size: ImageSize) -> Found:
     if not content.strip():
         raise KeypointsError(f"{path}: the file is empty")
     if _is_json(path, content):
-        return _in_json(path, parsed(path, content), image_size)
+        return _in_json(path, _with_people(path, parsed(path, content)), image_size)
     for is_own, read in _TEXTS:
         if is_own(content):
             return read(path, content)
@@ -94,6 +97,20 @@ def _in_folder(folder: Path, image_size: ImageSize) -> Found:
     )
 
 
+def _with_people(path: Path, data: Any) -> Any:
+    """The list or object of a JSON file, with its texts read; refused if it has nobody."""
+    if isinstance(data, list) and data and all(isinstance(entry, str) for entry in data):
+        data = [parsed(f"{path}: entry {frame}", text) for frame, text in enumerate(data)]
+    if not isinstance(data, dict | list):
+        raise KeypointsError(
+            f"{path}: holds {short(json.dumps(data))} and no keypoints: wanted a list with an entry for each "
+            "frame, or an object"
+        )
+    if isinstance(data, list) and all(map(is_nobody, data)):
+        raise KeypointsError(f"{path}: no person in any frame")
+    return data
+
+
 def _in_json(path: Path, data: Any, image_size: ImageSize) -> Found:
     if is_mmpose(data):
         return read_mmpose(path, data)
@@ -106,7 +123,21 @@ def _in_json(path: Path, data: Any, image_size: ImageSize) -> Found:
         return read_detections(path, frames, image_size)
     if is_detections(data) or is_instances(data):
         raise KeypointsError(f"{path}: the people of one picture; give the folder of all")
+    if isinstance(data, list) and not isinstance(data[0], dict):
+        raise KeypointsError(f"{path}: {_unknown_list(data)}")
     return read_coco(path, data)
+
+
+def _unknown_list(data: list[Any]) -> str:
+    """What is wanted in place of a list of no known form."""
+    try:
+        shape = np.array(data, np.float64).shape
+    except (TypeError, ValueError, OverflowError):
+        return f"a list whose first entry is {_described(data[0])}: no known form of keypoints"
+    return (
+        f"an array of shape {shape}, which does not name its points: read it with NumPy and pass it to "
+        'memo.Keypoints.from_arrays(points, names="COCO_17")'
+    )
 
 
 def _in_hdf5(path: Path) -> Found:

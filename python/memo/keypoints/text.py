@@ -26,14 +26,14 @@ def content_of(path: Path, most: int = MAX_FILE_BYTES) -> str:
         raise KeypointsError(f"{path}: cannot be read: {error.strerror or error}") from None
 
 
-def parsed(path: Path, content: str) -> Any:
-    """The JSON of a file."""
+def parsed(where: object, content: str) -> Any:
+    """The JSON of a file, or of a text in it."""
     try:
         return json.loads(content)
     except json.JSONDecodeError as error:
-        raise KeypointsError(f"{path}: not JSON: {error.msg} in line {error.lineno}") from None
+        raise KeypointsError(f"{where}: not JSON: {error.msg} in line {error.lineno}") from None
     except (ValueError, RecursionError) as error:
-        raise KeypointsError(f"{path}: not JSON that can be read: {short(str(error))}") from None
+        raise KeypointsError(f"{where}: not JSON that can be read: {short(str(error))}") from None
 
 
 def json_text(data: Any, like: str) -> str:
