@@ -11,6 +11,7 @@ from memo.files import FLIP_COLUMNS
 from memo.keypoints import KeypointsError, read_keypoints, write_csv
 
 NAMES = [f"{side}_{part}" for part in ("hip", "knee", "ankle", "heel") for side in ("right", "left")]
+LEVELS = {"hip": [(1, 0)], "knee": [(3, 2)], "ankle": [(5, 4), (7, 6)]}
 EXCHANGED = [12, 13, 14, 30, 47]
 
 
@@ -74,6 +75,25 @@ def test_an_exchange_that_is_a_guess_is_called_one(confused, tmp_path, memo_unsw
     code, out, _ = memo_unswap(path, "--fps", 25, "--out", tmp_path / "out")
     assert code == 0 and "legs in 0" in out and "by the best guess: legs in 30" in out
     assert "most frames are labelled correctly" in out
+
+
+def test_frames_without_the_person_are_neither_undecided_nor_exchanged(tmp_path, memo_unswap):
+    points = walk()
+    points[20:45] = np.nan
+    names = [*NAMES, "nose"]
+    whole = np.concatenate([points, np.full((60, 1, 2), 50.0)], axis=1)
+    keypoints = memo.keypoints.Keypoints.from_arrays(whole, names=names, fps=25)
+    repair = memo.unswap(keypoints)
+    decided = memo._memo.unswap(
+        keypoints.times_s, keypoints.points, keypoints.scores, groups={"legs": LEVELS}
+    )["legs"].decided
+    assert not decided[20:45].all(), "the core says nothing of frames that it does not see"
+    assert repair.undecided == {"legs": int((~decided).sum() - (~decided[20:45]).sum())}
+    hidden = {frame for row in repair.flips for frame in range(row["frame"], row["last_frame"] + 1)}
+    assert hidden.isdisjoint(range(20, 45))
+    write_csv(tmp_path / "walk.csv", keypoints)
+    said = memo_unswap(tmp_path / "walk.csv", "--out", tmp_path / "out")[1]
+    assert "none undecided" in said or f"undecided: legs in {repair.undecided['legs']}" in said
 
 
 def test_the_majority_is_what_is_taken_for_right(confused):

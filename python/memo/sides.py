@@ -11,6 +11,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from memo import _memo
 from memo.files import FLIP_COLUMNS
@@ -46,7 +47,8 @@ class SideRepair(Shown):
     guessed: dict[str, int]
     """Number of frames exchanged only by the best guess, by group."""
     undecided: dict[str, int]
-    """Number of frames in which the labels are only the best guess, exchanged or not, by group."""
+    """Number of frames in which the labels are only the best guess, exchanged or not, by group. Frames in
+    which no joint of the group is seen are not counted here or elsewhere."""
     p_global: dict[str, float]
     """Probability, by group, that the majority of the labels is right, from the majority alone."""
 
@@ -106,15 +108,16 @@ def unswap(
             for left, right in at:
                 points[rows, [left, right]] = points[rows, [right, left]]
                 scores[rows, [left, right]] = scores[rows, [right, left]]
-    exchanged = {group: found[group].level_flipped.any(axis=1) for group in pairs}
+    seen = {group: _seen(keypoints, levels) for group, levels in pairs.items()}
+    exchanged = {group: found[group].level_flipped.any(axis=1) & seen[group] for group in pairs}
     decided = {group: found[group].decided for group in pairs}
-    flips = [row for group in pairs for row in _rows(keypoints, group, found[group])]
+    flips = [row for group in pairs for row in _rows(keypoints, group, found[group], seen[group])]
     return SideRepair(
         keypoints=keypoints.replaced(points, scores),
         flips=sorted(flips, key=lambda row: (row["frame"], row["group"], row["verdict"])),
         exchanged={group: int((exchanged[group] & decided[group]).sum()) for group in pairs},
         guessed={group: int((exchanged[group] & ~decided[group]).sum()) for group in pairs},
-        undecided={group: int((~decided[group]).sum()) for group in pairs},
+        undecided={group: int((~decided[group] & seen[group]).sum()) for group in pairs},
         p_global={group: found[group].p_global for group in pairs},
     )
 
@@ -128,7 +131,16 @@ def _levels(names: Sequence[str], group: str) -> dict[str, list[tuple[int, int]]
     return {level: pairs for level, pairs in levels.items() if pairs}
 
 
-def _rows(keypoints: Keypoints, group: str, found: _memo.LimbSides) -> Iterator[dict[str, Any]]:
+def _seen(keypoints: Keypoints, levels: dict[str, list[tuple[int, int]]]) -> npt.NDArray[np.bool_]:
+    """(T,) whether any joint of a group is seen."""
+    joints = [joint for pairs in levels.values() for pair in pairs for joint in pair]
+    there = np.isfinite(keypoints.points[:, joints]).all(axis=2)
+    return np.asarray(np.any(there, axis=1), np.bool_)
+
+
+def _rows(
+    keypoints: Keypoints, group: str, found: _memo.LimbSides, seen: npt.NDArray[np.bool_]
+) -> Iterator[dict[str, Any]]:
     flipped, probability, reasons = found.level_flipped, found.level_p_flipped, found.reason
 
     def row(first: int, last: int, told: int, levels: Any, verdict: str, p: float) -> dict[str, Any]:
@@ -143,11 +155,11 @@ def _rows(keypoints: Keypoints, group: str, found: _memo.LimbSides) -> Iterator[
             "reason": reasons[told],
         }
 
-    for t in np.flatnonzero(flipped.any(axis=1)).tolist():
+    for t in np.flatnonzero(flipped.any(axis=1) & seen).tolist():
         levels = [name for name, own in zip(found.levels, flipped[t], strict=True) if own]
         verdict = "flipped" if found.decided[t] else "guessed"
         yield row(t, t, t, levels, verdict, float(probability[t][flipped[t]].min()))
-    doubt = np.flatnonzero(~found.decided)
+    doubt = np.flatnonzero(~found.decided & seen)
     for run in np.split(doubt, np.flatnonzero(np.diff(doubt) > 1) + 1):
         if len(run):
             least_sure = run[np.argmin(np.abs(found.p_flipped[run] - 0.5))]
