@@ -368,9 +368,22 @@ def test_commands_take_the_size_of_the_picture(tmp_path, memo_command):
     made.mediapipe(tmp_path / "walk.json")
     common = ["unswap", tmp_path / "walk.json", "--fps", "30", "--format", "csv", "--out", tmp_path / "out"]
     code, _, err = memo_command(*common)
-    assert code == 1 and "image_size" in err
+    assert code == 1 and "give its width and height (--image-size)" in err
+    code, _, err = memo_command("planar", *common[1:4], "--out", tmp_path / "out")
+    assert code == 1 and "give its width and height (--image-size)" in err
+    code, _, err = memo_command("convert", tmp_path / "walk.json", tmp_path / "c.json", "--fps", 30)
+    assert code == 1 and "give its width and height (--image-size)" in err
+    arguments = [tmp_path / "walk.json", tmp_path / "c.json", "--image-size", "1280x720"]
+    code, _, err = memo_command("convert", *arguments)
+    assert code == 1 and "has no time stamps; give its frame rate (--fps)" in err
+    assert memo_command("convert", *arguments, "--fps", 30)[0] == 0
+    assert memo.read_keypoints(tmp_path / "c.json", fps=30).people.sum() == made.FRAMES - 1
+    code, _, err = memo_command(
+        "calibrate", "walker", tmp_path / "walk.json", "--height", "1.8", "--out", tmp_path
+    )
+    assert code == 1 and "give its width and height (--size)" in err
     code, _, err = memo_command(*common, "--image-size", "720p")
-    assert code == 1 and "--image-size 720p: wanted width and height" in err
+    assert code == 1 and "--image-size 720p is not two whole numbers such as 1920x1080" in err
     code, said, err = memo_command(*common, "--image-size", "1280x720", "--json")
     assert code == 0 and json.loads(said)["frames"] == made.FRAMES, err
 

@@ -139,7 +139,7 @@ def test_the_command_writes_the_table_and_every_change(confused, tmp_path, memo_
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["walk.csv"], "give its frame rate"),
+        (["walk.csv"], "give its frame rate (--fps)"),
         (["nowhere", "--fps", "25"], "no such file"),
         (["walk.csv", "--fps", "-1"], "frame rate must be positive"),
         (["walk.csv", "--fps", "25", "--layout", "BODY_25"], "leave the layout BODY_25 out"),

@@ -234,6 +234,8 @@ def _walker(
     options: tuple[str | None, Path | None, float | None, Path | None],
     delivery: Delivery,
 ) -> Exit:
+    from memo.cli.keypoint_options import keypoints_of
+
     check_writable(delivery.out)
     if not source.exists():
         raise InputError(nothing_at(source, "file or folder"))
@@ -243,7 +245,9 @@ def _walker(
     shares: dict[str, Any] = {}
     if is_keypoints:
         # The fit uses no times; a rate is only needed to read a source without times.
-        keypoints = memo.read_keypoints(source, **{**reading, "fps": reading["fps"] or 25.0})
+        sides = None if options[0] is None else two_sides(options[0], "--size")
+        reading = {**reading, "fps": reading["fps"] or 25.0, "image_size": sides}
+        keypoints = keypoints_of(source, reading, "--size")
         view = _view(*options, keypoints.image_size)
         points = np.where(keypoints.scores[..., None] > 0, keypoints.points, np.nan)
         feet, heads, shares["foot_share"], shares["head_share"] = memo.walker_sightings(

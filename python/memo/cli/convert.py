@@ -93,6 +93,13 @@ def add_convert(app: "typer.Typer") -> None:
             int | None, typer.Option(help="One walk of a track, counted from 0; default: all.")
         ] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate of a table without times.")] = None,
+        image_size: Annotated[
+            str | None,
+            typer.Option(
+                help="Width and height of the picture, pixels: for keypoints that are fractions of it.",
+                metavar="WxH",
+            ),
+        ] = None,
         unit: Annotated[
             str | None,
             typer.Option(help="Unit of a SOURCE that names none: m, cm, mm, or its length in metres."),
@@ -110,7 +117,9 @@ def add_convert(app: "typer.Typer") -> None:
             if target.suffix.lower() in _IN_PICTURE:
                 asked = {"--from-up": from_up, "--rate": rate, "--fill": fill, "--walk": walk, "--unit": unit}
                 asked |= {"--names": names, "--clinical": is_clinical or None}
-                return _convert_picture(source, target, up, fps, asked, delivery)
+                return _convert_picture(source, target, up, fps, image_size, asked, delivery)
+            if image_size is not None:
+                raise InputError("--image-size: has no meaning for data in space")
             return _convert(source, target, reading, (up, names, is_clinical), *changes, delivery)
 
         raise typer.Exit(guarded(work))
@@ -173,7 +182,13 @@ _IN_PICTURE = (".txt", ".json", "")
 
 
 def _convert_picture(
-    source: Path, target: Path, up: Axis | None, fps: float | None, asked: dict[str, Any], delivery: Delivery
+    source: Path,
+    target: Path,
+    up: Axis | None,
+    fps: float | None,
+    image_size: str | None,
+    asked: dict[str, Any],
+    delivery: Delivery,
 ) -> Exit:
     """Writes boxes of a track (.txt), or keypoints: COCO results (.json), an OpenPose folder (no ending)."""
     kind = {".txt": "MOTChallenge rows", ".json": "COCO results", "": "OpenPose keypoints"}[
@@ -181,6 +196,7 @@ def _convert_picture(
     ]
     unused = [name for name, value in asked.items() if value is not None]
     unused += ["--up"] * (up is not None and target.suffix.lower() != ".txt")
+    unused += ["--image-size"] * (image_size is not None and target.suffix.lower() == ".txt")
     if unused:
         raise InputError(f"{', '.join(unused)}: has no meaning for {kind}")
     if not source.exists():
@@ -197,10 +213,10 @@ def _convert_picture(
         summary: dict[str, Any] = {"rows": rows, "notes": []}
         told = f"{counted(summary['rows'], 'row')} of the track"
     else:
-        from memo.keypoints import read_keypoints
+        from memo.cli.keypoint_options import keypoints_of, size_of
         from memo.keypoints.writing import write_keypoints
 
-        keypoints = read_keypoints(source, fps=fps)
+        keypoints = keypoints_of(source, {"fps": fps, "image_size": size_of(image_size)})
         left_out = write_keypoints(target, keypoints, "coco" if target.suffix else "openpose")
         notes = [f"Left out, the format cannot store them: {', '.join(left_out)}."] if left_out else []
         summary = {"frames": len(keypoints.frames), "points": list(keypoints.names), "notes": notes}

@@ -1,12 +1,15 @@
 """Options that the commands on keypoints share. Needs typer, so import it only where commands are made."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from memo.given import InputError, point_in_frame
+import memo
+from memo.given import InputError, point_in_frame, two_sides
+from memo.keypoints import OptionError
 
 _PLACE_WITHOUT_FRAME = re.compile(r"[-+.\d\s]+,[-+.\d\s]+")
 
@@ -50,6 +53,15 @@ def reading_of(
     return {"fps": fps, "layout": layout, "person": person_of(person), "image_size": size_of(image_size)}
 
 
+def keypoints_of(path: Path, reading: Mapping[str, Any], size_option: str = "--image-size") -> memo.Keypoints:
+    """`memo.read_keypoints`, whose errors name the options of the command line."""
+    try:
+        return memo.read_keypoints(path, **reading)
+    except OptionError as error:
+        option = size_option if error.option == "image_size" else f"--{error.option}"
+        raise InputError(f"{error.message} ({option})") from None
+
+
 def person_of(text: str | None) -> int | str | tuple[float, float, int] | None:
     """A person chosen by number, name or place."""
     if text is None:
@@ -63,9 +75,4 @@ def person_of(text: str | None) -> int | str | tuple[float, float, int] | None:
 
 def size_of(text: str | None) -> tuple[int, int] | None:
     """Width and height from `640x480`."""
-    if text is None:
-        return None
-    width, _, height = text.lower().partition("x")
-    if not (width.isascii() and width.isdecimal() and height.isascii() and height.isdecimal()):
-        raise InputError(f"--image-size {text}: wanted width and height in pixels, such as 1920x1080")
-    return int(width), int(height)
+    return None if text is None else two_sides(text, "--image-size", "1920x1080")

@@ -142,10 +142,11 @@ def _planar(
 
 def _read(tracks: Path, reading: dict[str, Any]) -> tuple[Any, list[str]]:
     """The points, and sentences on whose they are, if the file is of keypoints."""
+    from memo.cli.keypoint_options import keypoints_of
     from memo.linkage import holds_keypoints, limb_points, read_tracks
 
     if tracks.exists() and holds_keypoints(tracks):
-        keypoints = memo.read_keypoints(tracks, **reading)
+        keypoints = keypoints_of(tracks, reading)
         who = one_of_several(keypoints, reading["person"] is None).strip()
         warned = [f"Warning: {doubt}." for doubt in keypoints.doubts]
         return limb_points(keypoints), [who] * bool(who) + warned

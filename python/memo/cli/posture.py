@@ -186,9 +186,11 @@ def _posture(
     frame: int | None,
     delivery: Delivery,
 ) -> Exit:
+    from memo.cli.keypoint_options import keypoints_of
+
     check_writable(delivery.out)
     with with_count("finding postures", delivery) as progress:
-        keypoints = memo.read_keypoints(path, **reading)
+        keypoints = keypoints_of(path, reading)
         row = None if frame is None else _row(keypoints, frame)
         if not {"camera", "track"} & options.keys() and keypoints.image_size is None:
             raise InputError("--camera is needed, or the size of the picture to assume one: --image-size")

@@ -78,9 +78,11 @@ def add_unswap(app: "typer.Typer") -> None:
 
 
 def _unswap(path: Path, reading: dict[str, Any], as_format: Written, delivery: Delivery) -> Exit:
+    from memo.cli.keypoint_options import keypoints_of
+
     check_writable(delivery.out)
     with with_elapsed("looking at right and left", delivery):
-        keypoints = memo.read_keypoints(path, **reading)
+        keypoints = keypoints_of(path, reading)
         repair = memo.unswap(keypoints)
         source = repair.keypoints.source.path.resolve()
         stem = source.stem.removesuffix("_json")

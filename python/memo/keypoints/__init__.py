@@ -27,7 +27,7 @@ Limits: it knows people by their places alone (see `read_keypoints`), reads no 3
 
 from memo.keypoints.coco import write_coco
 from memo.keypoints.openpose import write_openpose
-from memo.keypoints.points import Keypoints, KeypointsError, Someone, layouts
+from memo.keypoints.points import Keypoints, KeypointsError, OptionError, Someone, layouts
 from memo.keypoints.reading import read_keypoints
 from memo.keypoints.table import write_csv
 from memo.keypoints.track import keypoints_of_track
@@ -37,6 +37,7 @@ __all__ = [
     "WRITERS",
     "Keypoints",
     "KeypointsError",
+    "OptionError",
     "Someone",
     "keypoints_of_track",
     "layouts",

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from memo.keypoints.found import Found, Person, with_missing
-from memo.keypoints.points import Array, KeypointsError, Source
+from memo.keypoints.points import Array, KeypointsError, OptionError, Source
 from memo.keypoints.text import short
 
 __all__ = ["is_mediapipe", "is_nobody", "read_mediapipe"]
@@ -60,9 +60,9 @@ def read_mediapipe(path: Path, data: list[Any], image_size: tuple[int, int] | No
     if _is_row(_first_person(data)[0]):
         data = _from_array(path, data)
     if image_size is None:
-        raise KeypointsError(
-            f"{path}: MediaPipe's coordinates are fractions of the picture: "
-            "give its width and height (image_size)"
+        raise OptionError(
+            f"{path}: MediaPipe's coordinates are fractions of the picture: give its width and height",
+            "image_size",
         )
     people = []
     times_s = {}

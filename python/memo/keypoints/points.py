@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-__all__ = ["Array", "Keypoints", "KeypointsError", "Someone", "Source", "layouts"]
+__all__ = ["Array", "Keypoints", "KeypointsError", "OptionError", "Someone", "Source", "layouts"]
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +41,15 @@ class KeypointsError(ValueError):
     def __init__(self, message: str) -> None:
         # Names and cells of damaged files may contain any characters.
         super().__init__("".join(character if character.isprintable() else "?" for character in message))
+
+
+class OptionError(KeypointsError):
+    """Keypoints that need another value of an option of `read_keypoints`."""
+
+    def __init__(self, message: str, option: str) -> None:
+        super().__init__(f"{message} ({option})")
+        self.message = message
+        self.option = option
 
 
 def layouts() -> dict[str, tuple[str, ...]]:

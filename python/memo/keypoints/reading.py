@@ -15,7 +15,7 @@ import numpy as np
 from memo import _memo
 from memo.given import nothing_at
 from memo.keypoints.found import MAX_COORDINATE_PX, Found, Person
-from memo.keypoints.points import Array, Keypoints, KeypointsError, Someone, frame_range
+from memo.keypoints.points import Array, Keypoints, KeypointsError, OptionError, Someone, frame_range
 from memo.keypoints.recognising import everybody_in
 from memo.pixels import of_video, shrink_of_table
 from memo.wording import counted
@@ -74,8 +74,8 @@ def _own_size(keypoints: Keypoints, image_size: tuple[int, int]) -> tuple[int, i
     width, height = keypoints.image_size or image_size
     if (width, height) != tuple(image_size):
         given = f"{image_size[0]}x{image_size[1]}"
-        raise KeypointsError(
-            f"{keypoints.source.path}: is for {width}x{height} pixels, not {given} (image_size)"
+        raise OptionError(
+            f"{keypoints.source.path}: is for {width}x{height} pixels, not {given}", "image_size"
         )
     return width, height
 
@@ -276,7 +276,7 @@ def _times_s(path: Path, frames: range, times_s: dict[int, float] | None, fps: f
     if fps is not None:
         return np.array(frames) / fps
     if times_s is None:
-        raise KeypointsError(f"{path}: has no time stamps; give its frame rate (fps)")
+        raise OptionError(f"{path}: has no time stamps; give its frame rate", "fps")
     ordered = sorted(times_s.items())
     for (before, early), (after, late) in pairwise(ordered):
         if late <= early:

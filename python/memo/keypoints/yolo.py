@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from memo.keypoints.found import Found, Person, with_missing
-from memo.keypoints.points import Array, KeypointsError, Source
+from memo.keypoints.points import Array, KeypointsError, OptionError, Source
 from memo.keypoints.text import content_of, short
 from memo.wording import counted
 
@@ -140,7 +140,7 @@ def _of_line(line: str, where: str) -> tuple[Array, list[float]] | None:
 
 def _in_pixels(values: Array, path: Path, image_size: tuple[int, int] | None) -> Array:
     if image_size is None:
-        raise KeypointsError(
-            f"{path}: coordinates are fractions of the picture: give its width and height (image_size)"
+        raise OptionError(
+            f"{path}: coordinates are fractions of the picture: give its width and height", "image_size"
         )
     return with_missing(values * (*image_size, 1.0), str(path))
