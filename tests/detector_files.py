@@ -196,3 +196,74 @@ def sleap_csv(path):
     path.write_text("\n".join(rows) + "\n")
     kept = [index for index, joint in enumerate(PARTS.values()) if joint]
     return points[:, kept], scores[:, kept]
+
+
+def openpose(folder):
+    """As `openpose --write_json FOLDER`: a file per frame, counted from 0, with a list of people."""
+    points, scores = walker("BODY_25")
+    folder.mkdir()
+    for frame in range(FRAMES):
+        values = np.column_stack([points[frame], scores[frame]]).ravel().tolist()
+        people = [] if frame == 4 else [{"person_id": [-1], "pose_keypoints_2d": values}]
+        name = f"walk_{frame:012d}_keypoints.json"
+        (folder / name).write_text(json.dumps({"version": 1.3, "people": people}))
+    return points, scores
+
+
+def alphapose(path):
+    """As AlphaPose's `write_json`: an entry per person, with the name of the image, counted from 0."""
+    points, scores = walker("HALPE_26")
+    entries = [
+        {
+            **{"image_id": f"{frame}.jpg", "category_id": 1, "score": 2.9, "box": [1.0, 2.0, 3.0, 4.0]},
+            **{"idx": [0.0], "keypoints": np.column_stack([points[frame], scores[frame]]).ravel().tolist()},
+        }
+        for frame in range(FRAMES)
+        if frame != 4
+    ]
+    path.write_text(json.dumps(entries))
+    return points, scores
+
+
+def coco(path):
+    """Results in the format of COCO."""
+    points, scores = walker("COCO_17")
+    entries = [
+        {
+            **{"image_id": frame, "category_id": 1, "score": 0.9},
+            "keypoints": np.column_stack([points[frame], scores[frame]]).ravel().tolist(),
+        }
+        for frame in range(FRAMES)
+        if frame != 4
+    ]
+    path.write_text(json.dumps(entries))
+    return points, scores
+
+
+def trc_text(names, values, *, rate_hz=25, unit="m", own_name="walk_Sports2D_px_person00.trc", end="\n"):
+    """A file as Sports2D writes it: frames from 0, `m` for pixels too, empty cells where missing."""
+    cells = "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(names) + 1))
+    count = len(values)
+    rows = [
+        f"PathFileType\t4\t(X/Y/Z)\t{own_name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate_hz:g}\t{rate_hz:g}\t{count}\t{len(names)}\t{unit}\t{rate_hz:g}\t0\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t\t",
+        "\t\t" + cells,
+    ]
+    for t, points in enumerate(values):
+        own = ["" if np.isnan(number) else f"{number:.3f}" for point in points for number in (*point, 0.0)]
+        rows.append("\t".join([str(t), f"{t / rate_hz:.3f}", *own]))
+    return end.join([*rows, ""])
+
+
+SPORTS2D = ["Hip", "RHip", "RKnee", "RAnkle", "RBigToe", "LHip", "LKnee", "LAnkle", "LBigToe", "Neck", "Head"]
+
+
+def sports2d(path):
+    """As Sports2D writes image points: TRC in pixels, with times, without scores."""
+    joints = ["mid_hip", "right_hip", "right_knee", "right_ankle", "right_big_toe"]
+    joints += ["left_hip", "left_knee", "left_ankle", "left_big_toe", "neck", "head_top"]
+    points, _ = walker(joints)
+    path.write_text(trc_text(SPORTS2D, points, rate_hz=FPS))
+    return points, np.ones(points.shape[:2])

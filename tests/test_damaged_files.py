@@ -75,7 +75,7 @@ def good_file(name, folder):
         ]
         path.write_text("\n".join(["time_s;joint;x;y;score", *rows, ""]))
     elif name == "trc":
-        from test_keypoint_writers import SPORTS2D, trc_text
+        from detector_files import SPORTS2D, trc_text
 
         values = np.random.default_rng(7).uniform(10, 900, (3, len(SPORTS2D), 2))
         path.write_text(trc_text(SPORTS2D, values))

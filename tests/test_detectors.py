@@ -20,6 +20,10 @@ READ = {
     "deeplabcut_h5": (made.deeplabcut, "walkDLC_resnet50.h5", set(), 7),
     "sleap": (made.sleap_csv, "analysis.csv", set(), 7),
     "sleap_h5": (made.sleap_h5, "analysis.h5", set(), 7),
+    "openpose": (made.openpose, "walk_json", {4}, 25),
+    "alphapose": (made.alphapose, "alphapose-results.json", {4}, 26),
+    "coco": (made.coco, "coco.json", {4}, 17),
+    "sports2d": (made.sports2d, "walk_Sports2D_px_person00.trc", set(), 11),
 }
 
 

@@ -44,7 +44,7 @@ NOT_RUN = {
     "docs/methods/point-light-displays.md": 1,
     "docs/start/keypoints-from.md": 1,
 }
-BLOCKS_RUN = 31
+BLOCKS_RUN = 34
 
 _FENCE = re.compile(
     r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
@@ -174,6 +174,9 @@ def write_detections(folder):
         detector_files.deeplabcut(folder / f"deeplabcut.{ending}")
     detector_files.sleap_h5(folder / "sleap.h5")
     detector_files.sleap_csv(folder / "sleap.csv")
+    detector_files.alphapose(folder / "alphapose-results.json")
+    detector_files.coco(folder / "coco.json")
+    detector_files.sports2d(folder / "walk_Sports2D_px_person00.trc")
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import memo
 import numpy as np
 import pandas as pd
 import pytest
+from detector_files import SPORTS2D, trc_text
 from memo.files import TRACK_COLUMNS, write_track_csv
 from memo.formats.parquet import write_parquet
 from memo.keypoints import (
@@ -294,26 +295,6 @@ def test_keypoints_from_arrays_are_mended_and_have_no_file_to_be_like(tmp_path):
 
 
 # TRC in pixels.
-
-
-def trc_text(names, values, *, unit="m", own_name="walk_Sports2D_px_person00.trc", end="\n"):
-    """A file as Sports2D writes it: frames from 0, `m` for pixels too, empty cells where missing."""
-    cells = "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(names) + 1))
-    count = len(values)
-    rows = [
-        f"PathFileType\t4\t(X/Y/Z)\t{own_name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"25\t25\t{count}\t{len(names)}\t{unit}\t25\t0\t{count}",
-        "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t\t",
-        "\t\t" + cells,
-    ]
-    for t, points in enumerate(values):
-        own = ["" if np.isnan(number) else f"{number:.3f}" for point in points for number in (*point, 0.0)]
-        rows.append("\t".join([str(t), f"{t / 25:.3f}", *own]))
-    return end.join([*rows, ""])
-
-
-SPORTS2D = ["Hip", "RHip", "RKnee", "RAnkle", "RBigToe", "LHip", "LKnee", "LAnkle", "LBigToe", "Neck", "Head"]
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])

@@ -38,9 +38,9 @@ _PERSON = 0
 
 
 def is_detections(detections: Any) -> bool:
-    """Whether this is the JSON of the results of one frame."""
+    """Whether this is the JSON of the results of one frame; results of AlphaPose have `image_id` too."""
     first = detections[0] if isinstance(detections, list) and detections else None
-    return isinstance(first, dict) and "box" in first
+    return isinstance(first, dict) and "box" in first and "image_id" not in first
 
 
 def read_detections(
