@@ -219,7 +219,7 @@ def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_picture
     out = tmp_path / "out"
     common = ["pointlight", "--cycles", "1", "--size", "200x200", "--px-per-m", "150", "--out", out]
     code, said, _ = memo_command(*common, "--locomotion", "translating", "--lossless", "--png")
-    assert code == 0 and "Dots leave the picture" in said and "loops" in said
+    assert code == 0 and "Dots leave the picture" in said
     needed = said.split("--size ")[1].split(" ")[0]
     assert len(list((out / "frames").iterdir())) == len(memo.walker_motion(cycles=1).times_s)
     code, said, _ = memo_command(*common[:4], needed, *common[5:], "--locomotion", "translating")
@@ -234,6 +234,62 @@ def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_picture
     ):
         code, _, err = memo_command(*common, *options)
         assert code == 1 and words in err, (options, err)
+
+
+def write_table(path, walk, missing=()):
+    """The points of a walk as a table; frames and points of `missing` are left empty."""
+    points = walk.positions.copy()
+    for frames, point in missing:
+        points[frames, point] = np.nan
+    with open(path, "w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["time_s", *(f"{name}_{axis}" for name in walk.names for axis in "xyz")])
+        for time_s, frame in zip(walk.times_s, points, strict=True):
+            out.writerow([repr(float(time_s)), *("" if x != x else repr(x) for x in frame.ravel().tolist())])
+
+
+@pytest.mark.parametrize(
+    ("motion", "options", "loops"),
+    [
+        (None, "--cycles 1", True),
+        (None, "--cycles 2 --reversed --azimuth-deg 50", True),
+        (None, "--cycles 1 --scramble-phase --scramble-position --noise-dots 9", True),
+        (None, "--cycles 1 --noise-px 3", True),
+        (100, "--cycles 1", True),
+        ("cycle", "--scramble-phase", True),
+        (None, "--scramble-phase", False),
+        (100, "--scramble-phase", False),
+        (None, "--cycles 1 --lifetime 3 --noise-dots 10 --noise-kind linear", False),
+        (None, "--cycles 1 --lifetime 3", False),
+        (None, "--cycles 1 --noise-dots 10 --noise-kind linear", False),
+        (None, "--cycles 1 --locomotion translating", False),
+        (1, "--cycles 1", False),
+        (None, "", False),
+    ],
+)
+def test_a_loop_is_reported_only_where_the_last_frame_leads_into_the_first(
+    tmp_path, memo_command, motion, options, loops
+):
+    files = [] if motion is None else [tmp_path / "walk.csv"]
+    if motion is not None:
+        walk = memo.walker_motion(cycles=1) if motion == "cycle" else memo.walker_motion(motion)
+        write_table(tmp_path / "walk.csv", walk)
+    common = ["pointlight", *files, *options.split(), "--size", "64x64", "--out", tmp_path / "out"]
+    code, said, err = memo_command(*common)
+    assert code == 0, err
+    assert (" loops." in said) is loops
+    assert ("does not lead" in said) is (not loops and "--cycles" in options and motion != 1)
+    assert json.loads(memo_command(*common, "--json")[1])["loops"] is loops
+
+
+def test_a_dot_that_jumps_where_it_is_missing_is_no_loop(tmp_path, memo_command):
+    walk = memo.walker_motion(62)
+    walk.positions[:, 3, 1] += 0.01 * np.arange(62)  # a shoulder that drifts away
+    common = ["pointlight", tmp_path / "walk.csv", "--cycles", "1", "--period", "1", "--azimuth-deg", "90"]
+    for missing, loops in (((), True), ([(slice(60, 62), 3)], False)):
+        write_table(tmp_path / "walk.csv", walk, missing)
+        said = memo_command(*common, "--out", tmp_path / "out")[1]
+        assert (" loops." in said, "does not lead" in said) == (loops, not loops)
 
 
 def test_the_documented_program_shows_each_frame_upright_and_as_drawn(monkeypatch):

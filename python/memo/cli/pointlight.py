@@ -37,6 +37,14 @@ _SECONDS = 2.4
 
 _SAME_TIME_S = 1e-3  # files round times to milliseconds
 
+_SAME_FRAMES = 1e-3
+
+_SEAM = 1.25
+"""A step from end to start, as a multiple of the dot's largest step: at most 1.05 in recorded walks."""
+
+_NOISE_SDS = 6.0
+"""Noise moves a dot from one frame to the next by less, in standard deviations of a coordinate."""
+
 
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
@@ -253,12 +261,18 @@ def _deliver(
         lines.append(
             f"Dots leave the picture in {counted(left, 'frame')}; --size {width}x{height} holds them."
         )
-    if display.period_s is not None:
+    loops = _loops(display, options)
+    if loops:
         lines.append(f"The cycle of {display.period_s:.4g} s loops.")
+    elif options["cycles"] is not None and display.period_s is not None and len(shown) > 1:
+        lines.append(
+            f"A cycle takes {display.period_s:.4g} s, but the last frame does not lead into the first."
+        )
     summary = {
         "dots": shown.shape[1],
         "frames": shown.shape[0],
         "period_s": display.period_s,
+        "loops": loops,
         "centre_px": list(display.centre_px),
         "frames_with_dots_outside": left,
         "notes": list(notes),
@@ -269,6 +283,32 @@ def _deliver(
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
         print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
+
+
+def _loops(display: memo._memo.PointLightDisplay, options: dict[str, Any]) -> bool:
+    """Whether the last frame leads into the first: the display is whole cycles, in which no dot moves farther
+    from the end to the start than within a cycle. Dots that jump or move on their own lead nowhere."""
+    frames = len(display.times_s)
+    own_way = options["lifetime_frames"] is not None or (
+        options["noise_dots"] and options["noise_kind"] not in (None, "scrambled")
+    )
+    if display.period_s is None or own_way or frames < 2:
+        return False
+    frames_per_cycle = display.period_s / float(np.median(np.diff(display.times_s)))
+    cycles = round(frames / frames_per_cycle)
+    if cycles < 1 or abs(cycles * frames_per_cycle - frames) > _SAME_FRAMES:
+        return False
+    moved_by_noise = _NOISE_SDS * options["noise_sd_px"]
+    for path in np.moveaxis(display.positions_px, 1, 0):
+        known = np.flatnonzero(np.isfinite(path[:, 0]))
+        if len(known) < 2:
+            continue
+        within = known[known < round(frames_per_cycle)]
+        steps = np.linalg.norm(np.diff(path[within], axis=0), axis=1) / np.diff(within)
+        apart = np.linalg.norm(path[known[0]] - path[known[-1]]) / (known[0] + frames - known[-1])
+        if apart > _SEAM * steps.max(initial=0) + moved_by_noise + 1e-6:
+            return False
+    return True
 
 
 def _hexadecimal(colour: tuple[int, int, int]) -> str:
