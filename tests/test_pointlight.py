@@ -215,6 +215,38 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     assert "got tail" in memo_command(*arguments, "--out", tmp_path / "bad")[2]
 
 
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_a_file_has_the_same_size_under_other_names(tmp_path, memo_command, up):
+    from memo.formats import Motion, read_motion, write_motion
+
+    joints = memo.keypoints.layouts()["MOCAP_12"]
+    in_mm = Motion((*joints, "head"), WALKER.times_s, 10 * WALKER.positions)  # BVH files are written in cm
+    write_motion(tmp_path / "walk.bvh", in_mm, up)
+    text = (tmp_path / "walk.bvh").read_text()
+    names = [line.split()[1] for line in text.splitlines() if line.split()[:1] in (["ROOT"], ["JOINT"])]
+    for name in names:
+        text = text.replace(f"ROOT {name}\n", f"ROOT q_{name}\n").replace(
+            f"JOINT {name}\n", f"JOINT q_{name}\n"
+        )
+    (tmp_path / "renamed.bvh").write_text(text)
+    bones = {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot"}
+    lines = [f'{s}_{part} = "q_{s.capitalize()}{bones[part]}"' for s in ("right", "left") for part in bones]
+    (tmp_path / "map.toml").write_text("\n".join(lines))
+    shown, notes = [], []
+    for name, also in (("walk", []), ("renamed", ["--markers", tmp_path / "map.toml"])):
+        out = tmp_path / name
+        code, said, err = memo_command("pointlight", tmp_path / f"{name}.bvh", *also, "--out", out, "--json")
+        assert code == 0, err
+        notes.append(json.loads(said)["notes"])
+        with open(out / "dots.csv", newline="") as file:
+            shown.append([[float(row["RHP_v_px"]), float(row["LAN_v_px"])] for row in csv.DictReader(file)])
+    assert notes[0] == notes[1] and "mm was assumed" in notes[0][1]
+    assert np.allclose(shown[0], shown[1], atol=1e-3)
+    hip, ankle = (WALKER.positions[:, WALKER.names.index(name), 2] for name in ("RHP", "LAN"))
+    assert np.ptp(np.mean(shown[0], axis=0)) == pytest.approx(200 * np.mean(hip - ankle), abs=2)
+    assert read_motion(tmp_path / "renamed.bvh").notes != tuple(notes[0])
+
+
 def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_pictures(tmp_path, memo_command):
     out = tmp_path / "out"
     common = ["pointlight", "--cycles", "1", "--size", "200x200", "--px-per-m", "150", "--out", out]

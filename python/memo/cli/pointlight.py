@@ -369,7 +369,7 @@ def _read_points(path: Path, markers: Path | None, fps: float | None) -> tuple[A
     if not path.is_dir() and path.suffix.lower() not in READERS.keys() - {".csv"}:
         points = read_points_csv(path, 3, fps)
     else:
-        motion = read_motion(path)
+        motion = read_motion(path, markers=wanted)
         if fps is not None:
             raise InputError(f"{path}: already has times: leave --fps out")
         if wanted is None:

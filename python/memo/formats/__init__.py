@@ -9,7 +9,7 @@ line, byte or field.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -79,16 +79,19 @@ def read_motion(
     rate_hz: float | None = None,
     unit_m: float | None = None,
     walk: int | None = None,
+    markers: Mapping[str, Sequence[str]] | None = None,
 ) -> Motion:
     """Reads a motion file, or the folder of `memo track` or `memo posture`.
 
     `up`: the file's up axis, in place of the one it names. `rate_hz`: frame rate of an AMC file, or of a
     table without times. `unit_m`: metres in one unit of a BVH or AMC file, or of a table that names none.
-    `walk`: one walk of a track, from 0; all of them otherwise.
+    `walk`: one walk of a track, from 0; all of them otherwise. `markers`: names of the points at whose mean a
+    joint is, such as `{"right_hip": ["RASI"]}`, in files with names of their own: figures are measured by
+    them if a file names neither unit nor up axis.
     """
     path = Path(path)
     check_up(up)
-    given = Given(up, rate_hz, unit_m)
+    given = Given(up, rate_hz, unit_m, markers)
     for name, value in (("rate_hz", rate_hz), ("unit_m", unit_m)):
         if value is not None and not 0 < value < 1e9:
             raise FormatError(f"{name} must be positive and finite, got {value:g}")

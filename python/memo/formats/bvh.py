@@ -39,7 +39,7 @@ import numpy.typing as npt
 
 from memo import _memo
 from memo.formats.motion import MAX_POINTS, FormatError, Motion, Up, from_z_up, to_z_up
-from memo.formats.names import joints_found, listed
+from memo.formats.names import joint_places, joints_found, listed
 from memo.formats.reading import METRIC_M, Given, unit_of_legs
 from memo.formats.text import number, numbers, read_lines, whole_number
 from memo.unfinished import complete_file
@@ -301,26 +301,29 @@ def _conventions(nodes: list[_Node], given: Given) -> tuple[Up, float, list[str]
     rest = np.zeros((len(nodes), 3))
     for k, node in enumerate(nodes):
         rest[k] = node.offset + (rest[node.parent] if node.parent >= 0 else 0)
-    found = joints_found([node.name for node in nodes])
+    places = joint_places([node.name for node in nodes], given.markers)
+    found = {joint: rest[place].mean(axis=0) for joint, place in places.items()}
     notes = []
     up = given.up
     if up is None:
-        low = [rest[found[joint]] for joint in ("right_ankle", "left_ankle") if joint in found]
-        high = [rest[found[joint]] for joint in ("head", "neck", "right_shoulder") if joint in found]
+        low = [found[joint] for joint in ("right_ankle", "left_ankle") if joint in found]
+        high = [found[joint] for joint in ("head", "neck", "right_shoulder", "right_hip") if joint in found]
         tall = np.abs(high[0] - low[0]) if low and high else np.array([0.0, 1.0, 0.0])
         up = "z" if tall[2] > tall[1] else "y"
         why = "from the figure at rest" if low and high else "as most files have"
         notes.append(f"The file does not say which axis is up: {up.upper()} was assumed, {why}.")
     if given.unit_m is not None:
         return up, given.unit_m, notes
-    legs = [
-        float(
-            np.linalg.norm(nodes[found[f"{side}_knee"]].offset)
-            + np.linalg.norm(nodes[found[f"{side}_ankle"]].offset)
-        )
-        for side in ("right", "left")
-        if {f"{side}_knee", f"{side}_ankle"} <= found.keys()
-    ]
+    legs = []
+    for side in ("right", "left"):
+        if {f"{side}_knee", f"{side}_ankle"} <= found.keys():
+            above = nodes[places[f"{side}_knee"][0]].parent
+            hip, knee, ankle = (
+                found.get(f"{side}_hip", rest[above]),
+                found[f"{side}_knee"],
+                found[f"{side}_ankle"],
+            )
+            legs.append(float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)))
     unit_m, note = unit_of_legs(legs[0] if legs else None, _UNITS_M, "cm")
     return up, unit_m, [*notes, note]
 

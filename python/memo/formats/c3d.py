@@ -92,7 +92,9 @@ def read_c3d(path: Path, given: Given) -> Motion:
     names, renamed = _unique([label for label, kept in zip(labels, is_point, strict=True) if kept])
     points = np.where(valid[:, is_point, None], values[:, is_point] * unit_m, np.nan)
     said = file.text("POINT", "Y_SCREEN") or None
-    up, up_note = chosen_up(given, said, "z", "most laboratories have", standing_up(names, points))
+    up, up_note = chosen_up(
+        given, said, "z", "most laboratories have", standing_up(names, points, given.markers)
+    )
     points = to_z_up(points, up)
     angles = _angles(values, valid, labels, is_angle)
     events, other_events = _events(file)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from memo.formats.motion import FormatError, Motion, Up
 __all__ = [
     "NAMINGS",
     "SHORT",
+    "joint_places",
     "joint_points",
     "joints_found",
     "mapped_points",
@@ -112,14 +113,34 @@ def joints_found(names: Sequence[str]) -> dict[str, int]:
     return max(found, key=lambda joints: sum(joint in joints for joint in JOINTS))
 
 
-def standing_up(names: Sequence[str], points: npt.NDArray[np.float64]) -> Up | None:
-    """The axis along which shoulders and head are above the ankles; None if no figure is upright.
+def joint_places(
+    names: Sequence[str], markers: Mapping[str, Sequence[str]] | None = None
+) -> dict[str, list[int]]:
+    """Indices of the points at whose mean each joint is: as in `markers`, and else by its usual names."""
+    usual = {joint: [index] for joint, index in joints_found(names).items()}
+    place = _finder(names)
+    found = {joint: [place(name) for name in wanted] for joint, wanted in (markers or {}).items()}
+    known = {joint: [k for k in places if k is not None] for joint, places in found.items()}
+    return usual | {joint: places for joint, places in known.items() if len(places) == len(found[joint])}
+
+
+def standing_up(
+    names: Sequence[str],
+    points: npt.NDArray[np.float64],
+    markers: Mapping[str, Sequence[str]] | None = None,
+) -> Up | None:
+    """The axis along which shoulders and head, or else the hips, are above the ankles; None if no figure is
+    upright.
 
     `points` (T, K, 3) in the axes of a file. Upright is twice as high as wide, in the median frame.
     """
-    found = joints_found(names)
-    low = [found[joint] for joint in ("right_ankle", "left_ankle") if joint in found]
-    high = [found[joint] for joint in ("right_shoulder", "left_shoulder", "neck", "head") if joint in found]
+    found = joint_places(names, markers)
+
+    def those(*joints: str) -> list[int]:
+        return [index for joint in joints for index in found.get(joint, ())]
+
+    low = those("right_ankle", "left_ankle")
+    high = those("right_shoulder", "left_shoulder", "neck", "head") or those("right_hip", "left_hip")
     if not low or not high:
         return None
     rise = points[:, high].mean(axis=1) - points[:, low].mean(axis=1)
@@ -164,7 +185,10 @@ def renamed(motion: Motion, naming: str) -> tuple[Motion, list[str]]:
 
 
 def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
-    """The markers of each joint from a TOML file: `right_hip = "RASI"`, or a list whose mean is the joint."""
+    """The markers of each joint from a TOML file: `right_hip = "RASI"`, or a list whose mean is the joint.
+
+    The joints have memo's names. Raises `FormatError` for joints that memo does not know.
+    """
     try:
         table = tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
@@ -179,7 +203,23 @@ def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
                 f"{path}: {joint}: wanted the name of a marker or a list of names, got {value!r}"
             )
         markers[joint] = tuple(names)
-    return markers
+    return _joints_of(markers, path)
+
+
+def _joints_of(markers: Mapping[str, tuple[str, ...]], path: Path) -> dict[str, tuple[str, ...]]:
+    """The same with memo's names of the joints."""
+    try:
+        spelt = {joint: _memo.joint_name(joint) for joint in markers}
+    except ValueError as error:
+        raise FormatError(f"{path}: {error}") from None
+    unknown = [joint for joint, name in spelt.items() if name is None]
+    if unknown or not markers:
+        known = ", ".join([*JOINTS, "head"])
+        raise FormatError(f"{path}: joints of memo wanted ({known}), got {', '.join(unknown) or 'none'}")
+    twice = [joint for joint, count in Counter(spelt.values()).items() if count > 1]
+    if twice:
+        raise FormatError(f"{path}: joints with two entries: {listed([str(joint) for joint in twice])}")
+    return {str(spelt[joint]): wanted for joint, wanted in markers.items()}
 
 
 def mapped_points(
@@ -187,37 +227,25 @@ def mapped_points(
 ) -> tuple[list[str], npt.NDArray[np.float64]]:
     """Names of joints and their points (T, K, D), each the mean of its markers, NaN where one is missing.
 
-    The joints have memo's short names. Raises `FormatError` for joints that memo does not know and for
-    markers that do not exist; a marker may be named without its subject ("RKNE" for "Anna:RKNE") and in any
-    case.
+    The joints have memo's short names. Raises `FormatError` for markers that do not exist; a marker may be
+    named without its subject ("RKNE" for "Anna:RKNE") and in any case.
     """
-    exact = {name: index for index, name in reversed(list(enumerate(names)))}
-    plain = {_letters(name): index for index, name in reversed(list(enumerate(names)))}
-    try:
-        spelt = {joint: _memo.joint_name(joint) for joint in markers}
-    except ValueError as error:
-        raise FormatError(str(error)) from None
-    unknown = [joint for joint, name in spelt.items() if name is None]
-    if unknown or not markers:
-        known = ", ".join([*JOINTS, "head"])
-        raise FormatError(f"joints of memo wanted ({known}), got {', '.join(unknown) or 'none'}")
-    twice = [joint for joint, count in Counter(spelt.values()).items() if count > 1]
-    if twice:
-        raise FormatError(f"joints with two entries: {listed([str(joint) for joint in twice])}")
+    place = _finder(names)
     absent = [
-        f"{name} ({joint})"
-        for joint, wanted in markers.items()
-        for name in wanted
-        if name not in exact and _letters(name) not in plain
+        f"{name} ({joint})" for joint, wanted in markers.items() for name in wanted if place(name) is None
     ]
     if absent:
         raise FormatError(f"no points for {', '.join(absent)}; the file has {listed(names)}")
-    places = [
-        [exact.get(name, plain.get(_letters(name), 0)) for name in wanted] for wanted in markers.values()
-    ]
-    joints = [str(spelt[joint]) for joint in markers]
-    means = [points[:, place].mean(axis=1) for place in places]
-    return [SHORT.get(joint, joint.upper()) for joint in joints], np.stack(means, axis=1)
+    found = joint_places(names, markers)
+    means = [points[:, found[joint]].mean(axis=1) for joint in markers]
+    return [SHORT.get(joint, joint.upper()) for joint in markers], np.stack(means, axis=1)
+
+
+def _finder(names: Sequence[str]) -> Callable[[str], int | None]:
+    """A function that gives the index of a name: exactly, or else by its letters."""
+    exact = {name: index for index, name in reversed(list(enumerate(names)))}
+    plain = {_letters(name): index for index, name in reversed(list(enumerate(names)))}
+    return lambda name: exact.get(name, plain.get(_letters(name)))
 
 
 def listed(names: Sequence[str], most: int = 40) -> str:

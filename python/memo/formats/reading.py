@@ -1,8 +1,8 @@
-"""Values that the caller gives a reader if a file may not have them: up axis, frame rate, unit."""
+"""Values that the caller gives a reader if a file may not have them: up axis, frame rate, unit, joints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from memo.formats.motion import FormatError, Up
@@ -29,6 +29,8 @@ class Given:
     """Frame rate of an AMC file, or of a table without times."""
     unit_m: float | None = None
     """Metres in one unit of length, for BVH, AMC and tables that name none."""
+    markers: Mapping[str, Sequence[str]] | None = None
+    """Names of the points at whose mean a joint is, by which figures are measured; others by usual names."""
 
     def check_used(self, *used: str) -> None:
         """Refuses values that the reader does not use."""

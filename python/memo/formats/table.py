@@ -12,6 +12,7 @@ else Z. Both are reported.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
-from memo.formats.names import joints_found, standing_up
+from memo.formats.names import joint_places, standing_up
 from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
 from memo.spreadsheet import write_rows
 from memo.table import NumberTable, read_number_table
@@ -49,7 +50,8 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
     said = re.search(r"\b([yz])[ -]up\b", comments, re.IGNORECASE)
     names_unit = f"{names[0]}_x_m" in table.column
     stated = said.group(1) if said else "z" if names_unit else None
-    up, notes = chosen_up(given, stated, "z", "memo's tables have", standing_up(names, points))
+    stands = standing_up(names, points, given.markers)
+    up, notes = chosen_up(given, stated, "z", "memo's tables have", stands)
     unit_m = 1.0
     if names_unit:
         if given.unit_m is not None:
@@ -57,7 +59,7 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
     elif given.unit_m is not None:
         unit_m = given.unit_m
     elif not re.search(r"\bmet(er|re)s\b", comments, re.IGNORECASE):
-        unit_m, note = unit_of_legs(_leg(names, points), METRIC_M, "m")
+        unit_m, note = unit_of_legs(_leg(names, points, given.markers), METRIC_M, "m")
         notes = (*notes, note)
     return Motion(
         tuple(names),
@@ -69,13 +71,16 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
     )
 
 
-def _leg(names: list[str], points: npt.NDArray[np.float64]) -> float | None:
+def _leg(
+    names: list[str], points: npt.NDArray[np.float64], markers: Mapping[str, Sequence[str]] | None
+) -> float | None:
     """Length of thigh and shank in the file's unit, the median over time; None if unknown."""
-    found = joints_found(names)
+    found = joint_places(names, markers)
     for side in ("right", "left"):
         chain = [f"{side}_{part}" for part in ("hip", "knee", "ankle")]
         if all(joint in found for joint in chain):
-            parts = np.diff(points[:, [found[joint] for joint in chain]], axis=1)
+            joints = np.stack([points[:, found[joint]].mean(axis=1) for joint in chain], axis=1)
+            parts = np.diff(joints, axis=1)
             lengths = np.linalg.norm(parts, axis=2).sum(axis=1)
             if np.isfinite(lengths).any():
                 return float(np.nanmedian(lengths))

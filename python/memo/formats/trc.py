@@ -57,7 +57,9 @@ def read_trc(path: Path, given: Given) -> Motion:
     rate_hz = _checked_rate(fields, times_s)
     marked = next((cell.strip()[3:].lower() for cell in first[3:] if cell.lower().startswith("up=")), None)
     points = table[:, 2:].reshape(len(table), markers, 3) * unit_m
-    up, note = chosen_up(given, marked, "y", "OpenSim's files have", standing_up(names, points))
+    up, note = chosen_up(
+        given, marked, "y", "OpenSim's files have", standing_up(names, points, given.markers)
+    )
     points = to_z_up(points, up)
     metadata = {"format": "trc", "up": up, "unit": unit, "rate_hz": rate_hz}
     return Motion(tuple(names), times_s, points, metadata=metadata, notes=note)
