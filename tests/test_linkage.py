@@ -356,7 +356,9 @@ def test_the_way_to_the_limbs_is_told_where_there_is_one(tmp_path):
     out = tmp_path / "my dots"
     made = run("pointlight", "--out", out, "--seconds", "0.3", "--noise-px", "1.5")
     assert f"memo planar '{out / 'dots.csv'}' --noise-px 1.5" in made.stdout
-    for options in (("--seconds", "0.1"), ("--seconds", "0.3", "--scramble-position")):
+    assert "memo planar" in run("pointlight", "--out", out, "--seconds", "0.3", "--noise-dots", "3").stdout
+    others = (("--seconds", "0.1"), ("--seconds", "0.3", "--scramble-position"))
+    for options in (*others, ("--seconds", "0.3", "--noise-dots", "4")):
         made = run("pointlight", "--out", out, *options)
         assert made.returncode == 0 and "memo planar" not in made.stdout
 

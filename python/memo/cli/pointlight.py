@@ -31,7 +31,10 @@ Exit codes: 0 the display was written; 1 the input cannot be used; 2 wrong usage
 4 the app extra is not installed."""
 
 FEWEST_FRAMES = 8
-"""`memo planar` does not link fewer dots."""
+"""`memo planar` does not link dots of fewer frames."""
+
+MOST_DOTS = 16
+"""`memo planar` gives no verdict on more dots."""
 
 _SECONDS = 2.4
 
@@ -279,7 +282,8 @@ def _deliver(
     }
     delivery.tell(summary, lines, written)
     scrambled = options["scramble_position"] or options["scramble_phase"]
-    if delivery.talks and stays and not scrambled and len(shown) >= FEWEST_FRAMES:
+    can_be_linked = len(shown) >= FEWEST_FRAMES and shown.shape[1] <= MOST_DOTS
+    if delivery.talks and stays and not scrambled and can_be_linked:
         given = f"{shlex.quote(str(out / 'dots.csv'))} --noise-px {options['noise_sd_px']:g}"
         print(f"To find the limbs in it again: memo planar {given}")
     return Exit.DONE
