@@ -215,6 +215,29 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     assert "got tail" in memo_command(*arguments, "--out", tmp_path / "bad")[2]
 
 
+def test_no_picture_of_an_earlier_display_stays(tmp_path, memo_command):
+    out = tmp_path / "out"
+    common = ["pointlight", "--size", "64x64", "--out", out]
+    assert memo_command(*common, "--seconds", "0.1", "--png")[0] == 0
+    for name in ("note.txt", "cover.png"):
+        (out / "frames" / name).write_text("mine")
+    (out / "notes.txt").write_text("mine")
+    assert memo_command(*common, "--seconds", "0.2", "--lossless")[0] == 0
+    left = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert left == {
+        *("dots.csv", "labels.csv", "display.mkv", "notes.txt", "frames/note.txt", "frames/cover.png")
+    }
+    assert memo_command(*common, "--seconds", "0.1", "--png")[0] == 0
+    assert len(list((out / "frames").iterdir())) == 6 + 2
+    for name in ("note.txt", "cover.png"):
+        assert (out / "frames" / name).read_text() == "mine"
+        (out / "frames" / name).unlink()
+    assert memo_command(*common, "--seconds", "0.1", "--dot-px", "0")[0] != 0
+    assert (out / "frames" / "00000.png").exists() and not (out / "display.mkv").exists()
+    assert memo_command(*common, "--seconds", "0.1")[0] == 0
+    assert not (out / "frames").exists()
+
+
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_a_file_has_the_same_size_under_other_names(tmp_path, memo_command, up):
     from memo.formats import Motion, read_motion, write_motion

@@ -5,6 +5,8 @@ All pictures are drawn by `PointLightDisplay.frames` at the scale of the display
 
 from __future__ import annotations
 
+import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -21,9 +23,10 @@ from memo._memo import PointLightDisplay
 from memo.overlay import _h264
 from memo.unfinished import complete_file, complete_folder
 
-__all__ = ["frames_left", "write_display_png", "write_display_video"]
+__all__ = ["frames_left", "remove_display", "write_display_png", "write_display_video"]
 
 _MILLISECONDS = Fraction(1, 1000)  # the clock of Matroska
+_NUMBERED = re.compile(r"\d{5,}\.png")
 
 
 def write_display_video(
@@ -45,7 +48,7 @@ def write_display_png(folder: str | PathLike[str], display: PointLightDisplay, *
     """Writes each frame as `00000.png`, `00001.png`, ... with alpha; returns the paths.
 
     Every pixel has the colour of the dots, and its alpha is how much of the pixel they cover, so that the
-    pictures can be laid over any background.
+    pictures can be laid over any background. Earlier pictures of these names are removed; other files stay.
     """
     folder = Path(folder)
     names = [f"{index:05d}.png" for index in range(len(display.times_s))]
@@ -53,7 +56,28 @@ def write_display_png(folder: str | PathLike[str], display: PointLightDisplay, *
         for index, name in enumerate(names):
             (frame,) = display.frames(start=index, stop=index + 1, alpha=True, **picture)
             Image.fromarray(frame).save(temporary / name)
+        for path in folder.iterdir() if folder.is_dir() else ():
+            if path.is_dir():
+                shutil.copytree(path, temporary / path.name, symlinks=True)
+            elif not _NUMBERED.fullmatch(path.name):
+                shutil.copy2(path, temporary / path.name, follow_symlinks=False)
     return [folder / name for name in names]
+
+
+def remove_display(folder: str | PathLike[str]) -> None:
+    """Removes the pictures of an earlier display: `display.mp4`, `display.mkv` and the pictures in `frames`.
+
+    Other files stay, and `frames` if it holds any.
+    """
+    for name in ("display.mp4", "display.mkv"):
+        (Path(folder) / name).unlink(missing_ok=True)
+    pictures = Path(folder) / "frames"
+    if pictures.is_dir():
+        for path in pictures.iterdir():
+            if _NUMBERED.fullmatch(path.name):
+                path.unlink()
+        if not any(pictures.iterdir()):
+            pictures.rmdir()
 
 
 def frames_left(

@@ -242,12 +242,13 @@ def _deliver(
     notes: Sequence[str],
     delivery: Delivery,
 ) -> Exit:
-    from memo.display import frames_left, write_display_png, write_display_video
+    from memo.display import frames_left, remove_display, write_display_png, write_display_video
     from memo.linkage import Points, write_points_csv
 
     out, (lossless, png) = delivery.out, also
     display.frames(stop=0, **picture)  # refuses a bad picture before anything is written
     check_writable(out)
+    remove_display(out)
     shown, labels = display.positions_px, display.labels
     stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
     named = [names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
