@@ -215,6 +215,43 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     assert "got tail" in memo_command(*arguments, "--out", tmp_path / "bad")[2]
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("jump.csv --cycles 1", "no period found up to 1.07 s: at the best lag, the mismatch is 0."),
+        ("jump.csv --cycles 1", "wanted); give --period\n"),
+        ("short.csv --cycles 1", "no lag fits better than those around it; give --period\n"),
+        ("--speed 9", "--speed 9 is not a walking speed in m/s (up to 4)"),
+        ("--speed 9 --cycles 1", "--speed 9 is not a walking speed in m/s (up to 4)"),
+        ("--speed nan", "--speed nan is not a walking speed"),
+        ("--noise-dots -3", "Invalid value for '--noise-dots'"),
+        ("--lifetime 0", "Invalid value for '--lifetime'"),
+        ("--azimuth-deg nan", "--azimuth-deg must be finite, got NaN"),
+        ("--px-per-m 0", "--px-per-m must be positive"),
+        ("--fps 0 --cycles 1", "--fps 0 must be positive and finite"),
+        ("walk.csv --cycles 1 --period 9", "--period of 9 s needs a longer motion"),
+    ],
+)
+def test_errors_name_the_options_of_the_command(tmp_path, memo_command, monkeypatch, options, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    write_table("walk.csv", WALKER)
+    write_table("short.csv", memo.walker_motion(4))
+    still = memo.walker_motion(80)
+    still.positions[:] += np.random.default_rng(0).normal(size=still.positions.shape)
+    write_table("jump.csv", still)
+    code, said, err = memo_command("pointlight", *options.split())
+    assert code in (1, 2) and words in err and not said, err
+    assert "period_s" not in err and "shortened" not in err
+
+
+def test_the_average_walker_loops_at_few_frames_per_second(tmp_path, memo_command):
+    common = ["pointlight", "--cycles", "1", "--size", "64x64", "--out", tmp_path]
+    for options in (["--speed", "2", "--fps", "5"], ["--speed", "4", "--fps", "25"]):
+        code, said, err = memo_command(*common, *options)
+        assert code == 0 and " loops." in said, err
+
+
 def test_no_picture_of_an_earlier_display_stays(tmp_path, memo_command):
     out = tmp_path / "out"
     common = ["pointlight", "--size", "64x64", "--out", out]

@@ -72,7 +72,7 @@ def remove_display(folder: str | PathLike[str]) -> None:
     for name in ("display.mp4", "display.mkv"):
         (Path(folder) / name).unlink(missing_ok=True)
     pictures = Path(folder) / "frames"
-    if pictures.is_dir():
+    if pictures.is_dir() and not pictures.is_symlink():
         for path in pictures.iterdir():
             if _NUMBERED.fullmatch(path.name):
                 path.unlink()

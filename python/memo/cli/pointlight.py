@@ -4,6 +4,7 @@
 """
 
 import math
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,6 +38,25 @@ MOST_DOTS = 16
 """`memo planar` gives no verdict on more dots."""
 
 _SECONDS = 2.4
+
+_MOST_SPEED_MPS = 4.0
+"""Of people who walk: race walkers."""
+
+_OPTIONS = {
+    "period_s": "--period",
+    "noise_sd_px": "--noise-px",
+    "noise_kind": "--noise-kind",
+    "life_sites": "--on",
+    "locomotion": "--locomotion",
+    "scramble_axes": "--scramble-axes",
+    "scramble_limit_px": "--scramble-limit-px",
+    "tempo": "--tempo",
+    "pixels per metre": "--px-per-m",
+    "azimuth": "--azimuth-deg",
+}
+"""The option for each argument that messages of `memo.pointlight` name."""
+
+_MOST_SEED = 2**63 - 1
 
 _SAME_TIME_S = 1e-3  # files round times to milliseconds
 
@@ -79,17 +99,18 @@ def add_pointlight(app: "typer.Typer") -> None:
             int | None, typer.Option(help="Number of whole cycles, which loop without a jump.", min=1)
         ] = None,
         speed: Annotated[
-            float | None, typer.Option(help="Without MOTION: walking speed, m/s; default: 1.3.")
+            float | None, typer.Option(help="Without MOTION: walking speed, m/s, up to 4; default: 1.3.")
         ] = None,
         tempo: Annotated[
-            float | None, typer.Option(help="With MOTION and --cycles: times as fast; default: 1.")
+            float | None,
+            typer.Option(help="With MOTION and --cycles: times as fast; default: 1.", min=0.1, max=10),
         ] = None,
         azimuth_deg: Annotated[
             float, typer.Option(help="Azimuth of the viewer, degrees; 90 looks from +x.")
         ] = usual["azimuth_deg"],
-        elevation_deg: Annotated[float, typer.Option(help="Elevation of the viewer, degrees.")] = usual[
-            "elevation_deg"
-        ],
+        elevation_deg: Annotated[
+            float, typer.Option(help="Elevation of the viewer, degrees.", min=-90, max=90)
+        ] = usual["elevation_deg"],
         px_per_m: Annotated[float, typer.Option(help="Scale, pixels per metre.")] = usual["px_per_m"],
         locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = usual[
             "locomotion"
@@ -117,9 +138,12 @@ def add_pointlight(app: "typer.Typer") -> None:
         period: Annotated[
             float | None, typer.Option(help="Period of the motion, seconds; default: the one found.")
         ] = None,
-        lifetime: Annotated[int | None, typer.Option(help="Limited lifetime of the dots, frames.")] = None,
+        lifetime: Annotated[
+            int | None, typer.Option(help="Limited lifetime of the dots, frames.", min=1)
+        ] = None,
         dots: Annotated[
-            int | None, typer.Option(help=f"With --lifetime: dots shown; default: {usual['life_dots']}.")
+            int | None,
+            typer.Option(help=f"With --lifetime: dots shown; default: {usual['life_dots']}.", min=1),
         ] = None,
         on: Annotated[
             str | None,
@@ -127,7 +151,7 @@ def add_pointlight(app: "typer.Typer") -> None:
                 help=f"With --lifetime: limbs or joints; default: {usual['life_sites']}.", metavar="TEXT"
             ),
         ] = None,
-        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.")] = usual["noise_dots"],
+        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.", min=0)] = usual["noise_dots"],
         noise_kind: Annotated[
             str | None,
             typer.Option(
@@ -135,13 +159,15 @@ def add_pointlight(app: "typer.Typer") -> None:
             ),
         ] = None,
         noise_px: Annotated[
-            float, typer.Option(help="Standard deviation of the dots' noise, pixels.")
+            float, typer.Option(help="Standard deviation of the dots' noise, pixels.", min=0)
         ] = usual["noise_sd_px"],
         seconds: Annotated[
             float | None, typer.Option(help=f"Without MOTION: duration, seconds; default: {_SECONDS:g}.")
         ] = None,
         fps: Annotated[float | None, typer.Option(help="Frame rate, if the file has none.")] = None,
-        seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = usual["seed"],
+        seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=_MOST_SEED)] = usual[
+            "seed"
+        ],
         size: Annotated[
             str, typer.Option(help="Width and height of the picture, pixels.", metavar="WxH")
         ] = "{}x{}".format(*drawn["size_px"]),
@@ -212,6 +238,12 @@ def add_pointlight(app: "typer.Typer") -> None:
                     raise InputError(says)
             if period is not None and not (period > 0 and math.isfinite(period)):
                 raise InputError(f"--period {period:g} must be positive and finite")
+            if fps is not None and not (fps > 0 and math.isfinite(fps)):
+                raise InputError(f"--fps {fps:g} must be positive and finite")
+            if speed is not None and not 0 < speed <= _MOST_SPEED_MPS:
+                raise InputError(
+                    f"--speed {speed:g} is not a walking speed in m/s (up to {_MOST_SPEED_MPS:g})"
+                )
             picture = {
                 "size_px": _numbers("--size", size, "x", int),
                 "centre_px": None if centre is None else _numbers("--centre", centre, ",", float),
@@ -226,7 +258,10 @@ def add_pointlight(app: "typer.Typer") -> None:
                 actors, notes = _read_actors(motion, markers, fps)
             else:
                 length_s = _SECONDS if seconds is None else seconds
-                actors = [_walker_points(length_s, fps, cycles is not None, speed)]
+                walk, cycle_s = _walker_points(length_s, fps, cycles is not None, speed)
+                actors = [walk]
+                if cycles is not None:
+                    options["period_s"] = cycle_s
             display, names = _display_of(actors, options, apart_m)
             return _deliver(display, names, options, picture, (lossless, png), notes, delivery)
 
@@ -396,15 +431,18 @@ def _display_of(
     actors: list[Any], options: dict[str, Any], apart_m: float | None
 ) -> tuple[memo._memo.PointLightDisplay, list[str]]:
     """One display of all actors, each with its own seed, and the names of all points."""
-    displays = [
-        memo.pointlight(
-            np.ascontiguousarray(points.positions, dtype=np.float64),
-            points.times_s,
-            points.names,
-            **{**options, "seed": options["seed"] + index},
-        )
-        for index, points in enumerate(actors)
-    ]
+    try:
+        displays = [
+            memo.pointlight(
+                np.ascontiguousarray(points.positions, dtype=np.float64),
+                points.times_s,
+                points.names,
+                **{**options, "seed": options["seed"] + index},
+            )
+            for index, points in enumerate(actors)
+        ]
+    except ValueError as error:
+        raise InputError(_in_options(str(error))) from None
     if len(displays) == 1:
         return displays[0], actors[0].names
     offsets = None
@@ -419,7 +457,21 @@ def _display_of(
     return memo.pointlight_together(displays, offsets), names
 
 
-def _walker_points(seconds: float, fps: float | None, one_cycle: bool, speed: float | None) -> Any:
+def _in_options(message: str) -> str:
+    """A message of `memo.pointlight`, with the options of the command in place of its arguments."""
+    message = message.replace(', or shift the phases with "shortened"', "")
+    message = message.replace("finite radians", "finite")
+    unknown = r"at the best lag, the mismatch is inf of .* wanted\)"
+    message = re.sub(unknown, "no lag fits better than those around it", message)
+    for argument, option in _OPTIONS.items():
+        message = re.sub(rf"\b{argument}\b", option, message)
+    return message
+
+
+def _walker_points(
+    seconds: float, fps: float | None, one_cycle: bool, speed: float | None
+) -> tuple[Any, float]:
+    """The average walker, and the duration of a cycle."""
     from memo.linkage import Points
 
     rate_hz = memo._memo.defaults("walker_motion")["rate_hz"] if fps is None else fps
@@ -429,7 +481,7 @@ def _walker_points(seconds: float, fps: float | None, one_cycle: bool, speed: fl
         if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
             raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
         walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz, speed_mps=speed)
-    return Points(walk.names, walk.times_s, walk.positions)
+    return Points(walk.names, walk.times_s, walk.positions), walk.cycle_s
 
 
 def _write_labels(
